@@ -26,35 +26,36 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
 BLOCK = 0.02
-"""Readings are averaged over this long: the shaft is moved by hand [s]."""
+"""Readings are averaged over this long: the shaft is moved by hand [s] (chosen)."""
 
 _PLACE = math.radians(10.0)
-"""Readings at the wall within this angle are one place [rad]."""
+"""Readings at the wall within this angle are one place [rad] (chosen): a hand trembles by less."""
 
 _LEAST_PLACES = 5
 _WIDEST_OPENING = 150.0
-"""Directions without a reading at the wall may span this much [deg]."""
+"""Directions without a reading at the wall may span this much [deg] (chosen): beyond it the places at the
+edges fix the radius alone, and one that is off moves it several times as far."""
 
 _APART = 3.0
-"""A place this many standard deviations off the circle was not at the wall [1]."""
+"""A place this many standard deviations off the circle was not at the wall [1] (chosen)."""
 
 _OUTSIDE = 3.0
-"""Weight of a place outside a circle over that of one inside [1]: no shaft goes through a wall."""
+"""Weight of a place outside a circle over that of one inside [1] (chosen): no shaft goes through a wall."""
 
 _TOUCHING = 4.0
-"""Readings at the wall lie within this many standard deviations of the outermost of them [1]."""
+"""Readings at the wall lie within this many standard deviations of the outermost of them [1] (chosen)."""
 
 _ROUND = 1.5e-6
-"""How far places at a sound wall lie off a circle [m]."""
+"""How far places at a sound wall lie off a circle [m] (chosen): a ground bore."""
 
 _AT_WALL = 2e-6
-"""Places this close to the circle are at the wall however round it is [m]."""
+"""Places this close to the circle are at the wall however round it is [m] (chosen)."""
 
 _SHARED = 0.15e-6
-"""Standard uncertainty that all places share, by averaging over a shaft that moves [m]."""
+"""Standard uncertainty that all places share, by averaging over a shaft that moves [m] (chosen)."""
 
 _LEAST_SCATTER = 0.5e-6
-"""Roundness and blocks of readings are never better than this [m]."""
+"""Roundness and blocks of readings are never better than this [m] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 _KNOTS = 1e-4
-"""Spacing of the knots between which a force runs straight [s]."""
+"""Spacing of the knots between which a force runs straight [s] (chosen): a tenth of a short contact."""
 
 _BEND = 0.5
 """Standard deviation of the change of slope at a knot over the weight of the rotor [1 per knot]: about a half
 sine of seven times the weight in 1 ms."""
 
 _SIZE = 8.5
-"""Standard deviation of a force over the weight of the rotor [1]."""
+"""Standard deviation of a force over the weight of the rotor [1]; chosen, not measured."""
 
 _LEAST_SHARE = 0.15
-"""A contact force counts from this share of the largest, and from three standard errors."""
+"""A contact force counts from this share of the largest, and from three standard errors (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,10 +208,11 @@ def _zero_crossing(time: Array, size: Array, edge: int, peak: int) -> float:
 
 
 CLEAR = 6e-3
-"""How far the rotor must come out of the air gap circle to count as out, over the gap [1], against noise."""
+"""How far the rotor must come out of the air gap circle to count as out, over the gap [1], against noise
+(chosen)."""
 
 APPROACH = 1.5e-3
-"""Stretch before the contact from which the impact speed is taken [s]."""
+"""Stretch before the contact from which the impact speed is taken [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,20 +246,9 @@ class TimedContact:
 def identify_first_contacts(
     time: Array, place: Array, gaps: Array, loads: Array, gravity: float, noise: float
 ) -> tuple[TimedContact, ...]:
-    """First contact of every bearing from the measured displacement.
+    """First contact of every bearing from displacements (N, B, 2) [m] at times from power-off (N,) [s].
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    place : ndarray, shape (N, B, 2)
-        Displacement at the bearings [m].
-    gaps, loads : ndarray, shape (B,)
-        Air gap [m] and static load share [N] of each bearing.
-    gravity : float
-        [m/s²].
-    noise : float
-        Noise of the displacement [m].
+    Gaps (B,) [m] and static load shares (B,) [N] are those of the bearings, gravity is in m/s², noise in m.
 
     Raises
     ------
@@ -272,8 +262,9 @@ def identify_first_contacts(
     estimate.
     """
     radius = np.hypot(place[..., 0], place[..., 1])
+    masses = loads / gravity
     return tuple(
-        _first_contact(time, radius[:, b], float(gaps[b]), float(loads[b]) / gravity, gravity, noise)
+        _first_contact(time, radius[:, b], float(gaps[b]), float(masses[b]), gravity, noise)
         for b in range(len(gaps))
     )
 
@@ -281,57 +272,53 @@ def identify_first_contacts(
 def contact_intervals(time: Array, radius: Array, gap: float) -> Array:
     """Times at which the rotor leaves the air gap circle outwards and comes back [s], shape (K, 2).
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    radius : ndarray, shape (N,)
-        Distance of the rotor from the bearing centre [m].
-    gap : float
-        Air gap [m]; a contact begins a share `CLEAR` beyond it and ends as far inside, against noise.
+    By times (N,) [s] and distances from the bearing centre (N,) [m]; against noise a contact begins a share
+    `CLEAR` beyond the gap [m] and ends as far inside.
     """
-    intervals = []
-    k, outside = 0, radius > (1.0 + CLEAR) * gap
-    while k < len(time):
-        begins = np.flatnonzero(outside[k:])
-        if not len(begins):
+    level = radius - gap
+    outside = np.flatnonzero(radius > (1.0 + CLEAR) * gap)
+    inside = np.flatnonzero(radius < (1.0 - CLEAR) * gap)
+    intervals: list[tuple[float, float]] = []
+    at = 0
+    while (begins := int(np.searchsorted(outside, at))) < len(outside):
+        first = int(outside[begins])
+        back = int(np.searchsorted(inside, first))
+        if back == len(inside):
+            intervals.append((_crossing(time, level, first), float(time[-1])))
             break
-        first = k + int(begins[0])
-        back = np.flatnonzero(radius[first:] < (1.0 - CLEAR) * gap)
-        if not len(back):
-            intervals.append((_crossing(time, radius - gap, first), float(time[-1])))
-            break
-        last = first + int(back[0])
-        intervals.append((_crossing(time, radius - gap, first), _crossing(time, gap - radius, last)))
-        k = last
+        at = int(inside[back])
+        intervals.append((_crossing(time, level, first), _crossing(time, -level, at)))
     return np.array(intervals).reshape(-1, 2)
 
 
 def _first_contact(
     time: Array, radius: Array, gap: float, mass: float, gravity: float, noise: float
 ) -> TimedContact:
-    outside = (radius > (1.0 + CLEAR) * gap) & (time > 0.0)
-    if not outside.any():
+    falling = time > 0.0
+    contacts = contact_intervals(time[falling], radius[falling], gap)
+    if not len(contacts):
         raise IdentificationError(
             f"the rotor comes to {1e6 * float(radius.max()):.4g} µm from the bearing centre at most and "
-            "never reaches "
-            f"the air gap of {1e6 * gap:.4g} µm. Check the settled tail and the gain of the sensors."
+            f"never reaches the air gap of {1e6 * gap:.4g} µm. Check the settled tail and the gain of the "
+            "sensors."
         )
-    first = int(np.argmax(outside))
-    back = np.flatnonzero(radius[first:] < (1.0 - CLEAR) * gap)
-    if not len(back):
+    start, end = contacts[0].tolist()
+    if end == time[-1] and radius[-1] >= (1.0 - CLEAR) * gap:
         raise IdentificationError(
-            f"the rotor stays beyond the air gap of {1e6 * gap:.4g} µm from {1e3 * time[first]:.4g} ms to "
-            "the end of the record. Check the settled tail: its radius must be that of the resting rotor."
+            f"the rotor stays beyond the air gap of {1e6 * gap:.4g} µm from "
+            f"{1e3 * float(time[time >= start][0]):.4g} ms to the end of the record. Check the settled tail: "
+            "its radius must be that of the resting rotor."
         )
-    start = _crossing(time, radius - gap, first)
-    end = _crossing(time, gap - radius, first + int(back[0]))
-    speed = _approach(time, radius, start)
+    # radial speed by a parabola through the samples before the contact
+    before = (time > start - APPROACH) & (time < start)
+    speed = 0.0
+    if int(before.sum()) >= 5:
+        slope = local_polynomial(time[before], radius[before], start, width=2.1 * APPROACH)[1]
+        speed = float(slope)
     step = float(time[1] - time[0])
     timing = math.hypot(step / math.sqrt(12.0), noise / max(abs(speed), 1e-6))
     duration = max(end - start, step)
     stiffness = equivalent_stiffness(duration, mass)
-    inside = slice(first, first + int(back[0]))
     return TimedContact(
         start=start,
         end=end,
@@ -341,7 +328,7 @@ def _first_contact(
         equivalent_stiffness=stiffness,
         corrected_stiffness=corrected_stiffness(duration, mass, speed, gravity),
         standard_error=2.0 * math.sqrt(2.0) * stiffness * timing / duration,
-        indentation=float(radius[inside].max() - gap),
+        indentation=float(radius[(time >= start) & (time <= end)].max() - gap),
     )
 
 
@@ -354,15 +341,6 @@ def _crossing(time: Array, level: Array, at: int) -> float:
         return float(time[0])
     low, high = float(level[k - 1]), float(level[k])
     return float(time[k - 1] + (time[k] - time[k - 1]) * low / (low - high))
-
-
-def _approach(time: Array, radius: Array, start: float) -> float:
-    """Radial speed at the contact from a parabola through the samples before it [m/s]."""
-    before = (time > start - APPROACH) & (time < start)
-    if int(before.sum()) < 5:
-        return 0.0
-    _, slope, _ = local_polynomial(time[before], radius[before], start, width=2.1 * APPROACH, order=2)
-    return float(slope)
 
 
 def equivalent_stiffness(duration: float, mass: float) -> float:

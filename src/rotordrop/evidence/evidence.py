@@ -404,20 +404,11 @@ def read_evidence(
     name: str = "",
     power_off: DropInstant | PowerOff | None = None,
 ) -> Evidence:
-    """Ask a record what it says before the first contact and at rest.
+    """Ask a record what it says before the first contact and at rest; the name is that of the record if
+    empty.
 
-    Parameters
-    ----------
-    model : DropModel
-        Drop model of the machine.
-    record : Record
-        The recorded drop.
-    tail : Record, optional
-        The settled tail; that of the record itself where it reaches standstill.
-    name : str
-        Name of the drop; that of the record by default.
-    power_off : DropInstant or PowerOff, optional
-        Power-off where it is known already.
+    The tail is that of the record itself where it reaches standstill; `power_off` is given where it is known
+    already.
 
     Raises
     ------

@@ -39,22 +39,23 @@ _BACKWARD_SHARE = 0.3
 """That of the turning force against the spin over the one with it [1]; chosen, not measured."""
 
 _GROWTH = 4e-4
-"""Step by which the window of the fit grows [s]."""
+"""Step by which the window of the fit grows [s] (chosen)."""
 
 _GOOD = 2.0
-"""Mean square over the noise up to which a search counts as successful."""
+"""Mean square over the noise up to which a search counts as successful (chosen)."""
 
 _AHEAD = 10e-3
 """Responses are tabulated so far ahead of a window that may grow [s]."""
 
 _STILL_FREE = 4.0
-"""Mean square over the noise up to which the newest samples count as free fall."""
+"""Mean square over the noise up to which the newest samples count as free fall (chosen): beyond, a contact
+has begun."""
 
 _STARTS = (0.0, -0.7, 0.6, -1.4, 1.2)
 """Where the search for the release begins, from the first guess [ms]; the later ones only when needed."""
 
 _LEAD = 5e-3
-"""Levitated samples kept before the earliest release [s]."""
+"""Levitated samples kept before the earliest release [s] (chosen)."""
 
 _STEP = 1e-2
 """Step of the derivatives by release [ms] and logarithm of the time constant."""
@@ -246,20 +247,10 @@ def fit_fall(
 ) -> Fall:
     """Find the release from the readings between the levitated part and the first contact.
 
-    Release and time constant of the remanent lift are searched; remanent and synchronous forces and gain
-    errors follow by linear least squares with priors (variable projection). The window grows until the newest
-    samples no longer fall freely.
-
-    Parameters
-    ----------
-    record : Record
-        The record; its planes are those of ``rotor.plane_rows``.
-    rotor : FreeRotor
-        The released rotor.
-    levitated : LevitatedModel
-        Readings before the drop.
-    window : tuple of float
-        First guess of the release, a time that is surely in free fall, and the latest end of it [s].
+    The window holds the first guess of the release, a time that is surely in free fall, and the latest end of
+    it [s]. Release and time constant of the remanent lift are searched; remanent and synchronous forces and
+    gain errors follow by linear least squares with priors (variable projection). The window grows until the
+    newest samples no longer fall freely.
     """
     origin, surely, latest = window
     record = record.window(origin - 2.0 * _LEAD, latest + _LEAD)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.machine import Machine
 from rotordrop.record.axes import Plane
 from rotordrop.record.recording import Array
@@ -22,7 +21,7 @@ from rotordrop.rotor.statics import rest_on
 ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 GRID = 1e-5
-"""Step of the tabulated responses [s]."""
+"""Step of the tabulated responses [s]: straight lines between them are off by 0.1 nm in a fall."""
 
 _MODES = 6
 """Free-free modes, the two rigid ones included: with four bending modes the falls of all rotors of the gate's
@@ -66,7 +65,7 @@ def held_by(machine: Machine, planes: tuple[Plane, ...], fe: RotorFE) -> Held:
     """
     gravity, ambs = float(machine.gravity), machine.ambs
     if len({amb.node for amb in ambs}) >= 2:
-        compliance = [_compliance(amb) for amb in ambs]
+        compliance = [0.0 if amb.integral_action else 1.0 / float(amb.stiffness) for amb in ambs]
         nodes = tuple(amb.node for amb in ambs)
         sag, lift = rest_on(fe, nodes, gravity, compliance)
         words = f"{len(nodes)} magnetic bearings"
@@ -77,10 +76,6 @@ def held_by(machine: Machine, planes: tuple[Plane, ...], fe: RotorFE) -> Held:
     sag, lift = rest_on(fe, nodes, gravity)
     words = f"forces at nodes {', '.join(map(str, nodes))} (the AMB planes are not known)"
     return Held(nodes=nodes, lift=lift, sag=sag, words=words, by_magnets=False)
-
-
-def _compliance(amb: ActiveMagneticBearing) -> float:
-    return 0.0 if amb.integral_action else 1.0 / float(amb.stiffness)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,21 +96,11 @@ class FreeRotor:
     """The model in words."""
 
     def table(self, speed: float, exponent: complex, span: float) -> ComplexArray:
-        """Displacement of the planes after a unit force ``exp(−exponent · t)`` at each of its places.
+        """Displacement of the planes (K, P, A) [m/N] at 0, `GRID`, 2 `GRID`, … after a unit force at each
+        place.
 
-        Parameters
-        ----------
-        speed : float
-            Shaft speed [rad/s].
-        exponent : complex
-            0 for a step, 1/τ for a fading force, −jω for a turning one [1/s].
-        span : float
-            Time covered from the release [s].
-
-        Returns
-        -------
-        array, shape (K, P, A), complex
-            Displacement [m/N] at 0, `GRID`, 2 `GRID`, …
+        At a speed [rad/s], over a span from the release on [s]. The force goes as ``exp(−exponent · t)``: 0
+        for a step, 1/τ for a fading force, −jω for a turning one [1/s].
         """
         m, inputs = self.basis.size, len(self.force_rows)
         system = np.zeros((2 * m + inputs, 2 * m + inputs), dtype=np.complex128)

@@ -40,24 +40,25 @@ BENDING_SIGMA = 1.1e-3
 
 END_WINDOW = 1e-3
 """Time before the end of the fall at which place and velocity are read where nothing says what held the rotor
-[s]."""
+[s] (chosen): long enough against noise, short against the fall."""
 
 ROUGH_RATE = 0.1
 """Standard deviation of that velocity over that of a fall through the gap [1]: in three hidden drops of lp400
 at 60, 100 and 250 Hz it was off by up to 0.14, the ringing of the released sag being in it."""
 
 RUNOUT_SIGMA = 0.3e-6
-"""Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine."""
+"""Runout of a sensor track at 1X [m], a quality of its surface whatever the size of the machine (chosen)."""
 
 SIDEWAYS_REST_SIGMA = 5e-3
 """How far beside the lowest point the resting rotor may lie, over the air gap [1]: a race turns on its balls
-before the shaft slides in it, and the starting friction of a ball bearing holds up this slope."""
+before the shaft slides in it, and the starting friction of a ball bearing holds up this slope (chosen)."""
 
 CLEARANCE_KEPT = 0.03
 """The fall ends when the rotor has come this close to the air gap, over the gap [1]: a zero of the sensors
-that is off looks like another gap."""
+that is off looks like another gap (chosen)."""
 
 FEWEST_SAMPLES = 12
+"""Samples of the fall from which its bending is told from noise [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,14 +131,10 @@ class FreeFall:
         return np.asarray(expm(self.matrix(decay) * span))
 
     def orbit(self) -> tuple[ComplexArray, ComplexArray]:
-        """Amplitudes of the modes on the orbits that turning forces hold.
+        """Amplitudes of the modes on the orbits that turning forces hold, complex.
 
-        Returns
-        -------
-        forward : array, shape (m, U + A), complex
-            Those that turn with the spin, per unbalance [1/kg m] and per force at a magnet [1/N].
-        backward : array, shape (m, A), complex
-            Those that turn against it, per force at a magnet [1/N].
+        Forward, with the spin, per unbalance [1/kg m] and per force at a magnet [1/N], (m, U + A); backward,
+        against it, per force at a magnet [1/N], (m, A).
         """
         w, basis = self.speed, self.model.basis
         free = motion_of(basis, w)
@@ -153,18 +150,9 @@ class FreeFall:
 def build_free_fall(
     model: DropModel, speed: float, unbalance_nodes: tuple[int, ...], magnets: Array | None = None
 ) -> FreeFall:
-    """Linear model of a falling rotor from the model of the drop.
+    """Linear model of a falling rotor at a constant speed [rad/s] with unbalance at nodes counted from 1.
 
-    Parameters
-    ----------
-    model : DropModel
-        Rotor, magnetic bearings, gravity.
-    speed : float
-        Rotor speed [rad/s].
-    unbalance_nodes : tuple of int
-        Nodes at which unbalance may sit, counted from 1.
-    magnets : ndarray, shape (A, m), optional
-        Mode shapes where remanent forces act; those of the magnetic bearings by default.
+    Remanent forces act by mode shapes (A, m); by default by those of the magnetic bearings.
     """
     magnets = model.parameters.magnet_shape if magnets is None else magnets
     m, n_a, n_u = model.basis.size, len(magnets), len(unbalance_nodes)
@@ -187,23 +175,10 @@ def build_free_fall(
 
 
 def kernel_state(fall: FreeFall, state: Array, angle: float) -> tuple[Array, Array, Array]:
-    """A state of the fall as the drop model takes it.
+    """A state (n,) of the fall as the drop model takes it, at a rotor angle [rad].
 
-    Parameters
-    ----------
-    state : ndarray, shape (n,)
-        State of the fall.
-    angle : float
-        Rotor angle there, which the unbalance columns are turned back by [rad].
-
-    Returns
-    -------
-    state : ndarray
-        State of the drop model, rotor angle zero.
-    remanent : ndarray, shape (A, 2)
-        Remanent forces there [N].
-    unbalance : ndarray, shape (2, m)
-        Modal unbalance of the kernel, cosine and sine [kg m / sqrt(kg)].
+    Gives the state of the drop model at that angle, the remanent forces (A, 2) [N], and the modal unbalance
+    of the kernel, cosine and sine, (2, m) [kg m / sqrt(kg)], turned back by the angle.
     """
     layout = fall.model.layout
     m = fall.n_modes
@@ -349,17 +324,7 @@ def covariance_root(covariance: Array) -> Array:
 
 
 def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
-    """Last time of the free fall [s from the first sample's clock].
-
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    place : ndarray, shape (N, B, 2)
-        Displacement at the bearings [m].
-    gaps : ndarray, shape (B,)
-        Air gaps [m].
-    """
+    """Last time of the free fall [s], by displacements (N, B, 2) [m] at times from power-off (N,) [s]."""
     radius = np.hypot(place[..., 0], place[..., 1])
     near = np.any(radius > (1.0 - CLEARANCE_KEPT) * gaps, axis=1) & (time > 0.0)
     if not near.any():
@@ -382,23 +347,9 @@ def initial_state_of(
 ) -> InitialState:
     """State at power-off with its covariance, by the levitated motion and the fit of the fall.
 
-    Parameters
-    ----------
-    record : Record
-        Readings from before power-off to the first contact at least.
-    model : DropModel
-        The rotor.
-    release : DropInstant or PowerOff
-        Power-off with the levitated motion before it and the fall after it.
-    speed : float
-        Speed at power-off [rad/s].
-    angle : RotorAngle
-        Angle over the record.
-    gap : AirGap
-        Air gaps, to see where the fall ends, and the rest position, from which displacements count, so that
-        zero errors of the sensors drop out.
-    sensing : Sensing
-        What the sensors see of the rotor.
+    The record reaches from before power-off to the first contact at least; the speed is that at power-off
+    [rad/s]. The gap says where the fall ends, and its rest is where displacements count from, so that zero
+    errors of the sensors drop out.
 
     Raises
     ------
@@ -451,16 +402,12 @@ def initial_state_of(
         end=end,
         noise=np.maximum(release.levitated.noise * record.gains, 1e-9),
         misfit=release.fall.misfit,
-        notes=_notes(release.fall.misfit),
-    )
-
-
-def _notes(misfit: float) -> tuple[str, ...]:
-    if misfit <= 2.0:
-        return ()
-    return (
-        f"the fall deviates from a free rotor by {misfit**0.5:.1f} times the sensor noise; expected about 1. "
-        "Check nodes and angles of the sensors",
+        notes=()
+        if release.fall.misfit <= 2.0
+        else (
+            f"the fall deviates from a free rotor by {release.fall.misfit**0.5:.1f} times the sensor noise; "
+            "expected about 1. Check nodes and angles of the sensors",
+        ),
     )
 
 

@@ -28,20 +28,19 @@ OTHER_SUPPLIES = (50.0 / 3.0, 400.0)
 """Railway, ships and aircraft [Hz]: taken only where the line stands out of what surrounds it."""
 
 _STANDS_OUT = 12.0
-"""A line stands out when it explains this many times what neighbouring frequencies explain."""
+"""A line stands out when it explains this many times what neighbouring frequencies explain (chosen)."""
 
 _APART = 1.5
-"""Two tones are told apart when they differ by this many cycles over the window."""
+"""Two tones are told apart when they differ by this many cycles over the window (chosen)."""
 
-_FEWEST_TURNS = 2.0
-
-_FEWEST_SAMPLES = 50
+_FEWEST_TURNS, _FEWEST_SAMPLES = 2.0, 50
+"""Levitated turns and samples that the fit needs (chosen): seven numbers of each channel come from them."""
 
 _STRETCH = 1e-3
-"""Length of the stretches by which the end of the levitated part is looked at [s]."""
+"""Length of the stretches by which the end of the levitated part is looked at [s] (chosen)."""
 
 _LEFT = 3.0
-"""A last stretch that scatters this many times as much as most has left the levitated motion [1]."""
+"""A last stretch that scatters this many times as much as most has left the levitated motion [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +130,8 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
     NoDropError
         When fewer than two revolutions, or hardly any samples, lie before the drop.
     """
+    from scipy.optimize import minimize_scalar
+
     start = float(record.time[0]) if start is None else start
     keep = (record.time >= start) & (record.time <= end)
     time, signals = record.time[keep], record.signals[keep]
@@ -145,7 +146,15 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
             begins_late=True,
         )
     hum = _choose_hum(time, signals, nominal, span)
-    found = _fit(time, signals, _refined(time, signals, nominal, hum, span), hum)
+    # the speed reading says where 1X is to be looked for, the readings of the sensors where it is
+    reach = min(0.5 / span, 0.02 * nominal)
+    refined = minimize_scalar(
+        lambda frequency: _misfit(time, signals, frequency, hum),
+        bounds=(nominal - reach, nominal + reach),
+        method="bounded",
+        options={"xatol": 1e-5 * nominal},
+    )
+    found = _fit(time, signals, float(refined.x), hum)
     stays = _stays_until(time, signals, found)
     return found if stays >= found.end else fit_levitated(record, stays, speed=speed, start=start)
 
@@ -163,48 +172,26 @@ def _stays_until(time: Array, signals: Array, model: LevitatedModel) -> float:
 
 def _choose_hum(time: Array, signals: Array, frequency: float, span: float) -> float | None:
     """The supply frequency that explains most, if it can be told apart from 1X and 2X."""
-    usual = [mains for mains in MAINS if _told_apart(mains, frequency, span)]
-    other = [
-        supply
-        for supply in OTHER_SUPPLIES
-        if _told_apart(supply, frequency, span) and _stands_out(time, signals, frequency, supply, span)
-    ]
-    if not usual + other:
-        return None
-    return min(usual + other, key=lambda mains: _misfit(time, signals, frequency, mains))
 
+    def told_apart(supply: float) -> bool:
+        return all(abs(supply - k * frequency) * span > _APART for k in (0, 1, 2))
 
-def _told_apart(mains: float, frequency: float, span: float) -> bool:
-    return all(abs(mains - k * frequency) * span > _APART for k in (0, 1, 2))
+    def misfit(supply: float | None) -> float:
+        return _misfit(time, signals, frequency, supply)
 
-
-def _stands_out(time: Array, signals: Array, frequency: float, supply: float, span: float) -> bool:
-    """Whether a line explains far more than the frequencies around it: slow wander of the rotor does not."""
-    nearby = [supply + k * _APART / span for k in (-3, -2, -1, 1, 2, 3)]
-    without = _misfit(time, signals, frequency, None)
-    around = [
-        without - _misfit(time, signals, frequency, f) for f in nearby if _told_apart(f, frequency, span)
-    ]
-    gained = without - _misfit(time, signals, frequency, supply)
-    return bool(around) and gained > _STANDS_OUT * float(np.median(around))
+    candidates = [mains for mains in MAINS if told_apart(mains)]
+    for supply in filter(told_apart, OTHER_SUPPLIES):
+        # a line explains far more than the frequencies around it: slow wander of the rotor does not
+        nearby = [supply + k * _APART / span for k in (-3, -2, -1, 1, 2, 3)]
+        without = misfit(None)
+        around = [without - misfit(other) for other in filter(told_apart, nearby)]
+        if around and without - misfit(supply) > _STANDS_OUT * float(np.median(around)):
+            candidates.append(supply)
+    return min(candidates, key=misfit, default=None)
 
 
 def _misfit(time: Array, signals: Array, frequency: float, hum: float | None) -> float:
     return float(np.nansum(_fit(time, signals, frequency, hum).noise ** 2))
-
-
-def _refined(time: Array, signals: Array, nominal: float, hum: float | None, span: float) -> float:
-    """Find the frequency of the 1X tone by golden section around the speed reading."""
-    from scipy.optimize import minimize_scalar
-
-    reach = min(0.5 / span, 0.02 * nominal)
-    found = minimize_scalar(
-        lambda frequency: _misfit(time, signals, frequency, hum),
-        bounds=(nominal - reach, nominal + reach),
-        method="bounded",
-        options={"xatol": 1e-5 * nominal},
-    )
-    return float(found.x)
 
 
 def _fit(time: Array, signals: Array, frequency: float, hum: float | None) -> LevitatedModel:

@@ -288,14 +288,8 @@ class AirGap:
 def identify_air_gap(rest: Rest, model: DropModel, sensing: Sensing) -> AirGap:
     """Air gap of each bearing: settled radius less what gives way under the weight.
 
-    Parameters
-    ----------
-    rest : Rest
-        From `rest_of`.
-    model : DropModel
-        Gives load shares, contact, balls and support; call again with a better support until the gap rests.
-    sensing : Sensing
-        Gives the uncertainty of gain and zero.
+    The model gives load shares, contact, balls and support: with a better support call again. The sensing
+    gives what the tail cannot tell.
 
     Notes
     -----

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rotordrop.rotor.parameters import DropModel
 
 WEAKEST_DIRECTION = 0.05
-"""Smallest ratio of singular values with which four rigid motions count as resolved [1]."""
+"""Smallest ratio of singular values with which four rigid motions count as resolved [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,20 +8,20 @@ friction took.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotordrop.known import NINETY, Known
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
-from rotordrop.record.speed import SpeedAtDrop, require_speed, speed_at_drop
+from rotordrop.record.speed import require_speed, speed_at_drop
 
 LONGEST = 2.0
 """Part of the record after the drop that is fitted [s]; the law in time holds for about a second."""
 
 SEPARABLE = 0.6
-"""Shortest record after the drop from which friction and air can be told apart [s]."""
+"""Shortest record after the drop from which friction and air can be told apart [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,17 +46,9 @@ class SpeedFit:
 
 
 def identify_speed(record: Record, power_off: float, *, turning: float | None = None) -> SpeedFit:
-    """Speed at power-off and time constants from the speed readings of a record.
+    """Speed at power-off [s, record time] and time constants from the speed readings of a record.
 
-    Parameters
-    ----------
-    record : Record
-        Record with speed.
-    power_off : float
-        Power-off in record time [s].
-    turning : float, optional
-        Speed found from the orbit of the levitated rotor [rad/s]; taken when the readings do not contradict
-        it.
+    The speed by the orbit of the levitated rotor [rad/s] is taken when the readings do not contradict it.
 
     Raises
     ------
@@ -69,53 +61,34 @@ def identify_speed(record: Record, power_off: float, *, turning: float | None = 
     that it is not counted twice.
     """
     at_drop = speed_at_drop(record, power_off)
-    initial, error = _initial(at_drop, turning)
+    initial, error = at_drop.value, max(at_drop.standard_error, 1e-4 * at_drop.value)
+    # the orbit tells the speed better than its readings, where it does not contradict them
+    if turning is not None and abs(turning - initial) < 5.0 * error + 2e-3 * initial:
+        initial, error = turning, 1e-4 * turning
     time, readings = require_speed(record)
     since = time - power_off
     used = (since > 0.0) & (since <= LONGEST) & np.isfinite(readings)
     t, n = since[used], readings[used]
-    if len(t) < 8 or t[-1] < 0.1:
-        return _without_fit(initial, error, "the record ends too soon to see the speed fall")
-    plain = _plain_time_constant(t, n, initial)
-    if t[-1] < SEPARABLE:
-        return SpeedFit(
-            initial=initial,
-            initial_error=error,
-            profile_time_constant=plain,
-            aero_time_constant=Known(
-                value=plain, status="the record does not determine it", lower=plain, unit="s"
-            ),
-            friction_loss=0.0,
-            residual=at_drop.scatter,
-            note=f"{t[-1]:.2g} s of speed do not separate air from friction: all is taken as air",
-        )
-    return _separated(t, n, initial, error, plain)
-
-
-def _initial(at_drop: SpeedAtDrop, turning: float | None) -> tuple[float, float]:
-    """Speed at power-off and its standard error: from the orbit where orbit and readings agree."""
-    error = max(at_drop.standard_error, 1e-4 * at_drop.value)
-    if turning is not None and abs(turning - at_drop.value) < 5.0 * error + 2e-3 * at_drop.value:
-        return turning, 1e-4 * turning
-    return at_drop.value, error
-
-
-def _without_fit(speed: float, error: float, why: str) -> SpeedFit:
+    short = len(t) < 8 or t[-1] < 0.1
+    plain = np.inf
+    if not short:
+        fall = np.log(np.maximum(n, 1e-3 * initial) / initial)
+        rate = -float(fall @ t) / float(t @ t)
+        plain = 1.0 / rate if rate > 1e-6 else np.inf
+    if not short and t[-1] >= SEPARABLE:
+        return _separated(t, n, initial, error, plain)
+    undetermined = Known(value=plain, status="the record does not determine it", unit="s")
     return SpeedFit(
-        initial=speed,
+        initial=initial,
         initial_error=error,
-        profile_time_constant=np.inf,
-        aero_time_constant=Known(value=np.inf, status="the record does not determine it", unit="s"),
+        profile_time_constant=plain,
+        aero_time_constant=undetermined if short else replace(undetermined, lower=plain),
         friction_loss=0.0,
-        residual=0.0,
-        note=f"{why}; it is taken as constant",
+        residual=0.0 if short else at_drop.scatter,
+        note="the record ends too soon to see the speed fall; it is taken as constant"
+        if short
+        else f"{t[-1]:.2g} s of speed do not separate air from friction: all is taken as air",
     )
-
-
-def _plain_time_constant(t: Array, n: Array, initial: float) -> float:
-    fall = np.log(np.maximum(n, 1e-3 * initial) / initial)
-    rate = -float(fall @ t) / float(t @ t)
-    return 1.0 / rate if rate > 1e-6 else np.inf
 
 
 def _separated(t: Array, n: Array, initial: float, error: float, plain: float) -> SpeedFit:

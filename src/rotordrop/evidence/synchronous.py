@@ -11,7 +11,7 @@ import numpy as np
 from rotordrop.record.recording import Array
 
 FEWEST_TURNS = 4
-"""Turns from which the scatter between them gives an interval [1]."""
+"""Turns from which the scatter between them gives an interval [1] (chosen)."""
 
 CONFIDENCE = 0.95
 """Quantile of Student's t of a two-sided 90 % interval [1]."""
@@ -20,10 +20,10 @@ FEWEST_MARKS, FEWEST_FOR_SLOWING = 3, 8
 """Passages of the mark from which an angle, and from which an even slowing too, is fitted [1]."""
 
 MISSED_MARKS = 3.0
-"""Turns after the last passage beyond which the angle is no longer told [1]."""
+"""Turns after the last passage beyond which the angle is not stated [1] (chosen)."""
 
 MARK_SPAN = 0.5
-"""Passages up to this long before an instant say where the shaft stands at it [s]."""
+"""Passages up to this long before an instant say where the shaft stands at it [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,32 +47,20 @@ class Synchronous:
 def synchronous_motion(
     plane: str, time: Array, position: Array, marks: Array, until: float
 ) -> Synchronous | None:
-    """Amplitude and phase of 1X before a drop.
+    """Amplitude and phase of 1X in a plane before a drop; None where too few turns lie before it.
 
-    Parameters
-    ----------
-    plane : str
-        Name of the plane.
-    time : array, shape (N,)
-        Time [s].
-    position : array, shape (N, 2)
-        Path of the shaft [m], (x, y).
-    marks : array, shape (M,)
-        When the mark passed [s].
-    until : float
-        End of the levitated part [s].
-
-    Returns
-    -------
-    Synchronous or None
-        None where too few turns lie before the drop.
+    By times (N,) [s], the path of the shaft (N, 2) [m], the passages of the mark (M,) [s] and the end of the
+    levitated part [s].
     """
     usual = float(np.median(np.diff(marks)))
-    per_turn = [
-        _turn(time, position, begin, end)
-        for begin, end in pairwise(marks)
-        if begin >= time[0] and end <= until and end - begin < 1.5 * usual
-    ]
+    path, per_turn = position[:, 0] + 1j * position[:, 1], []
+    for begin, end in pairwise(marks):
+        if begin < time[0] or end > until or end - begin >= 1.5 * usual:
+            continue  # a mark was missed in a turn that lasts longer than others
+        inside = (time >= begin) & (time < end)
+        angle = 2.0 * np.pi * (time[inside] - begin) / (end - begin)
+        design = np.column_stack([np.exp(1j * angle), np.exp(-1j * angle), np.ones(len(angle))])
+        per_turn.append(complex(np.linalg.lstsq(design, path[inside], rcond=None)[0][0]))
     if len(per_turn) < FEWEST_TURNS:
         return None
     from scipy.special import stdtrit
@@ -95,15 +83,6 @@ def synchronous_motion(
     )
 
 
-def _turn(time: Array, position: Array, begin: float, end: float) -> complex:
-    """Forward 1X of one turn: the mean of the path, turned back with the shaft."""
-    inside = (time >= begin) & (time < end)
-    angle = 2.0 * np.pi * (time[inside] - begin) / (end - begin)
-    design = np.column_stack([np.exp(1j * angle), np.exp(-1j * angle), np.ones(len(angle))])
-    path = position[inside, 0] + 1j * position[inside, 1]
-    return complex(np.linalg.lstsq(design, path, rcond=None)[0][0])
-
-
 @dataclass(frozen=True, kw_only=True)
 class MarkAngle:
     """How far the shaft has turned since its mark passed, and the standard error of that [rad]."""
@@ -113,24 +92,13 @@ class MarkAngle:
 
 
 def angle_since_mark(marks: Array, when: float, *, span: float = MARK_SPAN) -> MarkAngle | None:
-    """How far the shaft has turned at an instant since the mark passed last, from the passages before.
+    """How far the shaft has turned at an instant [s] since the mark passed last, from the passages (M,)
+    before.
 
-    Friction changes the speed within a fraction of a turn after the first contact, so passages after the
-    instant are not asked; before it a levitated rotor turns evenly, or slows evenly where that shows.
-
-    Parameters
-    ----------
-    marks : array, shape (M,)
-        When the mark passed [s].
-    when : float
-        The instant, shortly after the last passage that counts [s].
-    span : float
-        Passages up to this long before the instant are used [s].
-
-    Returns
-    -------
-    MarkAngle or None
-        None where fewer than three passages lie before, or the last one far before the instant.
+    Passages up to `span` [s] before the instant count. Friction changes the speed within a fraction of a turn
+    after the first contact, so those after it are not asked; before it a levitated rotor turns evenly, or
+    slows evenly where that shows. None where fewer than three passages lie before, or the last one far before
+    the instant.
     """
     used = marks[(marks <= when) & (marks >= when - span)]
     if len(used) < FEWEST_MARKS or when - used[-1] > MISSED_MARKS * float(np.median(np.diff(used))):

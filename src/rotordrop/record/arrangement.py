@@ -95,7 +95,18 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
             f'example --map "NDE: {labels[0]} 0 deg, {labels[1]} 90 deg"'
         )
     sensors = [
-        _sensor(channel, name, number, place * math.pi / 2 if angle is None else angle)
+        Sensor.model_construct(
+            name=channel.name,
+            node=number,
+            position=None,
+            angle=Known(value=place * math.pi / 2 if angle is None else angle, unit="rad"),
+            polarity=1,
+            gain=Known(value=1.0),
+            offset=Known(value=0.0, unit="m"),
+            sensitivity=None,
+            bearing=name,
+            position_error=Known(value=0.0, unit="m"),
+        )
         for number, (name, entries) in enumerate(planes, start=1)
         for place, (channel, angle) in enumerate(entries)
     ]
@@ -107,21 +118,6 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         channels={sensor.name: label for sensor, label in zip(sensors, labels, strict=True)},
         angles_known=known,
         notes=notes,
-    )
-
-
-def _sensor(channel: Channel, plane: str, number: int, angle: float) -> Sensor:
-    return Sensor.model_construct(
-        name=channel.name,
-        node=number,
-        position=None,
-        angle=Known(value=angle, unit="rad"),
-        polarity=1,
-        gain=Known(value=1.0),
-        offset=Known(value=0.0, unit="m"),
-        sensitivity=None,
-        bearing=plane,
-        position_error=Known(value=0.0, unit="m"),
     )
 
 

@@ -66,28 +66,27 @@ def sensor_planes(sensors: Sequence[Sensor]) -> tuple[Plane, ...]:
     RecordError
         When a plane has one sensor, or sensors that all look along one line.
     """
-    nodes = list(dict.fromkeys(sensor.node for sensor in sensors))
-    return tuple(_plane(node, sensors) for node in nodes)
-
-
-def _plane(node: int, sensors: Sequence[Sensor]) -> Plane:
-    columns = tuple(i for i, sensor in enumerate(sensors) if sensor.node == node)
-    members = [sensors[i] for i in columns]
-    if not sees_both_directions(members):
-        seen = ", ".join(f"{sensor.name} at {math.degrees(float(sensor.angle)):.4g}°" for sensor in members)
-        why = "one sensor" if len(members) < 2 else "sensors along one line"
-        raise RecordError(
-            f"the plane at node {node} has {why} ({seen}): x and y cannot be found; a second direction, at "
-            "least 3° "
-            "away, is needed at this node"
+    planes = []
+    for node in dict.fromkeys(sensor.node for sensor in sensors):
+        columns = tuple(i for i, sensor in enumerate(sensors) if sensor.node == node)
+        members = [sensors[i] for i in columns]
+        if not sees_both_directions(members):
+            seen = ", ".join(f"{one.name} at {math.degrees(float(one.angle)):.4g}°" for one in members)
+            why = "one sensor" if len(members) < 2 else "sensors along one line"
+            raise RecordError(
+                f"the plane at node {node} has {why} ({seen}): x and y cannot be found; a second direction, "
+                "at least 3° away, is needed at this node"
+            )
+        planes.append(
+            Plane(
+                node=node,
+                bearing=members[0].bearing,
+                columns=columns,
+                names=tuple(sensor.name for sensor in members),
+                to_planar=np.asarray(np.linalg.pinv(sensor_directions(members)), dtype=np.float64),
+            )
         )
-    return Plane(
-        node=node,
-        bearing=members[0].bearing,
-        columns=columns,
-        names=tuple(sensor.name for sensor in members),
-        to_planar=np.asarray(np.linalg.pinv(sensor_directions(members)), dtype=np.float64),
-    )
+    return tuple(planes)
 
 
 def planar_of(along: Array, planes: Sequence[Plane]) -> Array:

@@ -116,8 +116,17 @@ def _rounded_clock(time: Array) -> tuple[Array, float] | None:
     that are there twice, or missing, drift away from it.
     """
     steps = np.diff(time)
-    resolution = _resolution(time)
-    if resolution is None or np.any(steps < 0.0) or not np.any(steps > 0.0):
+    if np.any(steps < 0.0) or not np.any(steps > 0.0):
+        return None
+    # the largest step of which all distances of the stamps are multiples
+    for decimals in range(MOST_DECIMALS + 1):
+        counts = np.rint((time - time[0]) * 10.0**decimals)
+        if np.max(np.abs(time - time[0] - counts * 10.0**-decimals)) < 1e-3 * 10.0**-decimals:
+            break
+    else:
+        return None
+    resolution = float(np.gcd.reduce(counts.astype(np.int64))) * 10.0**-decimals
+    if resolution == 0.0:
         return None
     count = np.rint((time - time[0]) / resolution)
     index = np.arange(len(time), dtype=np.float64)
@@ -132,12 +141,3 @@ def _rounded_clock(time: Array) -> tuple[Array, float] | None:
         start = float(np.mean(count - index))
     rate = float(f"{1.0 / (slope * resolution):.9g}")
     return time[0] + start * resolution + index / rate, rate
-
-
-def _resolution(time: Array) -> float | None:
-    """Largest step of which all distances of decimal stamps are multiples [s]; None where there is none."""
-    for decimals in range(MOST_DECIMALS + 1):
-        counts = np.rint((time - time[0]) * 10.0**decimals)
-        if np.max(np.abs(time - time[0] - counts * 10.0**-decimals)) < 1e-3 * 10.0**-decimals:
-            return float(np.gcd.reduce(counts.astype(np.int64))) * 10.0**-decimals or None
-    return None

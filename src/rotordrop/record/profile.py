@@ -7,17 +7,30 @@ import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.files import write_text
 from rotordrop.record.recording import Array, Channel, spelled
 from rotordrop.record.tacho import Edge
 from rotordrop.units import parse_quantity
+
+
+def _of_kind(kind: str) -> AfterValidator:
+    """Accept texts that are a quantity of a kind."""
+
+    def checked(text: str) -> str:
+        try:
+            parse_quantity(text, kind)
+        except UsageError as error:
+            raise ValueError(str(error)) from error
+        return text
+
+    return AfterValidator(checked)
 
 
 class _Section(BaseModel):
@@ -43,13 +56,12 @@ class Clock(_Section):
 
     channel: str | None = Field(default=None, description="name of the time column")
     unit: str | None = Field(default=None, description="unit of the time column")
-    step: str | None = Field(default=None, description='time between samples, for example "50 us"')
-    start: str | None = Field(default=None, description='time of the first sample, for example "-0.25 s"')
-
-    @field_validator("step", "start")
-    @classmethod
-    def _is_time(cls, text: str | None) -> str | None:
-        return _checked(text, "time")
+    step: Annotated[str, _of_kind("time")] | None = Field(
+        default=None, description='time between samples, for example "50 us"'
+    )
+    start: Annotated[str, _of_kind("time")] | None = Field(
+        default=None, description='time of the first sample, for example "-0.25 s"'
+    )
 
 
 class SpeedSource(_Section):
@@ -57,15 +69,12 @@ class SpeedSource(_Section):
 
     channel: str | None = Field(default=None, description="name of the speed channel")
     unit: str | None = Field(default=None, description="unit of the speed channel")
-    constant: str | None = Field(default=None, description='speed by hand, for example "60 Hz"')
+    constant: Annotated[str, _of_kind("speed")] | None = Field(
+        default=None, description='speed by hand, for example "60 Hz"'
+    )
     pulses: str | None = Field(default=None, description="name of a channel of tacho or keyphasor pulses")
     pulses_per_turn: int = Field(default=1, ge=1, le=10_000, description="pulses in one turn of the shaft")
     edge: Edge = Field(default="rising", description="the edge of a pulse that counts, rising or falling")
-
-    @field_validator("constant")
-    @classmethod
-    def _is_speed(cls, text: str | None) -> str | None:
-        return _checked(text, "speed")
 
 
 class Profile(_Section):
@@ -81,7 +90,7 @@ class Profile(_Section):
     """Channel name in the recording -> unit."""
     unit: str | None = None
     """Unit of all displacement channels that name none."""
-    sensitivity: str | None = None
+    sensitivity: Annotated[str, _of_kind("voltage_sensitivity")] | None = None
     """Volts per length of all channels, for example ``"8 mV/um"``."""
     full_scale: str | None = None
     """What full scale stands for where a file only knows shares of it (WAV), for example ``"10 V"``."""
@@ -101,11 +110,6 @@ class Profile(_Section):
             values=np.asarray(values, dtype=np.float64),
             time=time,
         )
-
-    @field_validator("sensitivity")
-    @classmethod
-    def _is_sensitivity(cls, text: str | None) -> str | None:
-        return _checked(text, "voltage_sensitivity")
 
 
 def load_profile(path: str | Path) -> Profile:
@@ -187,12 +191,3 @@ def save_profile(profile: Profile, path: str | Path) -> None:
     import tomlkit
 
     write_text(path, tomlkit.dumps(profile.model_dump(exclude_defaults=True, exclude_none=True)))
-
-
-def _checked(text: str | None, kind: str) -> str | None:
-    if text is not None:
-        try:
-            parse_quantity(text, kind)
-        except UsageError as error:
-            raise ValueError(str(error)) from error
-    return text

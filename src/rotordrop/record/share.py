@@ -131,16 +131,10 @@ def _plain_names(sensors: Sequence[Sensor]) -> dict[str, str]:
 
 
 def nameless(machine: Machine, sensors: Mapping[str, str], shared: Sequence[str]) -> Machine:
-    """The machine without names, sources and remarks; sensors that are not shared count as lost.
+    """The machine without names, sources and remarks; sensors whose names are not among the shared ones count
+    as lost.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    sensors : mapping of str
-        New names of its sensors by their own.
-    shared : sequence of str
-        Own names of the sensors whose readings are shared.
+    The new names of its sensors come by their old ones.
     """
     raw = _untold(tomllib.loads(machine_text(machine)))
     raw["name"] = "shared machine"

@@ -153,10 +153,14 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
     if int(used.sum()) < 2:
         raise RecordError(
             f"{record.name}: {int(used.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
-            "the "
-            f"speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
+            f"the speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
         )
-    solution, scatter, covariance = _level_or_line(time[used] - drop, readings[used])
+    when, values = time[used] - drop, readings[used]
+    solution, scatter, covariance = _robust(np.ones((len(when), 1)), values)
+    if len(when) >= _FEW:  # a straight line where its slope is beyond doubt
+        line = _robust(np.column_stack([np.ones_like(when), when]), values)
+        if abs(line[0][1]) > 4.0 * line[1] * float(np.sqrt(line[2][1, 1])):
+            solution, scatter, covariance = line
     value = float(solution[0])
     return SpeedAtDrop(
         value=value,
@@ -165,16 +169,6 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
         scatter=scatter,
         readings=int(used.sum()),
     )
-
-
-def _level_or_line(when: Array, values: Array) -> tuple[Array, float, Array]:
-    """A constant, or a straight line where its slope is beyond doubt."""
-    level = _robust(np.ones((len(when), 1)), values)
-    if len(when) < _FEW:
-        return level
-    line = _robust(np.column_stack([np.ones_like(when), when]), values)
-    doubt = 4.0 * line[1] * float(np.sqrt(line[2][1, 1]))
-    return line if abs(line[0][1]) > doubt else level
 
 
 def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
@@ -195,8 +189,7 @@ def require_speed(record: Record) -> tuple[Array, Array]:
     if record.speed_time is None or record.speed_readings is None:
         raise RecordError(
             f"{record.name} has no shaft speed beside {', '.join(record.channel_names)}; name its channel in "
-            "a "
-            'profile ([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz")'
+            'a profile ([speed] channel = "..."), or give it by hand ([speed] constant = "60 Hz")'
         )
     return record.speed_time, record.speed_readings
 

@@ -232,17 +232,16 @@ def _clock(
     else:
         notes = ["no trigger in the file: record time counts from the first sample"]
     counter = next(iter(table))
-    if _is_counter(table[counter], columns[counter][0]):
+    values = table[counter]
+    # where samples are missing a counter steps by more, and so tells it
+    if len(values) > 1 and np.all(values == np.round(values)):
+        ones = float(np.mean(np.diff(values) == 1.0))
+        counts = ones == 1.0 or ones > (0.5 if _COUNTERS.match(columns[counter][0]) else 0.9)
+    else:
+        counts = False
+    if counts:
         return {0: start + step * table[counter]}, [counter], notes
     return {0: start + step * np.arange(len(table[counter]), dtype=np.float64)}, [], notes
-
-
-def _is_counter(values: Array, name: str) -> bool:
-    """Whether a column counts the samples; where samples are missing it steps by more, and so tells it."""
-    if len(values) < 2 or not np.all(values == np.round(values)):
-        return False
-    ones = float(np.mean(np.diff(values) == 1.0))
-    return ones == 1.0 or ones > (0.5 if _COUNTERS.match(name) else 0.9)
 
 
 def _time_columns(

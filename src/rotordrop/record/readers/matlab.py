@@ -144,6 +144,11 @@ def _clock(variables: dict[str, Any], folder: str, count: int, profile: Profile)
     """Find the clock of samples: in the profile, in the same structure, then at the top of the file."""
     from rotordrop.units import parse_quantity
 
+    def stored(name: str) -> Any:
+        """The variable of a name, in any case."""
+        pattern = re.compile(re.escape(name), re.IGNORECASE)
+        return next((value for key, value in variables.items() if pattern.fullmatch(key)), None)
+
     index = np.arange(count, dtype=np.float64)
     if profile.time.step is not None:
         first = parse_quantity(profile.time.start or "0 s", "time")
@@ -151,24 +156,20 @@ def _clock(variables: dict[str, Any], folder: str, count: int, profile: Profile)
     times = _TIMES if profile.time.channel is None else (profile.time.channel,)
     for prefix in dict.fromkeys((f"{folder}." if folder else "", "")):
         for name in times:
-            value = _get(variables, prefix, name)
+            value = stored(prefix + name)
             if isinstance(value, np.ndarray) and value.shape == (count,):
                 return np.asarray(value, dtype=np.float64)
-        rate, step, start = (_scalar(variables, prefix, names) for names in (_RATES, _STEPS, _STARTS))
+        rate, step, start = (
+            next(
+                (float(v) for n in names if isinstance(v := stored(prefix + n), int | float | np.number)),
+                None,
+            )
+            for names in (_RATES, _STEPS, _STARTS)
+        )
         step = step or (1.0 / rate if rate else None)
         if step:
             return (start or 0.0) + step * index
     return None
-
-
-def _get(variables: dict[str, Any], prefix: str, name: str) -> Any:
-    pattern = re.compile(re.escape(prefix + name), re.IGNORECASE)
-    return next((value for key, value in variables.items() if pattern.fullmatch(key)), None)
-
-
-def _scalar(variables: dict[str, Any], prefix: str, names: tuple[str, ...]) -> float | None:
-    values = (_get(variables, prefix, name) for name in names)
-    return next((float(value) for value in values if isinstance(value, int | float | np.number)), None)
 
 
 def unpacked(path: Path) -> Content:
