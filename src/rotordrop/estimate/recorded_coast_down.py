@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.evidence import Missing, known, read_evidence
-from rotordrop.evidence.rest import identify_air_gap, rest_of
+from rotordrop.evidence.evidence import known, read_evidence
+from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -77,8 +77,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     sensing = known(evidence.sensing)
     first = int(np.searchsorted(record.time, off))
     try:
-        if isinstance(gap := evidence.gap, Missing):
-            gap = identify_air_gap(rest_of(record, sensing, turning=True), evidence.model, sensing)
+        gap = identify_air_gap(known(evidence.lying), evidence.base, sensing)
         sideways = gap.rest.sideways
         gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
         centre = (

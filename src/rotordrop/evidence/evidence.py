@@ -218,6 +218,13 @@ class Evidence:
         return sought(lambda: rest_of(known(self.still), known(self.sensing)))
 
     @cached_property
+    def lying(self) -> Rest | Missing:
+        """Where the rotor rests, or where it lies at the end of a record although the shaft still turns."""
+        if not isinstance(self.rest, Missing):
+            return self.rest
+        return sought(lambda: rest_of(self.record, known(self.sensing), turning=True))
+
+    @cached_property
     def settled_level(self) -> Array | Missing:
         """What the sensors read of the resting rotor, in their positive directions [m]; NaN where dead."""
         if isinstance(self.still, Missing):
