@@ -129,6 +129,7 @@ def _columns(ramp: np.ndarray, time: Array, knots: Array, record: Record) -> Arr
     parts = []
     for knot in knots:
         since = time - knot
+        # a force that rises and falls along straight lines is the second difference of a ramp
         hat = (
             response_at(ramp, since + _KNOTS)
             - 2 * response_at(ramp, since)

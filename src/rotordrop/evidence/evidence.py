@@ -265,6 +265,7 @@ class Evidence:
                 float(np.mean(fall.noise)),
             )
 
+        # a coast-down lasts a minute, its first contacts milliseconds: all of it only where they come late
         until = max(self.power_off.value, float(self.record.time[0])) + AFTER_FALL
         first = [self.record.window(-np.inf, until)] if self.record.time[-1] > until else []
         for part in (*first, self.record):

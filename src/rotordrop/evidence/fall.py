@@ -92,6 +92,7 @@ class FallProblem:
         fall = (-1j * step * lift).sum(axis=-1).real
         parts = [column for unit in (left, forward, backward) for column in (unit.real, -unit.imag)]
         expected = fall + parts[1].sum(axis=-1) * REMANENT_SHARE[0]
+        # a gain that is off shows as a share of the fall that is expected, so the problem stays linear
         own = expected[:, :, None] * np.eye(fall.shape[1])
         return fall, np.concatenate([*parts, own], axis=-1)
 
@@ -113,6 +114,7 @@ class FallProblem:
 
     def named(self, search: Array) -> tuple[float, float]:
         """Release [s] and time constant [s] of the searched numbers."""
+        # 0.07 to 30 ms: beyond, a lift that fades is none at all, or one that stays
         return self.origin + 1e-3 * float(search[0]), float(np.exp(np.clip(search[1], -9.5, -3.5)))
 
     def newest_misfit(self, search: Array) -> float:

@@ -555,12 +555,14 @@ class _Levitated:
         shape = 1j * self.sag + self.bending @ self._complex(bend[0])
         at_rest = self.sensing.from_bearings.reshape(len(self.level), -1) @ x[self.rest]
         place = self.settled + at_rest + self.level / (1.0 + x[self.gain])
+        # the level before the drop fixes the rigid motions once sag and bending are taken off what it shows
         shape[:2] += self._complex(self.rigid @ (place - (self.seen @ shape).real))
         shape = shape + forward + backward
         rate = 1j * self.found.speed * (forward - backward) + self.bending @ self._complex(bend[1])
         moved = [shape.real, shape.imag, rate.real, rate.imag, [1.0]]
         state = np.concatenate([*moved, x[self.remanent], x[self.unbalance]])
         decay = float(np.exp(x[self.decay][0]))
+        # a release later or earlier than guessed: one step along the fall, short against all that moves
         state = state - 1e-3 * float(x[self.instant][0]) * (self.found.matrix(decay) @ state)
         return np.concatenate([state, x[self.gain], x[self.decay], x[self.rest]])
 

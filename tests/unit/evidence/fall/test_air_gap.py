@@ -96,6 +96,16 @@ def test_short_tail_is_refused(drop: SyntheticDrop, sensing: Sensing) -> None:
         rest_of(short, sensing)
 
 
+def test_a_short_tail_says_how_little_it_knows(drop: SyntheticDrop, sensing: Sensing) -> None:
+    """A tail of one block had no scatter and so no error; of two, nine in ten means lie within 6.3 errors."""
+    assert drop.tail is not None
+    begin = float(drop.tail.time[0])
+    rest = rest_of(drop.tail.window(begin, begin + 0.4), sensing)
+    halves = rest.radius_upper - rest.radius_lower
+    assert np.all(rest.standard_error > 0.0)
+    assert rest.standard_error == pytest.approx(0.5 * halves * 6.3137515 / 1.6448536, rel=1e-6)
+
+
 def test_levitated_rotor_is_no_rest(drop: SyntheticDrop, sensing: Sensing) -> None:
     assert drop.tail is not None
     floating = replace(drop.tail, signals=-drop.tail.signals)
