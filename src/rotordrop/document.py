@@ -56,12 +56,7 @@ class Document(BaseModel):
         try:
             return cls.model_validate(content)
         except ValidationError as error:
-            fault = error.errors(include_url=False)[0]
-            where = ".".join(str(part) for part in fault["loc"]) or "the document"
-            found = "" if fault["type"] == "missing" else f" is {str(fault['input'])[:60]!r}"
-            raise UsageError(
-                f"{place}: {where}{found}: {fault['msg']}. Give a file that '{made_by}' wrote."
-            ) from None
+            raise UsageError(f"{place}: {first_fault(error)}. Give a file that '{made_by}' wrote.") from None
 
     @classmethod
     def schema_of(cls, title: str, description: str) -> dict[str, Any]:
@@ -86,6 +81,14 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise UsageError(
             f"{path} cannot be read ({fault.strerror}); name a file that a command wrote with --json"
         ) from fault
+
+
+def first_fault(error: ValidationError) -> str:
+    """Where the first fault of a document lies, what stands there, and what was expected."""
+    fault = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in fault["loc"]) or "the document"
+    found = "" if fault["type"] == "missing" else f" is {str(fault['input'])[:60]!r}"
+    return f"{where}{found}: {fault['msg']}"
 
 
 def read_json(path: Path, made_by: str) -> dict[str, Any]:

@@ -76,6 +76,7 @@ VERBS: dict[str, tuple[Verb, ...]] = {
         Verb("calibrate", "Calibrate a machine on several recorded drops", _HERE + "estimate"),
     ),
     "Judge": (
+        Verb("restart", "Judge whether a machine may run again after a drop", _HERE + "restart"),
         Verb("compare", "Compare drops: which was worst, and how sure that is", _HERE + "compare"),
         Verb("log", "Keep the log of a machine's drops and what they are allowed", _HERE + "log"),
         Verb("study run", "Compute many drops and show how they are spread", _HERE + "study"),

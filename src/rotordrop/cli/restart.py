@@ -1,0 +1,108 @@
+"""Judge whether a machine may run again after a drop."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from typer import Argument, Option
+
+from rotordrop.cli import _options as options
+from rotordrop.cli._options import file_option, text_option
+from rotordrop.cli._output import deliver, progress_bar
+from rotordrop.errors import UsageError
+
+if TYPE_CHECKING:
+    from rotordrop.restart.next_drop import NextDrop
+
+
+def restart(
+    machine: options.Machine,
+    estimate: Annotated[Path, Argument(metavar="ESTIMATE", help="Estimate of the drop (.json).")],
+    since: Annotated[
+        Path | None,
+        file_option("--since", "Estimate of an earlier drop with these bearings, best the first."),
+    ] = None,
+    log: Annotated[str | None, text_option("LOG", "Log of drops: earlier ones count.")] = None,
+    bearings: Annotated[str, Option(metavar="NAME", help="Set of touchdown bearings in the log.")] = "1",
+    check: Annotated[
+        list[str] | None,
+        Option(metavar="CHECK", help='A check that was made, "turning=bad" or "lift=good"; repeat it.'),
+    ] = None,
+    assumptions: Annotated[
+        Path | None,
+        file_option("--assumptions", "Costs, kinds of damage and checks that you state otherwise (.toml)."),
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        Option(metavar="LIMIT", help='Limit of the next drop, "peak_stress=2.5 GPa"; repeat it.'),
+    ] = None,
+    drops: Annotated[
+        int, Option(min=0, metavar="N", help="Next drops to simulate at each speed; 0 leaves them out.")
+    ] = 40,
+    report: options.Report = None,
+    data: options.Data = None,
+    json: options.Json = None,
+) -> None:
+    """Judge whether a machine may run again after a drop: restart, with limits, inspect first, or replace.
+
+    Example: rotordrop restart machine.toml drop.json --log drops.db
+    """
+    from rotordrop.estimate.published import read_drop
+    from rotordrop.machine import load_machine
+    from rotordrop.report.limits import read_limits
+    from rotordrop.report.restart_page import restart_numbers, restart_page
+    from rotordrop.restart.assumptions import assumptions_of, load_assumptions
+    from rotordrop.restart.card import restart_card
+    from rotordrop.restart.next_drop import next_drops
+    from rotordrop.study.repeat import COMPARED
+
+    described, drop = load_machine(machine), read_drop(estimate)
+    if drop.machine != described.name:
+        raise UsageError(
+            f"{estimate} is of {drop.machine!r} and {machine} describes {described.name!r}; name the machine "
+            "file of that drop"
+        )
+    limits = read_limits(limit or ())
+    for field in limits:
+        if field not in COMPARED:
+            raise UsageError(f"--limit: no simulated drop has {field}; there are {', '.join(COMPARED)}")
+    assumed = assumptions_of({}, "the assumptions") if assumptions is None else load_assumptions(assumptions)
+    speed = 2.0 * math.pi * drop.speed_Hz
+    found: tuple[NextDrop, ...] = ()
+    if drops and described.ambs:
+        with progress_bar("the next drop") as bar:
+            found = next_drops(described, speed, limits, drops=drops, progress=bar)
+    card = restart_card(
+        drop,
+        assumed,
+        since=None if since is None else read_drop(since),
+        checks=_checks(check or ()),
+        earlier=0 if log is None else _earlier(log, drop.machine, bearings, drop.record_sha256),
+        next_drops=found,
+    )
+    deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
+
+
+def _checks(written: list[str] | tuple[str, ...]) -> dict[str, str]:
+    """Checks and their outcomes as they are written on the command line."""
+    found = {}
+    for text in written:
+        name, equals, outcome = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise UsageError(f'--check {text!r}; expected a check and its outcome, "turning=bad"')
+        if name in found:
+            raise UsageError(f"--check {name} is given twice; give the outcome that counts")
+        found[name] = outcome
+    return found
+
+
+def _earlier(log: str, machine: str, bearings: str, sha256: str) -> int:
+    """Drops of a set of bearings in a log, this one left out."""
+    from rotordrop.ledger.book import logged_drops
+
+    return sum(
+        one.bearing_set == bearings and (not sha256 or one.sha256 != sha256)
+        for one in logged_drops(log, machine=machine).values()
+    )

@@ -1,0 +1,392 @@
+"""The restart card: which answer costs least, how sure that is, and which check would change it most.
+
+Kinds of damage are present or not, each by itself; every answer has a cost in every such state. The answer is
+the one of the least expected cost, and a check is worth what it takes off that cost.
+Source: Bayesian decision with the expected value of sample information, Raiffa and Schlaifer, Applied
+Statistical Decision Theory, 1961.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.estimate.published import Drop
+from rotordrop.restart.assumptions import Assumptions, Check
+from rotordrop.restart.evidence import (
+    Indicator,
+    Suspicion,
+    in_words,
+    indicators,
+    require_check,
+    suspicions,
+)
+from rotordrop.restart.next_drop import NextDrop
+from rotordrop.units import format_chance
+
+Array = NDArray[np.float64]
+Answer = Literal["restart", "restart with limits", "inspect first", "replace"]
+ANSWERS: tuple[Answer, ...] = ("restart", "restart with limits", "inspect first", "replace")
+
+SAYS_SOMETHING = math.log(1.5)
+"""Logarithm of a likelihood ratio from which it counts as evidence; chosen, not measured."""
+FLIPS_WITHIN = 10.0
+"""Largest factor on a cost or a chance at which a flip of the answer is looked for; chosen, not measured."""
+RARE = 0.005
+"""Probability below which an answer is not named in the sentence [1]; chosen, not measured."""
+COSTS = {
+    "day_cost": "a day of standstill",
+    "bearing_set_cost": "a set of bearings",
+    "machine_cost": "a damaged machine",
+    "another_drop": "the chance of another drop",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckValue:
+    """What a check that has not been made would be worth."""
+
+    name: str
+    label: str
+    cost: float
+    """[unit of the assumptions]."""
+    value: float
+    """What it takes off the expected cost, its own cost taken off [unit of the assumptions]."""
+    settles: float
+    """Chance that its outcome changes the answer [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flip:
+    """How far an assumption may be wrong before the answer is another one."""
+
+    of: str
+    """In words."""
+    factor: float
+    """Smallest factor on it, above or below one, at which the answer changes [1]."""
+    answer: Answer
+    """What the answer is then."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestartCard:
+    """Whether a machine may run again."""
+
+    answer: Answer
+    """What costs least in expectation."""
+    right: dict[Answer, float]
+    """Probability that each answer is the one that is right if the state was known [1]."""
+    costs: dict[Answer, float]
+    """Expected cost of each answer [unit of the assumptions]."""
+    at_stake: float
+    """Expected cost of the dearest answer less that of the cheapest one [unit of the assumptions]."""
+    suspicions: tuple[Suspicion, ...]
+    """Every kind of damage at every bearing, the likeliest first, checks included."""
+    sound: float
+    """Probability that nothing of them is there, checks included [1]."""
+    indicators: tuple[Indicator, ...]
+    """What the parameters of the estimate say."""
+    checks: tuple[CheckValue, ...]
+    """Checks that have not been made, the most valuable first."""
+    made: dict[str, str]
+    """Checks that were made, with their outcome."""
+    flips: tuple[Flip, ...]
+    """Assumptions on which the answer hangs, the nearest first."""
+    next_drops: tuple[NextDrop, ...]
+    """What the next drop would be, by speed."""
+    prior_alone: bool
+    """Whether nothing but the assumptions decided."""
+    assumptions: Assumptions
+    statements: tuple[str, ...]
+    """What the card says, the answer first."""
+
+    @property
+    def best_check(self) -> CheckValue | None:
+        """The check that pays most; None where none pays."""
+        return self.checks[0] if self.checks and self.checks[0].value > 0.0 else None
+
+
+def restart_card(
+    drop: Drop,
+    assumed: Assumptions,
+    *,
+    since: Drop | None = None,
+    checks: Mapping[str, str] | None = None,
+    earlier: int = 0,
+    next_drops: Sequence[NextDrop] = (),
+) -> RestartCard:
+    """Judge whether a machine may run again after a drop.
+
+    Parameters
+    ----------
+    drop : Drop
+        Published estimate of the drop.
+    assumed : Assumptions
+        Costs, kinds of damage and checks.
+    since : Drop, optional
+        Estimate of an earlier drop with the same bearings, best the first: what changed since is evidence.
+    checks : mapping of str to "good" or "bad"
+        Checks that were made, with their outcome.
+    earlier : int
+        Drops that this set of bearings took before.
+    next_drops : sequence of NextDrop
+        What the next drop would be, the first one at the speed of a restart without limits.
+
+    Raises
+    ------
+    UsageError
+        For a check or an outcome that nobody knows, or estimates of two machines.
+    """
+    made = dict(checks or {})
+    for name, outcome in made.items():
+        require_check(name, outcome, assumed)
+    found = indicators(drop, since, assumed)
+    suspected = suspicions(drop, found, earlier, assumed)
+    before = _Case.of(suspected, assumed, next_drops)
+    case = before.after(made)
+    shown = [
+        replace(one, probability=one.probability * case.share(one.kind) / before.share(one.kind))
+        for one in suspected
+    ]
+    costs = case.expected()
+    answer = case.answer
+    right = case.right()
+    left = sorted(
+        (case.value_of(name) for name in assumed.checks if name not in made), key=lambda one: -one.value
+    )
+    alone = not made and all(abs(math.log(one.ratio)) < SAYS_SOMETHING for one in found)
+    card = RestartCard(
+        answer=answer,
+        right=right,
+        costs=costs,
+        at_stake=max(costs.values()) - min(costs.values()),
+        suspicions=tuple(sorted(shown, key=lambda one: -one.probability)),
+        sound=float(case.weights[0]),
+        indicators=found,
+        checks=tuple(left),
+        made=made,
+        flips=_flips(suspected, assumed, next_drops, made, answer),
+        next_drops=tuple(next_drops),
+        prior_alone=alone,
+        assumptions=assumed,
+        statements=(),
+    )
+    return replace(card, statements=tuple(_said(card, drop, since)))
+
+
+@dataclass(frozen=True)
+class _Case:
+    """All states of damage with their probabilities, and what each answer costs in each."""
+
+    assumed: Assumptions
+    states: Array
+    """Kinds present (1) or not (0) in each state, the sound one first, shape (states, kinds)."""
+    costs: Array
+    """Cost of each answer in each state, shape (answers, states)."""
+    weights: Array
+    """Probability of each state, shape (states,)."""
+
+    @classmethod
+    def of(
+        cls, suspected: Sequence[Suspicion], assumed: Assumptions, next_drops: Sequence[NextDrop]
+    ) -> _Case:
+        kinds = list(assumed.damages)
+        sound = np.ones(len(kinds))
+        for one in suspected:
+            sound[kinds.index(one.kind)] *= 1.0 - one.probability
+        states = np.array(list(product((0.0, 1.0), repeat=len(kinds))))
+        weights = np.prod(np.where(states > 0.0, 1.0 - sound, sound), axis=1)
+        beyond = (next_drops[0].beyond, min(one.beyond for one in next_drops)) if next_drops else (0.0, 0.0)
+        return cls(assumed, states, _costs(assumed, states, beyond), weights / weights.sum())
+
+    def after(self, made: Mapping[str, str]) -> _Case:
+        """The same once checks were made."""
+        weights = self.weights
+        for name, outcome in made.items():
+            bad = self._bad(self.assumed.checks[name])
+            weights = weights * (bad if outcome == "bad" else 1.0 - bad)
+        return replace(self, weights=weights / weights.sum())
+
+    def share(self, kind: str) -> float:
+        """Probability that a kind of damage is there, at whichever bearing [1]."""
+        return float(self.weights @ self.states[:, list(self.assumed.damages).index(kind)])
+
+    def _bad(self, check: Check) -> Array:
+        """Chance of a bad outcome in each state; each damage shows by itself."""
+        shown = np.array([check.shows.get(kind, 0.0) for kind in self.assumed.damages])
+        unseen = np.prod(1.0 - self.states * shown, axis=1)
+        return np.asarray(1.0 - (1.0 - check.false_alarm) * unseen)
+
+    def expected(self) -> dict[Answer, float]:
+        """Expected cost of each answer."""
+        return dict(zip(ANSWERS, (self.costs @ self.weights).tolist(), strict=True))
+
+    @property
+    def answer(self) -> Answer:
+        """The answer of the least expected cost."""
+        return ANSWERS[int(np.argmin(self.costs @ self.weights))]
+
+    def right(self) -> dict[Answer, float]:
+        """Probability of the states in which each answer costs least."""
+        best = np.argmin(self.costs, axis=0)
+        return {name: float(self.weights[best == k].sum()) for k, name in enumerate(ANSWERS)}
+
+    def value_of(self, name: str) -> CheckValue:
+        """What a check is worth."""
+        check, now = self.assumed.checks[name], self.answer
+        bad = self._bad(check)
+        left, settles = 0.0, 0.0
+        for outcome, chance in (("bad", bad), ("good", 1.0 - bad)):
+            share = float(chance @ self.weights)
+            then = self.after({name: outcome})
+            left += share * min(then.expected().values())
+            settles += share if then.answer != now else 0.0
+        cost = check.days * self.assumed.day_cost
+        value = min(self.expected().values()) - left - cost
+        return CheckValue(name=name, label=check.label, cost=cost, value=value, settles=settles)
+
+
+def _costs(a: Assumptions, present: Array, beyond: tuple[float, float]) -> Array:
+    """Cost of each answer in each state, shape (answers, states).
+
+    ``beyond`` is the chance that the next drop passes a limit, at full speed and with limits [1].
+    """
+    risk = np.array([one.risk for one in a.damages.values()])
+    renewed = np.array([one.remedy == "new bearings" for one in a.damages.values()])
+    repaired = ~renewed
+    unseen = np.array([one.of_machine for one in a.damages.values()])
+    day, bearings, machine = a.day_cost, a.bearing_set_cost, a.machine_cost
+
+    def harm(left: Array, share: float = 1.0) -> Array:
+        kept = (1.0 - a.sound_risk) * np.prod(1.0 - share * left * risk, axis=1)
+        return np.asarray(machine * (1.0 - kept))
+
+    exchange = bearings + a.exchange_days * day
+    drops = [a.another_drop * chance * exchange for chance in beyond]
+    any_renewed = (present @ renewed > 0).astype(float)
+    any_repaired = (present @ repaired > 0).astype(float)
+    seen = (present @ (repaired & ~unseen) > 0).astype(float)
+    sound = harm(np.zeros_like(present))
+    return np.array(
+        [
+            harm(present) + drops[0],
+            harm(present, a.limited_risk) + a.limited_days * day + drops[1],
+            a.inspection_days * day
+            + exchange * any_renewed
+            + a.exchange_days * day * any_repaired
+            + sound
+            + drops[0],
+            # what sits on the rotor is not seen while bearings are exchanged
+            a.replace_days * day
+            + bearings
+            + a.exchange_days * day * seen
+            + harm(present * unseen)
+            + drops[0],
+        ]
+    )
+
+
+def _flips(
+    suspected: Sequence[Suspicion],
+    assumed: Assumptions,
+    next_drops: Sequence[NextDrop],
+    made: Mapping[str, str],
+    answer: Answer,
+) -> tuple[Flip, ...]:
+    """The smallest factor on each cost and each prior that changes the answer."""
+
+    def scaled_cost(name: str, factor: float) -> _Case:
+        value = getattr(assumed, name) * factor
+        changed = assumed.model_copy(update={name: min(value, 1.0) if name == "another_drop" else value})
+        return _Case.of(suspected, changed, next_drops).after(made)
+
+    def scaled_prior(kind: str, factor: float) -> _Case:
+        moved = [_with_prior_odds(one, factor) if one.kind == kind else one for one in suspected]
+        return _Case.of(moved, assumed, next_drops).after(made)
+
+    tried: list[tuple[str, Callable[[float], _Case]]] = [
+        *((label, partial(scaled_cost, name)) for name, label in COSTS.items()),
+        *(
+            (f"the prior of a {damage.label}", partial(scaled_prior, kind))
+            for kind, damage in assumed.damages.items()
+        ),
+    ]
+    found = []
+    for label, case_at in tried:
+        for ends in ((1.0, FLIPS_WITHIN), (1.0, 1.0 / FLIPS_WITHIN)):
+            steps = np.geomspace(*ends, 9).tolist()
+            last = next((k for k, factor in enumerate(steps) if case_at(factor).answer != answer), None)
+            if last is None:
+                continue
+            inside, other = steps[last - 1], steps[last]
+            for _ in range(6):  # to a percent of the factor
+                middle = math.sqrt(inside * other)
+                inside, other = (middle, other) if case_at(middle).answer == answer else (inside, middle)
+            found.append(Flip(of=label, factor=other, answer=case_at(other).answer))
+    return tuple(sorted(found, key=lambda one: abs(math.log(one.factor))))
+
+
+def _with_prior_odds(one: Suspicion, factor: float) -> Suspicion:
+    odds = factor * one.probability / (1.0 - one.probability)
+    return replace(one, probability=odds / (1.0 + odds))
+
+
+def _said(card: RestartCard, drop: Drop, since: Drop | None) -> list[str]:
+    """The card in sentences, the answer first."""
+    assumed, likeliest = card.assumptions, card.suspicions[0]
+    said = []
+    if card.prior_alone:
+        missing = (
+            "there is no earlier estimate to compare with" if since is None else "no parameter moved clearly"
+        )
+        said.append(
+            f"The assumptions alone decide this: {missing}, and no check was made. Make one before you rely "
+            "on the answer."
+        )
+    known = [
+        name for name in sorted(card.right, key=lambda name: -card.right[name]) if card.right[name] > RARE
+    ]
+    said.append(
+        f"{card.answer.capitalize()}: it costs least in expectation, {card.costs[card.answer]:.2g} "
+        f"{assumed.unit}{_beside(card)}. Nothing is damaged with {format_chance(card.sound)}; the largest "
+        f"doubt is a {in_words(likeliest, assumed)}. Who knew the state of the bearings would answer "
+        f"{', '.join(f'{name} ({format_chance(card.right[name])})' for name in known)}."
+    )
+    best = card.best_check
+    if best is not None:
+        hours = 24.0 * best.cost / assumed.day_cost
+        said.append(
+            f"The check that pays most: {best.label} ({hours:.2g} h). Its outcome changes the answer in "
+            f"{format_chance(best.settles)} of the cases and saves {best.value:.2g} {assumed.unit} in "
+            "expectation."
+        )
+    else:
+        said.append("None of the checks pays: none can change the answer at its cost.")
+    said += [
+        f"The answer becomes “{one.answer}” where {one.of} is {_times(one.factor)}." for one in card.flips[:3]
+    ]
+    if not card.flips:
+        said.append(f"No cost and no prior within a factor of {FLIPS_WITHIN:g} changes the answer.")
+    if not drop.consistent:
+        said.append("The model is not consistent with this record: its parameters are no evidence here.")
+    said.append(
+        f"Costs, priors and risks are those of: {assumed.source}. They are no limits; state your own with "
+        "--assumptions."
+    )
+    return said
+
+
+def _beside(card: RestartCard) -> str:
+    others = ", ".join(f"{name} {cost:.2g}" for name, cost in card.costs.items() if name != card.answer)
+    return f" ({others})"
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.2g} times as large" if factor > 1.0 else f"{1.0 / factor:.2g} times smaller"

@@ -1,0 +1,289 @@
+"""Lives of machines whose bearings are damaged by drops: what the restart card makes of them.
+
+Usage: python studies/restart/lives.py [LIVES] [SEED]
+
+The lives know nothing of the card's equations: their damages have other sizes (gamma in place of log-normal),
+other chances (those assumed times a factor of each machine), dents by a logistic law of the true stress,
+and risks of their own. Estimates are published values with errors, as `rotordrop estimate` states them. After
+every drop the card is asked, its best check is made while one pays, and its answer is carried out. Costs are
+expectations under the true state. Prints the table.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from itertools import pairwise, product
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.stats import gamma, norm
+
+from rotordrop.estimate.published import Bearing, Drop, Parameter, Statistics, Unbalance, Value
+from rotordrop.known import NINETY
+from rotordrop.restart import restart_card
+from rotordrop.restart.assumptions import assumptions_of
+
+MACHINES, MOST_DROPS, ENDS = 20, 8, ("NDE", "DE")
+KINDS = ("worn", "brinelled", "dragging", "loose", "unbalance")
+SEEN = {"worn": "air_gap", "dragging": "friction.dynamic", "loose": "support.stiffness"}
+MEAN = {"worn": 18e-6, "dragging": math.log(1.5), "loose": math.log(0.55), "unbalance": math.log(2.8)}
+SHAPE = 3.0  # of the gamma law of the size of an effect
+HEALTHY = {"worn": 2e-6, "dragging": 0.05, "loose": 0.02, "unbalance": 0.1}
+ERROR = {"worn": 1.5e-6, "dragging": 0.04, "loose": 0.012, "unbalance": 0.15}
+TRUTH = {"worn": 275e-6, "dragging": math.log(0.12), "loose": math.log(1e8), "unbalance": math.log(2e-5)}
+ANSWERS = ("restart", "restart with limits", "inspect first", "replace")
+ZERO = dict.fromkeys((name for name, one in Statistics.model_fields.items() if one.is_required()), 0)
+STATISTICS = Statistics(**{**ZERO, "rule": "hazen", "weighted_by_time": False})
+
+
+@dataclass
+class Machine:
+    """A machine with its own chances, risks, stress and costs."""
+
+    chance: dict[str, float]
+    risk: dict[str, float]
+    stress: float
+    costs: dict[str, float]
+
+
+@dataclass
+class Score:
+    """What is counted."""
+
+    stated: list[tuple[float, bool]] = field(default_factory=list)
+    regret: float = 0.0
+    stake: float = 0.0
+    answers: Counter[str] = field(default_factory=Counter)
+    restarts: int = 0
+    damaged_restarts: int = 0
+    named: int = 0
+    best: int = 0
+    cards: int = 0
+
+
+def drawn(random: np.random.Generator, base) -> Machine:
+    """One of the machines."""
+    return Machine(
+        chance={k: min(base.damages[k].prior * random.lognormal(0.0, 0.4), 0.3) for k in KINDS},
+        risk={k: min(base.damages[k].risk * random.lognormal(0.0, 0.25), 0.95) for k in KINDS},
+        stress=random.uniform(1.3e9, 4.2e9),
+        costs={
+            "bearing_set_cost": random.uniform(1.0, 8.0),
+            "machine_cost": random.uniform(25.0, 150.0),
+            "inspection_days": random.uniform(0.5, 2.0),
+        },
+    )
+
+
+def effect(kind: str, random: np.random.Generator) -> float:
+    """Size of a damage in the measure of its parameter."""
+    return MEAN[kind] * random.gamma(SHAPE) / SHAPE
+
+
+def stated(mean: float, error: float, positive: bool) -> Value:
+    """A number as an estimate publishes it."""
+    low, mid, high = (mean + k * NINETY * error for k in (-1, 0, 1))
+    if positive:
+        low, mid, high = math.exp(low), math.exp(mid), math.exp(high)
+    return Value(value=mid, interval_90=[low, high])
+
+
+def published(state, random: np.random.Generator, stress: float) -> Drop:
+    """The estimate of a drop of bearings in a state."""
+    parameters, bearings = [], {}
+    for end in ENDS:
+        for kind, path in SEEN.items():
+            true = TRUTH[kind] + state[kind, end] + HEALTHY[kind] * random.standard_normal()
+            found = true + ERROR[kind] * random.standard_normal()
+            wide = 50.0 * ERROR[kind]
+            parameters.append(
+                Parameter(
+                    path=f"{end}.{path}",
+                    scope="machine",
+                    prior=stated(TRUTH[kind], wide, kind != "worn"),
+                    estimate=stated(found, ERROR[kind], kind != "worn"),
+                )
+            )
+        read = stress * math.exp(0.006 * random.standard_normal())
+        numbers = {
+            "peak_force_N": Value(value=3e3, interval_90=[2.9e3, 3.1e3]),
+            "peak_stress_Pa": Value(value=read, interval_90=[0.99 * read, 1.01 * read]),
+        }
+        bearings[end] = Bearing.model_construct(
+            origin="", numbers=numbers, stress_statistics_Pa=STATISTICS, impacts=[]
+        )
+    size = TRUTH["unbalance"] + state["unbalance", ""] + HEALTHY["unbalance"] * random.standard_normal()
+    size += ERROR["unbalance"] * random.standard_normal()
+    return Drop.model_construct(
+        bearings=bearings,
+        parameters=parameters,
+        joint=None,
+        consistent=True,
+        machine="m",
+        record="r",
+        unbalance=[
+            Unbalance(node=1, amount_kg_m=stated(size, ERROR["unbalance"], True), phase_rad=None, sentence="")
+        ],
+    )
+
+
+def places(kind: str) -> tuple[str, ...]:
+    """Where a kind may be."""
+    return ("",) if kind == "unbalance" else ENDS
+
+
+def costs_of(machine: Machine, present: set[str], assumed) -> dict[str, float]:
+    """What each answer costs in expectation with damages that are there."""
+    c, a = machine.costs, assumed
+
+    def harm(kinds, share=1.0):
+        return c["machine_cost"] * (1 - 0.998 * math.prod(1 - share * machine.risk[k] for k in kinds))
+
+    new, mend = present & {"worn", "brinelled", "dragging"}, present & {"loose", "unbalance"}
+    return {
+        "restart": harm(present),
+        "restart with limits": harm(present, a.limited_risk) + a.limited_days,
+        "inspect first": c["inspection_days"]
+        + bool(new) * (c["bearing_set_cost"] + a.exchange_days)
+        + bool(mend) * a.exchange_days
+        + harm(()),
+        "replace": a.replace_days
+        + c["bearing_set_cost"]
+        + ("loose" in present) * a.exchange_days
+        + harm(present & {"unbalance"}),
+    }
+
+
+def true_posterior(machine: Machine, since: Drop, drop: Drop, count: int, stress: float) -> dict[str, float]:
+    """Chance of every kind by the laws of the lives, integrated here."""
+    moved = {one.path: one.estimate.value for one in drop.parameters}
+    before = {one.path: one.estimate.value for one in since.parameters}
+    found = {}
+    for kind in KINDS:
+        absent = 1.0
+        for end in places(kind):
+            prior = 1.0 - (1.0 - machine.chance[kind]) ** count
+            if kind == "brinelled":
+                prior = 1.0 - (1.0 - prior) * (1.0 - dent(stress))
+            odds = prior / (1.0 - prior)
+            if kind in SEEN or kind == "unbalance":
+                pair = (
+                    (since.unbalance[0].amount_kg_m.value, drop.unbalance[0].amount_kg_m.value)
+                    if kind == "unbalance"
+                    else (before[f"{end}.{SEEN[kind]}"], moved[f"{end}.{SEEN[kind]}"])
+                )
+                change = pair[1] - pair[0] if kind == "worn" else math.log(pair[1] / pair[0])
+                wide = math.sqrt(2.0) * math.hypot(ERROR[kind], HEALTHY[kind])
+                sizes = gamma(SHAPE, scale=1.0 / SHAPE)
+
+                def both(size, kind=kind, change=change, wide=wide, sizes=sizes):
+                    return sizes.pdf(size) * norm.pdf((change - MEAN[kind] * size) / wide)
+
+                odds *= quad(both, 0.0, 6.0, limit=200, epsabs=1e-14)[0] / max(
+                    norm.pdf(change / wide), 1e-300
+                )
+            absent *= 1.0 / (1.0 + odds)
+        found[kind] = 1.0 - absent
+    return found
+
+
+def dent(stress: float) -> float:
+    """Chance that a stress dents a race so that it matters."""
+    return 1.0 / (1.0 + math.exp(-(stress - 5.25e9) / 0.33e9))
+
+
+def shows(check, present: set[str]) -> float:
+    """Chance of a bad outcome."""
+    return 1.0 - (1.0 - check.false_alarm) * math.prod(1.0 - check.shows.get(k, 0.0) for k in present)
+
+
+def best_checks(machine: Machine, chance: dict[str, float], assumed) -> dict[str, float]:
+    """What each check is worth by the laws of the lives."""
+    states = []
+    for flags in product((False, True), repeat=len(KINDS)):
+        present = {k for k, yes in zip(KINDS, flags, strict=True) if yes}
+        weight = math.prod(chance[k] if k in present else 1.0 - chance[k] for k in KINDS)
+        states.append((weight, present, costs_of(machine, present, assumed)))
+    now = min(sum(w * c[a] for w, _, c in states) for a in ANSWERS)
+    worth = {}
+    for name, check in assumed.checks.items():
+        left = 0.0
+        for bad in (True, False):
+            of = [(w * (shows(check, p) if bad else 1 - shows(check, p)), c) for w, p, c in states]
+            left += min(sum(w * c[a] for w, c in of) for a in ANSWERS)
+        worth[name] = now - left - check.days
+    return worth
+
+
+def live(machine: Machine, random: np.random.Generator, base, score: Score) -> None:
+    """One set of bearings from its first drop until it is opened or replaced."""
+    assumed = base.model_copy(update=machine.costs)
+    state = {(k, end): 0.0 for k in KINDS for end in places(k)}
+    there: set[str] = set()
+    baseline = published(state, random, 0.5 * machine.stress)
+    for count in range(MOST_DROPS):
+        stress = machine.stress * random.lognormal(0.0, 0.15)
+        for kind in KINDS:
+            for end in places(kind):
+                chance = machine.chance[kind]
+                if kind == "brinelled":
+                    chance = 1.0 - (1.0 - chance) * (1.0 - dent(stress))
+                if random.random() < chance and state[kind, end] == 0.0:
+                    there.add(kind)
+                    state[kind, end] = effect(kind, random) if kind in MEAN else 1.0
+        drop = published(state, random, stress)
+        checks: dict[str, str] = {}
+        card = restart_card(drop, assumed, since=baseline, earlier=count)
+        spent = 0.0
+        if (named := card.best_check) is not None:
+            worth = best_checks(machine, true_posterior(machine, baseline, drop, count + 1, stress), assumed)
+            score.named += 1
+            # two checks within a hundredth of a day are one
+            score.best += worth[named.name] >= max(worth.values()) - 0.01
+        while (check := card.best_check) is not None:
+            bad = random.random() < shows(assumed.checks[check.name], there)
+            checks[check.name] = "bad" if bad else "good"
+            spent += assumed.checks[check.name].days
+            card = restart_card(drop, assumed, since=baseline, earlier=count, checks=checks)
+        score.cards += 1
+        score.stated.append((1.0 - card.sound, bool(there)))
+        score.answers[card.answer] += 1
+        true = costs_of(machine, there, assumed)
+        score.regret += spent + true[card.answer] - min(true.values())
+        score.stake += max(true.values()) - min(true.values())
+        if card.answer == "restart":
+            score.restarts += 1
+            score.damaged_restarts += bool(there)
+        if card.answer in ("inspect first", "replace"):
+            return
+
+
+def main() -> None:
+    """Live and print."""
+    lives = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    base, score = assumptions_of({}, "the package"), Score()
+    random = np.random.default_rng(seed)
+    machines = [drawn(random, base) for _ in range(MACHINES)]
+    for k in range(lives):
+        live(machines[k % MACHINES], random, base, score)
+    print(f"{lives} lives of {MACHINES} machines, seed {seed}, {score.cards} cards\n")
+    print("| stated chance of a damage | cards | stated | damaged |\n| --- | --- | --- | --- |")
+    edges = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0001)
+    for low, high in pairwise(edges):
+        part = [(p, d) for p, d in score.stated if low <= p < high]
+        if part:
+            mean, share = (100 * sum(x) / len(part) for x in zip(*part, strict=True))
+            print(f"| {low:.0%} to {min(high, 1):.0%} | {len(part)} | {mean:.1f} % | {share:.1f} % |")
+    print(f"\nanswers: {dict(score.answers)}")
+    share = score.regret / score.stake
+    print(f"regret over an oracle: {score.regret:.1f} of {score.stake:.1f} at stake = {share:.1%}")
+    print(f"restart with a damaged bearing: {score.damaged_restarts} of {score.restarts}")
+    print(f"named check the best: {score.best} of {score.named}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,277 @@
+"""The restart card: probabilities by Bayes' rule, costs by states, sentences that hold."""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from tests.published import bearing, published, value
+
+from rotordrop.errors import UsageError
+from rotordrop.estimate.published import Parameter, Unbalance, Value
+from rotordrop.known import NINETY, Known
+from rotordrop.report.restart_page import restart_numbers, restart_page
+from rotordrop.report.terminal import print_summary
+from rotordrop.restart import load_assumptions, restart_card
+from rotordrop.restart.assumptions import assumptions_of
+from rotordrop.restart.card import ANSWERS
+from rotordrop.restart.evidence import indicators, suspicions
+from rotordrop.restart.next_drop import NextDrop
+
+ASSUMED = assumptions_of({}, "here")
+
+
+def drop(stress=2e9, width=0.02, gap=275e-6, stiffness=1e8, unbalance=None, **more):
+    """An estimate with a peak stress at two bearings, a gap with ±1 µm and a stiffness with ±1 %."""
+    numbers = {
+        "peak_force_N": value(3000.0, 2900.0, 3100.0),
+        "peak_stress_Pa": value(stress, stress * (1 - width), stress * (1 + width)),
+    }
+    found = []
+    for end in ("NDE", "DE"):
+        for path, at, one, before in (
+            ("air_gap", gap, NINETY * 1e-6, 22e-6),
+            ("support.stiffness", stiffness, NINETY * 0.01 * stiffness, 0.5 * stiffness),
+        ):
+            found.append(
+                Parameter(
+                    path=f"{end}.{path}",
+                    scope="machine",
+                    prior=Value(value=at, interval_90=[at - NINETY * before, at + NINETY * before]),
+                    estimate=Value(value=at, interval_90=[at - one, at + one]),
+                )
+            )
+    planes = []
+    if unbalance is not None:
+        amount = value(unbalance, 0.9 * unbalance, unbalance / 0.9)
+        planes = [Unbalance(node=8, amount_kg_m=amount, phase_rad=None, sentence="")]
+    return published(
+        bearings={"NDE": bearing(numbers), "DE": bearing(numbers)},
+        parameters=found,
+        unbalance=planes,
+        **more,
+    )
+
+
+def chance(card, kind, where="NDE"):
+    return next(one.probability for one in card.suspicions if (one.kind, one.bearing) == (kind, where))
+
+
+def test_a_mild_first_drop_rests_on_the_assumptions_and_says_so():
+    card = restart_card(drop(), ASSUMED)
+    assert card.prior_alone
+    assert card.statements[0].startswith("The assumptions alone decide this: there is no earlier estimate")
+    assert chance(card, "worn") == pytest.approx(0.02)
+
+
+def test_a_gap_that_grew_speaks_of_wear_and_one_that_did_not_against_it():
+    same = restart_card(drop(), ASSUMED, since=drop())
+    grown = restart_card(drop(gap=295e-6), ASSUMED, since=drop())
+    assert chance(same, "worn") < 0.01 < 0.9 < chance(grown, "worn")
+    assert not grown.prior_alone
+    assert chance(grown, "loose") == pytest.approx(chance(same, "loose"))
+
+
+def test_a_softer_support_is_a_loose_one_and_a_stiffer_one_is_not():
+    soft = restart_card(drop(stiffness=0.7e8), ASSUMED, since=drop())
+    stiff = restart_card(drop(stiffness=1.3e8), ASSUMED, since=drop())
+    assert chance(soft, "loose") > 0.9
+    assert chance(stiff, "loose") < 0.01
+    assert soft.answer == "inspect first"
+
+
+def test_an_unbalance_that_grew_is_seen_on_the_rotor():
+    card = restart_card(drop(unbalance=5e-5), ASSUMED, since=drop(unbalance=1.5e-5))
+    assert chance(card, "unbalance", "") > 0.9
+    assert next(one.what for one in card.indicators if one.kind == "unbalance").startswith(
+        "unbalance at node 8 × 3.33"
+    )
+
+
+def test_likelihood_ratio_is_the_integral_over_the_sizes_of_the_effect():
+    card = restart_card(drop(gap=281e-6), ASSUMED, since=drop())
+    effect = ASSUMED.damages["worn"].moves["air_gap"]
+    found = next(one for one in card.indicators if (one.kind, one.bearing) == ("worn", "NDE"))
+    own = math.sqrt(2.0) / math.sqrt(1e12 - 1 / 22e-6**2)  # the prior is taken out of both
+    width = math.hypot(own, effect.healthy)
+
+    def normal(x):
+        return math.exp(-0.5 * (x / width) ** 2)
+
+    def integrand(z):
+        return normal(6e-6 - effect.median * math.exp(effect.spread * z)) * math.exp(-0.5 * z * z)
+
+    damaged = quad(integrand, -8, 8)[0] / math.sqrt(2 * math.pi)
+    assert found.ratio == pytest.approx(damaged / normal(6e-6), rel=0.02)
+
+
+def test_stress_near_the_dent_limit_replaces_and_its_own_width_counts():
+    assert restart_card(drop(stress=6.5e9), ASSUMED).answer == "replace"
+    narrow, wide = (restart_card(drop(stress=4.5e9, width=w), ASSUMED) for w in (0.01, 0.3))
+    assert chance(narrow, "brinelled") < chance(wide, "brinelled")
+
+
+def test_costs_are_those_of_a_sum_over_all_states():
+    card = restart_card(drop(gap=283e-6), ASSUMED, since=drop(), earlier=3)
+    kinds = list(ASSUMED.damages)
+    absent = dict.fromkeys(kinds, 1.0)
+    for one in card.suspicions:
+        absent[one.kind] *= 1.0 - one.probability
+    expected = dict.fromkeys(ANSWERS, 0.0)
+    for present in product((False, True), repeat=len(kinds)):
+        there = {kind for kind, yes in zip(kinds, present, strict=True) if yes}
+        weight = math.prod(1 - absent[kind] if kind in there else absent[kind] for kind in kinds)
+        a = ASSUMED
+        sound = a.machine_cost * a.sound_risk
+        kept = math.prod(1 - a.damages[kind].risk for kind in there)
+        limited = math.prod(1 - a.limited_risk * a.damages[kind].risk for kind in there)
+        on_rotor = math.prod(1 - a.damages[kind].risk for kind in there & {"unbalance"})
+        new = bool(there & {"worn", "brinelled", "dragging"})
+        mended = bool(there & {"loose", "unbalance"})
+        expected["restart"] += weight * a.machine_cost * (1 - (1 - a.sound_risk) * kept)
+        expected["restart with limits"] += weight * (
+            a.machine_cost * (1 - (1 - a.sound_risk) * limited) + a.limited_days
+        )
+        expected["inspect first"] += weight * (
+            a.inspection_days
+            + new * (a.bearing_set_cost + a.exchange_days)
+            + mended * a.exchange_days
+            + sound
+        )
+        expected["replace"] += weight * (
+            a.replace_days
+            + a.bearing_set_cost
+            + ("loose" in there) * a.exchange_days
+            + a.machine_cost * (1 - (1 - a.sound_risk) * on_rotor)
+        )
+    assert card.costs == pytest.approx(expected)
+    assert card.answer == min(expected, key=expected.get)
+    assert sum(card.right.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ASSUMED.checks)
+def test_a_check_never_costs_more_than_itself_and_its_outcomes_average_to_what_was_known(name):
+    before = restart_card(drop(), ASSUMED)
+    check = next(one for one in before.checks if one.name == name)
+    assert check.value >= -check.cost - 1e-9
+    good, bad = (restart_card(drop(), ASSUMED, checks={name: how}) for how in ("good", "bad"))
+    share = (before.sound - good.sound) / (bad.sound - good.sound)
+    assert 0.0 < share < 0.3
+    for kind, where in (("worn", "DE"), ("dragging", "NDE"), ("unbalance", "")):
+        mixed = share * chance(bad, kind, where) + (1 - share) * chance(good, kind, where)
+        assert mixed == pytest.approx(chance(before, kind, where))
+    assert name not in {one.name for one in bad.checks}
+
+
+def test_a_flip_changes_the_answer_and_a_little_less_does_not():
+    card = restart_card(drop(), ASSUMED)
+    costs = [one for one in card.flips if one.of == "a damaged machine"]
+    assert costs, "half a day decides here"
+    for flip in costs:
+        beyond, short = flip.factor, flip.factor**0.95
+        for factor, same in ((beyond, False), (short, True)):
+            moved = ASSUMED.model_copy(update={"machine_cost": ASSUMED.machine_cost * factor})
+            assert (restart_card(drop(), moved).answer == card.answer) is same
+
+
+def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
+    assert chance(restart_card(drop(), ASSUMED, earlier=9), "worn") == pytest.approx(1 - 0.98**10)
+    known = {"NDE": (Known(value=3e3), Known(value=4e3))}
+    after = [
+        NextDrop(speed=s, peak_force=known, peak_stress=known, beyond_limit=Known(value=v))
+        for s, v in ((400.0, 0.5), (280.0, 0.1))
+    ]
+    with_limit, without = restart_card(drop(), ASSUMED, next_drops=after), restart_card(drop(), ASSUMED)
+    exchange = ASSUMED.bearing_set_cost + ASSUMED.exchange_days
+    for answer, share in (("restart", 0.5), ("restart with limits", 0.1)):
+        more = with_limit.costs[answer] - without.costs[answer]
+        assert more == pytest.approx(ASSUMED.another_drop * share * exchange)
+
+
+def test_an_estimate_that_does_not_fit_is_no_evidence():
+    card = restart_card(drop(gap=295e-6, consistent=False), ASSUMED, since=drop())
+    assert not card.indicators
+    assert any("not consistent with this record" in text for text in card.statements)
+
+
+def test_owner_states_what_differs_and_the_rest_stays(tmp_path):
+    file = tmp_path / "owner.toml"
+    file.write_text('machine_cost = 900\nunit = "kEUR"\nsource = "works"\n[damages.worn]\nprior = 0.1\n')
+    assumed = load_assumptions(file)
+    assert (assumed.machine_cost, assumed.damages["worn"].prior) == (900.0, 0.1)
+    assert assumed.damages["worn"].risk == ASSUMED.damages["worn"].risk
+    card = restart_card(drop(), assumed)
+    assert "kEUR" in card.statements[1]
+    assert "those of: works" in card.statements[-1]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("machine_cost = -1", r"machine_cost is '-1'.*greater than 0"),
+        ("machine_price = 1", r"machine_price"),
+        ("[damages.worn]\nprior = 1.5", r"damages\.worn\.prior is '1\.5'.*less than 1"),
+        (
+            "[checks.lift.shows]\nrust = 0.5",
+            r"checks\.lift\.shows\.rust: there is no such damage; there are worn",
+        ),
+        ("[checks.lift.shows]\nworn = 2.0", r"checks\.lift\.shows\.worn = 2; expected a chance from 0 to 1"),
+        ("machine_cost = nan", r"machine_cost is 'nan'"),
+        ("machine_cost =", r"is no TOML"),
+    ],
+)
+def test_bad_assumptions_are_named(tmp_path, text, message):
+    file = tmp_path / "owner.toml"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=message):
+        load_assumptions(file)
+    with pytest.raises(UsageError, match=r"cannot be read.*name another file"):
+        load_assumptions(tmp_path / "none.toml")
+
+
+def test_unknown_checks_and_outcomes_are_named():
+    with pytest.raises(UsageError, match="there is no check 'x-ray'; there are lift"):
+        restart_card(drop(), ASSUMED, checks={"x-ray": "bad"})
+    with pytest.raises(UsageError, match="check lift = 'fine'; expected good or bad"):
+        restart_card(drop(), ASSUMED, checks={"lift": "fine"})
+
+
+def test_page_json_and_terminal_say_the_same(capsys):
+    one = drop(gap=295e-6, simulated_record=True)
+    card = restart_card(one, ASSUMED, since=drop(), checks={"turning": "good"})
+    page = restart_page(card, one)
+    assert page.title.endswith(card.answer)
+    assert "simulated" in page.simulated
+    content = json.loads(json.dumps(restart_numbers(card), allow_nan=False))
+    assert content["answer"] == card.answer
+    assert content["costs"] == pytest.approx(card.costs)
+    from rotordrop.cli._output import console
+
+    print_summary(page, console())
+    out = capsys.readouterr().out
+    assert card.answer in out
+    assert "made: turning the rings by hand (good)" in out
+
+
+def test_probabilities_are_reliable_where_the_world_is_as_assumed():
+    """Of the states drawn as the assumptions say, the stated share is damaged."""
+    random = np.random.default_rng(8)
+    stated, true = [], []
+    effect = ASSUMED.damages["worn"].moves["air_gap"]
+    own = math.sqrt(2.0) * 1e-6
+    often = ASSUMED.damages["worn"].model_copy(update={"prior": 0.3})
+    world = ASSUMED.model_copy(update={"damages": {**ASSUMED.damages, "worn": often}})
+    for _ in range(400):
+        worn = random.random() < 0.3
+        moved = effect.healthy * random.standard_normal() + own * random.standard_normal()
+        moved += worn * effect.median * math.exp(effect.spread * random.standard_normal())
+        one = drop(gap=275e-6 + moved)
+        found = suspicions(one, indicators(one, drop(), world), 0, world)
+        stated.append(next(s.probability for s in found if (s.kind, s.bearing) == ("worn", "NDE")))
+        true.append(worn)
+    error = math.sqrt(sum(p * (1 - p) for p in stated))
+    assert abs(sum(stated) - sum(true)) < 3.0 * error
