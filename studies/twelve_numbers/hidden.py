@@ -28,7 +28,6 @@ import numpy as np
 from rotordrop import estimate_drop
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import RotordropError
-from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -177,7 +176,7 @@ def checked(machine: Machine, folder: Path, truth: Mapping[str, Any], described:
     row: dict[str, Any] = {"cpu_s": round(time.process_time() - began, 1)}
     if found.rotor.is_beam:
         row["rotor"] = found_rotor(found.rotor, described)
-    beam = NINETY * BEAM_FORCE_SIGMA if found.rotor.is_beam else 0.0
+    beam = NINETY * found.rotor.force_sigma
     for b, name in enumerate(problem.model.bearing_names):
         error = check.peak[b] / truth["peak_force_N"][name] - 1.0
         half = math.hypot(float(check.peak_error[b]), beam) * (1.0 + error)

@@ -222,6 +222,7 @@ def clearance(
 
     Example: rotordrop clearance lift.csv --machine machine.toml -o measured.toml
     """
+    from rotordrop.elements.touchdown_bearing import AIR_GAP
     from rotordrop.evidence.clearance import measure_clearance, wear_between
     from rotordrop.known import Known
     from rotordrop.machine import save_machine
@@ -236,7 +237,7 @@ def clearance(
     wear = wear_between(*checks) if after is not None else ()
     if output is not None and described is not None:
         gaps = {
-            f"{found.bearing}.air_gap": Known(
+            AIR_GAP.path_of(found.bearing): Known(
                 value=found.gap,
                 status="estimated",
                 interval_90=found.interval_90,

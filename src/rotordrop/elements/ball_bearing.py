@@ -437,14 +437,6 @@ def _check_play(values: dict[str, Any]) -> None:
         )
 
 
-NO_PRELOAD = Known(value=0.0, status="default", source="this kind of bearing has none", unit="N")
-"""What a bearing without rows to press against each other has: no unknown."""
-
-
-def _preload(bearing: TouchdownBearing) -> Known:
-    return getattr(bearing.bearing, "preload", NO_PRELOAD)
-
-
 def _offset_of_preload(balls: BallBearing, force: float) -> float:
     return balls.changed(preload=Known(value=force)).numbers().constants.axial_offset
 
@@ -475,7 +467,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         step=Step.IMPACTS,
         field="preload_N",
         truth=("preload_N",),
-        read=_preload,  # no lambda: a parameter is sent to other processes
+        stored="bearing.preload",
         estimated_by=_by_offset,
         taken_over="welcome",
     ),

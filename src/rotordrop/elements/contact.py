@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit, Usual
-from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
+from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, Values, bearing_entries
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -125,6 +126,42 @@ def _of_the_file(bearing: Any, load: float, slope: float) -> float:
     return -slope * math.log(bearing.contact.typical_depth(load))
 
 
+def _pair_of_the_file(bearing: Any, found: Values, load: float) -> Values:
+    """Exponent within its limits, and the stiffness that belongs to it.
+
+    The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
+    be compared with it; a description holds one pair, with the same force at a typical indentation.
+    """
+    exponent, stiffness = found.get("contact.exponent"), found.get("contact.stiffness")
+    if exponent is None or stiffness is None or stiffness.interval_90 is None:
+        return {}
+    exponent = EXPONENT.known_within(exponent)
+    depth = bearing.contact.typical_depth(load)
+    factor = depth ** (float(bearing.contact.exponent) - exponent.value)
+    low, high = stiffness.interval_90
+    stiffness = replace(stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high))
+    return {"contact.exponent": exponent, "contact.stiffness": stiffness}
+
+
+EXPONENT = Parameter(
+    path="contact.exponent",
+    label="contact exponent",
+    kind="dimensionless",
+    measured_by="a static push with a known force at {owner}",
+    guess_sigma=0.1,  # from 10/9 of a line to 3/2 of a point
+    least_sigma=0.01,  # an interval that ends at a limit may have no width, and no drop says more
+    lower=1.0,
+    upper=2.0,
+    entries=(
+        Entry(array="bearing", column=L.CONTACT_EXPONENT),
+        Entry(array="bearing", column=L.CONTACT_STIFFNESS, rule=Rule.AT_TYPICAL_DEPTH),
+    ),
+    field="contact.exponent",
+    truth=("contact", "n"),
+    changes={"contact.stiffness": _of_the_file},
+    filed=_pair_of_the_file,
+)
+
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="contact.stiffness",
@@ -141,23 +178,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         taken_over="welcome",
         separated_by={"air_gap": "a static push with a known force gives the contact stiffness"},
     ),
-    Parameter(
-        path="contact.exponent",
-        label="contact exponent",
-        kind="dimensionless",
-        measured_by="a static push with a known force at {owner}",
-        guess_sigma=0.1,  # from 10/9 of a line to 3/2 of a point
-        least_sigma=0.01,  # an interval that ends at a limit may have no width, and no drop says more
-        lower=1.0,
-        upper=2.0,
-        entries=(
-            Entry(array="bearing", column=L.CONTACT_EXPONENT),
-            Entry(array="bearing", column=L.CONTACT_STIFFNESS, rule=Rule.AT_TYPICAL_DEPTH),
-        ),
-        field="contact.exponent",
-        truth=("contact", "n"),
-        changes={"contact.stiffness": _of_the_file},
-    ),
+    EXPONENT,
     Parameter(
         path="contact.damping",
         label="contact damping",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 from rotordrop.elements.description import Description, Usual
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
@@ -76,9 +76,14 @@ class Friction(Description):
         )
 
 
+def _static(bearing: Any, dynamic: Known) -> Known:
+    return cast(Friction, bearing.friction).static_of(dynamic)
+
+
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="friction.static",
+        follows=("friction.dynamic", _static),
         label="static friction coefficient",
         kind="dimensionless",
         role=Role.DERIVED,

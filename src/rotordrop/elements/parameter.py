@@ -16,6 +16,13 @@ if TYPE_CHECKING:
     from rotordrop.elements.sensor import Seen
 
 Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]
+_OF_A_MACHINE = ("bearing", "sensor", "rotor")
+SMALLEST_GAP = "smallest air gap"
+"""Scale of the prior of an offset."""
+
+
+Values = Mapping[str, Known]
+"""Values by path."""
 
 
 class Role(Enum):
@@ -154,14 +161,16 @@ class Parameter:
     """What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual."""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
     """What measurement would tell it from another parameter, by the path of the other."""
+    by_drawing: bool = False
+    """Whether a drawing would make it known."""
     worn: float | None = None
     """Change by wear that two drops are asked for: [SI], or of the logarithm."""
     floor: float | None = None
     """Where published intervals end [SI]."""
     model_error: float = 0.0
     """Standard error by what a fit leaves out of it, as a share of its value [1]."""
-    read: Callable[[Any], Known] | None = None
-    """The described value of a part, where it does not stand at the path."""
+    stored: str = ""
+    """Where the description of a part has it, if not at its path; a part of a kind without it has none."""
     estimated_by: Callable[[Any], Measure] | None = None
     """Another number of a part by which the parameter is estimated."""
     ratio: tuple[str, str] | None = None
@@ -171,6 +180,11 @@ class Parameter:
     """Prior standard deviation of a part that may be anything; None where that of the row holds."""
     scaled: Callable[[Any, float], tuple[float, tuple[float, float]]] | None = None
     """Scale of the prior of a part and its limits [SI], for the mean load of a bearing [N]."""
+    follows: tuple[str, Callable[[Any, Known], Known]] | None = None
+    """Path of the value of the same part that it follows, and how: from part and value."""
+    filed: Callable[[Any, Values, float], Values] | None = None
+    """Values of a part, by path below it, as a machine file has them; from part, fitted values and mean load
+    of a bearing [N]."""
     changes: Mapping[str, Callable[[Any, float, float], float]] = dataclasses.field(default_factory=dict)
     """What it changes of another value in the machine file, by its path: from part, mean load [N] and slope
     of the value over the number that is estimated."""
@@ -193,6 +207,22 @@ class Parameter:
         """Kind a report shows it as."""
         return self.shown_as or self.kind
 
+    @property
+    def shared(self) -> bool:
+        """Whether all drops of a machine share it."""
+        return self.owner in _OF_A_MACHINE
+
+    @property
+    def errs_jointly(self) -> bool:
+        """Whether a calibrated machine file says how its error goes with those of others."""
+        return self.owner == "bearing"
+
+    def named(self, owner: str) -> str:
+        """Name for people, with what it belongs to."""
+        if self.owner == "unbalance":
+            return f"{self.label} of unbalance {int(owner) + 1}" if owner.isdigit() else self.label
+        return f"{owner}: {self.label}" if owner else self.label
+
     def path_of(self, owner: str) -> str:
         """Path in the machine: ``"NDE.support.stiffness"``, ``"sensors.X1.gain"``, ``"unbalance.0.sine"``."""
         return path_of(self.owner, owner, self.path)
@@ -206,6 +236,12 @@ class Parameter:
         """The value, or the limit of the model it lies beyond."""
         return min(max(value, self.lower), self.upper)
 
+    def known_within(self, known: Known) -> Known:
+        """A value and its interval, each or the limit of the model it lies beyond."""
+        low, high = known.interval_90 or (known.value, known.value)
+        ends = self.within(low), self.within(high)
+        return dataclasses.replace(known, value=self.within(known.value), interval_90=ends)
+
     def stated(self, part: Any) -> Known | None:
         """The value as the description has it; None where it leaves it out."""
         value = _at(part, self.path)
@@ -213,20 +249,26 @@ class Parameter:
 
     def described(self, part: Any) -> Known:
         """The value as the machine description has it."""
-        if self.read is not None:
-            return self.read(part)
         if self.ratio is not None:
             above, below = (float(_at(part, path)) for path in self.ratio)
             return Known(value=above / below, status="default")
-        value = _at(part, self.path)
+        value = _at(part, self.stored or self.path)
+        if value is None and self.stored:
+            why = "this kind of bearing has none"
+            return Known(value=0.0, status="default", source=why, unit=self.unit)
         assert isinstance(value, Known)
         return value
 
 
 def _at(part: Any, path: str) -> Any:
     for name in path.split("."):
-        part = None if part is None else getattr(part, name)
+        part = getattr(part, name, None)
     return part
+
+
+def below(values: Values, prefix: str) -> dict[str, Known]:
+    """The values whose path in the machine begins with a prefix, by the rest of it."""
+    return {path[len(prefix) :]: one for path, one in values.items() if path.startswith(prefix)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,10 +285,6 @@ class Load:
     """Field of a truth file."""
     truth_unit: float = 1.0
     """SI value of one unit of that field."""
-
-
-Values = Mapping[str, Known]
-"""Values by path."""
 
 
 M = TypeVar("M")  # a machine, which stands above the elements
@@ -337,8 +375,7 @@ class Extension:
         words = []
         for name, part in parts_of(machine, self.owner):
             prefix = path_of(self.owner, name, "")
-            inside = {path[len(prefix) :]: one for path, one in values.items() if path.startswith(prefix)}
-            words.append(self.sentence(part, inside, mean_load))
+            words.append(self.sentence(part, below(values, prefix), mean_load))
         return self.frame.format(self.joined.join(word for word in words if word))
 
 

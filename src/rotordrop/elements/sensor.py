@@ -11,7 +11,15 @@ from pydantic import Field
 
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Channel, Misfit, Name, Placed, Usual
-from rotordrop.elements.parameter import Extension, Parameter, Values, guess, in_words, itself
+from rotordrop.elements.parameter import (
+    SMALLEST_GAP,
+    Extension,
+    Parameter,
+    Values,
+    guess,
+    in_words,
+    itself,
+)
 from rotordrop.elements.values import default
 
 LEAST_PLANE_DISTANCE = 1e-3
@@ -195,7 +203,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="length",
         logarithmic=False,
         guess_sigma=0.04,
-        scale="smallest air gap",
+        scale=SMALLEST_GAP,
         least_sigma=1e-12,
     ),
 )

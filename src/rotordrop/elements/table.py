@@ -7,7 +7,8 @@ stand in the files of the elements that own them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from rotordrop.elements import (
     air,
@@ -25,6 +26,7 @@ from rotordrop.elements import (
 )
 from rotordrop.elements.parameter import Extension, Load, Owner, Parameter
 from rotordrop.elements.rotor import FORM
+from rotordrop.known import Known
 
 TABLE: tuple[Parameter, ...] = (
     *touchdown_bearing.PARAMETERS,
@@ -83,6 +85,17 @@ def row_of(path: str) -> Parameter:
     if owner == "rotor":
         return _BY_PATH["rotor", rest]
     return _BY_PATH.get(("bearing", path)) or _BY_PATH["bearing", rest]
+
+
+def following(owner: Owner = "bearing") -> Iterator[tuple[Parameter, str, Callable[[Any, Known], Known]]]:
+    """Rows whose value follows another of the same part: the row, the path of the other, and how."""
+    return ((row, *row.follows) for row in rows(owner) if row.follows is not None)
+
+
+def keys_of(keys: list[str], owner: Owner = "bearing") -> list[str]:
+    """Keys of a value in the description of its owner, for those of its path."""
+    row = _BY_PATH.get((owner, ".".join(keys)))
+    return keys if row is None or not row.stored else row.stored.split(".")
 
 
 def fitted_row(path: str) -> Parameter | None:

@@ -141,28 +141,30 @@ MODEL_GAP_ERROR = 0.008
 Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps of lone drops by up to 2 %.
 """
 
+AIR_GAP = Parameter(
+    path="air_gap",
+    worn=10e-6,
+    floor=0.0,
+    model_error=MODEL_GAP_ERROR,
+    label="air gap",
+    kind="length",
+    measured_by="a lift check at {owner} (rotordrop clearance)",
+    logarithmic=False,
+    role=Role.SOUGHT,
+    guess_sigma=0.08,
+    scale="air gap",
+    least_sigma=1e-12,
+    lower=0.0,
+    drift=0.032,
+    entries=bearing_entries(L.AIR_GAP),
+    step=Step.TAIL,
+    field="air_gap_m",
+    truth=("air_gap_m",),
+    separated_by={"offset": "a lift test of the rotor in its magnets gives the diametral clearance"},
+)
+
 PARAMETERS: tuple[Parameter, ...] = (
-    Parameter(
-        path="air_gap",
-        worn=10e-6,
-        floor=0.0,
-        model_error=MODEL_GAP_ERROR,
-        label="air gap",
-        kind="length",
-        measured_by="a lift check at {owner} (rotordrop clearance)",
-        logarithmic=False,
-        role=Role.SOUGHT,
-        guess_sigma=0.08,
-        scale="air gap",
-        least_sigma=1e-12,
-        lower=0.0,
-        drift=0.032,
-        entries=bearing_entries(L.AIR_GAP),
-        step=Step.TAIL,
-        field="air_gap_m",
-        truth=("air_gap_m",),
-        separated_by={"offset": "a lift test of the rotor in its magnets gives the diametral clearance"},
-    ),
+    AIR_GAP,
     Parameter(
         path="equivalent_stiffness",
         label="equivalent stiffness, bearing and support",

@@ -12,5 +12,3 @@ MODEL_MEAN_STRESS_SIGMA = 0.015
 MODEL_MEAN_FORCE_SIGMA = 0.004
 """Relative standard deviation of a mean force by what every model here leaves out [1]; readings alone fix it,
 by the momentum at both ends."""
-BEAM_FORCE_SIGMA = 0.08
-"""Relative standard deviation of a force by a beam in place of the rotor, its form from the record [1]."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.elements.table import published
+from rotordrop.elements.table import following, parameter, published
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -18,11 +18,11 @@ def bearing_values(
 ) -> dict[str, Known]:
     """Values of one bearing under its static load [N], by the field names of the published document."""
     bearing = machine.touchdown_bearings[b]
-    mine = (one for one in found if one.row.owner == "bearing" and one.owner == bearing.name)
-    own = {one.row.field: one.estimate for one in mine}
+    own = {one.row.field: one.estimate for one in found if one.owner == bearing.name}
     values = {field: own[field] for field in published() if field in own}
-    if "friction.dynamic" in values:  # a bearing described without friction has none to find
-        values["friction.static"] = bearing.friction.static_of(values["friction.dynamic"])
+    for row, path, by in following():  # a bearing described without friction has none to find
+        if (of := parameter(path).field) in values:
+            values[row.field] = by(bearing, values[of])
     support, preload = values["support.stiffness_N_per_m"], values.get("preload_N")
     values["equivalent_stiffness_N_per_m"] = equivalent_stiffness(machine, b, load, support, preload)
     return values

@@ -117,7 +117,7 @@ class FittedParameter:
     @property
     def scope(self) -> str:
         """Whether it belongs to the machine or to this drop alone."""
-        return "machine" if self.row.owner in ("bearing", "sensor", "rotor") else "drop"
+        return "machine" if self.row.shared else "drop"
 
 
 @dataclass(frozen=True, kw_only=True)

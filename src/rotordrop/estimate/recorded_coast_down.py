@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import known, read_evidence
 from rotordrop.evidence.rest import identify_air_gap
@@ -111,7 +112,7 @@ def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:
     if signal.air_gap_error is None:
         return machine
     found = {
-        f"{name}.air_gap": Known(
+        AIR_GAP.path_of(name): Known(
             value=gap,
             status="estimated",
             interval_90=(

@@ -19,6 +19,7 @@ from rotordrop.elements.load import Base, Load
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
+from rotordrop.elements.table import keys_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade, Unbalance, from_grade
 from rotordrop.elements.values import Acceleration, PositiveTime, default
@@ -299,8 +300,7 @@ def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
     keys: tuple[Any, ...] = (head, *rest)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     if head in bearings:
-        inside = ["bearing", *rest] if rest == ["preload"] else rest
-        keys = ("touchdown_bearings", bearings.index(head), *inside)
+        keys = ("touchdown_bearings", bearings.index(head), *keys_of(rest))
     elif head in ("unbalance", "loads"):
         what, value = ("unbalances", "amount") if head == "unbalance" else ("loads", "force")
         if rest and not rest[0].removeprefix("-").isdecimal():

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
+from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.estimate.agreement import compare_orbits, spread_horizon
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.assumptions import evidence_assumptions
@@ -479,7 +480,7 @@ def _identified_machine(machine: Machine, impacts: Identified, gap: IdentifiedGa
         if one.parameter.estimated_by is None and one.parameter.step is Step.IMPACTS
     }
     for b, bearing in enumerate(machine.touchdown_bearings):
-        values[f"{bearing.name}.air_gap"] = Known(
+        values[AIR_GAP.path_of(bearing.name)] = Known(
             value=float(gap.value[b]), status="estimated", standard_error=float(gap.standard_error[b])
         )
         if impacts.friction is not None:

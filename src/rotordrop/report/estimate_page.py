@@ -100,9 +100,7 @@ def estimate_figures(estimate: Estimate) -> dict[str, object]:
 
 def spoken(one: FittedParameter) -> str:
     """Name of an unknown for people: what it belongs to, and what it is."""
-    if one.row.owner == "unbalance":
-        return f"{one.row.label} of unbalance {int(one.owner) + 1}" if one.owner.isdigit() else one.row.label
-    return f"{one.owner}: {one.row.label}" if one.owner else one.row.label
+    return one.row.named(one.owner)
 
 
 def names_in(estimate: Estimate) -> Callable[[str], str]:

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.air import PARAMETERS as AERO
 from rotordrop.elements.magnet import REMANENCE, REMANENCE_TIME
-from rotordrop.elements.parameter import Entry, Measure, Owner, Parameter, Rule, guess, parts_of
+from rotordrop.elements.parameter import (
+    SMALLEST_GAP,
+    Entry,
+    Measure,
+    Owner,
+    Parameter,
+    Rule,
+    guess,
+    parts_of,
+)
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import row_of, rows, structure_rows
 from rotordrop.known import NINETY, Known
@@ -70,9 +79,12 @@ class Unknown:
         """Path in the machine, such as ``"NDE.support.stiffness"``."""
         return self.parameter.path_of(self.owner)
 
-    def sets(self, array: str, column: int) -> bool:
-        """Whether it sets an entry of the kernel."""
-        return any((entry.array, entry.column) == (array, column) for entry in self.parameter.entries)
+    def sets(self, array: str, column: int | None = None, row: int | None = None) -> bool:
+        """Whether it sets an entry of the kernel, in any column or row where none is named."""
+        return any(
+            one.entry.array == array and column in (None, one.entry.column) and row in (None, one.row)
+            for one in self.targets
+        )
 
     @property
     def logarithmic(self) -> bool:
@@ -87,7 +99,7 @@ class Unknown:
     @property
     def scope(self) -> Scope:
         """Whether all drops of a machine share it."""
-        return "machine" if self.parameter.owner in ("bearing", "sensor", "rotor") else "drop"
+        return "machine" if self.parameter.shared else "drop"
 
     @property
     def drift(self) -> float:
@@ -235,7 +247,7 @@ def sensor_prior(row: Parameter, quantity: Known, smallest_gap: float) -> Prior:
     """
     if quantity.status == "default":
         quantity = replace(quantity, range=None)
-    return prior(row, quantity, scale=smallest_gap if row.kind == "length" else 1.0)
+    return prior(row, quantity, scale=smallest_gap if row.scale == SMALLEST_GAP else 1.0)
 
 
 def smallest_gap(machine: Machine) -> float:
@@ -324,7 +336,7 @@ def is_logarithmic(unknown: Unknown) -> bool:
 
 def is_of_a_bearing(unknown: Unknown) -> bool:
     """Whether it is a value of a touchdown bearing: these err together in a calibrated file."""
-    return unknown.scope == "machine" and unknown.parameter.owner == "bearing"
+    return unknown.parameter.errs_jointly
 
 
 def slope_signs(unknowns: Sequence[Unknown], theta: Array, sigma: Array) -> Array:

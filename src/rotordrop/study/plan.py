@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -19,8 +20,9 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 
 from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.elements.table import fitted_row, parameter
+from rotordrop.elements.table import following
 from rotordrop.errors import UsageError
+from rotordrop.known import Known
 from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.machine import kind_of_path
 from rotordrop.machine.saving import machine_text
@@ -238,11 +240,9 @@ class Study:
             if case_kind(self.machine, path) is None and not is_bearing(path):
                 found |= dict.fromkeys(_starred(self.machine, path), value)
         if self.joint is not None:
-            dynamic, static_row = parameter("friction.dynamic"), parameter("friction.static")
-            for path in [path for path in self.joint.paths if fitted_row(path) is dynamic]:
-                bearing = self.machine.bearing(path.partition(".")[0])
-                static = static_row.path_of(bearing.name)  # known by its ratio alone
-                found.setdefault(static, bearing.friction.ratio * found[path])
+            for bearing, (row, path, by) in product(self.machine.touchdown_bearings, following()):
+                if (of := f"{bearing.name}.{path}") in self.joint.paths:
+                    found.setdefault(row.path_of(bearing.name), by(bearing, Known(value=found[of])).value)
         return found
 
     def machine_of(self, values: Mapping[str, float]) -> Machine:

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
-from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.elements.table import parameter
+from rotordrop.elements.magnet import FORCES, REMANENCE, REMANENCE_TIME
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop
 from rotordrop.known import NINETY, Known
@@ -84,10 +83,9 @@ def repeat_study(
     joint = origin is not None and origin.joint is not None
     described = machine.remanence_time_constant
     time = REMANENCE_TIME if described is None else float(described)
-    row = parameter("remanence.time_constant", "drop")
-    vary = {"remanence_time": Distribution(shape="log_normal", numbers=(time, row.guess_sigma))}
+    vary = {"remanence_time": Distribution(shape="log_normal", numbers=(time, REMANENCE.guess_sigma))}
     lifts = () if origin is None else [lift for drop in origin.drops for lift in drop.lift]
-    spread = parameter("remanent_force.y", "magnet").guess_sigma
+    spread = FORCES[1].guess_sigma
     up = next_draw([(lift.up, lift.up_error) for lift in lifts], spread)
     sideways = next_draw([(lift.sideways, lift.sideways_error) for lift in lifts], spread)
     gap = smallest_gap(machine)

@@ -28,9 +28,6 @@ NOTED_DEPARTURE = 4.0
 """Departure up to which one of them alone is a note where the innovations are white [1]. Of hidden records
 four with one at 3.6 to 3.9 had all peaks within 1.5 %, and one with 4.0 a peak 4.5 % off."""
 NOISE_FACTOR_LIMIT = 8.0
-BEAM_GAIN_SIGMA = 0.03
-"""Relative standard deviation of what a beam in place of the rotor gets wrong between bearing and sensor [1]:
-gains take it up. Such a gain went 5 % off on a rotor whose forces came out within 4 %."""
 LONGEST_REMANENCE = 0.2
 """Time constant [s] from which on a remanent force is none: eddy currents fade within milliseconds."""
 LARGEST_LASTING_LIFT = 0.02
@@ -72,7 +69,7 @@ def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forwa
     A beam in place of the rotor leaves more unexplained than a described rotor does, and its loads are stated
     with that error: it is judged with the impulses that were likeliest, up to their limit.
     """
-    return likeliest if problem.model.machine.rotor.is_beam else usual
+    return likeliest if problem.model.machine.rotor.form_errs else usual
 
 
 def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
@@ -105,7 +102,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
             message=f"process noise {noise_factor:.3g} × its usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
-            note=_of_a_beam(noise_factor) if problem.model.machine.rotor.is_beam else "",
+            note=_of_a_beam(noise_factor) if problem.model.machine.rotor.form_errs else "",
             remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
         ),
         Check(
@@ -180,8 +177,7 @@ def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departu
     start, n_c = problem.n_dynamic + len(problem.unknowns), problem.n_channels
     chosen = slice(start, start + 2 * n_c)
     sigma = np.sqrt(np.diag(problem.covariance)[chosen])
-    if problem.model.machine.rotor.is_beam:
-        sigma[:n_c] = np.hypot(sigma[:n_c], BEAM_GAIN_SIGMA)
+    sigma[:n_c] = np.hypot(sigma[:n_c], problem.model.machine.rotor.gain_sigma)
     departure = np.abs(smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
     names = [
         f"{kind} of channel {sensor.name}"

@@ -156,9 +156,13 @@ class DropProblem:
     @property
     def gap_entries(self) -> NDArray[np.int64]:
         """Entries of the estimate that hold the air gaps, bearing by bearing."""
-        paths = [unknown.path for unknown in self.unknowns]
-        gaps = [paths.index(f"{name}.air_gap") for name in self.model.bearing_names]
-        return np.array([self.n_dynamic + gap for gap in gaps], dtype=np.int64)
+        bearings = range(self.model.layout.n_bearings)
+        return np.array([self.entries_that_set("bearing", b, L.AIR_GAP)[0] for b in bearings], dtype=np.int64)
+
+    def entries_that_set(self, array: str, row: int, column: int | None = None) -> list[int]:
+        """Entries of the estimate whose unknowns set an entry of the kernel, or any of a row."""
+        setting = (k for k, unknown in enumerate(self.unknowns) if unknown.sets(array, column, row))
+        return [self.n_dynamic + k for k in setting]
 
     def sensor_errors(self, estimate: Array) -> tuple[Array, Array]:
         """Gain errors [1] and offsets [m] of the readings in an estimate (n,) or deviation, shape (C,)."""
@@ -177,9 +181,7 @@ class DropProblem:
         for axis in range(2):
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
-        for k, unknown in enumerate(self.unknowns):
-            if unknown.owner == name and unknown.sets("bearing", L.AXIAL_OFFSET):
-                rows[2, self.n_dynamic + k] = 1.0
+        rows[2, self.entries_that_set("bearing", b, L.AXIAL_OFFSET)] = 1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
         return rows

@@ -126,9 +126,8 @@ def measurement_row(
 def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) -> SensorForm:
     """What the sensors of a machine do beyond gain, offset and runout, as the filter takes it."""
     names = [sensor.name for sensor in model.machine.sensors]
-    own = [k for k, unknown in enumerate(unknowns) if unknown.parameter.owner == "sensor"]
-    terms = [(names.index(unknowns[k].owner), k) for k in own if unknowns[k].parameter.seen is not None]
-    lagging = [k for name in names for k in own if unknowns[k].parameter.lag and unknowns[k].owner == name]
+    terms = [(names.index(u.owner), k) for k, u in enumerate(unknowns) if u.parameter.seen is not None]
+    lagging = [k for name in names for k, u in enumerate(unknowns) if u.parameter.lag and u.owner == name]
     first = model.layout.sensors.start
     s = rows.shape[1]
     return SensorForm(

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.parameter import Parameter
-from rotordrop.elements.table import parameter, row_of, rows, separating_measurement
+from rotordrop.elements.magnet import FORCES
+from rotordrop.elements.parameter import below
+from rotordrop.elements.table import row_of, rows, separating_measurement
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Structure
@@ -149,7 +150,7 @@ def calibrate_machine(
     values = _values(problem, mean, covariance, widening)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
-    known = _as_known(at_fitted_exponents(machine, values), identifiability)
+    known = _as_known(as_filed(machine, values), identifiability)
     beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{beside}"
     fitted = machine_values(bearings, known, source)
@@ -196,9 +197,8 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
             float(sigma[problem.n_dynamic + k]) / share,
         )
         for k, unknown in enumerate(problem.unknowns)
-        if unknown.parameter.owner == "magnet"
     }
-    sideways, up = (parameter(f"remanent_force.{axis}", "magnet") for axis in "xy")
+    sideways, up = FORCES
     return tuple(
         RecordedLift(
             magnet=amb.name,
@@ -219,7 +219,7 @@ def _with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:
     values = {}
     for i, unbalance in enumerate(machine.unbalances):
         if unbalance.beyond_described is not None:
-            along = [said[f"unbalance.{i}.{part}"].value for part in ("cosine", "sine")]
+            along = [said[row.path_of(str(i))].value for row in rows("unbalance")]
             found = math.hypot(*along)
             factor = float(unbalance.beyond_described) * found / float(unbalance.amount)
             values[f"unbalance.{i}.amount"] = Known(value=found, status="guess")
@@ -268,33 +268,14 @@ def _plain(value: float, sigma: float, widening: float, unit: str) -> Known:
     )
 
 
-def at_fitted_exponents(machine: Machine, values: dict[str, Known]) -> dict[str, Known]:
-    """Values whose contact stiffness belongs to the fitted contact exponent.
-
-    The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
-    be compared with it; a description holds one pair, with the same force at a typical indentation.
-    """
-    found = dict(values)
+def as_filed(machine: Machine, values: dict[str, Known]) -> dict[str, Known]:
+    """Fitted values as a machine file has them: some belong to each other, such as a contact's."""
+    found, load = dict(values), float(np.mean(bearing_load_shares(machine)))
     for bearing in machine.touchdown_bearings:
-        exponent = values.get(f"{bearing.name}.contact.exponent")
-        stiffness = values.get(f"{bearing.name}.contact.stiffness")
-        if exponent is None or stiffness is None or stiffness.interval_90 is None:
-            continue
-        exponent = _within_limits(exponent, parameter("contact.exponent"))
-        found[f"{bearing.name}.contact.exponent"] = exponent
-        depth = bearing.contact.typical_depth(float(np.mean(bearing_load_shares(machine))))
-        factor = depth ** (float(bearing.contact.exponent) - exponent.value)
-        low, high = stiffness.interval_90
-        found[f"{bearing.name}.contact.stiffness"] = replace(
-            stiffness, value=factor * stiffness.value, interval_90=(factor * low, factor * high)
-        )
+        for filed in [row.filed for row in rows("bearing") if row.filed is not None]:
+            changed = filed(bearing, below(values, f"{bearing.name}."), load)
+            found |= {f"{bearing.name}.{path}": value for path, value in changed.items()}
     return found
-
-
-def _within_limits(value: Known, row: Parameter) -> Known:
-    interval = value.interval_90 or (value.value, value.value)
-    low, middle, high = (row.within(number) for number in (interval[0], value.value, interval[1]))
-    return replace(value, value=middle, interval_90=(low, high))
 
 
 def _as_known(values: dict[str, Known], identifiability: tuple[Identifiability, ...]) -> dict[str, Known]:

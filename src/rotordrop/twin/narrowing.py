@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
-from rotordrop.estimate.allowances import BEAM_FORCE_SIGMA, MODEL_FORCE_SIGMA
+from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA
 from rotordrop.known import NINETY
 from rotordrop.track.forces import ForceHistory, force_gradient
 from rotordrop.track.problem import DropProblem
@@ -43,7 +43,7 @@ def narrowing(
     names = problem.model.bearing_names
     peaks = [int(np.argmax(forces.magnitude[:, b])) for b in range(len(names))]
     at_peaks = smooth(smoothed.filtered, kept=peaks)
-    beam = BEAM_FORCE_SIGMA if problem.model.machine.rotor.is_beam else 0.0
+    form = problem.model.machine.rotor.force_sigma
     before: dict[str, float] = {}
     after: dict[str, dict[str, float]] = {name: {} for name, _ in _measurements(problem)}
     drawing: dict[str, float] = {}
@@ -52,7 +52,7 @@ def narrowing(
         gradient = force_gradient(problem, smoothed.means[at], b)
         shared = covariance @ gradient
         variance, force = max(float(gradient @ shared), 0.0), float(forces.magnitude[at, b])
-        rest = (MODEL_FORCE_SIGMA**2 + beam**2) * force**2
+        rest = (MODEL_FORCE_SIGMA**2 + form**2) * force**2
         before[name] = NINETY * widening * math.sqrt(variance + rest)
         drawing[name] = NINETY * widening * math.hypot(math.sqrt(variance), MODEL_FORCE_SIGMA * force)
         for measurement, entries in _measurements(problem):
@@ -68,7 +68,7 @@ def narrowing(
         )
         for measurement, entries in _measurements(problem)
     ]
-    if beam:
+    if form:
         listed.append(Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=drawing))
     listed.sort(key=lambda one: one.left)
     return tuple(one for one in listed[:MOST_NAMED] if one.left < WORTH_SAYING)

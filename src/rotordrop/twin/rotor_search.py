@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rotordrop.elements.parameter import Parameter
-from rotordrop.elements.rotor import FORM
-from rotordrop.elements.table import parameter
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import NINETY, Known
@@ -99,16 +97,11 @@ def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedD
 
 
 def _sought(machine: Machine) -> list[_Unknown]:
-    """What is only guessed of a beam."""
-    if not machine.rotor.is_beam:
-        return []
+    """What is only guessed of the form of the rotor."""
     sought = []
-    for row in (parameter("stiffness_factor", "rotor"), *FORM):
-        quantity = row.stated(machine.rotor)
-        if quantity is not None and quantity.status in ("guess", "default") and quantity.range is not None:
-            known = prior(row, quantity)
-            path = f"rotor.{row.path}"
-            sought.append(_Unknown(row=row, path=path, mean=known.mean, sigma=known.sigma))
+    for row in machine.rotor.sought():
+        known = prior(row, row.described(machine.rotor))
+        sought.append(_Unknown(row=row, path=row.path_of(""), mean=known.mean, sigma=known.sigma))
     return sought
 
 

@@ -210,7 +210,7 @@ def track_drops(
         if progress is not None:
             progress("trying extensions of the base model, and other starts", 0.0)
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
-        other = best_start(base, search) if machine.rotor.is_beam else best_structure(base, search)
+        other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
         followed = [one for one in (found, again) if one is not None]
         if not followed:
@@ -384,7 +384,7 @@ class Search:
 
     def with_rotor(self, machine: Machine) -> Machine:
         """The machine with its rotor as the records show it, where a beam stands for it."""
-        if not machine.rotor.is_beam:
+        if not machine.rotor.sought():
             return machine
         until = ROTOR_SEEN * fall_time(machine)
         return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.drops.evidence])

@@ -15,7 +15,7 @@ from rotordrop.track.noise_size import likeliest_noise, with_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.twin.search import FINE_SCHEDULE, Accepted, Progress, track_drops
-from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, of_a_beam
+from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,7 @@ def tracked_drop(
         problem=problem,
         smoothed=smoothed,
         judged=seen,
-        forces=of_a_beam(forces) if problem.model.machine.rotor.is_beam else forces,
+        forces=with_form_error(forces, problem.model.machine.rotor.force_sigma),
         checks=consistency_checks(problem, replace(smoothed, filtered=seen), noise_factor),
         noise_factor=noise_factor,
         drops=drops,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
@@ -33,15 +34,15 @@ from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_loads import (
     Loads,
     bearing_drop,
-    check_of_the_rotor,
+    check_without_form_error,
     cross_checks,
     is_beyond_accuracy,
     is_beyond_factor,
     loads_of_cross_check,
-    of_the_rotor,
     twin_loads,
     widened_to_cross_check,
     widening_of,
+    without_form_error,
 )
 from rotordrop.twin.tracked_parameters import (
     gap_of_record,
@@ -152,7 +153,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
 
 def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     """What to measure of a machine whose rotor is not known by its drawing; of others it costs a pass."""
-    unsure = any(unknown.parameter.owner == "rotor" for unknown in drop.problem.unknowns)
+    unsure = any(unknown.parameter.by_drawing for unknown in drop.problem.unknowns)
     if not unsure or drop.drops != 1:
         return ()
     if judged.fits:
@@ -166,10 +167,11 @@ def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     Its covariances say nothing then, so no other number can be weighed. The error of a beam is known and
     falls away; the rest stays as wide as the cross-check leaves it, though a twin of the rotor may well fit.
     """
-    if judged.check is None or not drop.problem.model.machine.rotor.is_beam:
+    form = drop.problem.model.machine.rotor.force_sigma
+    if judged.check is None or not form:
         return ()
-    drawn = replace(drop, forces=of_the_rotor(drop.forces))
-    known = replace(judged, check=check_of_the_rotor(judged.check))
+    drawn = replace(drop, forces=without_form_error(drop.forces, form))
+    known = replace(judged, check=check_without_form_error(judged.check, form))
     before, after = (
         {
             name: 0.5 * (high - low)
@@ -191,7 +193,7 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
     quick estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
-    departs = is_beyond_accuracy if problem.model.machine.rotor.is_beam else is_beyond_factor
+    departs = is_beyond_accuracy if problem.model.machine.rotor.form_errs else is_beyond_factor
     with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
@@ -226,7 +228,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     if not fits and check is not None:
         for b, name in enumerate(problem.model.bearing_names):
             # the twin has lost the drop there: by its peak force, or by an air gap that cannot be
-            gap, peak = found[f"{name}.air_gap"], float(drop.forces.magnitude[:, b].max())
+            gap, peak = found[AIR_GAP.path_of(name)], float(drop.forces.magnitude[:, b].max())
             replaced_at[b] = is_beyond_factor(peak, check, b) or is_lost(problem, gap.estimate, b)
             if replaced_at[b]:
                 found[gap.path] = replace(gap, estimate=gap_of_record(problem, b))

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.estimate.allowances import (
-    BEAM_FORCE_SIGMA,
     MODEL_FORCE_SIGMA,
     MODEL_MEAN_FORCE_SIGMA,
     MODEL_MEAN_STRESS_SIGMA,
@@ -77,28 +77,28 @@ def widening_of(checks: Iterable[Check]) -> float:
     return max(check.widening if check.passed else INCONSISTENT_WIDENING for check in checks)
 
 
-def of_a_beam(forces: ForceHistory) -> ForceHistory:
-    """Forces with the error of a beam that stands for the rotor; stress goes with the third root of force."""
+def with_form_error(forces: ForceHistory, sigma: float) -> ForceHistory:
+    """Forces with the relative error of the rotor's form [1]; stress goes with the third root of force."""
     return replace(
         forces,
-        magnitude_sigma=np.hypot(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
-        stress_sigma=np.hypot(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+        magnitude_sigma=np.hypot(forces.magnitude_sigma, sigma * forces.magnitude),
+        stress_sigma=np.hypot(forces.stress_sigma, sigma / 3.0 * forces.stress),
     )
 
 
-def of_the_rotor(forces: ForceHistory) -> ForceHistory:
-    """Forces without the error of a beam, as the rotor itself in its place would leave them."""
+def without_form_error(forces: ForceHistory, sigma: float) -> ForceHistory:
+    """Forces without the error of the rotor's form, as its drawing would leave them."""
     return replace(
         forces,
-        magnitude_sigma=_without(forces.magnitude_sigma, BEAM_FORCE_SIGMA * forces.magnitude),
-        stress_sigma=_without(forces.stress_sigma, BEAM_FORCE_SIGMA / 3.0 * forces.stress),
+        magnitude_sigma=_without(forces.magnitude_sigma, sigma * forces.magnitude),
+        stress_sigma=_without(forces.stress_sigma, sigma / 3.0 * forces.stress),
     )
 
 
 def check_without_contact_law(problem: DropProblem) -> InputEstimate:
-    """The cross-check, with the error of a beam where one stands for the rotor; the twin lends nothing."""
+    """The cross-check, with the error of the rotor's form; it takes nothing from the twin."""
     check = input_state_estimate(problem, corrections_by_record(problem))
-    return check_of_a_beam(check) if problem.model.machine.rotor.is_beam else check
+    return check_with_form_error(check, problem.model.machine.rotor.force_sigma)
 
 
 def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate] | None]:
@@ -109,23 +109,23 @@ def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate
     ]
 
 
-def check_of_a_beam(check: InputEstimate) -> InputEstimate:
-    """The cross-check with the error of a beam that stands for the rotor."""
-    beam = NINETY * BEAM_FORCE_SIGMA
+def check_with_form_error(check: InputEstimate, sigma: float) -> InputEstimate:
+    """The cross-check with the relative error of the rotor's form [1]."""
+    form = NINETY * sigma
     return replace(
         check,
-        peak_error=np.hypot(check.peak_error, beam),
-        stress_error=np.hypot(check.stress_error, beam / 3.0),
+        peak_error=np.hypot(check.peak_error, form),
+        stress_error=np.hypot(check.stress_error, form / 3.0),
     )
 
 
-def check_of_the_rotor(check: InputEstimate) -> InputEstimate:
-    """The cross-check without the error of a beam."""
-    beam = NINETY * BEAM_FORCE_SIGMA
+def check_without_form_error(check: InputEstimate, sigma: float) -> InputEstimate:
+    """The cross-check without the error of the rotor's form."""
+    form = NINETY * sigma
     return replace(
         check,
-        peak_error=_without(check.peak_error, beam),
-        stress_error=_without(check.stress_error, beam / 3.0),
+        peak_error=_without(check.peak_error, form),
+        stress_error=_without(check.stress_error, form / 3.0),
     )
 
 
@@ -330,7 +330,7 @@ def bearing_drop(
 ) -> BearingDrop:
     """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m]."""
     name = problem.model.bearing_names[b]
-    gap = values["air_gap_m"]
+    gap = values[AIR_GAP.field]
     low, high = gap.interval_90 or (gap.value, gap.value)
     estimated = Motion(
         label="estimated", time=forces.time, displacement=forces.displacement[:, b], role="estimated"

@@ -53,14 +53,10 @@ def plane_unbalances(
     mean, covariance = smoothed.means[at], smoothed.covariance(at)
     found = []
     for plane, unbalance in enumerate(problem.model.machine.unbalances):
-        rows = [
-            k
-            for k, unknown in enumerate(problem.unknowns)
-            if unknown.parameter.owner == "unbalance" and unknown.owner == str(plane)
-        ]
-        entries = problem.n_dynamic + np.array(rows, dtype=np.intp)
-        prior = problem.unknowns[rows[0]].sigma
-        factor = parameter_widening(problem.unknowns[rows[0]], _largest(covariance, entries), widening)
+        entries = np.array(problem.entries_that_set("unbalance", plane), dtype=np.intp)
+        first = problem.unknowns[entries[0] - problem.n_dynamic]
+        prior = first.sigma
+        factor = parameter_widening(first, _largest(covariance, entries), widening)
         joint = factor**2 * covariance[np.ix_(entries, entries)]
         amount, phase = _polar(complex(*mean[entries]), joint, prior, turned, fits)
         reason = NO_MARK if marks is None else NO_PASSAGE if turned is None else NO_DIRECTION

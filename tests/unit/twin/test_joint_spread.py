@@ -13,7 +13,7 @@ from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import bearing_unknowns, correlate
-from rotordrop.twin.calibrated import at_fitted_exponents
+from rotordrop.twin.calibrated import as_filed
 from rotordrop.twin.joint_spread import joint_spread
 from rotordrop.twin.tracked_parameters import identified
 
@@ -54,7 +54,7 @@ def stated(problem, covariance, widening):
 
 
 def test_spreads_are_those_of_the_intervals(problem, covariance):
-    known = at_fitted_exponents(problem.model.machine, stated(problem, covariance, 1.5))
+    known = as_filed(problem.model.machine, stated(problem, covariance, 1.5))
     spread = joint_spread(problem, middle(problem), covariance, known)
     sigma = np.sqrt(np.diag(spread.matrix))
     for path in ("NDE.air_gap", "DE.support.mass", "NDE.preload", "DE.friction.dynamic"):

@@ -25,11 +25,11 @@ from rotordrop.twin.narrowing import explained
 from rotordrop.twin.problems import recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_loads import (
-    check_of_a_beam,
-    check_of_the_rotor,
+    check_with_form_error,
+    check_without_form_error,
     is_beyond_accuracy,
-    of_a_beam,
-    of_the_rotor,
+    with_form_error,
+    without_form_error,
 )
 
 RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
@@ -132,14 +132,16 @@ def test_the_error_of_a_beam_is_taken_back_from_forces_and_cross_check():
     forces = ForceHistory(
         **{f.name: np.array([[getattr(forces, f.name, 0.0)]]) for f in fields(ForceHistory)}
     )
-    beam = of_a_beam(forces)
+    beam = with_form_error(forces, 0.08)
     assert beam.magnitude_sigma[0, 0] == pytest.approx(math.hypot(30.0, 80.0))
-    assert of_the_rotor(beam).magnitude_sigma[0, 0] == pytest.approx(30.0)
-    assert of_the_rotor(beam).stress_sigma[0, 0] == pytest.approx(2e7)
+    assert without_form_error(beam, 0.08).magnitude_sigma[0, 0] == pytest.approx(30.0)
+    assert without_form_error(beam, 0.08).stress_sigma[0, 0] == pytest.approx(2e7)
+    assert with_form_error(forces, 0.0).magnitude_sigma[0, 0] == 30.0  # a described rotor adds no bit
     check = InputEstimate(**{f.name: np.array([0.1]) for f in fields(InputEstimate)})
-    assert check_of_a_beam(check).peak_error[0] == pytest.approx(math.hypot(0.1, 1.6449 * 0.08), rel=1e-4)
-    assert check_of_the_rotor(check_of_a_beam(check)).peak_error == pytest.approx(check.peak_error)
-    assert check_of_the_rotor(check_of_a_beam(check)).stress_error == pytest.approx(check.stress_error)
+    wider = check_with_form_error(check, 0.08)
+    assert wider.peak_error[0] == pytest.approx(math.hypot(0.1, 1.6449 * 0.08), rel=1e-4)
+    assert check_without_form_error(wider, 0.08).peak_error == pytest.approx(check.peak_error)
+    assert check_without_form_error(wider, 0.08).stress_error == pytest.approx(check.stress_error)
 
 
 def test_a_peak_beyond_the_accuracy_of_the_cross_check_is_apart():

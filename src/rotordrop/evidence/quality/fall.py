@@ -88,7 +88,7 @@ def check_ends(
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
         return _as_described(own, machine)
     cases = _other_cases(record, levitated)
-    if not machine.rotor.is_beam:
+    if not machine.rotor.form_errs:
         cases.append(_any_gain(record, levitated))
     grown = [fitted(case.record, case.levitated) for case in cases]
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
@@ -102,7 +102,7 @@ def check_ends(
         for case, fall in zip(cases, grown, strict=True)
     ]
     decided = _decide(mine, cases, finals)
-    if machine.rotor.is_beam and decided.severity == "stop":
+    if machine.rotor.form_errs and decided.severity == "stop":
         return [_doubted(decided)]
     if decided.kind not in (Kind.UNDECIDED_ENDS, Kind.WRONG_GAIN):
         return [decided]
