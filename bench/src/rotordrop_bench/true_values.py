@@ -188,7 +188,7 @@ _PARTS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Fields of the supplied truth files that are lists over the bearings, and where a bearing has their values;
-the power of the damping in the contact is always one."""
+the power of the damping in the contact is always one. What a row of the parameters says beside joins them."""
 
 
 def machine_truth(machine: Machine) -> dict[str, Any]:
@@ -202,9 +202,15 @@ def machine_truth(machine: Machine) -> dict[str, Any]:
             float(bearing.support.stiffness),
         )
         series[bearing.name] = support * tangent / (support + tangent)
+
+    def stated(part: str, bearing: TouchdownBearing) -> dict[str, float]:
+        own = (row for row in rows("bearing") if len(row.truth) == 2 and row.truth[0] == part)
+        return {row.truth[1]: float(row.described(bearing)) for row in own}
+
     parts = {
         part: [
-            {key: float(attrgetter(path)(b)) if path else 1 for key, path in paths.items()} for b in bearings
+            {key: float(attrgetter(path)(b)) if path else 1 for key, path in paths.items()} | stated(part, b)
+            for b in bearings
         ]
         for part, paths in _PARTS.items()
     }

@@ -33,7 +33,7 @@ def bearing_values(
 
     The axial offset of the balls is set to ``axial`` [m] and stays so.
     """
-    p.bearing[b, L.AXIAL_OFFSET] = axial
+    p.bearing[b, L.SET_UNKNOWN] = axial
     entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
     F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
     _load, stress = ball_set_load(entries, balls, dx, dy)
@@ -70,7 +70,7 @@ def force_values(
         y[:s] = means[i, :s]
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
-            axial = p.bearing[b, L.AXIAL_OFFSET]
+            axial = p.bearing[b, L.SET_UNKNOWN]
             contact_at(times[i], p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
             bearing_values(dx, dy, axial, b, p, work, values[i, b])
             for c in range(3):
@@ -81,7 +81,7 @@ def force_values(
                 bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
                 for v in range(N_VALUES):
                     gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
-            p.bearing[b, L.AXIAL_OFFSET] = axial
+            p.bearing[b, L.SET_UNKNOWN] = axial
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +176,7 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
 
     def lacking(deflection: float) -> float:
         bearing_values(
-            deflection * along[0], deflection * along[1], p.bearing[b, L.AXIAL_OFFSET], b, p, work, out
+            deflection * along[0], deflection * along[1], p.bearing[b, L.SET_UNKNOWN], b, p, work, out
         )
         return float(out[FORCE]) - size
 

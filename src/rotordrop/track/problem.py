@@ -181,7 +181,7 @@ class DropProblem:
         for axis in range(2):
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
-        rows[2, self.entries_that_set("bearing", b, L.AXIAL_OFFSET)] = 1.0
+        rows[2, self.entries_that_set("bearing", b, L.SET_UNKNOWN)] = 1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
         return rows
