@@ -149,7 +149,8 @@ def _put_law(row: Array, contact: ContactViolation, damping: float) -> None:
     for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(points)):
         exponent = math.log(f2 / f1) / math.log(d2 / d1)
         at = D.LAW + i * D.LAW_WIDTH
-        row[at : at + D.LAW_WIDTH] = f1 / d1**exponent, exponent, damping, d2
+        row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, damping)
+        row[at + D.LAW_UNTIL] = d2
 
 
 def support_matrices(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, Any]:

@@ -139,11 +139,10 @@ class Mount(Description):
         numbers[blocks.MOUNT_PRESENT], numbers[blocks.MOUNT_STATES] = self.present, self.states
         if self.stop is not None:
             numbers[blocks.MOUNT_STOP_GAP] = float(self.stop.gap)
-            numbers[blocks.MOUNT_STOP : blocks.MOUNT_STOP_END] = (
-                float(self.stop.stiffness),
-                1.0,
-                float(self.stop.damping),
-            )
+            from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
+
+            law = contact_law(float(self.stop.stiffness), 1.0, float(self.stop.damping))
+            numbers[blocks.MOUNT_STOP : blocks.MOUNT_STOP_END] = law
         if self.ribbon is not None:
             numbers[blocks.MOUNT_RIBBON_STIFFNESS] = float(self.ribbon.friction_stiffness)
             numbers[blocks.MOUNT_RIBBON_SLIP] = float(self.ribbon.slip_force)
