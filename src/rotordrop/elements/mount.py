@@ -197,7 +197,7 @@ def _element(element: Any, place: tuple[str | int, ...]) -> tuple[str, dict[str,
     return kind, rest
 
 
-PARAMETERS: tuple[Parameter, ...] = (
+STATED: tuple[Parameter, ...] = (
     Parameter(
         path="mount.stop.gap",
         label="travel up to the stop of the mount",

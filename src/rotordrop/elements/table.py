@@ -44,20 +44,31 @@ TABLE: tuple[Parameter, ...] = (
 )
 """The rows; those of a bearing in the order in which the estimators hold them."""
 
-EXTENSIONS: tuple[Extension, ...] = (
-    *support.EXTENSIONS,
-    *sensor.EXTENSIONS,
-    *magnet.EXTENSIONS,
-    *unbalance.EXTENSIONS,
-    *rotor.EXTENSIONS,
+_ELEMENTS = (
+    support,
+    sensor,
+    magnet,
+    unbalance,
+    rotor,
+    contact,
+    friction,
+    race,
+    touchdown_bearing,
+    ball_bearing,
+    mount,
+    air,
+)
+
+EXTENSIONS: tuple[Extension, ...] = tuple(
+    extension for element in _ELEMENTS for extension in getattr(element, "EXTENSIONS", ())
 )
 """What a machine may have beyond the base model, in the order in which a search tries it."""
 
 STRUCTURE: tuple[Parameter, ...] = (
     *(row for extension in EXTENSIONS for row in extension.rows),
-    *mount.PARAMETERS,
+    *(row for element in _ELEMENTS for row in getattr(element, "STATED", ())),
 )
-"""Unknowns of a machine only where its description names them: those of extensions, and of a mount."""
+"""Unknowns of a machine only where its description names them: those of extensions, and ``STATED`` ones."""
 
 _BY_PATH = {(row.owner, row.path): row for row in (*TABLE, *STRUCTURE, *FORM)}
 
