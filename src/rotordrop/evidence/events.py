@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.table import parameter
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.known import NINETY
@@ -19,7 +20,7 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
     from rotordrop.evidence.free_rotor import FreeRotor
-    from rotordrop.machine import Machine
+    from rotordrop.machine import Machine, TouchdownBearing
     from rotordrop.record.record import Record
 
 FALLEN_SHARE = 0.35
@@ -305,17 +306,25 @@ def _first(far: NDArray[np.bool_]) -> int:
 
 def nominal_gaps(machine: Machine, record: Record) -> Array:
     """Nominal air gaps [m], shape (P,), of the touchdown bearings nearest to the sensor planes."""
-    return np.array([_gap_at(machine, plane) for plane in record.planes])
+    return np.array([float(_bearing_at(machine, plane).air_gap) for plane in record.planes])
 
 
-def _gap_at(machine: Machine, plane: Plane) -> float:
+def expected_gap(machine: Machine, plane: Plane) -> tuple[float, float]:
+    """Air gap that a machine file expects at a sensor plane, and its standard error [m]."""
+    from rotordrop.rotor.unknowns import prior
+
+    gap = _bearing_at(machine, plane).air_gap
+    expected = prior(parameter("air_gap", "bearing"), gap, scale=float(gap))
+    return expected.mean, expected.sigma
+
+
+def _bearing_at(machine: Machine, plane: Plane) -> TouchdownBearing:
     named = [b for b in machine.touchdown_bearings if b.name == plane.bearing]
     position = machine.rotor.node_positions
-    nearest = min(
+    return min(
         named or machine.touchdown_bearings,
         key=lambda b: abs(position[b.node - 1] - position[plane.node - 1]),
     )
-    return float(nearest.air_gap)
 
 
 def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:

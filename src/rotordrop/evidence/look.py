@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.events import nominal_gaps
+from rotordrop.evidence.events import expected_gap
 from rotordrop.evidence.paths import (
     Drop,
+    Gap,
     Impact,
     Motion,
+    Path,
     Whirl,
     drops_of,
-    impacts_of,
     motion_of,
-    slope,
     whirls_of,
+    with_impacts,
 )
 from rotordrop.evidence.quality import Finding, Kind, check_record, stops
 from rotordrop.evidence.quality.channels import check_channels
@@ -28,8 +31,10 @@ from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
+from rotordrop.evidence.wall import GAIN, slope
 from rotordrop.files import DIGEST
-from rotordrop.json_schema import DIALECT, FLAG, MAYBE, NUMBER, PAIR, TEXT, TEXTS, closed, listed
+from rotordrop.json_schema import DIALECT, FLAG, MAYBE, MAYBE_PAIR, NUMBER, PAIR, TEXT, TEXTS, closed, listed
+from rotordrop.known import NINETY
 from rotordrop.record.arrangement import Arrangement
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.record import Record, open_record
@@ -47,14 +52,26 @@ INDEX_WINDOW = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneLook:
-    """What one plane shows of a drop."""
+    """What one plane shows of a drop; displacements are those at its sensors."""
 
     plane: str
     """Name of the plane."""
     gap: float
     """Air gap used [m]."""
+    gap_interval_90: tuple[float, float] | None
+    """Interval that holds it with 90 % probability [m]; None where it was given."""
+    gap_determined: bool
+    """False where the record leaves it open."""
+    touch: float | None
+    """When the shaft first touches its race [s]; None where the record does not show it."""
+    touch_interval_90: tuple[float, float] | None
+    """Interval that holds it with 90 % probability [s]."""
+    contact_from: float | None
+    """When the last impact began, after which the rotor no longer left its race [s]."""
     largest: float
     """Largest distance from the centre [m]."""
+    largest_interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [m]: centre, gain, and the bearing beside the sensors."""
     largest_time: float
     """When [s]."""
     position_index: float
@@ -80,8 +97,7 @@ class Look:
     findings: tuple[Finding, ...]
     """What the quality gate says, the worst first."""
     drops: tuple[Drop, ...]
-    """Every fall in the record."""
-    impacts: tuple[Impact, ...]
+    """Every fall in the record, with its impacts."""
     whirls: tuple[Whirl, ...]
     """Of the first drop."""
     planes: tuple[PlaneLook, ...]
@@ -95,18 +111,38 @@ class Look:
     notes: tuple[str, ...]
     """What was guessed."""
 
+    @property
+    def impacts(self) -> tuple[Impact, ...]:
+        """Impacts of the first drop, in the order of time."""
+        return self.drops[0].impacts
+
+    @property
+    def first_end(self) -> str | None:
+        """The plane that is touched first; None where the planes are less apart than their errors."""
+        touched = sorted(
+            (plane.touch, 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0]), plane.plane)
+            for plane in self.planes
+            if plane.touch is not None and plane.touch_interval_90 is not None
+        )
+        if len(touched) < len(self.planes):
+            return None
+        for (first, error, _), (then, doubt, _) in pairwise(touched[:2]):
+            if then - first <= math.hypot(error, doubt):
+                return None
+        return touched[0][2]
+
     def timeline(self) -> tuple[tuple[float, str], ...]:
         """Events in the order of time: time [s] and words."""
         events = [(float(self.record.time[0]), "record begins, rotor levitated")]
         for number, drop in enumerate(self.drops, start=1):
             events.append((drop.release, "released" if number == 1 else f"released again, drop {number}"))
             if drop.permanent_contact is not None:
-                events.append((drop.permanent_contact, "in contact from here on"))
+                events.append((drop.permanent_contact, "last impact, in contact from here on"))
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
-        for plane in self.motion.paths:
-            first = next((impact for impact in self.impacts if impact.plane == plane.name), None)
-            if first is not None:
-                events.append((first.time, f"first impact at {plane.name}"))
+        for plane in self.planes:
+            if plane.touch is not None and plane.touch_interval_90 is not None:
+                half = 0.5e3 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
+                events.append((plane.touch, f"first touch at {plane.plane} (± {half:.2g} ms)"))
         events += [
             (
                 whirl.start,
@@ -157,7 +193,17 @@ class Look:
                 {
                     "plane": plane.plane,
                     "air_gap_m": plane.gap,
+                    "air_gap_interval_90_m": None
+                    if plane.gap_interval_90 is None
+                    else list(plane.gap_interval_90),
+                    "air_gap_determined": plane.gap_determined,
+                    "first_touch_s": plane.touch,
+                    "first_touch_interval_90_s": (
+                        None if plane.touch_interval_90 is None else list(plane.touch_interval_90)
+                    ),
+                    "contact_from_s": plane.contact_from,
                     "largest_displacement_m": plane.largest,
+                    "largest_displacement_interval_90_m": list(plane.largest_interval_90),
                     "largest_displacement_time_s": plane.largest_time,
                     "beyond_air_gap_m": plane.excess,
                     "position_index": plane.position_index,
@@ -250,7 +296,7 @@ def look(
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
     gaps = _gaps(read, machine, gap)
     motion = motion_of(read, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
-    drops = drops_of(motion)
+    drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
     if not drops:
         raise RecordError(
             f"{read.name}: the rotor does not fall from where it floated; check channels and gap"
@@ -261,7 +307,6 @@ def look(
         motion=motion,
         findings=findings,
         drops=drops,
-        impacts=impacts_of(motion, drops[0]),
         whirls=whirls_of(motion, drops[0]),
         planes=tuple(_plane_looks(motion, drops[0], turning)),
         standstill=standstill_of(read),
@@ -301,10 +346,13 @@ def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:
     return ranked(findings if stops(findings) else findings + check_blocks(record))
 
 
-def _gaps(record: Record, machine: Machine | None, gap: float | None) -> tuple[float | None, ...]:
-    if gap is not None or machine is None:
-        return (gap,) * len(record.planes)
-    return tuple(map(float, nominal_gaps(machine, record)))
+def _gaps(record: Record, machine: Machine | None, gap: float | None) -> tuple[Gap | None, ...]:
+    """Air gaps that are given, or that a machine file expects with their doubt."""
+    if gap is not None:
+        return ((gap, 0.0),) * len(record.planes)
+    if machine is None:
+        return (None,) * len(record.planes)
+    return tuple(expected_gap(machine, plane) for plane in record.planes)
 
 
 def _speed_at(record: Record, release: float) -> float | None:
@@ -329,22 +377,44 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
     during = (motion.time >= drop.release) & (motion.time <= drop.end)
     window = during & (motion.time <= drop.release + INDEX_WINDOW)
     found = []
-    for path in motion.paths:
+    for path, contact_from in zip(motion.paths, drop.lasting, strict=True):
         radius = np.where(during, path.radius, 0.0)
         at = int(np.argmax(radius))
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
         index = float(np.sqrt(np.mean(velocity**2))) / (speed * path.gap) if speed else None
+        wall, touch = path.wall, path.wall.touch
+        touched = (
+            None if touch is None else float(np.interp(touch.sample, np.arange(len(radius)), motion.time))
+        )
         found.append(
             PlaneLook(
                 plane=path.name,
                 gap=path.gap,
+                gap_interval_90=wall.interval_90 if wall.gap_error > 0.0 else None,
+                gap_determined=wall.determined,
+                touch=touched,
+                touch_interval_90=(
+                    None
+                    if touch is None or touched is None
+                    else (touched - NINETY * touch.error, touched + NINETY * touch.error)
+                ),
+                contact_from=contact_from,
                 largest=float(radius[at]),
+                largest_interval_90=_largest_between(path, at),
                 largest_time=float(motion.time[at]),
                 position_index=float(np.mean(path.radius[window])) / path.gap,
                 velocity_index=index,
             )
         )
     return found
+
+
+def _largest_between(path: Path, at: int) -> tuple[float, float]:
+    """Interval of a distance from the centre [m], 90 %: at the sensors, or at the bearing beside them."""
+    here = float(path.radius[at])
+    aside = float(np.hypot(*path.bearing_position[at])) - here
+    half = NINETY * float(np.hypot(path.wall.centre_error.mean(), GAIN * here))
+    return here + min(aside, 0.0) - half, here + max(aside, 0.0) + half
 
 
 __all__ = ["Drop", "Impact", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]
@@ -374,7 +444,13 @@ def look_schema() -> dict[str, Any]:
         planes=listed(
             plane=TEXT,
             air_gap_m=NUMBER,
+            air_gap_interval_90_m=MAYBE_PAIR,
+            air_gap_determined=FLAG,
+            first_touch_s=MAYBE,
+            first_touch_interval_90_s=MAYBE_PAIR,
+            contact_from_s=MAYBE,
             largest_displacement_m=NUMBER,
+            largest_displacement_interval_90_m=PAIR,
             largest_displacement_time_s=NUMBER,
             beyond_air_gap_m=NUMBER,
             position_index=NUMBER,

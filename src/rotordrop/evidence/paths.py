@@ -9,17 +9,21 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
+from rotordrop.evidence.touch import crossing
+from rotordrop.evidence.wall import GRAVITY, Wall, find_wall, reversals_of
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
 
-GRAVITY = 9.81
 _SLOWEST_FALL = 0.2
 """Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
 
-SMOOTHING = 1e-3
-"""Window of velocities [s]."""
+LASTING = 0.05
+"""Contact without an impact for this long lasts [s]."""
+
+Gap = tuple[float, float]
+"""An air gap and its standard error [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +36,17 @@ class Path:
     """Displacement from the centre of the clearance circle [m], y up, shape (N, 2)."""
     levitated: Array
     """Mean levitated position [m], shape (2,)."""
-    gap: float
-    """Radius of the clearance circle [m]."""
+    bearing_position: Array
+    """The same at the touchdown bearing, a little outside the sensors, the shaft taken as straight [m]."""
+    wall: Wall
+    """The clearance circle, with what the record leaves open; its centre is that of `position`."""
     noise: float
     """Standard deviation of the readings beside their motion [m]."""
+
+    @property
+    def gap(self) -> float:
+        """Radius of the clearance circle [m]."""
+        return self.wall.gap
 
     @property
     def radius(self) -> Array:
@@ -54,16 +65,16 @@ class Motion:
     notes: tuple[str, ...]
 
 
-def motion_of(record: Record, *, gaps: tuple[float | None, ...], angles_known: bool) -> Motion:
+def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: bool) -> Motion:
     """Find down, centre and gap in every plane.
 
     Parameters
     ----------
     record : Record
         Readings in metres.
-    gaps : tuple of float or None, length P
-        Air gap of every plane [m]; None where it has to come from the record: the depth at which the rotor
-        rests below where it floated, taken as the centre.
+    gaps : tuple, length P
+        Air gap of every plane and its standard error [m], 0 where it counts as exact; None where it has to
+        come from the record, by `find_wall`.
     angles_known : bool
         Whether the angles of the sensors are known. Where not, the fall shows where down is, and which way
         round the plane is seen follows from the orbit before it, taken as running counter-clockwise.
@@ -73,42 +84,52 @@ def motion_of(record: Record, *, gaps: tuple[float | None, ...], angles_known: b
     RecordError
         When nothing falls.
     """
-    planes, raw = record.planes, record.motion
-    begin, sunk = _first_fall(raw, record.sampling_rate)
-    notes: list[str] = []
+    raw, rate = record.motion, record.sampling_rate
+    begin, sunk = _first_fall(raw, rate)
     rest = np.median(raw[_rest_from(raw, sunk, record) :], axis=0)
-    levitated = np.mean(raw[:begin], axis=0)
     paths = []
-    for number, plane in enumerate(planes):
-        position, low, floated = raw[:, number], rest[number], levitated[number]
-        if not angles_known:
-            turn = _upright(position[:begin], low - floated)
-            position, low, floated = position @ turn.T, turn @ low, turn @ floated
-        depth = float(np.hypot(*(low - floated)))
-        given = gaps[number]
-        gap = given if given is not None else depth
-        centre = low + np.array([0.0, gap])
-        if given is None:
-            centre = floated
-            notes.append(
-                f"{plane.bearing}: air gap {1e6 * gap:.0f} µm taken from where the rotor floated to where "
-                "it lies; give it with --gap"
-            )
-        paths.append(
-            Path(
-                name=plane.bearing,
-                position=position - centre,
-                levitated=floated - centre,
-                gap=gap,
-                noise=_noise(position),
-            )
+    for number, plane in enumerate(record.planes):
+        other = raw[:, 0 if number else -1]
+        position, floated = raw[:, number], np.mean(raw[:begin, number], axis=0)
+        wall = find_wall(position, other, rate, (begin, sunk), gaps[number])
+        apart = position - floated - other + np.mean(other[:begin], axis=0)
+        turn = np.eye(2) if angles_known else _upright(position[:begin], rest[number] - floated)
+        centred = (position - wall.centre) @ turn.T
+        path = Path(
+            name=plane.bearing,
+            position=centred,
+            bearing_position=centred + wall.lever * apart @ turn.T,
+            levitated=turn @ (floated - wall.centre),
+            wall=wall,
+            noise=_noise(position),
         )
+        if wall.touch is None:
+            radius = np.hypot(*path.bearing_position.T)
+            touch = crossing(radius, begin, rate, wall.gap, wall.gap_error)
+            path = replace(path, wall=replace(wall, touch=touch))
+        paths.append(path)
+    notes = [_gap_note(path) for path, given in zip(paths, gaps, strict=True) if given is None]
     if not angles_known:
         notes.append("down is where the rotor fell; counter-clockwise is how it ran before the fall")
-    floats = _floating(paths, record.sampling_rate)
     return Motion(
-        time=record.time, rate=record.sampling_rate, paths=tuple(paths), floats=floats, notes=tuple(notes)
+        time=record.time,
+        rate=rate,
+        paths=tuple(paths),
+        floats=_floating(paths, rate),
+        notes=tuple(notes),
     )
+
+
+def _gap_note(path: Path) -> str:
+    low, high = (1e6 * end for end in path.wall.interval_90)
+    if path.wall.determined:
+        told = f"between {low:.0f} and {high:.0f} µm (90 %) by where the rotor touched"
+    else:
+        told = (
+            "not determined by this record, because the rotor touched its race in too few directions and "
+            f"hardly swung: {low:.0f} to {high:.0f} µm are possible (90 %), {1e6 * path.gap:.0f} µm are taken"
+        )
+    return f"{path.name}: air gap {told}; give it with --gap where it is known"
 
 
 def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
@@ -172,21 +193,6 @@ def _floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
     return near
 
 
-def slope(values: Array, rate: float) -> Array:
-    """Velocity by a straight line through `SMOOTHING` around every sample [m/s], shape of the values."""
-    half = max(int(0.5 * SMOOTHING * rate), 1)
-    index = np.arange(-half, half + 1)
-    weights = -index * rate / float(np.sum(index**2))  # numpy turns the kernel round
-    columns = [
-        np.convolve(np.pad(column, half, mode="edge"), weights, mode="valid")
-        for column in np.atleast_2d(values.T)
-    ]
-    return np.stack(columns, axis=-1).reshape(values.shape)
-
-
-_NEAR = 0.85
-"""An impact turns the rotor back at this share of the gap or beyond."""
-
 _FOLLOWED = 2e-4
 """Time between the angles by which a whirl is followed [s]."""
 
@@ -198,14 +204,14 @@ class Impact:
     plane: str
     """Sensor plane."""
     time: float
-    """Deepest point [s]."""
+    """When it touches, by the kink of its velocity [s]."""
     azimuth: float
-    """Direction of the contact from the centre [rad], counter-clockwise from +x."""
+    """Direction of the deepest point from the centre [rad], counter-clockwise from +x."""
     depth: float
     """How far beyond the air gap the rotor went, negative for short of it [m]."""
     approach: float
     rebound: float
-    """Largest radial velocity in the 2 ms before and after, by straight lines over 1 ms and so up to 5 mm/s
+    """Largest radial velocity before and after, by straight lines over 1 ms and so up to 5 mm/s
     too small [m/s], both positive."""
 
 
@@ -243,10 +249,18 @@ class Drop:
     """When the rotor began to fall [s], to about 2 ms."""
     end: float
     """When it was lifted again, or the record ends [s]."""
-    permanent_contact: float | None
-    """From when on it no longer left its bearings until `end` [s]."""
     lifted: bool
     """Whether it was lifted again in the record."""
+    impacts: tuple[Impact, ...] = ()
+    """In the order of time."""
+    lasting: tuple[float | None, ...] = ()
+    """When the last impact of each plane began [s]; None where that was within `LASTING` of the end."""
+
+    @property
+    def permanent_contact(self) -> float | None:
+        """When the last impact of all began [s]; None where one plane has none."""
+        known = [time for time in self.lasting if time is not None]
+        return max(known) if known and len(known) == len(self.lasting) else None
 
 
 def drops_of(motion: Motion) -> tuple[Drop, ...]:
@@ -265,7 +279,6 @@ def drops_of(motion: Motion) -> tuple[Drop, ...]:
             Drop(
                 release=release,
                 end=float(motion.time[stop - 1]),
-                permanent_contact=_permanent(motion, int(start), stop),
                 lifted=bool(len(later)),
             )
         )
@@ -284,63 +297,39 @@ def _release(motion: Motion, start: int, stop: int) -> float | None:
     return max(min(begun), float(motion.time[0]))
 
 
-def _permanent(motion: Motion, start: int, stop: int) -> float | None:
-    """Time after the last sample at which any plane was off its race, if the rotor stayed there for 50 ms."""
-    free = np.zeros(stop - start, dtype=np.bool_)
-    for path in motion.paths:
-        free |= path.radius[start:stop] < path.gap - max(0.1 * path.gap, 5.0 * path.noise)
-    last = np.flatnonzero(free)
-    first = start + (int(last[-1]) + 1 if len(last) else 0)
-    return float(motion.time[first]) if (stop - first) > 0.05 * motion.rate else None
-
-
-def impacts_of(motion: Motion, drop: Drop) -> tuple[Impact, ...]:
-    """Find every impact of a drop, first to last."""
-    found = [impact for path in motion.paths for impact in _impacts(motion, path, drop)]
-    return tuple(sorted(found, key=lambda impact: impact.time))
-
-
-def _impacts(motion: Motion, path: Path, drop: Drop) -> list[Impact]:
+def with_impacts(motion: Motion, drop: Drop) -> Drop:
+    """A drop with its impacts and the begin of lasting contact, by the rule of `reversals_of`."""
     inside = (motion.time >= drop.release) & (motion.time <= drop.end)
-    first = int(np.argmax(inside))
-    radius = path.radius[inside]
-    least = max(0.04 * path.gap, 6.0 * path.noise)
-    speed = slope(radius, motion.rate)
-    reach = max(int(2e-3 * motion.rate), 1)
-    impacts = []
-    for at in _peaks(radius, _NEAR * path.gap, least):
-        x, y = path.position[first + at]
-        before, after = speed[max(at - reach, 0) : at + 1], speed[at : at + reach + 1]
-        impacts.append(
+    first, time = int(np.argmax(inside)), motion.time[inside]
+    impacts, lasting = [], []
+    for path in motion.paths:
+        place = path.bearing_position[inside]
+        hits = reversals_of(place, motion.rate, path.gap, path.noise, np.array([0.0, -1.0]))
+        touched = time[hits.touched]
+        touch = path.wall.touch
+        if (
+            len(touched)
+            and touch is not None
+            and abs(touch.sample - first - hits.touched[0]) < 3e-3 * motion.rate
+        ):
+            touched[0] = float(np.interp(touch.sample, np.arange(len(motion.time)), motion.time))
+        impacts += [
             Impact(
                 plane=path.name,
-                time=float(motion.time[first + at]),
-                azimuth=float(np.arctan2(y, x)),
-                depth=float(radius[at] - path.gap),
-                approach=max(float(np.max(before)), 0.0),
-                rebound=max(float(-np.min(after)), 0.0),
+                time=float(begins),
+                azimuth=float(np.arctan2(*place[at][::-1])),
+                depth=float(np.hypot(*place[at]) - path.gap),
+                approach=float(approach),
+                rebound=float(rebound),
             )
-        )
-    return impacts
-
-
-def _peaks(values: Array, floor: float, least: float) -> list[int]:
-    """Maxima above a floor between which the values fall by at least `least`."""
-    peaks: list[int] = []
-    best, lowest, rising = 0, float(values[0]), True
-    for i, value in enumerate(values.tolist()):
-        if rising:
-            if value > values[best]:
-                best = i
-            elif values[best] - value > least:
-                if values[best] >= floor:
-                    peaks.append(best)
-                rising, lowest = False, value
-        elif value < lowest:
-            lowest = value
-        elif value - lowest > least:
-            rising, best = True, i
-    return peaks
+            for begins, at, approach, rebound in zip(
+                touched, hits.deepest, hits.approach, hits.rebound, strict=True
+            )
+        ]
+        last = float(touched[-1]) if len(touched) else None
+        ends = last is None or drop.end - last < LASTING
+        lasting.append(None if ends else last)
+    return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), lasting=tuple(lasting))
 
 
 def whirls_of(motion: Motion, drop: Drop) -> tuple[Whirl, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.evidence.wall import HOP
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -26,12 +27,18 @@ from rotordrop.report.record_quality import quality_statements, record_quality_s
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.look import Look, Synchronous
+    from rotordrop.evidence.look import Look, PlaneLook, Synchronous
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
 ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
+RULE = (
+    f"An impact is a return to the race after a flight that takes the rotor {HOP:.0%} of the air gap off it; "
+    "shorter hops belong to the impact before, and a swing along the race is none."
+)
+VAGUE = 0.05
+"""A length whose 90 % interval reaches further to either side is shown as a range [1] (chosen)."""
 SENSOR_PLANES = "Displacement in the planes of the sensors; time counts from the release."
 
 
@@ -80,14 +87,24 @@ def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
 def _verdict(seen: Look) -> list[Statement]:
     drop = seen.drops[0]
     contact = drop.permanent_contact
-    ends = "." if contact is None else f"; from {format_moment(contact)} on it stayed in contact."
+    ends = (
+        "." if contact is None else f"; the last one at {format_moment(contact)}, in contact from there on."
+    )
     release = f"The rotor was released at {format_moment(drop.release)} of the record (± 2 ms)"
     said = [f"{release}, {len(seen.impacts)} impacts{ends}"]
+    if len(seen.planes) > 1:
+        first = seen.first_end
+        said.append(
+            "Which end touched first is not determined by this record: the touches are less apart than their "
+            "errors, or one does not show."
+            if first is None
+            else f"{first} touched first."
+        )
     said += [
         f"{plane.plane}: {shown(plane.excess, 'length', 3)} beyond the air gap of "
-        f"{shown(plane.gap, 'length', 3)} at {format_moment(plane.largest_time)}."
+        f"{shown(plane.gap, 'length', 3)} at {format_moment(plane.largest_time)}, at the sensors."
         for plane in seen.planes
-        if plane.excess > 0
+        if plane.excess > 0 and plane.gap_interval_90 is None
     ]
     if seen.standstill is not None:
         said.append(f"The shaft came to rest {seen.standstill - drop.release:.3g} s after the release.")
@@ -100,10 +117,11 @@ def _verdict(seen: Look) -> list[Statement]:
 def _card(seen: Look, number: int) -> Card:
     plane = seen.planes[number]
     hits = sum(impact.plane == plane.plane for impact in seen.impacts)
-    note = f"at {plane.largest_time:.4g} s, {hits} impacts"
+    note = f"at the sensors, at {plane.largest_time:.4g} s, {hits} impacts"
+    largest = _found(plane.largest, plane.largest_interval_90)
     figures = [
-        fact("largest distance from the centre", plane.largest, "length", note=note),
-        fact("air gap used", plane.gap, "length"),
+        KeyFigure("largest distance from the centre", largest, note),
+        _gap_figure(plane),
         fact("position index (mean distance over gap)", plane.position_index, "dimensionless"),
     ]
     if plane.velocity_index is not None:
@@ -113,6 +131,19 @@ def _card(seen: Look, number: int) -> Card:
         if found.plane == plane.plane:
             figures += _synchronous(found)
     return Card(plane.plane, tuple(figures))
+
+
+def _gap_figure(plane: PlaneLook) -> KeyFigure:
+    if plane.gap_interval_90 is None:
+        return KeyFigure("air gap", Quantity(value=plane.gap, kind="length", digits=3), "as given")
+    note = "by where the rotor touched" if plane.gap_determined else "not determined by this record"
+    return KeyFigure("air gap", _found(plane.gap, plane.gap_interval_90), note)
+
+
+def _found(value: float, interval: tuple[float, float]) -> Quantity:
+    """A length with its interval; the interval alone where a number would say too much."""
+    vague = interval[1] - interval[0] > 2.0 * VAGUE * value
+    return Quantity(value=value, kind="length", interval_90=interval, digits=3, range_only=vague)
 
 
 def _synchronous(found: Synchronous) -> list[KeyFigure]:
@@ -133,7 +164,7 @@ def _figures(seen: Look) -> tuple[Section, ...]:
         BearingMotions(
             name=path.name,
             motions=(Motion(label="measured", time=time, displacement=path.position, role="measured"),),
-            air_gap=AirGap.of(path.gap),
+            air_gap=AirGap(lower=path.wall.interval_90[0], upper=path.wall.interval_90[1]),
         )
         for path in seen.motion.paths
     ]
@@ -150,11 +181,13 @@ def _figures(seen: Look) -> tuple[Section, ...]:
 def _impacts(seen: Look) -> Table:
     columns = (
         Column("plane", "plane"),
-        Column("record time", lambda impact: format_moment(impact.time, 4)),
+        Column("touches at (record time)", lambda impact: format_moment(impact.time, 4)),
         Column("azimuth", lambda impact: f"{degrees(impact.azimuth):.0f}°"),
         Column("beyond the air gap", "depth", "length"),
         Column("radial velocity before", "approach", "velocity"),
         Column("and after", "rebound", "velocity"),
     )
     note = f"The first {MOST_LISTED} of {len(seen.impacts)}." if len(seen.impacts) > MOST_LISTED else ""
-    return table(seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", note)
+    return table(
+        seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{RULE} {note}".strip()
+    )

@@ -70,7 +70,7 @@ def write_look(
             "places": [
                 {
                     "name": path.name,
-                    "gap": [path.gap, path.gap],
+                    "gap": list(path.wall.interval_90),
                     "measured": [f"x{b}", f"y{b}"],
                     "radius": f"r{b}",
                 }

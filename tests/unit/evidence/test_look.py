@@ -74,7 +74,7 @@ def test_release_impacts_and_contact_of_a_bouncing_point(angles, tmp_path):
         assert impact.rebound == pytest.approx(rebound, abs=6e-3)
     assert seen.drops[0].permanent_contact == pytest.approx(hits[-1][0], abs=15e-3)
     for plane in seen.planes:
-        assert plane.largest == pytest.approx(GAP, abs=2e-6)
+        assert plane.largest == pytest.approx(GAP, abs=3e-6)
     assert seen.speed == pytest.approx(120 * np.pi)
     assert seen.findings == ()
 
@@ -82,8 +82,61 @@ def test_release_impacts_and_contact_of_a_bouncing_point(angles, tmp_path):
 def test_the_gap_comes_from_the_depth_of_the_rest_where_it_is_not_given(tmp_path):
     time, path, _ = fall_and_bounce()
     seen = look(written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path}))
-    assert [plane.gap for plane in seen.planes] == pytest.approx([GAP, 0.8 * GAP], abs=1e-6)
-    assert any("air gap 250 µm taken from where the rotor floated" in note for note in seen.notes)
+    for plane, gap in zip(seen.planes, (GAP, 0.8 * GAP), strict=True):
+        low, high = plane.gap_interval_90
+        assert low < gap < high and high - low < 0.3 * gap
+        assert plane.gap == pytest.approx(gap, rel=0.05)
+    low, high = (1e6 * end for end in seen.planes[0].gap_interval_90)
+    told = f"NDE: air gap between {low:.0f} and {high:.0f} µm"
+    assert any(note.startswith(told) and "--gap" in note for note in seen.notes)
+
+
+def test_a_gap_is_found_where_the_rotor_floats_beside_the_centre(tmp_path):
+    """The way from floating to rest was taken for the gap: 222 µm of 250."""
+    time, path, _ = fall_and_bounce(until=1.5)
+    turning = (time >= 0.6) & (time < 1.2)
+    angle = -np.pi / 2 + 2 * np.pi * 25.0 * (time[turning] - 0.6)
+    path[turning] = GAP * np.column_stack([np.cos(angle), np.sin(angle)])
+    lifted = path.copy()
+    lifted[time < RELEASE, 1] -= 28e-6
+    before = (time >= RELEASE) & (lifted[:, 1] > -28e-6)
+    lifted[before, 1] = -28e-6
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": lifted, "DE": lifted}))
+    for plane in seen.planes:
+        low, high = plane.gap_interval_90
+        assert low < GAP < high
+        assert plane.gap == pytest.approx(GAP, rel=0.02)
+
+
+def test_a_swing_along_the_race_is_no_impact_and_bounces_are_counted(tmp_path):
+    """Every swing counted as an impact beyond the air gap; 50 of 66 impacts of a drop were swings."""
+    time, path, hits = fall_and_bounce(until=2.0)
+    swings = time > hits[-1][0] + 0.02
+    since = time[swings] - hits[-1][0] - 0.02
+    angle = -np.pi / 2 + 0.4 * np.exp(-since / 5.0) * np.sin(2 * np.pi * 28.0 * since)
+    path[swings] = GAP * np.column_stack([np.cos(angle), np.sin(angle)])
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path}))
+    flown = np.diff([at for at, _, _ in hits])
+    clear = [
+        hits[0],
+        *(hit for hit, flew in zip(hits[1:], flown, strict=True) if flew > np.sqrt(0.4 * GAP / G)),
+    ]
+    for plane in seen.planes:
+        mine = [hit for hit in seen.impacts if hit.plane == plane.plane]
+        assert len(mine) == len(clear)
+        assert plane.contact_from == mine[-1].time == pytest.approx(clear[-1][0], abs=0.3e-3)
+
+
+def test_the_end_that_touches_first_is_named_by_the_kink_and_left_open_where_both_touch_together(tmp_path):
+    time, path, hits = fall_and_bounce()
+    late = np.roll(path, 13, axis=0)  # 0.65 ms
+    seen = look(written(tmp_path / "drop.csv", time, {"NDE": late, "DE": path}))
+    assert seen.first_end == "DE"
+    touches = {plane.plane: plane for plane in seen.planes}
+    for name, at in (("DE", hits[0][0]), ("NDE", hits[0][0] + 0.65e-3)):
+        low, high = touches[name].touch_interval_90
+        assert low < at < high and high - low < 0.5e-3
+    assert look(written(tmp_path / "both.csv", time, {"NDE": path, "DE": path})).first_end is None
 
 
 @pytest.mark.parametrize(("frequency", "sense"), [(25.0, "forward"), (-40.0, "backward")])
@@ -180,7 +233,8 @@ def test_the_bundled_drop_with_and_without_its_machine(machine):
     assert alone.drops[0].release == pytest.approx(0.0, abs=2e-3)
     for one in alone.planes:
         other = next(plane for plane in known.planes if plane.plane == one.plane)
-        assert one.largest == pytest.approx(other.largest, rel=0.15), "where it floats counts as the centre"
+        assert one.gap_interval_90[0] < other.gap < one.gap_interval_90[1]
+        assert one.largest_interval_90[0] < other.largest < one.largest_interval_90[1]
     for name in ("NDE", "DE"):
         first = [next(hit.time for hit in seen.impacts if hit.plane == name) for seen in (alone, known)]
         assert first[0] == pytest.approx(first[1], abs=1e-3)
@@ -204,15 +258,18 @@ def test_every_number_of_the_document_is_that_of_what_was_seen(machine):
         assert entry["largest_displacement_time_s"] == plane.largest_time
         assert entry["position_index"] == plane.position_index
         assert entry["velocity_index"] == plane.velocity_index
+    assert [plane.plane for plane in seen.planes if seen.first_end == plane.plane] == ["DE"]
     names = ("plane", "time", "azimuth", "depth", "approach", "rebound")
     keys = ("plane", "time_s", "azimuth_rad", "depth_m", "approach_m_per_s", "rebound_m_per_s")
     assert len(written["impacts"]) == len(seen.impacts) > 4
     for entry, impact in zip(written["impacts"], seen.impacts, strict=True):
         assert tuple(entry[key] for key in keys) == tuple(getattr(impact, name) for name in names)
     first = next(hit for hit in written["impacts"] if hit["plane"] == "DE")
-    # The remanent lift makes the fall through the gap longer and slower than a free one.
+    assert {entry["plane"]: entry["first_touch_s"] for entry in written["planes"]}["DE"] == pytest.approx(
+        7.11e-3 - 0.25e-3, abs=0.3e-3
+    )
     gap = next(one["air_gap_m"] for one in written["planes"] if one["plane"] == "DE")
-    assert np.sqrt(2.0 * gap / G) < first["time_s"] - drop["release_s"] < 1.5 * np.sqrt(2.0 * gap / G)
+    assert 0.8 * np.sqrt(2.0 * gap / G) < first["time_s"] - drop["release_s"] < 1.5 * np.sqrt(2.0 * gap / G)
     assert 0.5 * np.sqrt(2.0 * gap * G) < first["approach_m_per_s"] < 1.05 * np.sqrt(2.0 * gap * G)
     assert [one["event"] for one in written["timeline"]] == [words for _, words in seen.timeline()]
 
@@ -222,7 +279,7 @@ def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys
     page, file = tmp_path / "look.html", tmp_path / "look.json"
     assert run(["look", record, "--gap", "280 um", "--report", str(page), "--json", str(file)]) == 0
     told = capsys.readouterr().out
-    assert "first impact at NDE" in told
+    assert "first touch at NDE" in told
     assert "This record is simulated" in told
     jsonschema.validate(json.loads(file.read_text()), look_schema())
     assert "Path of the rotor centre against the clearance circle" in page.read_text()

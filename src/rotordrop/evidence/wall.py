@@ -1,0 +1,334 @@
+"""The wall round the shaft in a sensor plane: centre and radius, from the motion of one drop alone.
+
+Where the rotor floated is a poor centre: a controller holds it some hundredths of the gap beside. What
+touches lies on the circle: the place of the first touch, the reversals of impacts, the arc of the swing.
+A reversal lies beyond the circle by ``β v``, with v the velocity of approach and ``β`` the inverse natural
+frequency of the rotor on its contact; at rest it lies beyond by ``g β²``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.evidence.touch import Touch, first_touch
+from rotordrop.known import NINETY
+from rotordrop.record.recording import Array
+from rotordrop.series import noise_by_differences
+
+GRAVITY = 9.81
+
+SMOOTHING = 1e-3
+"""Window of velocities [s]."""
+
+_CENTRED = 0.08
+"""Standard deviation of where a rotor floats from the centre, per axis, over the gap [1] (chosen)."""
+
+_UNLIKE = 0.2
+"""Standard deviation of the gap over the way from floating to rest, less one [1] (chosen)."""
+
+_LEVER = (0.05, 0.06)
+"""How far a bearing lies outside its sensor plane over the distance of the planes, and its standard deviation
+[1] (chosen)."""
+
+_ROUND = 0.01
+"""Standard deviation of a place at the wall over the gap [1]: races that move, shafts that bend (chosen)."""
+
+_STRAYS = 0.35
+"""Standard deviation of the depth of a reversal over ``β v`` [1] (chosen)."""
+
+_KINK, _SLOW_KINK = 0.012, 0.04
+"""Standard deviation of the place of the first touch over the gap [1], of a hard and a soft contact (from the
+first half of DropBench)."""
+
+_USUAL_BETA = (6e-4, 1.2)
+"""Inverse frequency of rotor on contact [s] and the standard deviation of its logarithm: 5 kg have 2e-4, 6 t
+4e-3."""
+
+_SAG_DOUBT = 0.4
+"""Standard deviation of the logarithm of the static depth over ``g β²`` [1] (chosen)."""
+
+GAIN = 0.01
+"""Standard deviation of the gain of displacement sensors [1] (chosen; calibrated ones keep 1 %)."""
+
+_DOUBTFUL = 0.25
+"""An air gap whose 90 % interval reaches this share of it to either side is not determined [1] (chosen)."""
+
+_BIN = 5e-3
+"""Length of a stretch that shows where a swinging rotor lies [s]."""
+
+_MOST_BINS = 400
+_INDEPENDENT = 4.0
+"""Stretches of a swing count like so many independent places: their errors are alike [1]."""
+
+_SEARCHED = 2.0
+"""How long after the fall impacts are looked for to find the wall [s]."""
+
+_NEAR = 0.85
+"""A contact turns the rotor back at this share of the gap or beyond [1]."""
+
+HOP = 0.05
+"""A rotor that left its race by less than this share of the gap has not left it [1] (chosen)."""
+
+_FREE, _LEAST_FREE = 0.8, 0.3
+"""Least mean acceleration in a flight over that of a free body, and least of that over gravity [1] (both from
+the first half of DropBench)."""
+
+_LONGEST_FALL = 20e-3
+"""The first approach is looked for so long before the first reversal [s]."""
+
+_SHARPEST_SWING = 0.7
+"""Radial acceleration over gravity above which a reversal is an impact [1]: a swing along the race and the
+wrong centre of a circle give less."""
+
+
+def shortest_flight(gap: float) -> float:
+    """Shortest flight that ends in an impact [s]: gravity moves the rotor by `HOP` of the gap in it."""
+    return math.sqrt(8.0 * HOP * gap / GRAVITY)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wall:
+    """The circle in which the shaft moves in one plane."""
+
+    centre: Array
+    """Its centre, from the origin of the readings [m], shape (2,)."""
+    centre_error: Array
+    """Standard error of the centre [m], shape (2,)."""
+    gap: float
+    """Its radius [m]."""
+    gap_error: float
+    """Standard error of the radius, gain of the sensors included [m]; 0 where it was given."""
+    lever: float
+    """How far the touchdown bearing lies outside, over the distance of the planes [1]."""
+    touch: Touch | None
+    """First touch of the race; None where the fall is not seen to end."""
+
+    @property
+    def interval_90(self) -> tuple[float, float]:
+        """Interval that holds the radius with 90 % probability [m]."""
+        half = NINETY * self.gap_error
+        return self.gap - half, self.gap + half
+
+    @property
+    def determined(self) -> bool:
+        """Whether the record, or who gave it, tells the radius to `_DOUBTFUL` of itself."""
+        return NINETY * self.gap_error < _DOUBTFUL * self.gap
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reversals:
+    """Where a bearing turned the rotor back; K impacts, as samples of the path."""
+
+    deepest: NDArray[np.int64]
+    """Deepest point, shape (K,)."""
+    touched: NDArray[np.int64]
+    """Kink of the radial velocity before it, to about 0.3 ms, shape (K,)."""
+    approach: Array
+    rebound: Array
+    """Largest radial velocity before and after, by straight lines over `SMOOTHING` [m/s], shape (K,)."""
+
+
+def reversals_of(path: Array, rate: float, gap: float, noise: float, down: Array) -> Reversals:
+    """Find the impacts of a path (N, 2) from the centre: back on the race after a flight, and turned sharply.
+
+    A flight takes the rotor off the race by `HOP` of the gap, lasts as long as gravity needs for that, is as
+    fast at its end, and is accelerated like a free body. Shorter hops belong to the impact before; a rotor
+    that swings along its race, or shakes with it, makes none.
+    """
+    radius = np.hypot(*path.T)
+    speed, velocity = slope(radius, rate), slope(path, rate)
+    along = path / np.maximum(radius, 1e-12)[:, None]
+    across = along[:, 0] * velocity[:, 1] - along[:, 1] * velocity[:, 0]
+    free = GRAVITY * (along @ down) + across**2 / gap
+    shortest, slowest = shortest_flight(gap), math.sqrt(2.0 * GRAVITY * HOP * gap)
+    early = round(0.25 * SMOOTHING * rate)  # a velocity over a window turns up to half of it before the kink
+    reach = max(int(max(2e-3, 1.5 * shortest) * rate), 1)
+    found: list[tuple[int, int, float, float]] = []
+    before: int | None = None
+    for at in peaks(radius, _NEAR * gap, max(0.5 * HOP * gap, 6.0 * noise)):
+        begin = max(at - round(_LONGEST_FALL * rate), 0) if before is None else before
+        fastest = begin + int(np.argmax(speed[begin : at + 1]))
+        left = begin if before is None else begin + int(np.argmin(speed[begin : fastest + 1]))
+        leaves = at + int(np.argmin(speed[at : at + reach + 1]))
+        approach, rebound = max(float(speed[fastest]), 0.0), max(float(-speed[leaves]), 0.0)
+        turned = (approach + rebound) * rate / max(leaves - fastest, 1)
+        flew = (fastest - left) / rate
+        gained = float(speed[fastest] - speed[left]) / max(flew, 1.0 / rate)
+        accelerated = gained / max(float(np.mean(free[left : fastest + 1])), _LEAST_FREE * GRAVITY)
+        hopped = float(radius[at] - np.min(radius[left : at + 1])) > HOP * gap
+        flight = flew > shortest and approach > slowest and accelerated > _FREE
+        if before is None or (flight and hopped and turned > _SHARPEST_SWING * GRAVITY):
+            found.append((at, min(fastest + early, at), approach, rebound))
+        before = at
+    columns = list(zip(*found, strict=True)) if found else [(), (), (), ()]
+    return Reversals(
+        deepest=np.array(columns[0], dtype=np.int64),
+        touched=np.array(columns[1], dtype=np.int64),
+        approach=np.array(columns[2], dtype=np.float64),
+        rebound=np.array(columns[3], dtype=np.float64),
+    )
+
+
+def slope(values: Array, rate: float) -> Array:
+    """Velocity by a straight line through `SMOOTHING` around every sample [m/s], shape of the values."""
+    half = max(int(0.5 * SMOOTHING * rate), 1)
+    index = np.arange(-half, half + 1)
+    weights = -index * rate / float(np.sum(index**2))  # numpy turns the kernel round
+    columns = [
+        np.convolve(np.pad(column, half, mode="edge"), weights, mode="valid")
+        for column in np.atleast_2d(values.T)
+    ]
+    return np.stack(columns, axis=-1).reshape(values.shape)
+
+
+def peaks(values: Array, floor: float, least: float) -> list[int]:
+    """Maxima above a floor between which the values fall by at least `least`."""
+    found: list[int] = []
+    best, lowest, rising = 0, float(values[0]), True
+    for i, value in enumerate(values.tolist()):
+        if rising:
+            if value > values[best]:
+                best = i
+            elif values[best] - value > least:
+                if values[best] >= floor:
+                    found.append(best)
+                rising, lowest = False, value
+        elif value < lowest:
+            lowest = value
+        elif value - lowest > least:
+            rising, best = True, i
+    return found
+
+
+def find_wall(
+    place: Array,
+    other: Array,
+    rate: float,
+    fall: tuple[int, int],
+    given: tuple[float, float] | None = None,
+) -> Wall:
+    """Find the circle of one plane.
+
+    Parameters
+    ----------
+    place : array, shape (N, 2)
+        Readings of the plane [m].
+    other : array, shape (N, 2)
+        Readings of a plane at the other end [m]; those of the plane where there is none.
+    rate : float
+        Samples per second [Hz].
+    fall : tuple of int
+        Last sample that surely floats, and first sample by which the rotor lies away from it.
+    given : tuple of float, optional
+        Radius that is known and its standard error [m].
+
+    Notes
+    -----
+    Damped least squares with robust weights over centre, radius, ``β``, static depth and the lever of the
+    bearing outside the sensor plane; what the record leaves open, the priors named above hold.
+    """
+    from scipy.optimize import least_squares
+
+    begin, sunk = fall
+    until = min(len(place), sunk + int(_SEARCHED * rate))
+    place, other = place[:until], other[:until]
+    noise = noise_by_differences(place, 3)
+    floated = np.mean(place[:begin], axis=0)
+    apart = (place - floated) - (other - np.mean(other[:begin], axis=0))
+    size = _first_size(place, floated, sunk)
+    down = (place[sunk] - floated) / math.hypot(*(place[sunk] - floated))
+    touch = first_touch(place, floated, rate, begin, size, noise)
+    touched = None if touch is None or not touch.by_kink else (touch.at(place), touch.at(apart))
+
+    def residual(sought: Array, hits: Reversals, strays: Array, lying: NDArray[np.int64]) -> Array:
+        centre, gap, beta, lever = sought[:2], sought[2], math.exp(sought[3]), sought[5]
+
+        def beyond(here: Array, aside: Array) -> Array:
+            return np.asarray(np.hypot(*(here + lever * aside - centre).T) - gap)
+
+        deepest = sunk + hits.deepest
+        depth = beta * hits.approach
+        impacts = (beyond(place[deepest], apart[deepest]) - depth) / np.hypot(_ROUND * size, strays)
+        rest = beyond(place[lying], apart[lying]) - GRAVITY * beta**2 * math.exp(sought[4])
+        parts = [
+            _robust(impacts),
+            _robust(rest / (_ROUND * size)) / math.sqrt(max(len(lying) / _INDEPENDENT, 1.0)),
+            (centre - floated) / (_CENTRED * size),
+            [
+                (sought[3] - math.log(_USUAL_BETA[0])) / _USUAL_BETA[1],
+                sought[4] / _SAG_DOUBT,
+                (lever - _LEVER[0]) / _LEVER[1],
+                (gap / size - 1.0) / _UNLIKE,
+            ],
+        ]
+        if touched is not None and touch is not None:
+            scale = (_SLOW_KINK if touch.soft else _KINK) * size
+            parts.append(_robust(np.atleast_1d(beyond(*touched) / scale)))
+        if given is not None:
+            parts.append([(gap - given[0]) / max(given[1], 1e-9)])
+        return np.concatenate(parts)
+
+    start = size if given is None else given[0]
+    sought = np.array([*floated, start, math.log(_USUAL_BETA[0]), 0.0, _LEVER[0]])
+    scale = (1e-5, 1e-5, 1e-5, 0.3, 0.3, 0.05)
+    low = np.array([*(floated - size), 0.5 * size, -10.0, -3.0, -0.5])
+    high = np.array([*(floated + size), 1.6 * size, -4.0, 3.0, 0.5])
+    found = None
+    for _ in range(10):
+        path = place + sought[5] * apart
+        radius = np.hypot(*(path - sought[:2]).T)
+        hits = reversals_of(path[sunk:] - sought[:2], rate, float(sought[2]), noise, down)
+        strays = _STRAYS * math.exp(sought[3]) * hits.approach
+        lying = _lying(
+            radius, sunk + (int(hits.deepest[-1]) if len(hits.deepest) else 0), rate, sought[2], noise
+        )
+        found = least_squares(
+            residual,
+            np.clip(sought, low, high),
+            args=(hits, strays, lying),
+            bounds=(low, high),
+            x_scale=scale,
+        )
+        moved = float(np.max(np.abs(found.x[:3] - sought[:3])))
+        sought = found.x
+        if moved < 1e-7:
+            break
+    assert found is not None
+    error = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+    gap, exact = float(sought[2]), given is not None and given[1] == 0.0
+    return Wall(
+        centre=sought[:2].copy(),
+        centre_error=error[:2],
+        gap=gap,
+        gap_error=0.0 if exact else math.hypot(float(error[2]), GAIN * gap),
+        lever=float(sought[5]),
+        touch=touch,
+    )
+
+
+def _robust(error: Array) -> Array:
+    """Errors over their standard deviations whose squares grow like a line when large (pseudo-Huber)."""
+    return np.asarray(np.sign(error) * np.sqrt(2.0 * (np.sqrt(1.0 + error**2) - 1.0)))
+
+
+def _first_size(place: Array, floated: Array, sunk: int) -> float:
+    """How far the rotor lies from where it floated, or strays where it ends in a whirl [m]."""
+    late = place[sunk + 3 * (len(place) - sunk) // 4 :]
+    lies = math.hypot(*(np.median(late if len(late) else place[-1:], axis=0) - floated))
+    strays = float(np.percentile(np.hypot(*(place[sunk:] - floated).T), 80))
+    return max(lies, 0.9 * strays)
+
+
+def _lying(radius: Array, since: int, rate: float, gap: float, noise: float) -> NDArray[np.int64]:
+    """Middles of the stretches after the last impact in which the rotor keeps its distance to the centre."""
+    length = max(int(_BIN * rate), 4)
+    since = max(min(since + int(2e-3 * rate), len(radius) - 8 * length), 0)
+    count = (len(radius) - since) // length
+    stretches = radius[since : since + count * length].reshape(count, length)
+    calm = (stretches.std(axis=1) < 0.015 * gap + noise) & (stretches.mean(axis=1) > _NEAR * gap)
+    middles = since + length * np.flatnonzero(calm) + length // 2
+    return np.asarray(middles[:: max(len(middles) // _MOST_BINS, 1)], dtype=np.int64)
