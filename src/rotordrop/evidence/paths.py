@@ -19,6 +19,9 @@ from rotordrop.series import noise_by_differences, runs_of
 _SLOWEST_FALL = 0.2
 """Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
 
+BEYOND = 0.06
+"""A kink so far beyond the air gap, over it, is not that of the first touch [1] (chosen)."""
+
 LASTING = 0.05
 """Contact without an impact for this long lasts [s]."""
 
@@ -103,8 +106,8 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
             wall=wall,
             noise=_noise(position),
         )
-        if wall.touch is None:
-            radius = np.hypot(*path.bearing_position.T)
+        radius = np.hypot(*path.bearing_position.T)
+        if wall.touch is None or wall.touch.at(radius[:, None])[0] > (1.0 + BEYOND) * wall.gap:
             touch = crossing(radius, begin, rate, wall.gap, wall.gap_error)
             path = replace(path, wall=replace(wall, touch=touch))
         paths.append(path)

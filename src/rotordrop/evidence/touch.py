@@ -48,10 +48,17 @@ class _Windows:
 
 
 _HARD_KINK = _Windows(
-    before=2e-3, after=0.35e-3, power=2, earliest=-0.7e-3, latest=0.2e-3, ringing=2.5, least=0.8, error=0.1e-3
+    before=2e-3,
+    after=0.35e-3,
+    power=2,
+    earliest=-0.7e-3,
+    latest=0.2e-3,
+    ringing=2.5,
+    least=0.8,
+    error=0.15e-3,
 )
 _SOFT_KINK = _Windows(
-    before=2e-3, after=1.2e-3, power=3, earliest=-1.5e-3, latest=0.8e-3, ringing=1.5, least=0.4, error=0.2e-3
+    before=2e-3, after=1.2e-3, power=3, earliest=-1.5e-3, latest=0.8e-3, ringing=1.5, least=0.4, error=0.35e-3
 )
 
 
