@@ -16,7 +16,7 @@ from common import keep
 from tests.unit.spectrum.synthetic import CoastDown
 
 from rotordrop.spectrum.orders import track_orders
-from rotordrop.spectrum.waterfall import smear_factor, waterfall
+from rotordrop.spectrum.waterfall import smear_factor, waterfalls
 
 SEEDS = range(8)
 TIME_CONSTANT = 5.9
@@ -38,7 +38,7 @@ def main() -> None:
     exact = chirp()
     recorded = [chirp(seed=seed) for seed in SEEDS]
     framed = chirp(rate=20000.0)
-    frames = waterfall(framed.xy, framed.sampling_rate, component="x", speed=framed.speed)
+    (frames,) = waterfalls(framed.xy, framed.sampling_rate, components=("x",), speed=framed.speed)
     seen = np.array([row[frames.frequency > 5.0].max() for row in frames.amplitude]) / 20e-6
     length = frames.settings.points / framed.sampling_rate
     change = np.abs(frames.speed_change) / (2.0 * np.pi * length)

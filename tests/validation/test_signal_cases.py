@@ -15,7 +15,7 @@ from rotordrop.physics.aerodynamics import exponential_deceleration
 from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.spectrum.coast_down_law import exponential_time_constant
-from rotordrop.spectrum.waterfall import WaterfallSettings, waterfall
+from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
@@ -26,7 +26,7 @@ def waterfall_grid(inputs: Inputs) -> dict[str, float]:
     frames = {f"frames for N={n}": float(settings.frame_count(n)) for n in inputs["points"]}
     # The count is that of frames really computed, not only of the formula.
     shortest = min(inputs["points"])
-    computed = waterfall(np.zeros((shortest, 2)), inputs["fs"], settings=settings, highest_frequency=10.0)
+    (computed,) = waterfalls(np.zeros((shortest, 2)), inputs["fs"], settings=settings, highest_frequency=10.0)
     assert len(computed.time) == frames[f"frames for N={shortest}"]
     return frames | {"frequency resolution": computed.resolution}
 
@@ -37,7 +37,9 @@ def hann_amplitudes(inputs: Inputs) -> dict[str, float]:
     def highest(off: float) -> float:
         phase = 2.0 * math.pi * (1000.0 + off) * np.arange(points) / points
         tone = inputs["A"] * np.column_stack([np.cos(phase), np.zeros(points)])
-        found = waterfall(tone, float(points), component="x", settings=WaterfallSettings(points=points))
+        (found,) = waterfalls(
+            tone, float(points), components=("x",), settings=WaterfallSettings(points=points)
+        )
         return float(found.amplitude.max())
 
     half = highest(0.5)

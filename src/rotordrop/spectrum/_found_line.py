@@ -39,9 +39,8 @@ class FoundLine:
     time: Array
     path: Array
     """The frequency that it follows [Hz], shape (N,)."""
-    power: NDArray[np.float32]
-    """Square of what was taken out of the signal [m²], over all channels, in single precision: dozens of
-    lines are kept until all are named, shape (N,)."""
+    power: Array
+    """Mean square of what was taken out of the signal [m²], over all channels, shape (N,)."""
     brief: bool
     """Seen only for a short part of the signal."""
     parent: FoundLine | None = None
@@ -51,7 +50,7 @@ class FoundLine:
     @property
     def strength(self) -> float:
         """Sum of squares of what was taken out [m²]."""
-        return float(np.sum(self.power, dtype=np.float64))
+        return float(np.sum(self.power))
 
     @property
     def skirt(self) -> float:

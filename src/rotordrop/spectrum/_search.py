@@ -10,12 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from rotordrop.spectrum._clock import TURN, Clock, View
+from rotordrop.spectrum._clock import BESIDE, TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
-from rotordrop.spectrum.line_extraction import Envelope, Offset, drift_phase, mean_offset, power_share, smooth
+from rotordrop.spectrum.line_extraction import (
+    Envelope,
+    Near,
+    Offset,
+    drift_phase,
+    mean_offset,
+    power_share,
+    smooth,
+)
 from rotordrop.spectrum.line_settings import LineSettings
-from rotordrop.spectrum.line_spectra import offset_power
+from rotordrop.spectrum.line_spectra import frame_power
 from rotordrop.spectrum.naming import LineKind
 from rotordrop.spectrum.speed_profile import SpeedProfile
 
@@ -60,8 +68,6 @@ SURE_COMBINATION = 25.0
 """Minus the logarithm of the chance of noise [1] for a sum or difference to be believed."""
 
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
-BESIDE = 25.0
-"""Band [Hz] on either side of a moving path whose power is its floor."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +123,7 @@ class LineSearch:
 
     def _bursts(self) -> None:
         """Take out what is strong for a moment only, against what the same frequency usually shows."""
-        while len(self._refused) < MOST_REFUSED and self._clock.profile is not None:
+        while len(self._refused) < MOST_REFUSED and self._clock.angle is not None:
             view = self._view(SHORT_FRAME, of_orders=False)
             assert view is not None
             usual = np.median(view.frames.power, axis=0)
@@ -211,32 +217,42 @@ class LineSearch:
 
     def _follow(self, peak: Peak, view: View) -> tuple[FoundLine | None, Array]:
         """Follow a peak through the signal, with the part it takes of it; None if a line only swept past."""
-        advance = cast(Array, self._clock.angle) if view.of_orders else TURN * self._clock.time
+        clock = self._clock
+        near = clock.near(self._rest, peak.coordinate * self._advance(view.of_orders, of_signal=True))
+        advance = self._advance(view.of_orders)
         spoken = self._spoken(peak, view)
-        coordinate, offset = peak.coordinate, Offset(value=0.0, error=math.inf)
+        offset, shift = Offset(value=0.0, error=math.inf), 0.0
         for lag in LAGS:
-            envelope = self._clock.extract(self._rest, coordinate * advance)
+            envelope = clock.extract(near, shift * advance)
             present = self._present(envelope, peak, spoken)
             used = self._undisturbed(envelope, peak, present, spoken)
-            offset = mean_offset(envelope.value, advance, lag=round(lag * self._clock.rate), present=used)
-            coordinate += offset.value
-        phase = coordinate * advance
+            offset = mean_offset(envelope.value, advance, lag=round(lag * clock.rate), present=used)
+            shift += offset.value
+        coordinate, turn = peak.coordinate + shift, shift * advance
         if not view.of_orders and peak.ratio > 6.0:
-            envelope = self._clock.extract(self._rest, phase)
-            phase = phase + drift_phase(envelope.value, self._clock.rate, present, span=1.0)
-        envelope = self._clock.extract(self._rest, phase)
+            envelope = clock.extract(near, turn)
+            turn = turn + drift_phase(envelope.value, clock.rate, present, span=1.0)
+        envelope = clock.extract(near, turn)
         present = self._present(envelope, peak, spoken)
-        taken = self._part(envelope, present)
+        part = self._part(envelope, present)
+        taken = clock.line(envelope, part)
         if not self._explained(peak, view, taken) or self._better_otherwise(
             envelope, view, coordinate, spoken
         ):
             return None, taken
-        line = self._describe(envelope, present, taken, peak, view, coordinate, offset.error)
+        line = self._describe(envelope, present, part, peak, view, coordinate, offset.error)
         if self._skirt(line):
             return None, taken
         if line.kind == "steady":
-            self._phases.append((line, phase))
+            self._phases.append((line, envelope.phase))
         return line, taken
+
+    def _advance(self, of_orders: bool, *, of_signal: bool = False) -> Array:
+        """What an order, or a frequency [Hz], is multiplied with to be a phase [rad]."""
+        clock = self._clock
+        if of_orders:
+            return cast(Array, clock.signal_angle if of_signal else clock.angle)
+        return TURN * (clock.signal_time if of_signal else clock.time)
 
     def _skirt(self, line: FoundLine) -> bool:
         """Whether a line is blurred and small beside a strong one: what is left of that one, not a line."""
@@ -271,8 +287,9 @@ class LineSearch:
         order = coordinate if view.of_orders else coordinate / speed
         if order * float(np.ptp(self._clock.speed[spoken])) > CLOSE * self.settings.bandwidth:
             return False
-        other = coordinate * speed * TURN * self._clock.time if view.of_orders else order * self._clock.angle
-        rival = self._clock.extract(self._rest, other)
+        other = coordinate * speed if view.of_orders else order
+        path = other * self._advance(not view.of_orders, of_signal=True)
+        rival = self._clock.extract(self._clock.near(self._rest, path))
         usual = 4.0 * np.median(np.abs(envelope.value[spoken]) ** 2, axis=0)
         own, others = (np.minimum(np.abs(e.value[spoken]) ** 2, usual).sum() for e in (envelope, rival))
         return bool(others > 1.05 * own)
@@ -308,18 +325,18 @@ class LineSearch:
             clear &= _connected(clear, spoken, round(0.5 * self._clock.rate))
         return clear if clear[spoken].mean() > 0.2 else spoken & reachable
 
-    def _part(self, envelope: Envelope, present: Mask) -> Array:
-        """The line where it is present [m], fading in and out."""
+    def _part(self, envelope: Envelope, present: Mask) -> NDArray[np.complex128]:
+        """The amplitude of the line where it is present [m], fading in and out."""
         reach = round(self._clock.rate / self.settings.bandwidth)
         near = smooth(present.astype(np.float64), reach) > 0.02
         fade = smooth((near & self._clock.reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
-        return fade[:, None] * envelope.line()
+        return fade[:, None] * envelope.value
 
     def _describe(
         self,
         envelope: Envelope,
         present: Mask,
-        taken: Array,
+        part: NDArray[np.complex128],
         peak: Peak,
         view: View,
         coordinate: float,
@@ -346,7 +363,7 @@ class LineSearch:
         return self._line(
             envelope,
             present,
-            taken,
+            part,
             peak,
             kind=kind,
             frequency=mean,
@@ -361,7 +378,7 @@ class LineSearch:
         self,
         envelope: Envelope,
         present: Mask,
-        taken: Array,
+        part: NDArray[np.complex128],
         peak: Peak,
         *,
         kind: LineKind,
@@ -394,7 +411,7 @@ class LineSearch:
             existence=1.0 - self.settings.detection.false_alarm,
             time=self._clock.time,
             path=np.abs(self._clock.rate_of(envelope.phase)),
-            power=np.sum(taken**2, axis=1).astype(np.float32),
+            power=0.5 * np.sum(np.abs(part) ** 2, axis=1),
             brief=bool(when[-1] - when[0] < BRIEF * (self._clock.time[-1] - self._clock.time[0])),
             parent=parent,
             multiple=multiple,
@@ -402,7 +419,7 @@ class LineSearch:
 
     def _decided(self, weight: Array, frequency: float, resolution: float) -> bool:
         """Whether the speed changed enough, while the line was seen, to say whether the line follows it."""
-        if self._clock.profile is None:
+        if self._clock.angle is None:
             return False
         first, last = np.searchsorted(np.cumsum(weight), [0.1, 0.9])
         early, late = (
@@ -421,7 +438,7 @@ class LineSearch:
         seen: list[list[Peak | None]] = []
         while pairs and len(self.found) < self.settings.most_lines:
             # what is seen along the paths stays as it is until a line is taken out
-            seen = seen or [self._along(phase + k * self._clock.angle) for _, phase, k in pairs]
+            seen = seen or [self._along(self._combined(phase, k)) for _, phase, k in pairs]
             scored = [(peak, index) for index, peaks in enumerate(seen) for peak in peaks]
             peak, index = max(scored, key=lambda entry: entry[0].score if entry[0] else 0.0)
             if peak is None:
@@ -432,20 +449,24 @@ class LineSearch:
                 self._take_combination(peak, line, phase, k)
                 seen = []
 
-    def _along(self, phase: Array) -> list[Peak | None]:
+    def _combined(self, phase: Array, k: float) -> Near:
+        """What the signal holds near a sum of a steady line, whose phase [rad] is known, and an order."""
+        clock = self._clock
+        path = np.interp(clock.signal_time, clock.time, phase) + k * cast(Array, clock.signal_angle)
+        return clock.near(self._rest, path)
+
+    def _along(self, near: Near) -> list[Peak | None]:
         """The peak on a moving path against what lies beside it, in long frames and in short ones."""
-        turned = np.empty(self._rest.shape, dtype=np.complex128)
-        np.multiply(2.0 * self._rest, np.cos(phase)[:, None], out=turned.real)
-        np.multiply(-2.0 * self._rest, np.sin(phase)[:, None], out=turned.imag)
-        path, reachable = np.abs(self._clock.rate_of(phase)), self._clock.reachable(phase).astype(np.float64)
-        return [self._beside(turned, path, reachable, share) for share in (1.0, 0.5)]
+        path = np.abs(self._clock.rate_of(near.phase))
+        reachable = self._clock.reachable(near.phase).astype(np.float64)
+        return [self._beside(near.value, path, reachable, share) for share in (1.0, 0.5)]
 
     def _beside(
         self, turned: NDArray[np.complex128], path: Array, reachable: Array, share: float
     ) -> Peak | None:
         length = share * self._clock.frame
-        view = offset_power(
-            turned, self._clock.rate, start_time=self._clock.start, frame=length, reach=BESIDE
+        view = frame_power(
+            turned, self._clock.rate, start_time=self._clock.start, frame=length, highest=BESIDE
         )
         usable = self._clock.at(view.time, reachable) > 0.99
         for line in self.found:
@@ -464,16 +485,15 @@ class LineSearch:
         return peak
 
     def _take_combination(self, peak: Peak, partner: FoundLine, partner_phase: Array, k: float) -> None:
-        phase = partner_phase + k * cast(Array, self._clock.angle)
-        envelope = self._clock.extract(self._rest, phase)
-        present = self._present(envelope, peak, self._clock.reachable(phase))
-        frequency = np.abs(self._clock.rate_of(phase))
+        envelope = self._clock.extract(self._combined(partner_phase, k))
+        present = self._present(envelope, peak, self._clock.reachable(envelope.phase))
+        frequency = np.abs(self._clock.rate_of(envelope.phase))
         low, high = np.percentile(frequency[present], [5.0, 95.0])
-        taken = self._part(envelope, present)
+        part = self._part(envelope, present)
         line = self._line(
             envelope,
             present,
-            taken,
+            part,
             peak,
             kind="combination",
             frequency=float(np.sum(power_share(envelope, present) * frequency)),
@@ -485,7 +505,7 @@ class LineSearch:
             parent=partner,
             multiple=k,
         )
-        self._keep(line, taken)
+        self._keep(line, self._clock.line(envelope, part))
 
 
 def _connected(clear: Mask, spoken: Mask, gap: int) -> Mask:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -40,7 +40,7 @@ from rotordrop.spectrum.waterfall import (
     PlanarSignal,
     Waterfall,
     WaterfallSettings,
-    waterfall,
+    waterfalls,
 )
 
 Array = NDArray[np.float64]
@@ -192,12 +192,16 @@ def analyse_coast_down(
     choice, tell = choice or WaterfallChoice(), progress or (lambda stage, fraction: None)
     tell("lines", 0.05)
     read = signal.planes if signal.recorded else _as_read_by_a_sensor(signal.planes)
+    settled = {
+        name: find_settling(moved, signal.sampling_rate, start_time=signal.start_time)
+        for name, moved in signal.planes.items()
+    }
     lines = find_lines(
         read,
         signal.sampling_rate,
         signal.profile,
         start_time=signal.start_time,
-        skip=_bouncing(signal),
+        skip=_bouncing(signal, settled.values()),
         candidates=candidates,
         air_gap=float(np.mean(list(signal.air_gap.values()))),
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
@@ -205,19 +209,18 @@ def analyse_coast_down(
     tell("orders and waterfalls", 0.5)
     with ThreadPoolExecutor() as pool:
         seen = pool.map(
-            lambda name: _plane(signal, name, read[name], lines, candidates, choice), signal.planes
+            lambda name: _plane(signal, name, read[name], settled[name], lines, candidates, choice),
+            signal.planes,
         )
         planes = dict(zip(signal.planes, seen, strict=True))
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 
 
-def _bouncing(signal: CoastDownSignal) -> float:
+def _bouncing(signal: CoastDownSignal, settled: Iterable[Settling]) -> float:
     """How long the rotor bounces at the beginning [s]; nothing if it does not settle soon."""
-    last = 0.0
-    for moved in signal.planes.values():
-        found = find_settling(moved, signal.sampling_rate, start_time=signal.start_time)
-        last = max(last, found.last_lift_off if found.settled else 0.0)
+    last = max((found.last_lift_off for found in settled if found.settled), default=0.0)
+    last = max(last, 0.0)
     duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
     return last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0
 
@@ -234,6 +237,7 @@ def _plane(
     signal: CoastDownSignal,
     name: str,
     read: PlanarSignal,
+    settled: Settling,
     lines: Sequence[Line],
     candidates: Sequence[Candidate],
     choice: WaterfallChoice,
@@ -252,7 +256,7 @@ def _plane(
     return PlaneAnalysis(
         waterfalls=_waterfalls(signal, moved, choice),
         history=displacement_history(moved, rate, air_gap=signal.air_gap[name], start_time=start),
-        settling=find_settling(moved, rate, start_time=start),
+        settling=settled,
         track=track,
         resonances=resonances,
     )
@@ -266,18 +270,15 @@ def _waterfalls(
     speed = None
     if signal.profile is not None:
         speed = signal.profile.speed_at(signal.start_time + np.arange(moved.shape[0]) / signal.sampling_rate)
-    return tuple(
-        waterfall(
-            moved,
-            signal.sampling_rate,
-            component=component,
-            speed=speed,
-            settings=choice.settings,
-            amplitude_kind=choice.amplitude_kind,
-            start_time=signal.start_time,
-            highest_frequency=choice.highest_frequency,
-        )
-        for component in choice.components
+    return waterfalls(
+        moved,
+        signal.sampling_rate,
+        components=choice.components,
+        speed=speed,
+        settings=choice.settings,
+        amplitude_kind=choice.amplitude_kind,
+        start_time=signal.start_time,
+        highest_frequency=choice.highest_frequency,
     )
 
 

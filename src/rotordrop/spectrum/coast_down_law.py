@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 Model = Callable[[Array], Array]
 
 MOST_VALUES = 2000
-LONGEST_STEP = 0.02
 CLOSE_ENOUGH = 1e-4
 """Residual over the highest speed [1] below which a law holds even where the speed has less noise."""
 
@@ -81,10 +80,7 @@ class DragFit:
         """Fitted speed [rad/s] at times [s] from ``start`` on; standstill is kept."""
         values = (self.initial_speed, self.constant, self.linear, self.quadratic)
         parameters = np.array([value.value for value in values])
-        wanted = np.asarray(time, dtype=np.float64)
-        steps = max(math.ceil((float(wanted.max()) - self.start) / LONGEST_STEP), 1)
-        knots = np.linspace(self.start, self.start + steps * LONGEST_STEP, steps + 1)
-        return np.interp(wanted, knots, _drag_solution(parameters, knots))
+        return _drag_solution(parameters, np.asarray(time, dtype=np.float64) - self.start)
 
 
 def exponential_time_constant(first_speed: float, later_speed: float, elapsed: float) -> float:
@@ -176,11 +172,10 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
     """
     t, omega = _window(time, speed, start, end)
     expected = _reading(t, omega)
-    knots = np.concatenate([[start], t])
     scale = _drag_scale(t, omega)
 
     def model(p: Array) -> Array:
-        return expected(_drag_solution(p, knots)[1:])
+        return expected(_drag_solution(p, t - start))
 
     fit = _fit(model, omega, scale, lower=np.zeros(4))
     noise = neighbour_noise(omega)
@@ -376,22 +371,25 @@ def _drag_scale(time: Array, speed: Array) -> Array:
 
 
 def _drag_solution(parameters: Array, time: Array) -> Array:
-    """Speed [rad/s] at rising times [s] under dry, linear and quadratic drag; fourth-order steps."""
-    omega, dry, linear, quadratic = (float(p) for p in parameters)
+    """Speed [rad/s] under dry, linear and quadratic drag at times [s] from its beginning; standstill is kept.
 
-    def slope(w: float) -> float:
-        return -(dry + (linear + quadratic * w) * w) if w > 0.0 else 0.0
-
-    result = np.empty(time.size)
-    result[0] = omega
-    for k, h in enumerate(np.diff(time).tolist(), start=1):
-        a = slope(omega)
-        b = slope(omega + 0.5 * h * a)
-        c = slope(omega + 0.5 * h * b)
-        d = slope(omega + h * c)
-        omega = max(omega + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), 0.0)
-        result[k] = omega
-    return result
+    The solution of Riccati's equation with constant coefficients: ``root`` turns from tanh over t/2 to tan as
+    dry and quadratic drag outweigh the linear one.
+    """
+    first, dry, linear, quadratic = (float(p) for p in parameters)
+    balance = linear**2 - 4.0 * dry * quadratic
+    rate = math.sqrt(abs(balance))
+    half = 0.5 * rate * time
+    stop = linear * first + 2.0 * dry  # of the root at standstill, times the first speed
+    if rate * float(np.max(time, initial=0.0)) < 1e-6:
+        root = 0.5 * time
+    elif balance > 0.0:
+        root = np.tanh(half) / rate
+    else:
+        # beyond standstill the tangent may pass its pole
+        root = np.tan(np.minimum(half, math.atan2(rate * first, stop))) / rate
+    speed = (first - stop * root) / (1.0 + (2.0 * quadratic * first + linear) * root)
+    return np.maximum(speed, 0.0)
 
 
 def _law_statement(law: str, rms: float, noise: float, highest: float) -> str:

@@ -10,6 +10,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import firwin, upfirdn
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -19,18 +20,34 @@ SHARPENING = 3
 """Passes over what the smoothing missed: each widens the band in which an amplitude is kept exactly."""
 
 
+TAPS_PER_FACTOR = 10
+STOP_BAND = 90.0
+"""Length of the filter before thinning out, in factors [1], and what it leaves of all that would fold back
+[dB]: it passes 0.2 of the rate that remains unchanged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Near:
+    """What a signal holds near a path: turned back by the phase of the path, and thinned out."""
+
+    value: ComplexArray
+    """Twice the signal, turned back [m], shape (M, C)."""
+    path: Array
+    """Phase of the path at every sample of the signal [rad], shape (N,)."""
+    phase: Array
+    """The same at the samples that are left [rad], shape (M,)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Envelope:
     """Complex amplitude of a line over time, in every channel."""
 
     value: ComplexArray
-    """The line is the real part of value times e^(j phase) [m], zero-to-peak, shape (N, C)."""
+    """The line is the real part of value times e^(j phase) [m], zero-to-peak, shape (M, C)."""
     phase: Array
-    """Phase [rad] the line was assumed to follow, shape (N,)."""
-
-    def line(self) -> Array:
-        """The line itself [m], shape (N, C)."""
-        return self.value.real * np.cos(self.phase)[:, None] - self.value.imag * np.sin(self.phase)[:, None]
+    """Phase [rad] the line was assumed to follow, shape (M,)."""
+    near: Near
+    """What it was found in."""
 
 
 def smooth(values: Array, samples: int) -> Array:
@@ -65,34 +82,65 @@ def _share_inside(count: int, size: int) -> Array:
     return weight
 
 
-def extract(signal: Array, sampling_rate: float, phase: Array, *, bandwidth: float) -> Envelope:
-    """Take the part of a signal out that follows a phase, with an amplitude that changes slowly.
+def near_path(signal: Array, path: Array, factor: int) -> Near:
+    """Turn a signal back by the phase of a path and keep every so manieth sample of what lies near it.
 
     Parameters
     ----------
     signal : shape (N, C)
         [m], without its mean.
+    path : shape (N,)
+        Phase [rad].
+    factor : int
+        Samples of which one is left [1].
+    """
+    channels = signal.shape[1]
+    turned = np.empty((2 * channels, len(signal)))  # one row per channel: real parts, then imaginary parts
+    np.multiply(2.0 * signal.T, np.cos(path), out=turned[:channels])
+    np.multiply(-2.0 * signal.T, np.sin(path), out=turned[channels:])
+    if factor > 1:
+        turned = _thinned(turned, factor) / _share_thinned(len(path), factor)
+    return Near(value=(turned[:channels] + 1j * turned[channels:]).T, path=path, phase=path[::factor].copy())
+
+
+def _thinned(rows: Array, factor: int) -> Array:
+    half = TAPS_PER_FACTOR // 2
+    taps = firwin(2 * half * factor + 1, 1.0 / factor, window=("kaiser", 0.1102 * (STOP_BAND - 8.7)))
+    return cast(
+        Array, upfirdn(taps, rows, 1, factor, axis=-1)[..., half : half - (-rows.shape[-1] // factor)]
+    )
+
+
+@lru_cache(maxsize=8)
+def _share_thinned(count: int, factor: int) -> Array:
+    """Share of the filter that lies inside a series, at every sample that is left."""
+    return _thinned(np.ones(count), factor)
+
+
+def extract(near: Near, sampling_rate: float, turn: Array, *, bandwidth: float) -> Envelope:
+    """Take the part out that follows a path and a further phase, with an amplitude that changes slowly.
+
+    Parameters
+    ----------
+    near : Near
+        The signal near the path.
     sampling_rate : float
-        [Hz].
-    phase : shape (N,)
-        [rad].
+        Of its samples [Hz].
+    turn : shape (M,)
+        What the phase of the line has more than that of the path [rad].
     bandwidth : float
         Distance from the line up to which amplitude changes are followed [Hz].
     """
     samples = round(0.5 * sampling_rate / bandwidth)
-    channels = signal.shape[1]
-    turned = np.empty((2 * channels, len(signal)))  # one row per channel: real parts, then imaginary parts
-    np.multiply(2.0 * signal.T, np.cos(phase), out=turned[:channels])
-    np.multiply(-2.0 * signal.T, np.sin(phase), out=turned[channels:])
+    back = (near.value * np.exp(-1j * turn)[:, None]).T
+    turned = np.concatenate([back.real, back.imag])
     value = np.zeros_like(turned)
-    missed = np.empty_like(turned)
     for _ in range(SHARPENING):
-        np.subtract(turned, value, out=missed)
+        missed = turned - value
         _smooth_rows(missed, samples)
         value += missed
-    found = np.empty(signal.shape, dtype=np.complex128)
-    found.real, found.imag = value[:channels].T, value[channels:].T
-    return Envelope(value=found, phase=phase)
+    channels = len(back)
+    return Envelope(value=(value[:channels] + 1j * value[channels:]).T, phase=near.phase + turn, near=near)
 
 
 def power_share(envelope: Envelope, present: NDArray[np.bool_]) -> Array:

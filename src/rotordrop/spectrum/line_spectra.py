@@ -9,11 +9,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.fft import fft, rfft
+from scipy.fft import fft, next_fast_len, rfft
 from scipy.ndimage import map_coordinates, spline_filter1d
 from scipy.signal import resample_poly
 
-from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import hann_window
 
 Array = NDArray[np.float64]
@@ -40,89 +39,52 @@ class FramePower:
         return float(self.coordinate[1] - self.coordinate[0])
 
 
-def frequency_power(
-    signal: Array, sampling_rate: float, *, start_time: float, frame: float, highest: float
+def frame_power(
+    signal: NDArray[Any], sampling_rate: float, *, start_time: float, frame: float, highest: float
 ) -> FramePower:
     """Power over frequency in half-overlapping Hann frames.
 
     Parameters
     ----------
     signal : shape (N, C)
-        Displacement of every channel [m].
+        Displacement of every channel [m]; or, complex, twice the displacement turned back by the phase of a
+        path, whose power is found on both sides of the path.
     sampling_rate : float
         [Hz].
     start_time : float
         Time of the first sample [s].
     frame : float
-        Length of a frame [s].
+        Length of a frame [s]; it is drawn out to a number of samples that transforms fast.
     highest : float
-        Highest frequency kept [Hz].
+        Highest frequency, or largest distance from the path, that is kept [Hz].
     """
-    points = min(2 * max(round(frame * sampling_rate / 2), 8), len(signal) // 2 * 2)
+    turned = np.iscomplexobj(signal)
+    half = next_fast_len(max(round(frame * sampling_rate / 2), 8), real=not turned)
+    points = min(2 * half, len(signal) // 2 * 2)
     window = hann_window(points)
     starts = np.arange(0, len(signal) - points + 1, points // 2)
-    frequency = np.fft.rfftfreq(points, 1.0 / sampling_rate)
-    kept = frequency <= highest
-    power = np.empty((starts.size, int(kept.sum()), signal.shape[1]))
+    frequency = (np.fft.fftfreq if turned else np.fft.rfftfreq)(points, 1.0 / sampling_rate)
+    kept = np.flatnonzero(np.abs(frequency) <= highest)
+    kept = kept[np.argsort(frequency[kept])]
+    power = np.empty((starts.size, kept.size, signal.shape[1]))
     for channel in range(signal.shape[1]):
-        frames = _frames(signal[:, channel], points)
-        spectrum = rfft((frames - frames.mean(axis=1, keepdims=True)) * window, overwrite_x=True)[:, kept]
-        power[:, :, channel] = np.abs(spectrum) ** 2 * (4.0 / points) ** 2
-    middle = start_time + (starts.astype(np.float64) + points / 2) / sampling_rate
-    return FramePower(
-        time=middle,
-        coordinate=cast(Array, frequency[kept]),
-        power=power,
-    )
-
-
-def offset_power(
-    turned: NDArray[np.complex128], sampling_rate: float, *, start_time: float, frame: float, reach: float
-) -> FramePower:
-    """Power over the distance from a moving path, in half-overlapping Hann frames.
-
-    Parameters
-    ----------
-    turned : shape (N, C)
-        Twice the displacement [m], turned back by the phase of the path.
-    sampling_rate : float
-        [Hz].
-    start_time : float
-        Time of the first sample [s].
-    frame : float
-        Length of a frame [s].
-    reach : float
-        Largest distance kept [Hz].
-    """
-    points = min(2 * max(round(frame * sampling_rate / 2), 8), len(turned) // 2 * 2)
-    window = hann_window(points)
-    starts = np.arange(0, len(turned) - points + 1, points // 2)
-    offset = np.fft.fftfreq(points, 1.0 / sampling_rate)
-    kept = np.flatnonzero(np.abs(offset) <= reach)
-    kept = kept[np.argsort(offset[kept])]
-    power = np.empty((starts.size, kept.size, turned.shape[1]))
-    for channel in range(turned.shape[1]):
-        spectrum = fft(_frames(turned[:, channel], points) * window, overwrite_x=True)[:, kept]
+        frames = sliding_window_view(signal[:, channel], points)[:: points // 2]
+        if turned:
+            spectrum = fft(frames * window, overwrite_x=True)[:, kept]
+        else:
+            spectrum = rfft((frames - frames.mean(axis=1, keepdims=True)) * window, overwrite_x=True)[:, kept]
         power[:, :, channel] = np.abs(spectrum) ** 2
+    power *= ((2.0 if turned else 4.0) / points) ** 2
     middle = start_time + (starts.astype(np.float64) + points / 2) / sampling_rate
-    return FramePower(
-        time=middle,
-        coordinate=cast(Array, offset[kept]),
-        power=power * (2.0 / points) ** 2,
-    )
-
-
-def _frames(series: NDArray[Any], points: int) -> NDArray[Any]:
-    """Half-overlapping frames of a series, shape (F, points), without a copy."""
-    return sliding_window_view(series, points)[:: points // 2]
+    return FramePower(time=middle, coordinate=cast(Array, frequency[kept]), power=power)
 
 
 def order_power(
     signal: Array,
-    sampling_rate: float,
-    profile: SpeedProfile,
+    time: Array,
+    angle: Array,
+    speed: Array,
     *,
-    start_time: float,
     turns: int,
     highest_order: float,
     highest_frequency: float,
@@ -134,12 +96,8 @@ def order_power(
     ----------
     signal : shape (N, C)
         Displacement of every channel [m].
-    sampling_rate : float
-        [Hz].
-    profile : SpeedProfile
-        Rotor speed.
-    start_time : float
-        Time of the first sample [s].
+    time, angle, speed : shape (N,)
+        Time [s], rotor angle [rad] and speed [rad/s] at every sample.
     turns : int
         Turns of the rotor in a frame [1].
     highest_order : float
@@ -149,30 +107,26 @@ def order_power(
     lowest_speed : float
         Frames that reach below it [rad/s] are left out.
     """
-    time = start_time + np.arange(len(signal)) / sampling_rate
-    angle = profile.angle_at(time) / TURN
-    slow = np.flatnonzero(profile.speed_at(time) < lowest_speed)
+    angle = angle / TURN
+    slow = np.flatnonzero(speed < lowest_speed)
     end = float(angle[slow[0]] if slow.size else angle[-1])
     starts = np.arange(float(angle[0]), end - turns, turns / 2)
     if starts.size == 0:
         return None
-    fine = spline_filter1d(resample_poly(signal, UPSAMPLING, 1, padtype="line"), SPLINE_DEGREE, axis=0)
+    fine = spline_filter1d(resample_poly(signal.T, UPSAMPLING, 1, axis=1, padtype="line"), SPLINE_DEGREE)
     coordinate = np.arange(int(highest_order * turns) + 1) / turns
     power = np.full((starts.size, coordinate.size, signal.shape[1]), np.nan)
-    middle = np.empty(starts.size)
+    middle, steps = np.empty(starts.size), np.arange(float(len(angle)))
     for row, start in enumerate(starts):
         first, last = np.searchsorted(angle, [start, start + turns])
         points = int(turns * max(math.ceil((last - first) / turns * 1.5), 4))
-        place = np.interp(start + np.arange(points) * turns / points, angle, np.arange(len(angle)))
-        middle[row] = np.interp(start + turns / 2, angle, time)
-        cut = np.column_stack(
-            [
-                map_coordinates(fine[:, c], [place * UPSAMPLING], order=SPLINE_DEGREE, prefilter=False)
-                for c in range(signal.shape[1])
-            ]
-        )
-        spectrum = np.fft.rfft((cut - cut.mean(axis=0)) * hann_window(points)[:, None], axis=0)
-        fastest = profile.speed_at(time[min(first, len(time) - 1)]) / TURN
+        turned = start + np.arange(points) * turns / points
+        near = slice(max(first - 1, 0), last + 1)
+        place = (near.start + np.interp(turned, angle[near], steps[: len(angle[near])])) * UPSAMPLING
+        middle[row] = np.interp(start + turns / 2, angle[near], time[near])
+        cut = np.stack([map_coordinates(one, [place], order=SPLINE_DEGREE, prefilter=False) for one in fine])
+        spectrum = rfft((cut - cut.mean(axis=1, keepdims=True)) * hann_window(points)).T
+        fastest = speed[min(first, len(time) - 1)] / TURN
         reach = min(coordinate.size, len(spectrum), int(highest_frequency / fastest * turns) + 1)
         power[row, :reach] = np.abs(spectrum[:reach]) ** 2 * (4.0 / points) ** 2
     return FramePower(time=middle, coordinate=coordinate, power=power)

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine
 from rotordrop.spectrum._search import LineSearch
@@ -263,8 +261,7 @@ def _swings(line: Line) -> bool:
 
 def _harmonics(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list[Candidate]:
     """Where the multiples of each swing would be seen, as it wanders, while this line was there."""
-    weight = line.power.astype(np.float64)
-    total = float(weight.sum())
+    total = float(line.power.sum())
     if total == 0.0:
         return []
     return [
@@ -272,7 +269,7 @@ def _harmonics(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list
         for label, swing in swings
         if swing is not line
         for candidate in harmonic_candidates(
-            label, float(weight @ swing.path) / total, swing.frequency_error + SWING_ERROR
+            label, float(line.power @ swing.path) / total, swing.frequency_error + SWING_ERROR
         )
     ]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.frequency_path import FrequencyPath
-from rotordrop.spectrum.rate import reduce_rate
+from rotordrop.spectrum.rate import PASSED, reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import PlanarSignal
 
@@ -150,7 +150,7 @@ def track_orders(
     fastest = float(np.abs(profile.speed).max()) / TURN
     highest = max([wanted.max() * fastest, *(float(line.frequency.max()) for line in steady_lines)])
     thin, thin_rate = reduce_rate(displacement, sampling_rate, highest)
-    signal = _Signal(thin, thin_rate, start_time, profile)
+    signal = _Signal(thin, thin_rate, start_time, profile, PASSED if thin_rate < sampling_rate else 1.0)
     rows = [_window_fit(signal, wanted, steady_lines, settings.degree, t, w) for t, w in centres]
     if not rows:
         raise RecordError(
@@ -202,6 +202,7 @@ class _Signal:
     sampling_rate: float
     start_time: float
     profile: SpeedProfile
+    band: float
 
     def cut(self, centre: float, window: float) -> tuple[Array, Array]:
         """Times [s] and displacement [m] within a window [s]."""
@@ -229,7 +230,8 @@ def _window_fit(
     first = (degree + 1) * 2 * np.arange(orders.size)
     amplitude = coefficients[first] - 1j * coefficients[first + degree + 1]
     residual = measured - basis @ coefficients
-    freedom = max(float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
+    # what was thinned out has lost part of its noise, none of it at the orders
+    freedom = max(signal.band * float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
     spread = np.sqrt(np.sum(residual**2, axis=0) / freedom)
     # Equal noise in all samples, unequal weights: the weights enter the variance once more.
     basis *= weight

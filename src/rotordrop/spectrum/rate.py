@@ -11,8 +11,10 @@ from rotordrop.spectrum.waterfall import PlanarSignal
 Array = NDArray[np.float64]
 
 TAPS_PER_FACTOR = 40
-BLOCK = 8192
+BLOCK = 1024
 """Samples that remain of what is read at a time [1]: the signal may lie in a file, or be made while read."""
+PASSED = 0.75
+"""Share of the band up to half the new rate that is left [1]: white noise is white below it only."""
 STOP_BAND = 100.0
 """Attenuation of what would fold back [dB]."""
 
@@ -22,7 +24,7 @@ def reduce_rate(
     sampling_rate: float,
     highest_frequency: float,
     *,
-    samples_per_turn: float = 8.0,
+    samples_per_turn: float = 3.6,
 ) -> tuple[Array, float]:
     """Thin out a displacement to what its highest frequency of interest needs.
 
@@ -52,7 +54,7 @@ def reduce_rate(
         return np.asarray(displacement[0 : displacement.shape[0]], dtype=np.float64), sampling_rate
     beta = 0.1102 * (STOP_BAND - 8.7)
     half = TAPS_PER_FACTOR // 2
-    taps = firwin(2 * half * factor + 1, 0.75 / factor, window=("kaiser", beta))
+    taps = firwin(2 * half * factor + 1, PASSED / factor, window=("kaiser", beta))
     samples = displacement.shape[0]
     thin = np.empty((-(-samples // factor), displacement.shape[1]))
     for first in range(0, len(thin), BLOCK):

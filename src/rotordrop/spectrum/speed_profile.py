@@ -18,7 +18,9 @@ LOG_TIME_UNIT = 0.3
 """Time [s] after power-off below which the speed may bend fast (the races spin up); later it bends ever
 slower."""
 
-MOST_KNOTS = 4000
+MOST_BLOCKS = 800
+"""Blocks of equal logarithmic time, at most, whose means the curve is drawn through: what is left of the
+curvature within a block moves the speed by about 5e-6 of itself."""
 
 TURNING_SHARE = 0.02
 """Share of the highest speed [1] above which the rotor counts as turning when the noise is judged."""
@@ -102,7 +104,7 @@ def fit_speed_profile(
     Source: own method; the error of the speed it leaves is about a tenth of the noise of a speed recorded 20
     times per second.
     """
-    t, omega = _block_means(*_checked(time, speed))
+    t, omega = _checked(time, speed)
     start = float(t[0]) if power_off is None else power_off
     before, after = t < start, t >= start
     if after.sum() < 8:
@@ -112,7 +114,8 @@ def fit_speed_profile(
         )
     log_time = np.log1p((t[after] - start) / LOG_TIME_UNIT)
     smooth, noise, rejected = _smooth_without_outliers(log_time, omega[after], outlier_limit)
-    knots = np.unique(np.concatenate([log_time, np.linspace(0.0, log_time[-1], 400)]))
+    blocks, _, _ = _block_means(log_time, omega[after])
+    knots = np.unique(np.concatenate([log_time[:1], blocks, np.linspace(0.0, log_time[-1], 400)]))
     knot_time = start + LOG_TIME_UNIT * np.expm1(knots)
     knot_speed = _not_through_zero(smooth(knots), float(omega[after][0]))
     if before.any():
@@ -150,13 +153,12 @@ def _checked(time: ArrayLike, speed: ArrayLike) -> tuple[Array, Array]:
     return t, omega
 
 
-def _block_means(time: Array, speed: Array) -> tuple[Array, Array]:
-    """Means of neighbouring values, so that a speed sampled as fast as the displacement stays affordable."""
-    block = -(-time.size // MOST_KNOTS)
-    if block == 1:
-        return time, speed
-    whole = time.size // block * block
-    return time[:whole].reshape(-1, block).mean(1), speed[:whole].reshape(-1, block).mean(1)
+def _block_means(log_time: Array, speed: Array) -> tuple[Array, Array, Array]:
+    """Means of neighbouring values, and how many there are: late in a coast-down a second holds one bend."""
+    block = (log_time * (MOST_BLOCKS / max(float(log_time[-1]), 1e-300))).astype(np.intp)
+    first = np.flatnonzero(np.diff(block, prepend=-1))
+    count = np.diff(np.append(first, len(block))).astype(np.float64)
+    return np.add.reduceat(log_time, first) / count, np.add.reduceat(speed, first) / count, count
 
 
 def _smooth_without_outliers(log_time: Array, speed: Array, limit: float) -> tuple[CubicSpline, float, int]:
@@ -168,7 +170,8 @@ def _smooth_without_outliers(log_time: Array, speed: Array, limit: float) -> tup
     least = 1e-12 * float(np.abs(speed).max())
     keep = np.abs(speed - median) <= limit * max(_spread((speed - median)[turning]), least)
     for _ in range(2):
-        smooth = make_smoothing_spline(log_time[keep], speed[keep])
+        place, mean, count = _block_means(log_time[keep], speed[keep])
+        smooth = make_smoothing_spline(place, mean, w=count)
         residual = speed - smooth(log_time)
         spread = _spread(residual[keep & turning])
         before, keep = keep, np.abs(residual) <= limit * max(spread, least)

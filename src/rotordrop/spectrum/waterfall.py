@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, cast
 
@@ -100,17 +101,17 @@ def hann_window(points: int) -> Array:
     return 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(points) / points)
 
 
-def waterfall(
+def waterfalls(
     displacement: PlanarSignal,
     sampling_rate: float,
     *,
-    component: Component = "full",
+    components: Sequence[Component] = ("full",),
     speed: ArrayLike | None = None,
     settings: WaterfallSettings = PAPER_SETTINGS,
     amplitude_kind: AmplitudeKind = "zero-to-peak",
     start_time: float = 0.0,
     highest_frequency: float | None = None,
-) -> Waterfall:
+) -> tuple[Waterfall, ...]:
     """Cut a displacement into overlapping frames and give the amplitude of each frequency in each frame.
 
     A steady tone on a line reads its true amplitude; between two lines up to 15 % less (scalloping); a tone
@@ -123,8 +124,8 @@ def waterfall(
         Displacement (x, y) [m] in one plane.
     sampling_rate : float
         Samples per second [Hz].
-    component : {"x", "y", "full"}
-        One direction, or forward and backward parts of x + jy.
+    components : sequence of {"x", "y", "full"}
+        One direction, or forward and backward parts of x + jy: a waterfall for each.
     speed : shape (N,), optional
         Rotor speed [rad/s] at each sample.
     settings : WaterfallSettings
@@ -137,7 +138,7 @@ def waterfall(
 
     Returns
     -------
-    Waterfall
+    tuple of Waterfall
 
     Notes
     -----
@@ -151,27 +152,31 @@ def waterfall(
             f"waterfall: the signal has {samples} samples, one frame needs {settings.points}; "
             f"choose shorter frames or a longer record"
         )
-    frequency, keep = _lines(settings.points, sampling_rate, component, highest_frequency)
+    lines = [_lines(settings.points, sampling_rate, one, highest_frequency) for one in components]
     window = hann_window(settings.points)
-    amplitude = np.empty((frames, frequency.size))
+    amplitudes = [np.empty((frames, frequency.size)) for frequency, _ in lines]
     for row in range(frames):
         start = row * settings.hop
         frame = np.asarray(displacement[start : start + settings.points], dtype=np.float64)
         if settings.remove_mean:
             frame = frame - frame.mean(axis=0)
-        amplitude[row] = _amplitude(frame, window, component)[keep]
+        for one, (_, keep), amplitude in zip(components, lines, amplitudes, strict=True):
+            amplitude[row] = _amplitude(frame, window, one)[keep] * AMPLITUDE_SCALE[amplitude_kind]
     centre = (np.arange(frames, dtype=np.float64) * settings.hop + settings.points / 2) / sampling_rate
     mean_speed, change = _frame_speed(speed, samples, frames, settings)
-    return Waterfall(
-        time=start_time + centre,
-        frequency=frequency,
-        amplitude=amplitude * AMPLITUDE_SCALE[amplitude_kind],
-        speed=mean_speed,
-        speed_change=change,
-        component=component,
-        amplitude_kind=amplitude_kind,
-        sampling_rate=sampling_rate,
-        settings=settings,
+    return tuple(
+        Waterfall(
+            time=start_time + centre,
+            frequency=frequency,
+            amplitude=amplitude,
+            speed=mean_speed,
+            speed_change=change,
+            component=component,
+            amplitude_kind=amplitude_kind,
+            sampling_rate=sampling_rate,
+            settings=settings,
+        )
+        for component, (frequency, _), amplitude in zip(components, lines, amplitudes, strict=True)
     )
 
 

@@ -10,7 +10,7 @@ from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.frequency_path import FrequencyPath, steady_path
 from rotordrop.spectrum.orders import TrackingSettings, track_orders
 from rotordrop.spectrum.speed_profile import exact_speed_profile
-from rotordrop.spectrum.waterfall import waterfall
+from rotordrop.spectrum.waterfall import waterfalls
 
 
 def chirp(**options) -> tuple[CoastDown, callable]:
@@ -45,7 +45,7 @@ def test_recorded_speed_gives_the_amplitude_within_a_hundredth(seed):
 
 def test_frames_smear_what_tracking_does_not():
     down, amplitude = chirp(noise=0.0)
-    frames = waterfall(down.xy, down.sampling_rate, component="x")
+    (frames,) = waterfalls(down.xy, down.sampling_rate, components=("x",))
     assert frames.settings.points == 32768  # 13 s at this sampling rate: the smear is drastic
     assert frames.amplitude[0, frames.frequency > 30.0].max() < 0.25 * amplitude(3.0)
     track = track_orders(down.xy, down.sampling_rate, down.exact())

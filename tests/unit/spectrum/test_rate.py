@@ -15,7 +15,7 @@ from rotordrop.spectrum.rate import STOP_BAND, TAPS_PER_FACTOR, reduce_rate
 def test_blocks_give_what_one_piece_gives(samples, block, monkeypatch):
     monkeypatch.setattr(rate, "BLOCK", block)
     signal = 3.0 + np.random.default_rng(1).standard_normal((samples, 2)).cumsum(axis=0)
-    thin, reduced = reduce_rate(signal, 20e3, 180.0)
+    thin, reduced = reduce_rate(signal, 20e3, 180.0, samples_per_turn=8.0)
     factor, beta = 13, 0.1102 * (STOP_BAND - 8.7)
     taps = firwin(2 * (TAPS_PER_FACTOR // 2) * factor + 1, 0.75 / factor, window=("kaiser", beta))
     whole = [resample_poly(signal[:, k], 1, factor, window=taps, padtype="line") for k in range(2)]

@@ -24,11 +24,12 @@ from rotordrop.spectrum.candidates import (
 )
 from rotordrop.spectrum.coast_down_law import _inflation
 from rotordrop.spectrum.detection import DetectionSettings, _half_power_width, clearest_peak
+from rotordrop.spectrum.indentation import find_settling
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower
 from rotordrop.spectrum.lines import SWING_ERROR, _harmonics, _named, find_lines
 from rotordrop.spectrum.naming import LineEvidence, _density
-from rotordrop.spectrum.waterfall import WaterfallSettings, waterfall
+from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
 SETTINGS = LineSettings(highest_frequency=450.0)
 
@@ -87,8 +88,9 @@ def test_another_kind_of_line_is_better_only_if_it_holds_more_power() -> None:
     """The rival has 1.35 times the amplitude half of the time: nine tenths of the power."""
     down = CoastDown(duration=4.0, time_constant=40.0)
     seeker = search(down.xy, down.sampling_rate, down.exact())
-    spoken = np.ones(len(down.time), dtype=np.bool_)
-    own, half = np.ones((len(down.time), 1), dtype=complex), np.arange(len(down.time)) % 2 == 0
+    count = len(seeker._clock.time)
+    spoken = np.ones(count, dtype=np.bool_)
+    own, half = np.ones((count, 1), dtype=complex), np.arange(count) % 2 == 0
     assert 1.35**2 / 2.0 < 1.0 < 1.5**2 / 2.0
     for amplitude, better in ((1.35, False), (1.5, True)):
         rival: Any = SimpleNamespace(value=np.where(half[:, None], amplitude, 0.0).astype(complex))
@@ -205,7 +207,8 @@ def test_lines_of_another_plane_are_no_neighbours_of_an_order(monkeypatch: pytes
     kinds = (("here", "steady", "DE"), ("there", "steady", "NDE"), ("sum", "combination", "DE"))
     known: Any = [SimpleNamespace(path=p, kind=k, forward={plane: 1e-6}) for p, k, plane in kinds]
     known.append(SimpleNamespace(path="1X", kind="order", forward={"DE": 1e-6}))
-    coast_down._plane(signal, "DE", down.xy, known, (), coast_down.WaterfallChoice())
+    settled = find_settling(down.xy, down.sampling_rate)
+    coast_down._plane(signal, "DE", down.xy, settled, known, (), coast_down.WaterfallChoice())
     assert given == [["here", "sum"]]
 
 
@@ -282,7 +285,7 @@ def test_the_average_over_frames_is_that_of_the_power() -> None:
     size = np.where(time < 4 * points / rate, 3e-6, 4e-6)
     phase = TURN * 50.0 * rate / points * time
     xy = size[:, None] * np.column_stack([np.cos(phase), np.sin(phase)])
-    found = waterfall(xy, rate, component="x", settings=WaterfallSettings(points=points, overlap=0.0))
+    (found,) = waterfalls(xy, rate, components=("x",), settings=WaterfallSettings(points=points, overlap=0.0))
     assert found.amplitude.shape[0] == 8
     assert found.average()[50] == pytest.approx(math.sqrt(0.5 * (9.0 + 16.0)) * 1e-6, rel=1e-9)
 

@@ -8,7 +8,7 @@ from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.spectrum.waterfall import PAPER_SETTINGS, WaterfallSettings, smear_factor, waterfall
+from rotordrop.spectrum.waterfall import PAPER_SETTINGS, WaterfallSettings, smear_factor, waterfalls
 
 FS = 20000.0
 SMALL = WaterfallSettings(points=2048)
@@ -22,7 +22,9 @@ def tone(frequency: float, samples: int = 8192, amplitude: float = 1.0) -> np.nd
 def test_same_amplitudes_as_scipys_short_time_transform():
     rng = np.random.default_rng(1)
     xy = rng.standard_normal((10000, 2))
-    ours = waterfall(xy, FS, component="x", settings=WaterfallSettings(points=2048, remove_mean=False))
+    (ours,) = waterfalls(
+        xy, FS, components=("x",), settings=WaterfallSettings(points=2048, remove_mean=False)
+    )
     transform = ShortTimeFFT(
         hann(2048, sym=False), hop=1024, fs=FS, scale_to="magnitude", fft_mode="onesided"
     )
@@ -33,7 +35,7 @@ def test_same_amplitudes_as_scipys_short_time_transform():
 
 @pytest.mark.parametrize("component", ["x", "y", "full"])
 def test_a_tone_on_a_line_reads_its_amplitude(component):
-    found = waterfall(tone(50 * FS / 2048, amplitude=3e-6), FS, component=component, settings=SMALL)
+    (found,) = waterfalls(tone(50 * FS / 2048, amplitude=3e-6), FS, components=(component,), settings=SMALL)
     line = np.argmin(np.abs(found.frequency - 50 * FS / 2048))
     assert found.amplitude[:, line] == pytest.approx(np.full(len(found.time), 3e-6), rel=1e-12)
     assert found.amplitude.sum(axis=1) == pytest.approx(np.full(len(found.time), 6e-6), rel=1e-9)
@@ -41,15 +43,15 @@ def test_a_tone_on_a_line_reads_its_amplitude(component):
 
 def test_peak_to_peak_is_twice_and_says_so():
     xy = tone(50 * FS / 2048)
-    single = waterfall(xy, FS, settings=SMALL)
-    double = waterfall(xy, FS, settings=SMALL, amplitude_kind="peak-to-peak")
+    (single,) = waterfalls(xy, FS, settings=SMALL)
+    (double,) = waterfalls(xy, FS, settings=SMALL, amplitude_kind="peak-to-peak")
     assert double.amplitude == pytest.approx(2.0 * single.amplitude)
     assert (single.amplitude_kind, double.amplitude_kind) == ("zero-to-peak", "peak-to-peak")
 
 
 def test_backward_motion_stands_at_negative_frequency():
-    found = waterfall(tone(50 * FS / 2048) * [1.0, -1.0], FS, component="full", settings=SMALL)
-    backward = waterfall(tone(-50 * FS / 2048), FS, component="full", settings=SMALL)
+    (found,) = waterfalls(tone(50 * FS / 2048) * [1.0, -1.0], FS, components=("full",), settings=SMALL)
+    (backward,) = waterfalls(tone(-50 * FS / 2048), FS, components=("full",), settings=SMALL)
     at = backward.frequency[np.argmax(backward.amplitude[0])]
     assert at == pytest.approx(-50 * FS / 2048)
     assert found.frequency[np.argmax(found.amplitude[0])] == pytest.approx(-50 * FS / 2048)
@@ -57,10 +59,10 @@ def test_backward_motion_stands_at_negative_frequency():
 
 def test_an_offset_stays_within_one_line_of_zero():
     xy = np.tile([2e-6, -285e-6], (4096, 1))
-    kept = waterfall(xy, FS, settings=WaterfallSettings(points=2048, remove_mean=False))
+    (kept,) = waterfalls(xy, FS, settings=WaterfallSettings(points=2048, remove_mean=False))
     near = np.abs(kept.frequency) < 1.5 * kept.resolution
     assert kept.amplitude[:, ~near].max() < 1e-15
-    assert waterfall(xy, FS, settings=SMALL).amplitude.max() < 1e-15
+    assert waterfalls(xy, FS, settings=SMALL)[0].amplitude.max() < 1e-15
 
 
 def test_frames_are_read_one_at_a_time():
@@ -73,13 +75,13 @@ def test_frames_are_read_one_at_a_time():
             return np.zeros((key.stop - key.start, 2))
 
     signal = Counting()
-    assert waterfall(signal, FS, settings=SMALL).amplitude.shape[0] == 96
+    assert waterfalls(signal, FS, settings=SMALL)[0].amplitude.shape[0] == 96
     assert signal.largest == 2048
 
 
 def test_speed_of_a_frame_and_its_change():
     speed = np.linspace(377.0, 300.0, 8192)
-    found = waterfall(tone(100.0), FS, speed=speed, settings=SMALL)
+    (found,) = waterfalls(tone(100.0), FS, speed=speed, settings=SMALL)
     assert found.speed == pytest.approx(np.interp(found.time * FS - 0.5, np.arange(8192), speed), rel=1e-9)
     assert found.speed_change == pytest.approx(np.full(7, 77.0 * 2047 / 8191), rel=1e-9)
 
@@ -88,7 +90,7 @@ def test_smear_of_the_papers_first_frame():
     """60 Hz falling with a time constant of 5.9 s reads 41 % of its amplitude in the paper's first frame."""
     t = np.arange(PAPER_SETTINGS.points) / FS
     angle = 2.0 * np.pi * 60.0 * 5.9 * (1.0 - np.exp(-t / 5.9))
-    found = waterfall(np.column_stack([np.cos(angle), np.sin(angle)]), FS)
+    (found,) = waterfalls(np.column_stack([np.cos(angle), np.sin(angle)]), FS)
     assert found.amplitude.max() == pytest.approx(0.41, abs=0.01)
     middle_rate = 60.0 / 5.9 * np.exp(-0.5 * t[-1] / 5.9)
     assert smear_factor(middle_rate, FS) == pytest.approx(found.amplitude.max(), abs=0.01)
@@ -99,16 +101,16 @@ def test_smear_factor_is_what_frames_of_a_linear_sweep_show(rate):
     """Up to the scalloping of a tone between two lines, so the tone is swept about a line."""
     t = (np.arange(PAPER_SETTINGS.points) - PAPER_SETTINGS.points / 2) / FS
     phase = 2.0 * np.pi * (200 * PAPER_SETTINGS.resolution(FS) * t + 0.5 * rate * t**2)
-    found = waterfall(np.column_stack([np.cos(phase), np.sin(phase)]), FS).amplitude.max()
+    found = waterfalls(np.column_stack([np.cos(phase), np.sin(phase)]), FS)[0].amplitude.max()
     assert smear_factor(rate, FS) == pytest.approx(found, rel=5e-3)
 
 
 def test_wrong_calls_are_refused():
     with pytest.raises(RecordError, match="100 samples, one frame needs 32768"):
-        waterfall(np.zeros((100, 2)), FS)
+        waterfalls(np.zeros((100, 2)), FS)
     with pytest.raises(UsageError, match=r"overlap 1\.0 given"):
         WaterfallSettings(overlap=1.0)
     with pytest.raises(
         RecordError, match=r"speed has shape \(5,\), expected one value per sample, \(4096,\)"
     ):
-        waterfall(np.zeros((4096, 2)), FS, settings=SMALL, speed=np.zeros(5))
+        waterfalls(np.zeros((4096, 2)), FS, settings=SMALL, speed=np.zeros(5))
