@@ -636,7 +636,8 @@ def _order(layout: Any) -> Any:
     import numpy as np
 
     q = [layout.modal_x, layout.modal_y, layout.race, layout.support]
-    parts = [*q, *(layout.velocity_of(part) for part in q), layout.race_spin, layout.own]
+    own = slice(layout.race_spin.stop, layout.magnets.stop)
+    parts = [*q, *(layout.velocity_of(part) for part in q), layout.race_spin, own]
     places = [np.arange(part.start, part.stop) for part in parts]
     return np.concatenate([*places, [layout.rotor_speed, layout.rotor_angle]])
 
@@ -664,7 +665,8 @@ def _drawn(model: Any, speed: float, seed: int) -> Any:
     state[layout.support] = 5e-6 * random.standard_normal(2 * len(ends))
     moving = slice(layout.n_coordinates, 2 * layout.n_coordinates)
     state[moving] = random.choice([0.005, 0.3]) * random.standard_normal(layout.n_coordinates)
-    state[layout.own] = 1e-5 * random.standard_normal(layout.own.stop - layout.own.start)
+    own = slice(layout.race_spin.stop, layout.magnets.stop)
+    state[own] = 1e-5 * random.standard_normal(own.stop - own.start)
     state[layout.rotor_speed] = speed * random.uniform(0.2, 1.0)
     state[layout.rotor_angle] = random.uniform(0.0, 200.0)
     rims = 1.0 - gap / np.array([float(b.bore_radius) for b in ends])

@@ -9,6 +9,7 @@ import pytest
 
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine import example_machine
+from rotordrop.physics.columns import POSITION
 from rotordrop_bench import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import PERFECT, lagging
@@ -270,7 +271,7 @@ def test_a_mount_of_the_machine_file_is_not_lost_beside_violations():
     branch = {"stiffness": "4e7 N/m", "time": "3 ms"}
     bearings = tuple(one.changed(mount={"maxwell": [branch]}) for one in machine.touchdown_bearings)
     mounted = machine.changed(touchdown_bearings=bearings)
-    assert hidden_machine(mounted, 1, "none").model.layout.mount_own == (2, 2)
+    assert hidden_machine(mounted, 1, "none").model.layout.further[0][1] == ((POSITION,) * 2,) * 2
     with pytest.raises(UsageError, match=r"states NDE\.mount .* leave the mount or the violations out"):
         hidden_machine(mounted, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
 

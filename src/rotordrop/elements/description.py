@@ -89,6 +89,9 @@ class Description(BaseModel):
     columns: ClassVar[Mapping[str, int]] = {}
     """Columns of a kernel row that fields stand in; what is left out is zero there."""
 
+    states_at: ClassVar[int] = -1
+    """Place of its further states among those of a touchdown bearing, see `physics.columns`."""
+
     reserved: ClassVar[Mapping[str, str]] = {}
     """Keys that a later version will know, with what they will hold."""
 
@@ -135,6 +138,11 @@ class Description(BaseModel):
     def left_out(self) -> dict[str, Any]:
         """Values for fields that were left out and follow from others."""
         return {}
+
+    @property
+    def further_states(self) -> tuple[int, ...]:
+        """Kinds of the states that it adds to the model of a drop."""
+        return ()
 
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of a kernel row."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,15 +82,17 @@ class Mount(Description):
     maxwell: tuple[Branch, ...] = ()
     """Branches that relax, such as of an O-ring, slowest first; three at most."""
 
+    states_at: ClassVar[int] = L.MOUNT_STATES
+
     @property
     def present(self) -> bool:
         """Whether there is any element."""
-        return self.stop is not None or self.states > 0
+        return self.stop is not None or len(self.further_states) > 0
 
     @property
-    def states(self) -> int:
-        """Number of its states: the stretch, x and y, of each spring that slips or relaxes."""
-        return 2 * (len(self.maxwell) + (self.ribbon is not None))
+    def further_states(self) -> tuple[int, ...]:
+        """The stretch, x and y, of each spring that slips or relaxes."""
+        return (L.POSITION, L.POSITION) * (len(self.maxwell) + (self.ribbon is not None))
 
     def check(self) -> None:
         """Refuse branches that do not descend, or too many."""
@@ -136,7 +138,7 @@ class Mount(Description):
     def fill(self, row: Array) -> None:
         """Write the columns of the mount."""
         numbers = row[L.MOUNT : L.MOUNT_END]
-        numbers[blocks.MOUNT_PRESENT], numbers[blocks.MOUNT_STATES] = self.present, self.states
+        numbers[blocks.MOUNT_PRESENT], numbers[blocks.MOUNT_STATES] = self.present, len(self.further_states)
         if self.stop is not None:
             numbers[blocks.MOUNT_STOP_GAP] = float(self.stop.gap)
             from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler

@@ -21,6 +21,7 @@ from rotordrop.elements.parameter import (
     itself,
 )
 from rotordrop.elements.values import default
+from rotordrop.physics import columns as L
 
 LEAST_PLANE_DISTANCE = 1e-3
 """Sensor planes closer than this [m] count as one."""
@@ -70,9 +71,9 @@ class Sensor(Placed):
     }
 
     @property
-    def further_states(self) -> int:
-        """Number of further states: the reading it has got to, where it lags behind."""
-        return int(self.time_constant is not None)
+    def further_states(self) -> tuple[int, ...]:
+        """The reading it has got to, where it lags behind."""
+        return () if self.time_constant is None else (L.INTERNAL,)
 
 
 def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:

@@ -143,10 +143,12 @@ class Support(Description):
             damping = replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
         return values | {"damping_horizontal": damping}
 
+    states_at: ClassVar[int] = L.BEARING_OWN
+
     @property
-    def further_states(self) -> int:
-        """Number of further states: displacement and velocity (x, y) of its foundation, or none."""
-        return L.FOUNDATION_STATES if self.foundation_share is not None else 0
+    def further_states(self) -> tuple[int, ...]:
+        """Displacement and velocity (x, y) of its foundation, or none."""
+        return (L.INTERNAL,) * L.FOUNDATION_STATES if self.foundation_share is not None else ()
 
     def fill(self, row: Array) -> None:
         """Write the columns of the support, after those of its mount."""

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.contact import Contact
-from rotordrop.elements.description import Misfit, Name, Placed
+from rotordrop.elements.description import Description, Misfit, Name, Placed
 from rotordrop.elements.friction import Friction
 from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
@@ -62,6 +64,20 @@ class TouchdownBearing(Placed):
         "kind": "another kind of touchdown bearing than a ball bearing (sleeve, planetary)",
         "thermal": "the heat of the bearing",
     }
+
+    columns: ClassVar[Mapping[str, int]] = {"air_gap": L.AIR_GAP, "bore_radius": L.BORE_RADIUS}
+
+    @property
+    def parts(self) -> tuple[Description, ...]:
+        """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
+        return self.contact, self.friction, self.race, self.mount, self.support
+
+    def fill(self, row: NDArray[np.float64]) -> None:
+        """Write the columns of clearance and parts."""
+        super().fill(row)
+        row[L.ROTOR_RADIUS] = row[L.BORE_RADIUS] - row[L.AIR_GAP]
+        for part in self.parts:
+            part.fill(row)
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:

@@ -22,13 +22,11 @@ class StateLayout:
     n_modes: int
     n_bearings: int
     """Modes per plane, touchdown bearings."""
-    bearing_own: tuple[int, ...] = ()
+    further: tuple[tuple[int, tuple[tuple[int, ...], ...]], ...] = ()
+    """Further states of touchdown bearings: column of `bearing_at` of what has them, their kinds at each
+    bearing; nothing where none has any."""
     magnet_own: tuple[int, ...] = ()
-    """Number of further states of each touchdown bearing and of each AMB; empty where none has any. Those of
-    a bearing are displacement (x, y) and velocity (x, y) of its foundation."""
-    mount_own: tuple[int, ...] = ()
-    """Number of states of the mount of each touchdown bearing: stretch (x, y) of each spring that slips or
-    relaxes; empty where none has any."""
+    """Number of further states of each AMB; empty where none has any."""
     sensor_own: int = 0
     """Number of sensors that lag behind, each with the reading that it has got to [m]; only the filter moves
     these."""
@@ -44,10 +42,8 @@ class StateLayout:
     """Velocities of all coordinates."""
     race_spin: slice = field(init=False)
     """Race spins [rad/s]."""
-    own: slice = field(init=False)
-    """Further states of bearings, then of AMBs."""
-    mount: slice = field(init=False)
-    """Stretch of the springs of mounts that slip or relax [m]."""
+    magnets: slice = field(init=False)
+    """Further states of AMBs, behind those of bearings."""
     sensors: slice = field(init=False)
     """What sensors that lag behind have got to [m]."""
     rotor_speed: int = field(init=False)
@@ -61,15 +57,16 @@ class StateLayout:
 
     def __post_init__(self) -> None:
         m, b = self.n_modes, self.n_bearings
-        blocks = {
+        further = [kind for _, each in self.further for kinds in each for kind in kinds]
+        blocks: dict[str, tuple[int | None, int]] = {
             "modal_x": (m, L.POSITION),
             "modal_y": (m, L.POSITION),
             "race": (2 * b, L.POSITION),
             "support": (2 * b, L.POSITION),
             "velocities": (2 * m + 4 * b, L.VELOCITY),
             "race_spin": (b, L.SPIN),
-            "own": (sum(self.bearing_own) + sum(self.magnet_own), L.INTERNAL),
-            "mount": (sum(self.mount_own), L.POSITION),
+            **{f"further {k}": (1, kind) for k, kind in enumerate(further)},
+            "magnets": (sum(self.magnet_own), L.INTERNAL),
             "sensors": (self.sensor_own, L.INTERNAL),
             "rotor_speed": (None, L.SPIN),
             "rotor_angle": (None, L.ANGLE),
@@ -78,7 +75,8 @@ class StateLayout:
         }
         sizes = [1 if size is None else size for size, _ in blocks.values()]
         for (name, (size, _)), stop in zip(blocks.items(), accumulate(sizes), strict=True):
-            object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
+            if not name.startswith("further"):
+                object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
         kinds = np.repeat([kind for _, kind in blocks.values()], sizes).astype(np.int64)
         kinds = np.concatenate([kinds, np.tile(np.array(self.departing, dtype=np.int64), b)])
         object.__setattr__(self, "kinds", kinds)
@@ -87,14 +85,16 @@ class StateLayout:
     def of_machine(cls, machine: Machine, n_modes: int) -> StateLayout:
         """Give the layout that the elements of a machine ask for."""
         bearings = machine.touchdown_bearings
-        further = tuple(bearing.support.further_states for bearing in bearings)
-        mounts = tuple(bearing.mount.states for bearing in bearings)
+        asked = [
+            {part.states_at: part.further_states for part in (bearing, *bearing.parts) if part.further_states}
+            for bearing in bearings
+        ]
+        places = sorted({place for states in asked for place in states})
         return cls(
             n_modes=n_modes,
             n_bearings=len(bearings),
-            bearing_own=further if any(further) else (),
-            mount_own=mounts if any(mounts) else (),
-            sensor_own=sum(sensor.further_states for sensor in machine.sensors),
+            further=tuple((place, tuple(one.get(place, ()) for one in asked)) for place in places),
+            sensor_own=sum(len(sensor.further_states) for sensor in machine.sensors),
         )
 
     @property
@@ -117,6 +117,15 @@ class StateLayout:
         """Number of states that the filter estimates: all before the books of energy."""
         return self.dissipated
 
+    def further_at(self, place: int) -> slice:
+        """Slice of the further states of all bearings of one column of `bearing_at`; empty without any."""
+        stop = self.race_spin.stop
+        for at, each in self.further:
+            start, stop = stop, stop + sum(map(len, each))
+            if at == place:
+                return slice(start, stop)
+        return slice(stop, stop)
+
     def velocity_of(self, coordinates: slice) -> slice:
         """Slice of the velocities that belong to a slice of coordinates."""
         return slice(coordinates.start + self.n_coordinates, coordinates.stop + self.n_coordinates)
@@ -133,16 +142,18 @@ class StateLayout:
 
     def bearing_at(self) -> Integers:
         """Places of the states of each bearing, shape (B, 8), see ``RACE`` and the names beside it."""
-        places = np.empty((self.n_bearings, L.N_BEARING_PLACES), dtype=np.int64)
+        places = np.full((self.n_bearings, L.N_BEARING_PLACES), -1, dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
         places[:, L.SUPPORT] = self.support.start + 2 * count
         places[:, L.RACE_SPIN] = self.race_spin.start + count
-        places[:, L.BEARING_OWN] = _first_of(self.bearing_own, self.own.start, self.n_bearings)
+        for place, each in self.further:
+            counts = tuple(map(len, each))
+            places[:, place] = _first_of(counts, self.further_at(place).start, self.n_bearings)
         places[:, L.CONTACTS], places[:, L.CONTACTS_END] = count, count + 1
         of_one = len(self.departing)
-        places[:, L.DEPARTURE] = self.work_in + 1 + of_one * count if of_one else -1
-        places[:, L.MOUNT_STATES] = _first_of(self.mount_own, self.mount.start, self.n_bearings)
+        if of_one:
+            places[:, L.DEPARTURE] = self.work_in + 1 + of_one * count
         return places
 
     def contact_at(self) -> Integers:
@@ -152,8 +163,7 @@ class StateLayout:
 
     def magnet_at(self, n_magnets: int) -> Integers:
         """Places of the states of each AMB, shape (A, 1), see ``MAGNET_OWN``."""
-        start = self.own.start + sum(self.bearing_own)
-        return _first_of(self.magnet_own, start, n_magnets).reshape(n_magnets, L.N_MAGNET_PLACES)
+        return _first_of(self.magnet_own, self.magnets.start, n_magnets).reshape(n_magnets, L.N_MAGNET_PLACES)
 
     def names(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
         """Name of every state, in order."""
@@ -166,7 +176,7 @@ class StateLayout:
             *coordinates,
             *(f"{name} velocity" for name in coordinates),
             *(f"race {name} spin" for name in bearing_names),
-            *(f"further state {k + 1}" for k in range(self.sensors.stop - self.own.start)),
+            *(f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
             *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )

@@ -193,15 +193,10 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     """
     numbers = numbers_of(bearing)
     row = np.zeros(L.N_BEARING_COLUMNS)
-    gap = float(bearing.air_gap)
-    row[L.AIR_GAP] = gap
-    row[L.BORE_RADIUS] = float(bearing.bore_radius)
-    row[L.ROTOR_RADIUS] = float(bearing.bore_radius) - gap
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
     row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
-    for part in (bearing.contact, bearing.friction, bearing.race, bearing.mount, bearing.support):
-        part.fill(row)
+    bearing.fill(row)
     return row
 
 

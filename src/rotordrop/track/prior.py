@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.table import parameter
 from rotordrop.machine import Machine
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
 from rotordrop.rotor.unknowns import Unknown, correlate, inferred_together, sensor_prior, smallest_gap
@@ -76,8 +77,9 @@ def prior_at_power_off(
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
         mean[offset], sigma[offset] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
-    sigma[layout.mount] = RACE_POSITION_SIGMA * gap
-    sigma[layout.own] = np.resize(OWN_SIGMA, layout.own.stop - layout.own.start)
+    sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap
+    own = layout.further_at(L.BEARING_OWN)
+    sigma[own] = np.resize(OWN_SIGMA, own.stop - own.start)
     covariance = np.diag(sigma**2)
     share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     inferred_together(model, unknowns, covariance[s : s + n_p, s : s + n_p])

@@ -29,10 +29,9 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
     # spins and parameters do not depend on the basis
     own, wanted = coarse.n_dynamic + len(coarse.unknowns), fine.n_dynamic + len(fine.unknowns)
     result[:, two.race_spin] = means[:, one.race_spin]
-    if one.bearing_own == two.bearing_own:
-        result[:, two.own] = means[:, one.own]
-    if one.mount_own == two.mount_own:
-        result[:, two.mount] = means[:, one.mount]
+    for place, states in one.further:
+        if (place, states) in two.further:
+            result[:, two.further_at(place)] = means[:, one.further_at(place)]
     result[:, two.rotor_speed : two.n_dynamic] = means[:, one.rotor_speed : one.n_dynamic]
     _carry_unknowns(coarse, fine, means, result)
     if two.sensor_own:

@@ -9,6 +9,7 @@ import pytest
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
+from rotordrop.physics import columns as L
 from rotordrop.physics.columns import RACE_INERTIA
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase, LevitatedStart
@@ -52,7 +53,7 @@ def test_places_close_with_a_foundation_that_gives_way():
     drop = simulate_drop(model, CASE)
     found = losses(model, drop)
     assert found.total == pytest.approx(float(drop.state[-1, model.layout.dissipated]), rel=1e-12)
-    layout, own = model.layout, model.layout.own
+    layout, own = model.layout, model.layout.further_at(L.BEARING_OWN)
     mount = drop.state[:, layout.velocity_of(layout.support)][:, :2] - drop.state[:, own][:, 2:]
     damping = [
         float(getattr(machine.touchdown_bearings[0].support, f"damping{a}")) for a in ("_horizontal", "")

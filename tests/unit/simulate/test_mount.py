@@ -8,6 +8,7 @@ from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobi
 
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_path, load_machine, loads_machine, machine_text
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate.case import DropCase
@@ -46,7 +47,7 @@ def test_jacobian_agrees_with_finite_differences(elements, foundation):
     model = build_drop_model(machine, "quick")
     state = a_state(model, np.array([-40e-6, 15e-6]), 0.98)
     state[model.layout.support][-2:] = 9e-6, -4e-6  # beyond the stop
-    states = model.layout.mount
+    states = model.layout.further_at(L.MOUNT_STATES)
     state[states] = np.resize([4e-6, -3e-6, 2e-6, 1e-6], states.stop - states.start)
     jacobian, numeric = both_jacobians(model, state, DropCase(speed=SPEED, spin="prescribed"))
     size = np.maximum(np.max(np.abs(numeric), axis=0), 1e-9)

@@ -77,7 +77,8 @@ def scales(problem: DropProblem) -> np.ndarray:
     ):
         scale[part] = size
         scale[layout.velocity_of(part)] = 3e3 * size
-    scale[layout.own] = np.resize([1e-6, 1e-6, 3e-3, 3e-3], layout.own.stop - layout.own.start)
+    own = layout.further_at(L.BEARING_OWN)
+    scale[own] = np.resize([1e-6, 1e-6, 3e-3, 3e-3], own.stop - own.start)
     return np.concatenate([scale, [unknown.sigma for unknown in problem.unknowns]])
 
 

@@ -128,7 +128,7 @@ def test_a_support_without_form_is_the_plain_one_bit_by_bit(lp400):
     """Neutral entries change nothing but rounding; without any no term of them is computed."""
     model = build_drop_model(lp400, "quick")
     assert not model.parameters.bearing[:, L.SUPPORT_FORM : L.SUPPORT_FORM_END].any()
-    assert model.layout.bearing_own == () and model.layout.sensor_own == 0
+    assert model.layout.further == () and model.layout.sensor_own == 0
     neutral = lp400.with_values({f"{n}.support.coupling": 0.0 for n in model.bearing_names})
     case = DropCase(speed=2.0 * math.pi * 60.0, duration=0.02)
     one, two = (simulate_drop(machine, case).bearing_force for machine in (lp400, neutral))
@@ -181,7 +181,7 @@ def extended_flight(lp400: Machine, prepared: Evidence) -> DropProblem:
 def test_the_sensitivity_of_such_a_machine_is_that_of_finite_differences(extended_flight, indentation):
     problem = extended_flight
     y, theta = start_of(problem.model, indentation), theta_of(problem)
-    y[problem.model.layout.own] = np.resize([2e-6, -3e-6, 1e-3, -2e-3], 8)
+    y[problem.model.layout.further_at(L.BEARING_OWN)] = np.resize([2e-6, -3e-6, 1e-3, -2e-3], 8)
     _, F, _ = advanced(problem, y, theta, 64)
     errors = relative_errors(problem, F, finite_differences(problem, y, theta, 64))
     assert errors[: problem.n_dynamic].max() < 3e-4
