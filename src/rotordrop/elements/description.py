@@ -144,6 +144,11 @@ class Description(BaseModel):
         """Kinds of the states that it adds to the model of a drop."""
         return ()
 
+    @property
+    def remembered(self) -> int:
+        """Number of entries that it keeps in the discrete memory of a drop."""
+        return 0
+
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of a kernel row."""
         for name, column in self.columns.items():

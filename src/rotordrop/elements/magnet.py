@@ -38,6 +38,8 @@ class ActiveMagneticBearing(Placed):
     )
     """Whether the controller holds the rotor centred against gravity."""
 
+    columns: ClassVar[Mapping[str, int]] = {"stiffness": L.AMB_STIFFNESS, "damping": L.AMB_DAMPING}
+
     reserved: ClassVar[Mapping[str, str]] = {"controller": "the controller of a closed loop"}
 
     def completed(self, carried_mass: float) -> dict[str, Known]:

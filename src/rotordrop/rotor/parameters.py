@@ -108,9 +108,8 @@ def _kernel_parameters(
 ) -> KernelParameters:
     m = basis.size
     magnet = np.zeros((len(machine.ambs), L.N_MAGNET_COLUMNS))
-    for a, amb in enumerate(machine.ambs):
-        magnet[a, L.AMB_STIFFNESS] = float(amb.stiffness)
-        magnet[a, L.AMB_DAMPING] = float(amb.damping)
+    for row, amb in zip(magnet, machine.ambs, strict=True):
+        amb.fill(row)
 
     def shapes_at(parts: Sequence[Placed]) -> Array:
         rows = [basis.node_row(part.node) for part in parts]
@@ -130,7 +129,7 @@ def _kernel_parameters(
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
         departure=np.zeros((0, departure.N_COLUMNS)),
-        memory=np.zeros(0),
+        memory=np.zeros(sum(amb.remembered for amb in machine.ambs)),
         **_of_values(machine, fe, basis, shares),
     )
 
