@@ -39,6 +39,9 @@ _QUESTIONS = {
     "support": 'support of the touchdown bearings: "stiff", "soft", "1e8 N/m", or two: "8e7 N/m, 5e8 N/m"',
 }
 
+MADE_UP = "made up: put yours here"
+"""Remark behind a value of a machine file that nobody gave."""
+
 
 def _number(name: str) -> Any:
     return text_option("TEXT", f"For --simple: {_QUESTIONS[name]}.")
@@ -327,10 +330,25 @@ def convert(
     from rotordrop.machine import machine_text
     from rotordrop.machine.simple import SimpleMachine, drafted_machine
 
+    made_up = {
+        "balance_grade.grade": "balance grade",
+        "touchdown_bearings.support": "supports",
+        "ambs.node": "planes of the magnets",
+        "sensors.node": "planes of the sensors",
+        "sensors.angle": "angles of the sensors",
+    }
+    for given, path, what in (
+        (designation, "touchdown_bearings.bearing.designation", "touchdown bearings"),
+        (gap, "touchdown_bearings.air_gap", "air gap"),
+        (speed, "speed.nominal", "nominal speed"),
+    ):
+        if given is None:
+            made_up[path] = what
     ends = sorted({spring.node for spring in imported.springs if spring.kind == "BearingElement"})
     last = len(imported.rotor.node_positions)
     if len(ends) < 2:
         ends = [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
+        made_up["touchdown_bearings.node"] = "planes of the touchdown bearings"
     nodes = (ends[0], ends[-1])
     if nodes[0] == nodes[1]:
         raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")
@@ -352,7 +370,13 @@ def convert(
     planes = [("NDE", nodes[0]), ("DE", nodes[1])]
     notes = [f"rotor from {source.name} ({imported.source})", *imported.notes]
     machine = drafted_machine(rotor=imported.rotor, bearings=planes, sensors=planes, known=known, notes=notes)
-    deliver_text(machine_text(machine), output, overwrite=force)
+    marked = dict.fromkeys(made_up, MADE_UP) | {
+        f"touchdown_bearings.support.{value}": MADE_UP for value in ("stiffness", "mass")
+    }
+    deliver_text(machine_text(machine, marked), output, overwrite=force)
+    console(sys.stderr).print(
+        f"made up, marked in the file: {', '.join(made_up.values())}", soft_wrap=True, highlight=False
+    )
 
 
 def _written_for_ross(machine: Path, output: Path, json: Path | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -38,9 +38,9 @@ def save_machine(machine: Machine, path: str | os.PathLike[str]) -> None:
     write_text(path, machine_text(machine))
 
 
-def machine_text(machine: Machine) -> str:
-    """Give the TOML text of a machine."""
-    return "\n".join(_table(_content(machine), "")).strip("\n") + "\n"
+def machine_text(machine: Machine, remarks: Mapping[str, str] | None = None) -> str:
+    """Give the TOML text of a machine, with a remark behind values by path, such as "sensors.angle"."""
+    return "\n".join(_table(_content(machine), "", remarks or {})).strip("\n") + "\n"
 
 
 @dataclass(frozen=True)
@@ -89,20 +89,21 @@ def _shorthand(part: Description, content: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
-def _table(content: dict[str, Any], header: str) -> Iterator[str]:
+def _table(content: dict[str, Any], header: str, remarks: Mapping[str, str]) -> Iterator[str]:
     """Write the lines of a table: values first, then the tables below it."""
     for key, item in content.items():
         if isinstance(item, _Written):
-            yield f"{_key(key)} = {item.text}"
+            remark = remarks.get(f"{header}.{key}")
+            yield f"{_key(key)} = {item.text}" + (f"  # {remark}" if remark else "")
     for key, item in content.items():
         path = f"{header}.{_key(key)}" if header else _key(key)
         if isinstance(item, dict):
             holds_values = any(isinstance(entry, _Written) for entry in item.values())
             yield from ("", f"[{path}]") if holds_values else ()
-            yield from _table(item, path)
+            yield from _table(item, path, remarks)
         elif isinstance(item, list):
             for entry in item:
-                yield from ("", f"[[{path}]]", *_table(entry, path))
+                yield from ("", f"[[{path}]]", *_table(entry, path, remarks))
 
 
 def _key(key: str) -> str:

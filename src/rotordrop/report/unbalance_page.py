@@ -138,13 +138,13 @@ def _verdict(
 ) -> tuple[Statement, ...]:
     said = [
         Statement(
-            f"{one.plane}: the peak at {shown(one.peak.speed, 'speed')} with an amplification factor of "
-            f"{one.peak.factor:.1f} is {100.0 * one.apart:.1f} % from the nominal speed; API 617 asks for "
-            f"{100.0 * one.needed:.1f} %",
+            f"{', '.join(one.plane for one in seen)}: the peak at {shown(nearest.peak.speed, 'speed')} with "
+            f"an amplification factor of {nearest.peak.factor:.1f} is {100.0 * nearest.apart:.1f} % from the "
+            f"nominal speed; API 617 asks for {100.0 * nearest.needed:.1f} %",
             "bad",
         )
-        for one in peaks
-        if one.too_near
+        for seen in _modes([one for one in peaks if one.too_near])
+        for nearest in [min(seen, key=lambda one: one.apart)]
     ]
     said = said or [Statement(CLEAR, "good")]
     if machine.balance_grade is not None:
@@ -152,6 +152,18 @@ def _verdict(
     if response.suspension == "AMBs":
         said.append(Statement(SPRINGS))
     return tuple(said)
+
+
+def _modes(peaks: Sequence[PlanePeak]) -> list[list[PlanePeak]]:
+    """Peaks that lie within half a half-power width of each other are one mode, seen in several planes."""
+    modes: list[list[PlanePeak]] = []
+    for one in sorted(peaks, key=lambda one: one.peak.speed):
+        last = modes[-1][-1].peak if modes else None
+        if last is not None and one.peak.speed - last.speed < 0.5 * last.speed / last.factor:
+            modes[-1].append(one)
+        else:
+            modes.append([one])
+    return modes
 
 
 def _rise(steady: MachineResponse, rising: MachineResponse | None) -> tuple[Statement, ...]:

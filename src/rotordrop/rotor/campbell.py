@@ -255,18 +255,22 @@ def response_peaks(speed: Array, amplitude: Array) -> tuple[ResponsePeak, ...]:
 
 
 def _peak(speed: Array, amplitude: Array, k: int) -> ResponsePeak:
-    level = HALF_POWER * amplitude[k]
+    """A peak between samples, on the parabola through the highest and its neighbours."""
+    bend, slope = np.polyfit(speed[k - 1 : k + 2] - speed[k], amplitude[k - 1 : k + 2] - amplitude[k], 2)[:2]
+    top = float(speed[k] - 0.5 * slope / bend)
+    highest = float(amplitude[k] - 0.25 * slope**2 / bend)
+    level = HALF_POWER * highest
     below, above = np.flatnonzero(amplitude[:k] <= level), np.flatnonzero(amplitude[k:] <= level)
     halves = []
     if len(below):
-        halves.append(speed[k] - _between(speed, amplitude, int(below[-1]), level))
+        halves.append(top - _between(speed, amplitude, int(below[-1]), level))
     if len(above):
-        halves.append(_between(speed, amplitude, k + int(above[0]) - 1, level) - speed[k])
+        halves.append(_between(speed, amplitude, k + int(above[0]) - 1, level) - top)
     width = 2.0 * float(np.mean(halves)) if halves else math.nan
     return ResponsePeak(
-        speed=float(speed[k]),
-        amplitude=float(amplitude[k]),
-        factor=float(speed[k]) / width if halves else width,
+        speed=top,
+        amplitude=highest,
+        factor=top / width if halves else width,
     )
 
 

@@ -176,3 +176,17 @@ def test_names_of_materials_have_no_blanks_and_discs_of_one_name_are_several(tmp
     assert any(key.endswith(" layer") for key in content)
     assert not any(" " in one["material"]["name"] for one in shafts)
     assert len(read_ross(tmp_path / "rotor.json").rotor.discs) == len(machine.rotor.discs) > 1
+
+
+def test_what_nobody_gave_is_marked_in_the_file_and_said(tmp_path, capsys):
+    source, target = tmp_path / "shaft.csv", tmp_path / "machine.toml"
+    source.write_text("Ele, L, OD, ID\n, mm, mm, mm\n1, 100, 60, 0\n2, 300, 80, 20\n3, 100, 60, 0\n")
+    assert run(["convert", str(source), "-o", str(target), "--gap", "0.3 mm"]) == 0
+    said = capsys.readouterr().err
+    assert "made up, marked in the file: " in said
+    assert "nominal speed" in said and "air gap" not in said
+    lines = target.read_text(encoding="utf-8").splitlines()
+    for key, marked in (("designation", True), ("nominal", True), ("angle", True), ("air_gap", False)):
+        found = [line for line in lines if line.startswith(f"{key} = ")]
+        assert found and all(("made up" in line) == marked for line in found), key
+    assert load_machine(target).touchdown_bearings[0].air_gap.value == pytest.approx(0.3e-3)

@@ -92,6 +92,28 @@ def test_the_response_is_linear_in_the_unbalance():
     )
 
 
+def test_a_peak_between_the_samples_is_not_put_on_one_of_them():
+    """On a grid of 2 % around a peak of half-power width 6 %: within a twentieth of a step of the formula."""
+    ratio, step = 0.03, 0.02
+    r = np.arange(0.2, 3.0, step)
+    (peak,) = response_peaks(100.0 * r, r**2 / np.sqrt((1.0 - r**2) ** 2 + (2.0 * ratio * r) ** 2))
+    assert peak.speed == pytest.approx(100.0 / math.sqrt(1.0 - 2.0 * ratio**2), abs=100.0 * step / 20.0)
+
+
+def test_one_mode_seen_in_many_planes_is_one_sentence(capsys):
+    assert run(["unbalance-response", str(example_path("lp400"))]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("API 617 asks for") == 1
+    planes = said.split("problem: ")[1].split(": the peak at")[0]
+    assert set(planes.lower().split(", ")) == {
+        "sensors nde",
+        "sensors de",
+        "touchdown bearing nde",
+        "touchdown bearing de",
+    }
+    assert "the peak at 550.0 Hz" not in said
+
+
 def test_a_machine_without_unbalance_says_so():
     machine = example_machine("small").completed_with({"unbalances": ()})
     with pytest.raises(UsageError, match="has no unbalance; add"):
