@@ -31,7 +31,7 @@ from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
-from rotordrop.evidence.wall import GAIN, slope
+from rotordrop.evidence.wall import GAIN, LEVER_DOUBT, slope
 from rotordrop.files import DIGEST
 from rotordrop.json_schema import DIALECT, FLAG, MAYBE, MAYBE_PAIR, NUMBER, PAIR, TEXT, TEXTS, closed, listed
 from rotordrop.known import NINETY
@@ -413,7 +413,9 @@ def _largest_between(path: Path, at: int) -> tuple[float, float]:
     """Interval of a distance from the centre [m], 90 %: at the sensors, or at the bearing beside them."""
     here = float(path.radius[at])
     aside = float(np.hypot(*path.bearing_position[at])) - here
-    half = NINETY * float(np.hypot(path.wall.centre_error.mean(), GAIN * here))
+    outward = float(np.hypot(*(path.bearing_position - path.position)[at]))
+    beside = LEVER_DOUBT / max(abs(path.wall.lever), LEVER_DOUBT) * outward
+    half = NINETY * math.hypot(path.wall.centre_error.max(), GAIN * here, beside)
     return here + min(aside, 0.0) - half, here + max(aside, 0.0) + half
 
 

@@ -30,7 +30,8 @@ _CENTRED = 0.08
 _UNLIKE = 0.2
 """Standard deviation of the gap over the way from floating to rest, less one [1] (chosen)."""
 
-_LEVER = (0.05, 0.06)
+LEVER_DOUBT = 0.06
+_LEVER = (0.05, LEVER_DOUBT)
 """How far a bearing lies outside its sensor plane over the distance of the planes, and its standard deviation
 [1] (chosen)."""
 
