@@ -262,6 +262,7 @@ class Parameter:
 
 def _at(part: Any, path: str) -> Any:
     for name in path.split("."):
+        # another kind of bearing or support need not have the field at all
         part = getattr(part, name, None)
     return part
 
@@ -389,6 +390,7 @@ def derived(
     middle = [one.value for one in known]
     square = 0.0
     for k, one in enumerate(known):
+        # by its ends and not by a slope: intervals are wide where a function bends
         low, high = one.interval_90 or (one.value, one.value)
         ends = [function(*middle[:k], end, *middle[k + 1 :]) for end in (low, high)]
         square += (0.5 * (ends[1] - ends[0])) ** 2

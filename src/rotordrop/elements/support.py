@@ -153,6 +153,7 @@ class Support(Description):
     def fill(self, row: Array) -> None:
         """Write the columns of the support, after those of its mount."""
         super().fill(row)
+        # a neutral entry is a form too: a fit that holds it at zero computes what one beside zero does
         form = any(getattr(self, name) is not None for name in _FORM)
         row[_PRESENT] = float(form or row[L.MOUNT] != 0.0)
 
@@ -179,6 +180,7 @@ def support_sag(row: Array, load: float) -> float:
         stop = float(row[_STOP])
         sag = (load + stop * gap) / (stiffness + stop)
     cubic = float(row[_CUBIC])
+    # what a support is deflected by is its compliance: coupling to the side, which is free, takes 1 - κ²
     coupled = sag / (1.0 - float(row[_COUPLING]) ** 2)
     deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
     speed, share = float(row[_SPEED]), max(float(row[_SHARE]), 0.0)

@@ -44,6 +44,7 @@ TABLE: tuple[Parameter, ...] = (
 )
 """The rows; those of a bearing in the order in which the estimators hold them."""
 
+# In the order in which a search tries their extensions.
 _ELEMENTS = (
     support,
     sensor,

@@ -75,6 +75,7 @@ class TouchdownBearing(Placed):
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of clearance and parts."""
         super().fill(row)
+        # the bore is measured, so an error of the gap is one of the rotor's radius
         row[L.ROTOR_RADIUS] = row[L.BORE_RADIUS] - row[L.AIR_GAP]
         for part in self.parts:
             part.fill(row)

@@ -78,6 +78,7 @@ class StateLayout:
             if not name.startswith("further"):
                 object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
         kinds = np.repeat([kind for _, kind in blocks.values()], sizes).astype(np.int64)
+        # behind the books, where what the filter estimates ends: no estimator's model holds a departure
         kinds = np.concatenate([kinds, np.tile(np.array(self.departing, dtype=np.int64), b)])
         object.__setattr__(self, "kinds", kinds)
 
@@ -89,6 +90,7 @@ class StateLayout:
             {part.states_at: part.further_states for part in (bearing, *bearing.parts) if part.further_states}
             for bearing in bearings
         ]
+        # by column, not by part: who lists the parts of a bearing otherwise moves no state
         places = sorted({place for states in asked for place in states})
         return cls(
             n_modes=n_modes,

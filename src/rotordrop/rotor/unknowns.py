@@ -309,6 +309,7 @@ def _in_common(one: Unknown, machine: Machine, sensor: Sensor) -> Unknown:
     row = one.parameter
     group = [s for s in machine.sensors if row.group == "machine" or s.node == sensor.node]
     alone, count = one.sigma**2, len([s for s in group if row.stated(s) is not None])
+    # the mean of independent errors has a variance too, which is not counted twice
     common = row.common_sigma**2 - alone / count
     return replace(one, sigma=math.sqrt(alone + common), common_variance=common)
 
@@ -403,6 +404,7 @@ def correlate(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> No
     theta, sigma = np.array([(one.begin, one.sigma) for one in chosen]).reshape(-1, 2).T
     through = file_of_fitted(model, chosen, [one.value_of(one.begin) for one in chosen])
     signs = slope_signs(chosen, theta, sigma)
+    # the file's covariance is of the file's values; the fit holds others, such as a stiffness at one exponent
     half = solve(through, spread.matrix[np.ix_(order, order)])
     fitted = signs[:, None] * solve(through, half.T) * signs
     own = np.sqrt(np.diag(fitted))

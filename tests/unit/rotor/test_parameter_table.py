@@ -8,9 +8,21 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.parameter import Role, Step
-from rotordrop.elements.table import TABLE, parameter, published, row_of, rows, separating_measurement
+from rotordrop.elements.table import (
+    TABLE,
+    following,
+    keys_of,
+    parameter,
+    published,
+    row_of,
+    rows,
+    separating_measurement,
+)
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
+from rotordrop.physics import columns as L
+from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.units import KINDS
@@ -110,3 +122,28 @@ def test_limits_hold_a_value():
     exponent = parameter("contact.exponent")
     assert [exponent.within(n) for n in (0.9, 1.2, 2.5)] == [1.0, 1.2, 2.0]
     assert parameter("preload").within(math.pi) == math.pi
+
+
+def test_a_value_that_follows_another_names_a_row_and_a_path_finds_its_key():
+    bearing = example_machine("lp400").touchdown_bearings[0]
+    followed = {row.path: (path, by) for row, path, by in following()}
+    path, by = followed["friction.static"]
+    assert by(bearing, Known(value=0.2)).value == 0.2 * bearing.friction.ratio
+    assert parameter(path).entries  # what is followed is estimated
+    assert keys_of(["preload"]) == ["bearing", "preload"] and keys_of(["air_gap"]) == ["air_gap"]
+
+
+def test_the_layout_holds_the_states_that_the_parts_of_a_bearing_ask_for():
+    machine = example_machine("lp400")
+    first, second = machine.touchdown_bearings
+    softer = first.changed(mount={"maxwell": [{"stiffness": "4e7 N/m", "time": "3 ms"}]})
+    machine = machine.changed(touchdown_bearings=(softer, second))
+    foundation = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
+    machine = machine.with_values({f"DE.support.{name}": value for name, value in foundation.items()})
+    layout = StateLayout.of_machine(machine, 3)
+    at = layout.bearing_at()
+    start = layout.race_spin.stop
+    assert at[:, L.BEARING_OWN].tolist() == [-1, start] and at[:, L.MOUNT_STATES].tolist() == [start + 4, -1]
+    assert layout.kinds[layout.further_at(L.BEARING_OWN)].tolist() == [L.INTERNAL] * 4
+    assert layout.kinds[layout.further_at(L.MOUNT_STATES)].tolist() == [L.POSITION] * 2
+    assert layout.rotor_speed == start + 6
