@@ -33,7 +33,7 @@ holds late in a drop.
 
 STRUCTURE_TEXT = """\
 Unknowns only of a machine whose description names them; the estimate adds them where a record asks for it
-([extensions](../tracked_twin.md#beyond-the-usual-model)). Of those of a sensor, the column of a guess is the
+([extensions](../tracked_twin.md#extensions)). Of those of a sensor, the column of a guess is the
 share of one sensor; what the sensors of a plane, or all of them, have in common has a prior of its own.
 """
 

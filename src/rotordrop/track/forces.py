@@ -17,7 +17,7 @@ from rotordrop.simulate._rhs import race_deflection
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
 from rotordrop.track.problem import DropProblem, private_copy
-from rotordrop.track.smoother import Smoothed
+from rotordrop.track.smoother import Smoothed, parameter_sample
 
 Array = NDArray[np.float64]
 
@@ -108,6 +108,8 @@ class ForceHistory:
     displacement: Array
     displacement_sigma: Array
     """Rotor at the bearing nodes and standard deviation [m], shape (N, B, 2)."""
+    friction_sigma: Array
+    """Relative standard deviation of the dynamic friction coefficient [1], shape (B,)."""
 
 
 def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
@@ -146,6 +148,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         azimuth=np.where(touching, np.arctan2(contacts[..., 4], contacts[..., 3]), np.nan),
         displacement=displacement,
         displacement_sigma=displacement_sigma,
+        friction_sigma=_friction_sigma(problem, smoothed),
     )
 
 
@@ -200,6 +203,13 @@ def _standard_deviations(smoothed: Smoothed, gradients: Array) -> Array:
         g = gradients[:, b]
         sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, block, g), 0.0))
     return sigma
+
+
+def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
+    variances = np.diag(smoothed.covariance(parameter_sample(smoothed)))
+    bearings = range(problem.model.layout.n_bearings)
+    places = [problem.entries_that_set("bearing", b, L.FRICTION_DYNAMIC)[0] for b in bearings]
+    return np.sqrt(np.maximum(variances[places], 0.0))
 
 
 def _displacements(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:

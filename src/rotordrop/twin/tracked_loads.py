@@ -168,8 +168,14 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
     means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa", left_out)}
     late_mean = mean_late(force)
     if late_mean is not None:
-        sigma = MODEL_MEAN_FORCE_SIGMA * late_mean
-        means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", sigma)
+        # What the force of one sample gets wrong the next ones take back, or the readings would show it: the
+        # errors of a mean are those of independent samples at most.
+        late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
+        independent = forces.magnitude_sigma[late, b]
+        spread = float(np.linalg.norm(independent)) / len(independent)
+        left_out = MODEL_MEAN_FORCE_SIGMA * late_mean
+        sigma = math.hypot(spread, left_out)
+        means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", left_out)
     return Loads(
         force=force,
         force_band=_band(force, NINETY * widening * force_sigma),
@@ -389,7 +395,8 @@ def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float
 
     force = with_interval(peak, relative * peak, widening, "N")
     passed = with_interval(impulse, relative * impulse, widening, "N s")
-    energy = with_interval(lost, 2.0 * relative * abs(lost), widening, "J")
+    # nearly all of it is sliding: friction coefficient times impulse times sliding speed
+    energy = with_interval(lost, math.hypot(relative, forces.friction_sigma[b]) * abs(lost), widening, "J")
     if cut:
         # Impulse and energy are of the part that was estimated, and add up to that of the window. The peak of
         # a contact that goes on may be still to come: the whole impact has at least this.

@@ -217,6 +217,7 @@ def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
         contact_force=force,
         contact_power=0.01 * force,
         azimuth=np.arange(60.0)[:, None],
+        friction_sigma=np.array([0.03]),
     )
     long, short = twin_impacts(forces, 0, 1.0, None)
     for impact, first, last, strongest in ((long, 10, 15, 12), (short, 30, 30, 30)):

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError, UsageError
-from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA
+from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA
 from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.document import combined, estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
@@ -180,6 +180,32 @@ def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Ma
                     continue
                 low, high = impact[field]["interval_90"]
                 assert low <= impact[field]["value"] <= high
+
+
+def test_energies_of_the_impacts_hold_the_truth(tracked: Estimate, synthetic: SyntheticDrop) -> None:
+    """The error of the friction coefficient is in them: sliding takes nearly all of the energy."""
+    true = synthetic.result.contacts
+    held = []
+    for b, name in enumerate(BEARINGS):
+        of_bearing = np.flatnonzero(true.bearing == b)
+        for impact in tracked.bearing(name).impacts:
+            near = of_bearing[np.abs(true.peak_time[of_bearing] - impact.peak_time) < 5e-4]
+            energy = impact.dissipated_energy
+            if len(near) == 1 and math.isfinite(impact.end) and energy.value > 0.5:
+                held.append(energy.low <= float(true.dissipated_energy[near[0]]) <= energy.high)
+                assert energy.high - energy.value < 0.2 * energy.value
+    assert len(held) > 10 and np.mean(held) >= 0.85
+
+
+def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop: TrackedDrop) -> None:
+    """What the record does not know of the force, it does not know of its mean."""
+    forces = workshop.forces
+    worse = replace(forces, magnitude_sigma=100.0 * forces.magnitude_sigma)
+    mean, much = (twin_loads(one, 0, 1.0).means["mean_force_0p15_0p2_N"] for one in (forces, worse))
+    allowance = mean.allowance_90 or 0.0
+    assert allowance == pytest.approx(NINETY * MODEL_MEAN_FORCE_SIGMA * mean.value)
+    by_record = math.sqrt((mean.high - mean.value) ** 2 - allowance**2)
+    assert math.sqrt((much.high - much.value) ** 2 - allowance**2) == pytest.approx(100.0 * by_record)
 
 
 def test_impulses_of_the_impacts_add_up_to_the_impulse_of_the_force(
