@@ -47,6 +47,8 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     record = seen.record
     speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
     notes = tuple(Statement(note) for note in seen.notes)
+    facts = _facts(seen)
+    read = Statement(f"Read: {dict(facts)['channels']}; {dict(facts)['samples']}.")
     timeline = (
         Column("record time", lambda row: format_moment(row[0], 4)),
         Column("event", lambda row: row[1]),
@@ -54,9 +56,14 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     return ReportContent(
         title=f"A look at {record.name}",
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}",
-        facts=_facts(seen),
+        facts=facts,
         simulated=SIMULATED_RECORD if record.is_simulated else "",
-        verdict=(*_verdict(seen), *quality_statements(seen.findings)),
+        # the terminal shows neither the facts nor the sections
+        verdict=(
+            *_verdict(seen),
+            *quality_statements(seen.findings),
+            *(() if drawn else (read, *notes)),
+        ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
         summary=(table(seen.timeline(), timeline, "What happened when"),),
         sections=(

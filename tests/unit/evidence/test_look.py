@@ -1,6 +1,7 @@
 """What a record says by itself: on paths whose events are known because they are written down here."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -287,3 +288,10 @@ def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys
         f"look({record!r}); assert not {{'numba', 'plotly', 'scipy.signal'}} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_the_terminal_says_what_was_read_and_guessed(capsys):
+    assert run(["look", str(example_record_path("lp400_drop_060"))]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert re.search(r"Read: .*_A, .*_B; .* at 20000 Hz, -0\.25 to ", said)
+    assert "their sensors taken as perpendicular" in said
