@@ -30,7 +30,6 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     from rotordrop.elements.ball_numbers import BallNumbers
     from rotordrop.elements.catalog.lookup import CatalogueBearing
-    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 BallMaterial = Literal["silicon nitride", "steel"]
 
@@ -441,7 +440,7 @@ def _offset_of_preload(balls: BallBearing, force: float) -> float:
     return balls.changed(preload=Known(value=force)).numbers().constants.axial_offset
 
 
-def _by_offset(bearing: TouchdownBearing) -> Measure:
+def _by_offset(bearing: Any) -> Measure:
     """The preload by the axial offset of the rows, which is what the ball forces depend on."""
     from rotordrop.physics.ball_bearing import preload_of_offset  # compiled, as the numbers are
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.elements.description import Description
+from rotordrop.elements.description import Description, Text
 from rotordrop.known import Known
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ class RaceBearing(Description):
 
     The numbers that follow from it are its `BearingNumbers`.
     """
+
+    designation: Text | None = None
+    """What its maker calls it."""
 
     @abstractmethod
     def numbers(self) -> BearingNumbers:
