@@ -1,13 +1,18 @@
 """Let the gate judge spoiled and clean records, and count what it says.
 
-Usage: python studies/gate/score.py faults FOLDER FIRST LAST
-       python studies/gate/score.py clean FOLDER FIRST LAST
-       python studies/gate/score.py count [FIRST LAST]
+Usage: python studies/gate/score.py faults OUT FOLDER FIRST [SUPPLIED [KIND ...]]
+       python studies/gate/score.py clean OUT FOLDER FIRST LAST
+       python studies/gate/score.py count OUT [OUT ...]
 
-Every judgement is one line of ``results/faults.jsonl`` or ``results/clean.jsonl``; what is there already is
-not made again, so a run that was stopped goes on. FOLDER keeps the clean records (`records.py`). A seed
-stands for one clean record, spoiled in every way once. A record whose levitated orbit is wider than
-0.3 air gaps is left out: no machine runs so (zone limit B/C of ISO 14839-2 is 0.4).
+Every judgement is one line of the file OUT; what is there already is not made again, so a run that was
+stopped goes on. FOLDER keeps the clean records (`records.py`); FIRST, a multiple of ten, is the first of the
+twenty seeds that are spoiled. SUPPLIED is a folder with drops of the bundled example (`drop_060.csv`,
+`drop_060_tail.csv` and so on); the bundled drop stands for them where there is none. Every kind of fault hits
+three records: a supplied one, one of a rotor up to 60 kg and one of a heavier one.
+
+A fault counts as caught by a finding that the record as it was does not have: a refusal, a warning or a note.
+A clean record counts as a false alarm by any warning or refusal. Clean records whose levitated orbit is wider
+than 0.3 air gaps are left out: no machine runs so (zone limit B/C of ISO 14839-2 is 0.4).
 """
 
 from __future__ import annotations
@@ -17,66 +22,119 @@ import sys
 import time
 import zlib
 from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from faults import FAULTS
-from records import kept, rotor_of
+from faults import FAULTS, Given
+from records import NAMES, kept, name_of, rotor_of
 
+from rotordrop import example_machine, read_record
 from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record
-from rotordrop.record.record import Record
 
-RESULTS = Path(__file__).parent / "results"
+LIGHT, HEAVY = (0, 1, 2, 3, 8), (4, 5, 6, 7, 9)
+"""Places of the rotors up to 60 kg and of the heavier ones in `NAMES`."""
+
+SUPPLIED = (
+    ("drop_060.csv", "drop_060_tail.csv"),
+    ("drop_100.csv", "drop_100_tail.csv"),
+    ("drop_150.csv", "drop_150_tail.csv"),
+    ("drop_210.txt", "drop_210_tail.csv"),
+    ("repeat_150_1.csv", "drop_150_tail.csv"),
+    ("repeat_150_2.csv", "drop_150_tail.csv"),
+    ("repeat_150_3.csv", "drop_150_tail.csv"),
+)
+_LAST = 0.65
+"""Supplied records are cut here [s], as the simulated ones end."""
 
 
-def judged(record: Record, tail: Record, seed: int) -> dict[str, Any]:
-    """Findings that are more than notes, the worst first, and the processor time it took [s]."""
+@cache
+def supplied(folder: str, number: int) -> tuple[str, Given]:
+    """A supplied drop of the bundled example, by number, with its name."""
+    machine = example_machine("lp400")
+    drop, tail = SUPPLIED[number % len(SUPPLIED)]
+    place = Path(folder)
+    if not folder:
+        place = Path(str(resources.files("rotordrop"))) / "examples" / "lp400"
+        drop, tail = "drop_060.h5", "drop_060_tail.csv"
+    record = read_record(place / drop, machine).window(-np.inf, _LAST)
+    return drop, Given(record=record, tail=read_record(place / tail, machine), machine=machine)
+
+
+def of_seed(folder: Path, seed: int) -> Given:
+    """A simulated drop to be spoiled."""
+    record, tail = kept(folder, seed, long=True)
+    return Given(record=record, tail=tail, machine=rotor_of(seed))
+
+
+def spoiled_records(folder: Path, first: int, given: str) -> Iterator[tuple[str, str, Given]]:
+    """Every kind of fault with the three records it hits, by name."""
+    for number, kind in enumerate(FAULTS):
+        turn = len(NAMES) * (number // len(LIGHT) % 2)
+        name, one = supplied(given, number)
+        yield kind, name, one
+        for places in (LIGHT, HEAVY):
+            seed = first + turn + places[number % len(places)]
+            yield kind, str(seed), of_seed(folder, seed)
+
+
+def judged(given: Given) -> dict[str, Any]:
+    """Findings, the worst first, and the processor time it took [s]."""
     begun = time.process_time()
     try:
-        found = check_record(record, rotor_of(seed), tail)
-        said = [[one.kind, one.severity] for one in found if one.severity != "note"]
-        notes = [one.kind for one in found if one.severity == "note"]
+        found = check_record(given.record, given.machine, given.tail)
+        said = [[str(one.kind), one.severity, one.channel or "", one.message] for one in found]
     except RecordError as error:
-        said, notes = [[f"refused: {str(error)[:120]}", "stop"]], []
-    return {"findings": said, "notes": notes, "seconds": round(time.process_time() - begun, 2)}
+        said = [[f"refused: {str(error)[:120]}", "stop", "", ""]]
+    return {"findings": said, "seconds": round(time.process_time() - begun, 2)}
 
 
-def done(path: Path) -> set[tuple[str, int]]:
-    """Kinds and seeds of the lines that are there."""
-    lines = lines_of(path, range(10**9))
-    return {(line.get("fault", ""), line["seed"]) for line in lines}
+def spoilt(kind: str, name: str, given: Given) -> Given:
+    """What a fault makes of a record; place, channel and sign come from both names."""
+    return FAULTS[kind].make(given, np.random.default_rng(zlib.crc32(f"{kind} {name}".encode())))
 
 
-def _wide(record: Record, seed: int) -> bool:
+def _wide(given: Given) -> bool:
     """Whether the rotor circles wider before the drop than machines are run."""
-    gap = min(float(bearing.air_gap) for bearing in rotor_of(seed).touchdown_bearings)
-    return float(np.max(np.ptp(record.signals[record.time < -5e-3], axis=0))) > 2.0 * 0.3 * gap
+    gap = min(float(bearing.air_gap) for bearing in given.machine.touchdown_bearings)
+    floating = given.record.signals[given.record.time < -5e-3]
+    return float(np.max(np.ptp(floating, axis=0))) > 2.0 * 0.3 * gap
 
 
-def run(kind: str, folder: Path, seeds: range) -> None:
-    """Judge what is missing."""
-    RESULTS.mkdir(exist_ok=True)
-    path = RESULTS / f"{kind}.jsonl"
-    there = done(path)
+def lines_of(path: Path) -> list[dict[str, Any]]:
+    """What was judged so far."""
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
+
+
+def run_faults(path: Path, folder: Path, first: int, given: str, kinds: tuple[str, ...]) -> None:
+    """Judge every kind of fault on its three records, and these records as they were."""
+    done = {(line["fault"], line["record"]) for line in lines_of(path)}
+    with path.open("a") as out:
+        for kind, name, one in spoiled_records(folder, first, given):
+            if kinds and not any(word in kind for word in kinds):
+                continue
+            for fault, what in (("", one), (kind, None)):
+                if (fault, name) not in done:
+                    done.add((fault, name))
+                    line = {"fault": fault, "record": name, **judged(what or spoilt(kind, name, one))}
+                    out.write(json.dumps(line, ensure_ascii=False) + "\n")
+                    out.flush()
+
+
+def run_clean(path: Path, folder: Path, seeds: range) -> None:
+    """Judge clean records."""
+    done = {line["seed"] for line in lines_of(path)}
     with path.open("a") as out:
         for seed in seeds:
-            wanted = [fault for fault in (FAULTS if kind == "faults" else [""]) if (fault, seed) not in there]
-            if not wanted:
-                continue
             record, tail = kept(folder, seed)
-            if _wide(record, seed):
-                continue
-            for fault in wanted:
-                line: dict[str, Any] = {"seed": seed, "rotor": rotor_of(seed).name}
-                if fault:
-                    random = np.random.default_rng((seed, zlib.crc32(fault.encode())))
-                    spoiled, end, size = FAULTS[fault].make(record, tail, random)
-                    line |= {"fault": fault, "size": size} | judged(spoiled, end, seed)
-                else:
-                    line |= judged(record, tail, seed)
-                out.write(json.dumps(line) + "\n")
+            given = Given(record=record, tail=tail, machine=rotor_of(seed))
+            if seed not in done and not _wide(given):
+                line = {"seed": seed, "rotor": name_of(seed), "rate": record.sampling_rate, **judged(given)}
+                out.write(json.dumps(line, ensure_ascii=False) + "\n")
                 out.flush()
 
 
@@ -90,36 +148,60 @@ def wilson(hits: int, count: int) -> str:
     return f"{hits}/{count} = {p:.1%} ({max(middle - half, 0.0):.1%} to {min(middle + half, 1.0):.1%})"
 
 
-def lines_of(path: Path, seeds: range) -> list[dict[str, Any]]:
-    """What was judged of some seeds."""
-    lines = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
-    return [line for line in lines if line["seed"] in seeds]
+def _print_seconds(lines: list[dict[str, Any]]) -> None:
+    spent = [line["seconds"] for line in lines]
+    print(f"processor time: median {np.median(spent):.2f} s, most {max(spent):.1f} s")
 
 
-def count(seeds: range) -> None:
-    """Print what was caught, and under its right name."""
-    clean = RESULTS / "clean.jsonl"
-    alarms: set[int] = set()
-    if lines := lines_of(clean, seeds):
-        said = [line for line in lines if line["findings"]]
-        alarms = {line["seed"] for line in said}
-        kinds = Counter(kind for line in said for kind, _ in line["findings"])
-        print(f"false alarms {wilson(len(said), len(lines))} {dict(kinds)}")
-    lines = lines_of(RESULTS / "faults.jsonl", seeds)
+def _print_seconds(lines: list[dict[str, Any]]) -> None:
+    spent = [line["seconds"] for line in lines]
+    print(f"processor time: median {np.median(spent):.2f} s, most {max(spent):.1f} s")
+
+
+def count_clean(lines: list[dict[str, Any]]) -> None:
+    """Print the false alarms by rotor."""
+    said = [line for line in lines if any(one[1] != "note" for one in line["findings"])]
+    kinds = Counter(one[0] for line in said for one in line["findings"] if one[1] != "note")
+    print(f"false alarms {wilson(len(said), len(lines))} {dict(kinds)}")
+    print(f"seeds with a false alarm: {[line['seed'] for line in said]}")
+    for name in NAMES:
+        mine = [line for line in lines if line["rotor"] == name]
+        print(f"  {name:24} {sum(line in said for line in mine)}/{len(mine)}")
+    _print_seconds(lines)
+
+
+def count_faults(lines: list[dict[str, Any]]) -> None:
+    """Print what was caught, and what under its right name."""
+    was = {one["record"]: {tuple(f[:3]) for f in one["findings"]} for one in lines if not one["fault"]}
+    made = [line for line in lines if line["fault"]]
     total = Counter[str]()
     for fault, one in FAULTS.items():
-        mine = [line for line in lines if line["fault"] == fault]
-        caught = [line for line in mine if line["findings"]]
-        right = [line for line in caught if line["findings"][0][0] in one.names]
-        first = Counter(line["findings"][0][0] for line in caught if line not in right)
-        total.update(made=len(mine), caught=len(caught), right=len(right))
-        print(f"{fault:32} caught {wilson(len(caught), len(mine))}, right name {len(right)}; {dict(first)}")
-    print(f"caught {wilson(total['caught'], total['made'])}")
-    print(f"right name {wilson(total['right'], total['made'])}; seeds with a false alarm: {sorted(alarms)}")
+        mine = [line for line in made if line["fault"] == fault]
+        new = [[f for f in line["findings"] if tuple(f[:3]) not in was[line["record"]]] for line in mine]
+        caught = [found for found in new if found]
+        right = [found for found in caught if found[0][0] in one.names]
+        notes = sum(found[0][1] == "note" for found in caught)
+        other = dict(Counter(found[0][0] for found in caught if found not in right))
+        total.update(made=len(mine), caught=len(caught), right=len(right), notes=notes)
+        missed = [line["record"] for line, found in zip(mine, new, strict=True) if not found]
+        if mine:
+            named = f"right {len(right)}, notes {notes} {other or ''} {missed or ''}"
+            print(f"{fault:38} caught {len(caught)}/{len(mine)}, {named}")
+    print(f"caught {wilson(total['caught'], total['made'])}, {total['notes']} of them by a note alone")
+    right_of = [wilson(total["right"], total[of]) for of in ("made", "caught")]
+    print(f"right name {right_of[0]} of all; {right_of[1]} of caught")
+    _print_seconds(made)
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "count":
-        count(range(*map(int, sys.argv[2:4] or (1000, 10**6))))
+    what, *rest = sys.argv[1:]
+    if what == "count":
+        every = [line for name in rest for line in lines_of(Path(name))]
+        for counted, key in ((count_clean, "seed"), (count_faults, "fault")):
+            if lines := [line for line in every if key in line]:
+                counted(lines)
+    elif what == "faults":
+        out, folder, first, given, *kinds = [*rest, ""] if len(rest) < 4 else rest
+        run_faults(Path(out), Path(folder), int(first), given, tuple(kinds))
     else:
-        run(sys.argv[1], Path(sys.argv[2]), range(int(sys.argv[3]), int(sys.argv[4])))
+        run_clean(Path(rest[0]), Path(rest[1]), range(int(rest[2]), int(rest[3])))

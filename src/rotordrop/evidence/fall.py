@@ -195,6 +195,11 @@ class Fall:
         return float(np.mean(self._solved[1][: self.problem.deviation.size] ** 2))
 
     @property
+    def falls_freely(self) -> bool:
+        """Whether the newest samples of the window are still those of a free fall."""
+        return self.problem.newest_misfit(self.search) <= _STILL_FREE
+
+    @property
     def start(self) -> float:
         """Begin of the window of the fit [s]."""
         return float(self.problem.time[0])

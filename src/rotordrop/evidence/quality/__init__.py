@@ -16,8 +16,9 @@ import numpy as np
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
-from rotordrop.evidence.quality.arrangement import check_planes, fall_of
+from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels, check_rail
+from rotordrop.evidence.quality.continuity import check_orbit
 from rotordrop.evidence.quality.fall import check_ends, fell_as_described
 from rotordrop.evidence.quality.finding import Finding, Kind, Severity, ranked, refuse_unusable, stops
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
@@ -38,7 +39,7 @@ from rotordrop.evidence.quality.recorder import (
     check_filters,
     check_speed_signal,
 )
-from rotordrop.evidence.quality.tail import check_tail
+from rotordrop.evidence.quality.tail import check_rest_in_record, check_tail
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -179,11 +180,16 @@ def _tail_at_rest(evidence: Evidence) -> list[Finding]:
     still = evidence.still
     if isinstance(still, Missing):
         return [] if evidence.tail is None else check_tail(still, evidence.machine, evidence.floating)
-    return check_tail(still.whole, evidence.machine, evidence.floating)
+    found = check_tail(still.whole, evidence.machine, evidence.floating)
+    if found or evidence.tail is None:
+        return found
+    record = evidence.record.whole
+    return check_rest_in_record(still.whole, record, evidence.machine, evidence.floating.mean)
 
 
 STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
     {
+        "machine": lambda e: check_ends_named(e.machine),
         "damage": _damage,
         "clock": lambda e: check_clock(e.record),
         "channels": lambda e: check_channels(e.record),
@@ -199,6 +205,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
     {"beginning": _begins},
     {"recorder": _recorder},
     {
+        "orbit": lambda e: check_orbit(e.floating, e.record.whole),
         "levitated": lambda e: check_levitated(e.floating, e.record.whole),
         "length": _length,
         "fall": _fall,

@@ -18,6 +18,7 @@ from rotordrop.record.axes import Plane, along_sensors
 from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
+    from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
 Tone = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
@@ -56,6 +57,29 @@ def _changes(count: int) -> list[_Change]:
         order[a], order[b] = order[b], order[a]
         orders.append(tuple(order))
     return [_Change(signs=sign, order=order) for order in orders for sign in signs]
+
+
+def check_ends_named(machine: Machine) -> list[Finding]:
+    """Find magnetic bearings and sensors that bear the name of one touchdown bearing and stand at another."""
+    places, bearings = machine.rotor.node_positions, machine.touchdown_bearings
+    findings = []
+    for what, parts in (("AMB", machine.ambs), ("sensor", machine.sensors)):
+        for one in parts:
+            named = [bearing for bearing in bearings if one.name.startswith(bearing.name)]
+            nearest = min(bearings, key=lambda bearing: abs(places[bearing.node - 1] - places[one.node - 1]))
+            if named and max(named, key=lambda bearing: len(bearing.name)) is not nearest:
+                findings.append((f"{what} {one.name} at node {one.node}", nearest))
+    if not findings:
+        return []
+    words = ", ".join(f"{what} next to touchdown bearing {near.name}" for what, near in findings)
+    return [
+        Finding(
+            kind=Kind.MACHINE_FILE,
+            message=f"the machine file has {words}: nodes or names are exchanged",
+            remedy="correct the nodes in the machine file; a drop does not show how parts are named",
+            severity="warning",
+        )
+    ]
 
 
 def check_planes(

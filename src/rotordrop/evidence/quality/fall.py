@@ -90,6 +90,12 @@ def check_ends(
     cases = _other_cases(record, levitated)
     if not machine.rotor.form_errs:
         cases.append(_any_gain(record, levitated))
+    if own.misfit <= GOOD_FIT:
+        # the record as described explains the fall up to here: others count that explain it farther
+        farther = own.end + _NEAR_CONTACT
+        cases = [case for case in cases if fitted(case.record, case.levitated, farther).falls_freely]
+        if not cases:
+            return _as_described(own, machine)
     grown = [fitted(case.record, case.levitated) for case in cases]
     until = max([own.end, *(fall.end for fall in grown if fall.misfit <= GOOD_FIT)])
     mine = fitted(record, levitated, until).misfit

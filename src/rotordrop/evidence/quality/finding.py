@@ -64,6 +64,8 @@ class Kind(StrEnum):
     NO_PRETRIGGER = "missing pre-trigger"
     NO_DROP = "no drop in the record"
     NOT_SETTLED = "not settled"
+    TAIL_OFFSET = "tail offset"
+    MACHINE_FILE = "machine file"
     NOT_LOOKED_AT = "not looked at"
 
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.recording import Array
-from rotordrop.series import noise_by_differences, runs_of
+from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -149,73 +150,7 @@ def _stated_rate(record: Record) -> list[Finding]:
 
 def check_blocks(record: Record) -> list[Finding]:
     """Find blocks of samples that are there twice, and jumps of the motion from one sample to the next."""
-    return _copies(record) or _jumps(record) or _torn(record)
-
-
-_SIDE = 8
-"""Samples on either side of a jump through which a parabola says how the rotor moves."""
-
-_PART = 65536
-
-_SMOOTH = 2.5
-"""Mean square of the residual of those parabolas over the noise up to which they describe the motion [1]:
-in a contact of less than a millisecond they do not, and nothing is said of a jump there."""
-
-_KINK = 0.6
-"""Part of a sample by which the kink of a hard impact may lie aside of the middle of two samples [1]: a half,
-and what the parabolas leave open."""
-
-_TORN = 9.0
-"""Jump of a channel in standard deviations from which it is none of noise [1]: 130 clean drops of rotors of
-5, 60 and 140 kg had 7 at most, where the parabolas describe the motion."""
-
-
-def _torn(record: Record) -> list[Finding]:
-    """Jumps between two parabolas that each describe the motion: the rotor cannot make them.
-
-    Blocks of samples that were exchanged or overwritten end in such jumps, and so do lost samples.
-    """
-    signals = record.signals
-    if len(signals) < 4 * _SIDE or not np.isfinite(signals).all():
-        return []
-    design = np.vander(np.arange(_SIDE) + 0.5, 3)
-    slopes, ends = np.linalg.pinv(design)[1:]
-    left_over = np.linalg.svd(design)[0][:, 3:]
-    steps = [np.median(np.diff(np.unique(c))) if np.ptp(c) > 0.0 else 0.0 for c in signals.T]
-    own = np.array([noise_by_differences(column, 4) for column in signals.T])
-    noise = np.maximum(np.hypot(own, np.array(steps) / np.sqrt(12.0)), 1e-12)
-    worst, at, jump, found = 0.0, 0, np.zeros(signals.shape[1]), np.zeros(signals.shape[1])
-    for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
-        windows = np.lib.stride_tricks.sliding_window_view(signals[begin : begin + _PART + 16], _SIDE, axis=0)
-        smooth = np.sum((windows @ left_over) ** 2, axis=-1) < (_SIDE - 3) * _SMOOTH * noise**2
-        # where a channel holds one reading it is stuck, which has its own name
-        smooth &= np.sum(windows[..., 1:] == windows[..., :-1], axis=-1) < _SIDE // 2
-        jumps = (windows @ ends)[_SIDE:] - (windows @ ends[::-1])[:-_SIDE]
-        # a hard impact turns the velocity between two samples: that kink may lie half a sample aside
-        turned = np.abs((windows @ slopes)[_SIDE:] + (windows @ slopes[::-1])[:-_SIDE])
-        sized = np.maximum(np.abs(jumps) - _KINK * turned, 0.0) * smooth[_SIDE:] * smooth[:-_SIDE] / noise
-        sized /= np.sqrt(2.0) * np.linalg.norm(ends)
-        if sized.size and float(np.max(sized)) > worst:
-            row = int(np.argmax(np.max(sized, axis=1)))
-            worst, at = float(np.max(sized)), begin + row + _SIDE
-            jump, found = np.abs(jumps[row]), sized[row]
-    if worst < _TORN:
-        return []
-    torn = np.flatnonzero(found > 0.5 * _TORN)
-    alike = len(torn) > signals.shape[1] // 2
-    return [
-        Finding(
-            kind=Kind.DROPPED_BLOCK if alike else Kind.TORN,
-            message=f"the motion jumps by {float(np.max(jump[torn])) * 1e6:.3g} µm between two samples, "
-            f"{worst:.0f} standard deviations off the parabolas before and after it: "
-            + ("samples are missing or exchanged there" if alike else "a block was overwritten or exchanged"),
-            remedy="copy or export the recording again; the times after lost samples are wrong",
-            # a drop cannot be recorded again: one torn channel leaves the others to tell of it
-            severity="stop" if alike else "warning",
-            channel=None if alike else ", ".join(record.channel_names[i] for i in torn),
-            time=float(record.time[at]),
-        )
-    ]
+    return _copies(record) or _jumps(record) or check_continuity(record)
 
 
 def _copies(record: Record) -> list[Finding]:

@@ -1,0 +1,329 @@
+"""Whether readings follow each other as those of a moving rotor do: jumps, lost samples, an uneven clock.
+
+A rotor has position and velocity from one sample to the next, whatever machine it belongs to. Where parabolas
+before and after a place describe the motion, they meet there; where all channels jump by one time times their
+velocities, samples are missing. While it levitates, its orbit turns with the shaft: lost samples turn it on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.record.recording import Array
+from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
+
+if TYPE_CHECKING:
+    from rotordrop.record.record import Record
+
+_SIDES = (8, 16, 32)
+"""Samples on either side of a place through which a parabola says how the rotor moves: few where it turns
+fast, many where its noise hides what is missing [1]."""
+
+_PART = 65536
+
+_SMOOTH = 2.4
+"""Standard deviations by which the mean square of the residual of those parabolas may lie above that of noise
+where they describe the motion [1]: in a contact of less than a millisecond they do not, and nothing is said
+of a jump there."""
+
+_LONGEST = 0.5e-3
+"""Longest side of a jump of a single channel beyond the shortest one [s]: of 80 clean drops of all rotors none
+had more than 6.4 standard deviations, with 0.65 ms 8.6 and with 0.8 ms 9.3; channels that jump together
+agree on a time and may be longer."""
+
+_KINK = 0.6
+"""Part of a sample by which the kink of a hard impact may lie aside of the middle of two samples [1]: a half,
+and what the parabolas leave open."""
+
+_TORN = 9.0
+"""Jump of a channel in standard deviations from which it is none of noise [1]: 130 clean drops of rotors of
+5, 60 and 140 kg had 7 at most, where the parabolas describe the motion."""
+
+_LOST = 7.0
+"""Standard deviations of a time that is missing in all channels, from which it is named [1]: 80 clean drops
+of all rotors had 5.6 at most."""
+
+_SAME_WAY = 3.0
+"""Standard deviations up to which channels agree on the missing time [1]."""
+
+_HALF_A_SAMPLE = 0.5
+"""Least missing time in samples: what is lost is a whole number of them [1]."""
+
+_ORDER = 6
+"""Differences that leave no motion of a rotor: at 1 kHz of bending and 20 kHz of sampling 1e-3 of it [1]."""
+
+_UNEVEN = 1.3
+"""Scatter of readings along the motion over that across it from which the clock is uneven [1]: 0.94 to 1.1 in
+80 clean drops."""
+
+_UNEVEN_SHARE = 0.02
+"""Scatter of the sampling interval that is worth a word [1], that of a clock that is written down."""
+
+_MOVES = 1000
+"""Samples in motion that tell the two apart [1]: their medians then differ by 5 % by chance."""
+
+_TURNED = 6.0
+"""Standard deviations by which the orbit jumps in angle where samples are missing [1]: at a hundred places
+looked at, five have one chance in 10,000."""
+
+_LEAST_TURN = 0.04
+"""Least such jump [rad]: a quarter of a sample's turn at 500 Hz and 20 kHz (chosen)."""
+
+_FEWEST_PARTS, _BLOCKS = 8, 48
+"""Parts of the levitated motion in which the angle of the orbit is looked at, at least and at most
+[1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sides:
+    """How parabolas of some samples read a motion at their ends."""
+
+    count: int
+    """Samples."""
+    at_end: Array
+    slope: Array
+    """Weights of the value half a sample beyond the last one, and of the slope per sample there."""
+    left_over: Array
+    """Weights of what no parabola explains, shape (count, count - 3)."""
+
+    @classmethod
+    def of(cls, count: int) -> _Sides:
+        """Parabolas through a number of samples."""
+        design = np.vander(np.arange(count) + 0.5, 3)
+        slope, begin = np.linalg.pinv(design)[1:]
+        left_over = np.linalg.svd(design)[0][:, 3:]
+        return cls(count=count, at_end=begin[::-1].copy(), slope=-slope[::-1].copy(), left_over=left_over)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Jumps:
+    """Jumps of the motion between the parabolas before and after every place; shape (N, S)."""
+
+    jump: Array
+    """By how much [m]."""
+    before: Array
+    after: Array
+    """Velocity on both sides [m per sample]."""
+    smooth: NDArray[np.bool_]
+    """Whether both parabolas describe the motion."""
+    error: Array
+    """Standard deviation of a jump by noise [m], shape (S,)."""
+
+
+def check_continuity(record: Record) -> list[Finding]:
+    """Find places where no rotor moves from one sample to the next, or samples that were not taken evenly."""
+    signals = record.signals
+    if len(signals) < 4 * max(_SIDES) or not np.isfinite(signals).all():
+        return []
+    steps = [np.median(np.diff(np.unique(c))) if np.ptp(c) > 0.0 else 0.0 for c in signals.T]
+    own = np.array([noise_by_differences(column, 4) for column in signals.T])
+    noise = np.maximum(np.hypot(own, np.array(steps) / np.sqrt(12.0)), 1e-12)
+    torn, lost = _Worst(), _Worst()
+    for sides in map(_Sides.of, _SIDES):
+        reach = 2 * sides.count
+        for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
+            part = signals[begin : begin + _PART + reach]
+            if len(part) > reach:
+                seen = _jumps_of(part, sides, noise)
+                if sides.count == _SIDES[0] or sides.count <= _LONGEST * record.sampling_rate:
+                    torn.keep(_size_of_jump(seen), seen, begin + sides.count)
+                lost.keep(_size_of_loss(seen), seen, begin + sides.count)
+    if lost.size >= _LOST:
+        return [_lost(lost, record)]
+    if torn.size >= _TORN:
+        return [_torn(torn, record)]
+    return _uneven(record, noise)
+
+
+def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
+    count = sides.count
+    windows = np.lib.stride_tricks.sliding_window_view(part, count, axis=0)
+    left = np.sum((windows @ sides.left_over) ** 2, axis=-1)
+    free = count - 3
+    smooth = left < (free + _SMOOTH * math.sqrt(2.0 * free)) * noise**2
+    # where a channel holds one reading it is stuck, which has its own name
+    smooth &= np.sum(windows[..., 1:] == windows[..., :-1], axis=-1) < count // 2
+    ends, begins = windows @ sides.at_end, windows @ sides.at_end[::-1]
+    out, into = windows @ sides.slope, windows @ -sides.slope[::-1]
+    return _Jumps(
+        jump=begins[count:] - ends[:-count],
+        before=out[:-count],
+        after=into[count:],
+        smooth=smooth[count:] & smooth[:-count],
+        error=np.sqrt(2.0) * np.linalg.norm(sides.at_end) * noise,
+    )
+
+
+def _size_of_jump(seen: _Jumps) -> Array:
+    """Jump of every channel beyond what a kink explains, in standard deviations, shape (N, S)."""
+    # a hard impact turns the velocity between two samples: that kink may lie half a sample aside
+    turned = np.abs(seen.after - seen.before)
+    return np.asarray(np.maximum(np.abs(seen.jump) - _KINK * turned, 0.0) * seen.smooth / seen.error)
+
+
+def _size_of_loss(seen: _Jumps) -> Array:
+    """Missing time over its standard deviation, where every channel jumps by it times its velocity, (N, 1).
+
+    Over a gap the motion goes on with one acceleration: it has the mean velocity of both sides.
+    """
+    mean = 0.5 * (seen.before + seen.after) / seen.error
+    jump = seen.jump / seen.error
+    weight = np.sum(mean**2, axis=1)
+    missing = np.sum(jump * mean, axis=1) / np.maximum(weight, 1e-300)
+    aside = np.sum((jump - missing[:, None] * mean) ** 2, axis=1)
+    fits = np.all(seen.smooth, axis=1) & (missing > _HALF_A_SAMPLE)
+    fits &= aside < _SAME_WAY**2 * jump.shape[1]
+    kink = _KINK * np.linalg.norm((seen.after - seen.before) / seen.error, axis=1)
+    return np.asarray((np.maximum(missing * np.sqrt(weight) - kink, 0.0) * fits)[:, None])
+
+
+class _Worst:
+    """The largest of the jumps looked at."""
+
+    def __init__(self) -> None:
+        self.size, self.at = 0.0, 0
+        self.sizes = self.jump = self.velocity = np.zeros(0)
+
+    def keep(self, sizes: Array, seen: _Jumps, begin: int) -> None:
+        """Keep the largest of more jumps, the first of which is at a sample."""
+        if not sizes.size or float(np.max(sizes)) <= self.size:
+            return
+        row = int(np.argmax(np.max(sizes, axis=1)))
+        self.size, self.at, self.sizes = float(np.max(sizes)), begin + row, sizes[row]
+        self.jump = np.abs(seen.jump[row])
+        self.velocity = 0.5 * (seen.before[row] + seen.after[row])
+
+
+def _lost(worst: _Worst, record: Record) -> Finding:
+    fast = int(np.argmax(np.abs(worst.velocity)))
+    missing = worst.jump[fast] / abs(worst.velocity[fast])
+    return Finding(
+        kind=Kind.DROPPED_BLOCK,
+        message=f"between two samples all channels go on by {float(np.max(worst.jump)) * 1e6:.3g} µm at "
+        f"most, what they do in {missing:.2g} samples ({missing / record.sampling_rate * 1e3:.2g} ms) with "
+        f"the velocity before and after, {worst.size:.0f} standard deviations: samples are missing there",
+        remedy="copy or export the recording again; the times after lost samples are wrong",
+        severity="stop",
+        time=float(record.time[worst.at]),
+    )
+
+
+def _torn(worst: _Worst, record: Record) -> Finding:
+    torn = np.flatnonzero(worst.sizes > 0.5 * _TORN)
+    alike = len(torn) > record.signals.shape[1] // 2
+    return Finding(
+        kind=Kind.DROPPED_BLOCK if alike else Kind.TORN,
+        message=f"the motion jumps by {float(np.max(worst.jump[torn])) * 1e6:.3g} µm between two samples, "
+        f"{worst.size:.0f} standard deviations off the parabolas before and after it: "
+        + ("samples are missing or exchanged there" if alike else "a block was overwritten or exchanged"),
+        remedy="copy or export the recording again; the times after lost samples are wrong",
+        # a drop cannot be recorded again: one torn channel leaves the others to tell of it
+        severity="stop" if alike else "warning",
+        channel=None if alike else ", ".join(record.channel_names[i] for i in torn),
+        time=float(record.time[worst.at]),
+    )
+
+
+def _uneven(record: Record, noise: Array) -> list[Finding]:
+    """Readings taken early or late: they scatter along the motion of all channels, not across it.
+
+    What a channel reads at a wrong time is off by its velocity times one error of time, the same in all.
+    Noise, and what the rotor does within a few samples, have no reason to point along the velocity.
+    """
+    signals = record.signals / noise
+    scatter = np.diff(signals, _ORDER, axis=0)
+    velocity = (signals[_ORDER - 1 : -1] - signals[1 : 1 - _ORDER]) / (_ORDER - 2)
+    speed = np.linalg.norm(velocity, axis=1)
+    fast = speed > np.median(speed[speed > 0.0]) if np.any(speed > 0.0) else speed > 0.0
+    if int(np.sum(fast)) < _MOVES:
+        return []
+    # of the faster half the fastest, where a wrong time shows most
+    fast &= speed >= np.sort(speed[fast])[-max(_MOVES, int(np.sum(fast)) // 4)]
+    unit = velocity[fast] / speed[fast, None]
+    along = np.sum(scatter[fast] * unit, axis=1)
+    across = scatter[fast] - along[:, None] * unit
+    with_motion = SIGMA_OF_MEDIAN * float(np.median(np.abs(along)))
+    freedom = signals.shape[1] - 1
+    middle = freedom * (1.0 - 2.0 / (9.0 * freedom)) ** 3  # median of the chi square
+    aside = float(np.sqrt(np.median(np.sum(across**2, axis=1)) / middle))
+    if with_motion < _UNEVEN * aside:
+        return []
+    late = math.sqrt((with_motion**2 - aside**2) / math.comb(2 * _ORDER, _ORDER))
+    share = late / float(np.median(speed[fast]))
+    if share < _UNEVEN_SHARE:
+        return []
+    return [
+        Finding(
+            kind=Kind.JITTERED_CLOCK,
+            message=f"the readings scatter {with_motion / aside:.2g} times as much along the motion of all "
+            f"channels as across it: they were taken about {share / record.sampling_rate * 1e6:.2g} µs "
+            f"({share:.0%} of an interval, rms) early or late, though the clock runs evenly",
+            remedy="export the recording with the recorder's own sample clock",
+            severity="warning",
+        )
+    ]
+
+
+def check_orbit(levitated: LevitatedModel, record: Record) -> list[Finding]:
+    """Find samples lost before the drop: the orbit of the levitated rotor is then ahead by an angle.
+
+    A whole number of turns that is lost shows nowhere, and changes nothing that follows from the record.
+    """
+    inside = (record.time >= levitated.start) & (record.time <= levitated.end)
+    time, signals = record.time[inside], record.signals[inside]
+    turns = max(round((levitated.end - levitated.start) * levitated.frequency / _BLOCKS), 1)
+    if not np.isfinite(signals).all():
+        return []
+    noise = np.maximum(levitated.noise, 1e-12)
+    weight = levitated.amplitudes[0].conj() / noise**2
+    number = ((time - levitated.start) * levitated.frequency / turns).astype(int)
+    # what is left beside 1X, so that 2X and hum leave nothing in parts that hold no whole number of them
+    waves = np.exp(2j * np.pi * levitated.frequency * time)
+    left = signals - levitated.readings(time)
+    power = max(float(np.sum(np.abs(levitated.amplitudes[0]) ** 2 / noise**2)), 1e-300)
+    angle, error = [], []
+    for part in range(int(number[-1])):
+        own = number == part
+        seen = 2.0 * np.mean(left[own] * waves[own].conj()[:, None], axis=0)
+        angle.append(float(np.angle(power + np.sum(weight * seen))))
+        error.append(float(np.sqrt(2.0 / (power * np.sum(own)))))
+    return _orbit_steps(np.unwrap(angle), np.array(error), levitated, turns)
+
+
+def _orbit_steps(angle: Array, error: Array, levitated: LevitatedModel, turns: int) -> list[Finding]:
+    if len(angle) < _FEWEST_PARTS:
+        return []
+    places = np.arange(len(angle))
+    course = np.vander(places / len(places), 3) / error[:, None]
+    best, at, size = 0.0, 0, 0.0
+    for place in range(2, len(angle) - 1):
+        design = np.column_stack([course, (places >= place) / error])
+        inverse = np.linalg.pinv(design)
+        found = inverse @ (angle / error)
+        left = angle / error - design @ found
+        scatter = max(float(np.sqrt(left @ left / max(len(angle) - 4, 1))), 1.0)
+        sure = abs(float(found[3])) / (float(np.linalg.norm(inverse[3])) * scatter)
+        if sure > best:
+            best, at, size = sure, place, float(found[3])
+    if best < _TURNED or abs(size) < _LEAST_TURN:
+        return []
+    when = levitated.start + at * turns / levitated.frequency
+    return [
+        Finding(
+            kind=Kind.DROPPED_BLOCK,
+            message=f"near {when:.4g} s, before the drop, the orbit jumps by about {np.degrees(size):+.3g}° "
+            f"against the shaft that turns at {levitated.frequency:.4g} Hz, {best:.0f} standard deviations: "
+            f"{abs(size) / (2 * np.pi * levitated.frequency) * 1e3:.2g} ms are missing, whole turns aside, "
+            "or what holds the rotor changed",
+            remedy="export the recording without gaps; make sure that nothing was switched before the drop",
+            severity="warning",
+            time=when,
+        )
+    ]
