@@ -1,5 +1,6 @@
 """What a recorder does to a good record is found under its own name, and a good record is left alone."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from rotordrop.evidence import check_record, fit_levitated
+from rotordrop.evidence.quality.arrangement import check_ends_named
+from rotordrop.evidence.quality.continuity import check_continuity, check_orbit
 from rotordrop.evidence.quality.recorder import check_filters
+from rotordrop.evidence.quality.tail import check_rest_in_record
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.sensor_chain import PERFECT
 
@@ -270,3 +274,65 @@ def test_hum_that_hides_the_drop_is_no_missing_pre_trigger(drop, machine):
     found = worst(replace(drop, signals=drop.signals + wave), machine)
     assert (found.kind, found.severity) == ("hum", "stop")
     assert "mains hum of 60 Hz" in found.message
+
+
+def without(record, at, count):
+    """The record with samples lost at a time under a clock that runs on."""
+    first, left = int(np.searchsorted(record.time, at)), len(record.time) - count
+    signals = np.delete(record.signals, np.s_[first : first + count], axis=0)
+    return replace(record, time=record.time[:left], signals=signals, speed=record.speed[:left])
+
+
+def levitated(record):
+    return fit_levitated(record, -0.02, speed=float(record.speed_readings[0]))
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_lost_samples_in_the_fall(count, drop):
+    assert check_continuity(drop) == []
+    (found,) = check_continuity(without(drop, 5e-3, count))
+    assert (found.kind, found.severity) == ("dropped block", "stop")
+    assert found.time == pytest.approx(5e-3, abs=1.1e-3)
+    missing = float(re.search(r"what they do in ([\d.]+) samples", found.message)[1])
+    assert missing == pytest.approx(count, abs=0.5)
+
+
+def test_samples_lost_before_the_drop_turn_the_orbit(fast_drop):
+    assert check_orbit(levitated(fast_drop), fast_drop) == []
+    cut = without(fast_drop, -0.12, 20)
+    (found,) = check_orbit(levitated(cut), cut)
+    assert (found.kind, found.severity) == ("dropped block", "warning")
+    assert found.time == pytest.approx(-0.12, abs=0.02)
+    ahead = 360.0 * 20 / fast_drop.sampling_rate * levitated(fast_drop).frequency
+    seen = float(re.search(r"jumps by about ([+-][\d.]+)°", found.message)[1])
+    assert seen == pytest.approx(ahead, rel=0.2)
+
+
+def test_readings_taken_early_and_late_under_an_even_clock(drop):
+    random = np.random.default_rng(26)
+    when = drop.time + 0.3 / drop.sampling_rate * random.normal(0.0, 1.0, len(drop.time))
+    signals = np.column_stack([np.interp(when, drop.time, column) for column in drop.signals.T])
+    (found,) = check_continuity(replace(drop, signals=signals))
+    assert (found.kind, found.severity) == ("jittered clock", "warning")
+    early = float(re.search(r"\((\d+)% of an interval", found.message)[1])
+    assert early == pytest.approx(30.0, abs=10.0)
+
+
+def test_a_tail_whose_zero_moved_rests_beside_the_path_of_the_rotor(whole_drop, tail, machine):
+    floating = levitated(whole_drop).mean
+    assert check_rest_in_record(tail, whole_drop, machine, floating) == []
+    moved = replace(tail, signals=tail.signals + 40e-6 * np.eye(4)[2])
+    (found,) = check_rest_in_record(moved, whole_drop, machine, floating)
+    assert (found.kind, found.severity) == ("tail offset", "warning")
+    off = float(re.search(r"rests ([\d.]+) µm higher at node 25", found.message)[1])
+    assert off == pytest.approx(40.0 / np.sqrt(2.0), abs=3.0)
+    assert found.channel == ", ".join(whole_drop.channel_names[2:])
+
+
+def test_magnetic_bearings_at_the_nodes_of_each_other(machine):
+    assert check_ends_named(machine) == []
+    first, second = machine.ambs
+    exchanged = machine.changed(ambs=(first.changed(node=second.node), second.changed(node=first.node)))
+    (found,) = check_ends_named(exchanged)
+    assert (found.kind, found.severity) == ("machine file", "warning")
+    assert f"AMB {first.name} at node {second.node} next to touchdown bearing {second.name}" in found.message

@@ -233,6 +233,9 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
             fall = [one for one in fall if one.kind not in (Kind.WRONG_GAIN, Kind.TURNED)]
         flights = [one for one in flights if one.kind not in {other.kind for other in fall}]
         every |= {"fall": fall, "flights": flights}
+        # Readings of the drop that are doubted themselves say nothing against the tail.
+        if any(one.severity != "note" for one in (*every.get("levitated", ()), *fall, *flights)):
+            every["rest"] = [one for one in every.get("rest", ()) if one.kind != Kind.TAIL_OFFSET]
         # A fall that leans stops only when the sensors look in other directions before the first contact too.
         # That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz
         # did, and leant because of friction. Where the fall before the first contact is that of the rotor as

@@ -7,6 +7,7 @@ levitated shape, see `rotordrop.evidence.quality.fall`.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -65,17 +66,23 @@ def check_ends_named(machine: Machine) -> list[Finding]:
     findings = []
     for what, parts in (("AMB", machine.ambs), ("sensor", machine.sensors)):
         for one in parts:
-            named = [bearing for bearing in bearings if one.name.startswith(bearing.name)]
+            # one letter names an axis as well as an end
+            words = re.split(r"[^A-Za-z0-9]+", one.name)
+            named = [
+                bearing
+                for bearing in bearings
+                if len(bearing.name) > 1 and any(word.startswith(bearing.name) for word in words)
+            ]
             nearest = min(bearings, key=lambda bearing: abs(places[bearing.node - 1] - places[one.node - 1]))
             if named and max(named, key=lambda bearing: len(bearing.name)) is not nearest:
                 findings.append((f"{what} {one.name} at node {one.node}", nearest))
     if not findings:
         return []
-    words = ", ".join(f"{what} next to touchdown bearing {near.name}" for what, near in findings)
+    seen = ", ".join(f"{what} next to touchdown bearing {near.name}" for what, near in findings)
     return [
         Finding(
             kind=Kind.MACHINE_FILE,
-            message=f"the machine file has {words}: nodes or names are exchanged",
+            message=f"the machine file has {seen}: nodes or names are exchanged",
             remedy="correct the nodes in the machine file; a drop does not show how parts are named",
             severity="warning",
         )

@@ -34,8 +34,8 @@ where they describe the motion [1]: in a contact of less than a millisecond they
 of a jump there."""
 
 _LONGEST = 0.5e-3
-"""Longest side of a jump of a single channel beyond the shortest one [s]: of 80 clean drops of all rotors none
-had more than 6.4 standard deviations, with 0.65 ms 8.6 and with 0.8 ms 9.3; channels that jump together
+"""Longest side of a jump of a single channel beyond the shortest one [s]: of 80 clean drops of all rotors
+none had more than 6.4 standard deviations, with 0.65 ms 8.6 and with 0.8 ms 9.3; channels that jump together
 agree on a time and may be longer."""
 
 _KINK = 0.6
@@ -76,9 +76,9 @@ looked at, five have one chance in 10,000."""
 _LEAST_TURN = 0.04
 """Least such jump [rad]: a quarter of a sample's turn at 500 Hz and 20 kHz (chosen)."""
 
-_FEWEST_PARTS, _BLOCKS = 8, 48
-"""Parts of the levitated motion in which the angle of the orbit is looked at, at least and at most
-[1]."""
+_PARTS = (8, 48)
+"""Parts of the levitated motion, half turns or more, in which the angle of its orbit is looked at: at least
+and at most [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,18 +169,22 @@ def _size_of_jump(seen: _Jumps) -> Array:
 
 
 def _size_of_loss(seen: _Jumps) -> Array:
-    """Missing time over its standard deviation, where every channel jumps by it times its velocity, (N, 1).
+    """Missing time over its standard deviation, where channels jump by it times their velocity, shape (N, 1).
 
+    Channels that parabolas do not describe on both sides have no voice; more than half must have one.
     Over a gap the motion goes on with one acceleration: it has the mean velocity of both sides.
     """
-    mean = 0.5 * (seen.before + seen.after) / seen.error
-    jump = seen.jump / seen.error
+    jump, mean, turned = (
+        part * seen.smooth / seen.error
+        for part in (seen.jump, 0.5 * (seen.before + seen.after), seen.after - seen.before)
+    )
     weight = np.sum(mean**2, axis=1)
     missing = np.sum(jump * mean, axis=1) / np.maximum(weight, 1e-300)
     aside = np.sum((jump - missing[:, None] * mean) ** 2, axis=1)
-    fits = np.all(seen.smooth, axis=1) & (missing > _HALF_A_SAMPLE)
-    fits &= aside < _SAME_WAY**2 * jump.shape[1]
-    kink = _KINK * np.linalg.norm((seen.after - seen.before) / seen.error, axis=1)
+    seeing = np.sum(seen.smooth, axis=1)
+    fits = (seeing > max(jump.shape[1] // 2, 1)) & (missing > _HALF_A_SAMPLE)
+    fits &= aside < _SAME_WAY**2 * seeing
+    kink = _KINK * np.linalg.norm(turned, axis=1)
     return np.asarray((np.maximum(missing * np.sqrt(weight) - kink, 0.0) * fits)[:, None])
 
 
@@ -278,7 +282,8 @@ def check_orbit(levitated: LevitatedModel, record: Record) -> list[Finding]:
     """
     inside = (record.time >= levitated.start) & (record.time <= levitated.end)
     time, signals = record.time[inside], record.signals[inside]
-    turns = max(round((levitated.end - levitated.start) * levitated.frequency / _BLOCKS), 1)
+    half_turns = max(round(2.0 * (levitated.end - levitated.start) * levitated.frequency / _PARTS[1]), 1)
+    turns = 0.5 * half_turns
     if not np.isfinite(signals).all():
         return []
     noise = np.maximum(levitated.noise, 1e-12)
@@ -297,8 +302,8 @@ def check_orbit(levitated: LevitatedModel, record: Record) -> list[Finding]:
     return _orbit_steps(np.unwrap(angle), np.array(error), levitated, turns)
 
 
-def _orbit_steps(angle: Array, error: Array, levitated: LevitatedModel, turns: int) -> list[Finding]:
-    if len(angle) < _FEWEST_PARTS:
+def _orbit_steps(angle: Array, error: Array, levitated: LevitatedModel, turns: float) -> list[Finding]:
+    if len(angle) < _PARTS[0]:
         return []
     places = np.arange(len(angle))
     course = np.vander(places / len(places), 3) / error[:, None]

@@ -119,7 +119,8 @@ def check_rest_in_record(still: Record, record: Record, machine: Machine, floati
     off = _off_the_path(path, np.mean(rest, axis=0), gaps)
     if not np.any(np.abs(off) > _OFF_PATH * gaps):
         return []
-    for first, second in combinations(range(len(gaps)), 2):
+    # ends that are exchanged rest too high at one and too low at the other
+    for first, second in combinations(np.flatnonzero(np.abs(off) > 0.5 * _OFF_PATH * gaps).tolist(), 2):
         order = list(range(len(gaps)))
         order[first], order[second] = second, first
         if np.all(np.abs(_off_the_path(path, np.mean(rest, axis=0)[order], gaps)) <= _OFF_PATH * gaps):
