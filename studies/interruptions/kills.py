@@ -1,11 +1,13 @@
 """Kill whole commands at random moments and see whether anything is lost or half written.
 
-Usage: python studies/interruptions/kills.py COUNT
+Usage: python studies/interruptions/kills.py COUNT [FIRST]    runs number FIRST to FIRST + COUNT - 1
 
 Every command writes over outputs of an earlier run. After a kill each output must be whole, the earlier or
 the new one, the inputs must be untouched, and after one more run nothing hidden may be left. A command runs
 in a copy of this process that has imported and compiled all it needs, so that most kills meet its work and
-not its start. One line of ``results/kills.jsonl`` each; a run that was stopped goes on where it was.
+not its start. An estimate and a calibrated machine are made once and killed while they are written: before
+that there is nothing to lose. The number of a run is its seed. One line of ``results/kills.jsonl`` each; a
+run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -24,13 +26,19 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
-import h5py
+import numpy as np
+from pyarrow.parquet import read_table
+from scipy.io import loadmat
+from tests.published import bearing, published, value
 
+from rotordrop import Machine, Tracked, estimate_drop, read_document, read_record
 from rotordrop.cli.app import run
 from rotordrop.errors import RotordropError
+from rotordrop.estimate.estimate import Estimate
+from rotordrop.files import hdf5_is_sealed, write_json
 from rotordrop.ledger.book import read_log
 from rotordrop.machine import example_path, load_machine, save_machine
 from rotordrop.record import example_record_path
@@ -38,20 +46,28 @@ from rotordrop.study.summary import load_results
 from rotordrop.web import child
 from rotordrop.web.running import result_folder, write_state
 from rotordrop.web.workspace import Workspace, receive
+from rotordrop_bench.cli.app import run as run_bench
 
 RESULTS = Path(__file__).parent / "results" / "kills.jsonl"
+ROOT = Path(__file__).parents[2]
 COMMANDS = {
     "look": "look {record} machine.toml --report out.html --json out.json",
     "check": "check machine.toml --report out.html --json out.json",
     "init": "init out.toml --force",
     "profile": "profile {record} -o out.toml",
     "simulate": "simulate machine.toml --speed 60Hz --duration 0.02s -o out.h5 --json out.json",
-    "log": "log allow out.db --machine LP-400 --drops {number} --source contract",
+    "log allow": "log allow out.db --machine LP-400 --drops {number} --source contract",
+    "log add": "log add out.db drop.json",
     "study": "study run study.toml --folder study --threads 1",
     "coast-down": "coast-down machine.toml --speed 0.3Hz --duration 2s --reduction quick -o coast.h5",
+    "share": "look {record} machine.toml --share shared.h5 --licence CC0-1.0",
+    "bench": "synthesize machine.toml --speed 60Hz --duration 0.3s --seed {number} -o hidden",
+    "estimate": "estimate",
+    "calibrate": "calibrate",
     "page": "page",
 }
 """What is killed; ``page`` is a job of the page, from the upload to the result of a look."""
+ESTIMATED = ("e.json", "e.h5", "e.nc", "e.csv", "e.mat", "e.parquet")
 STUDY = """machine = "machine.toml"
 drops = 12
 shard = 2
@@ -66,17 +82,25 @@ def whole(path: Path) -> bool:
     if "page" in path.parts:
         return True  # told as a whole by `lost`
     try:
-        if path.suffix == ".json":
-            json.loads(path.read_text())
-        elif path.suffix in (".html", ".toml", ".csv"):
+        if path.suffix == ".json" and path.parent.name != "claims":
+            read_document(path)
+        elif path.suffix in (".html", ".toml", ".csv", ".sha256"):
             text = path.read_text()
             return text.rstrip().endswith("</html>") if path.suffix == ".html" else text.endswith("\n")
-        elif path.suffix == ".h5":
-            with h5py.File(path) as file:
-                return len(file) > 0
-    except (OSError, ValueError):
+        elif path.suffix in (".h5", ".nc"):
+            return hdf5_is_sealed(path, "")
+        elif path.suffix in READ:
+            READ[path.suffix](path)
+    except (OSError, ValueError, RotordropError):
         return False
     return True
+
+
+READ: dict[str, Callable[[Path], object]] = {
+    ".mat": loadmat,
+    ".parquet": read_table,
+    ".npz": lambda path: dict(np.load(path)),
+}
 
 
 def lost(folder: Path) -> list[str]:
@@ -119,7 +143,38 @@ def _look_on_the_page(record: str) -> int:
 
 
 def _called(words: list[str], record: str) -> int:
-    return _look_on_the_page(record) if words == ["page"] else run(words)
+    if words == ["page"]:
+        return _look_on_the_page(record)
+    if words == ["estimate"]:
+        for name in ESTIMATED:
+            _estimated().save(name)
+        _estimated().report("e.html")
+        _estimated().data("e")
+        return 0
+    if words == ["calibrate"]:
+        save_machine(_calibrated(), "calibrated.toml")
+        return 0
+    if words[0] == "synthesize":
+        return run_bench(words)
+    if words[:2] == ["log", "add"]:
+        drop = published(record_sha256=os.urandom(32).hex(), bearings={"DE": bearing(PEAKS)}).as_json()
+        write_json("drop.json", drop, sealed=True)
+    return run(words)
+
+
+PEAKS = {"peak_force_N": value(3300.0), "peak_stress_Pa": value(1.5e9)}
+
+
+@cache
+def _calibrated() -> Machine:
+    return load_machine(ROOT / "tests" / "yardstick" / "given" / "lp400_calibrated.toml")
+
+
+@cache
+def _estimated() -> Estimate:
+    record = read_record(example_record_path("lp400_drop_060"), _calibrated())
+    tail = read_record(example_record_path("lp400_drop_060_tail"), _calibrated())
+    return estimate_drop(_calibrated(), record, tail, method=Tracked(quick=True))
 
 
 def _start(words: list[str], record: str) -> int:
@@ -168,7 +223,8 @@ def one(
     shutil.rmtree(folder / "coast.h5.partial", ignore_errors=True)
     if name not in took:
         with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-            _called(words, record)
+            if code := _called(words, record):
+                raise SystemExit(f"{name} ends with {code}")
             shutil.rmtree(folder / "study", ignore_errors=True)
             begun = time.perf_counter()
             _called(words, record)
@@ -202,7 +258,9 @@ def main() -> None:
         folder = Path(name)
         inputs, record = _folder(folder)
         os.chdir(folder)
-        for number in range(len(lines), int(sys.argv[1])):
+        first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+        there = {line["number"] for line in lines}
+        for number in sorted(set(range(first, first + int(sys.argv[1]))) - there):
             line = one(number, folder, inputs, record, took)
             lines.append(line)
             out.write(json.dumps(line) + "\n")

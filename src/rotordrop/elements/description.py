@@ -106,6 +106,10 @@ class Description(BaseModel):
                     raise Misfit(f"{what}, which is not yet supported; leave it out", (key,))
                 if key not in cls.model_fields:
                     raise UnknownKey(unknown_key(str(key), cls.known_keys()), (str(key),))
+                if isinstance(raw[key], int) and not -(2**63) <= raw[key] < 2**63:
+                    digits = str(abs(raw[key]))
+                    told = f"{digits[:9]}... has {len(digits)} digits; TOML holds whole numbers of 64 bits"
+                    raise Misfit(told, (key,))
         return raw
 
     @model_validator(mode="after")

@@ -277,13 +277,21 @@ def _read(log: Transaction) -> Log:
 def _digests(found: Log) -> dict[str, str]:
     """Digest of every drop and every allowance, by what it is of."""
     return {f"drop {number}": _of_drop(drop) for number, drop in found.drops.items()} | {
-        f"allowance of {machine}, bearings {bearing_set}": _digest(*allowed)
-        for (machine, bearing_set), allowed in found.allowances.items()
+        _allowance(*key): _digest(*allowed) for key, allowed in found.allowances.items()
     }
+
+
+def _allowance(machine: str, bearing_set: str) -> str:
+    """What the digest of an allowance is of."""
+    return f"allowance of {machine}, bearings {bearing_set}"
 
 
 def _seal_what_has_none(log: Transaction) -> None:
     """Give digests to what an older rotordrop added."""
+    named = {f"drop {number}" for (number,) in log.run("SELECT id FROM drops")}
+    named |= {_allowance(*key) for key in log.run("SELECT machine, bearing_set FROM allowances")}
+    if named <= log.seals.keys():
+        return  # nothing is read that need not be: a log of thousands of drops is added to often
     for what, digest in _digests(_read(log)).items():
         if what not in log.seals:
             log.seal(what, digest)
@@ -322,7 +330,7 @@ def allow(
         _seal_what_has_none(log)
         log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", key)
         log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", (*key, drops, seconds, source))
-        log.seal(f"allowance of {machine}, bearings {bearing_set}", _digest(drops, seconds, source))
+        log.seal(_allowance(*key), _digest(drops, seconds, source))
 
 
 def used_shares(where: str | Path) -> tuple[UsedShare, ...]:

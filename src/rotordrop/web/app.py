@@ -14,12 +14,12 @@ from typing import Any, cast
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
 from rotordrop.web import histories
-from rotordrop.web.desk import Desk, NotThereError, Operation, options_of, order_of, verb_of
+from rotordrop.web.desk import Desk, NotThereError, Operation, of_file, options_of, order_of, verb_of
 from rotordrop.web.guard import App, Guard, Receive, Scope, Send
 from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
 from rotordrop.web.running import VERBS, Runner, published, state_of
@@ -131,7 +131,7 @@ async def sent_file(desk: Desk, request: Request) -> Response:
     place = await asyncio.to_thread(job.file, role) if role in ROLES else None
     if place is None:
         raise NotThereError("the job has no such file")
-    return FileResponse(place, media_type="application/octet-stream")
+    return await of_file(place, "application/octet-stream")
 
 
 async def set_options(desk: Desk, request: Request) -> Response:
@@ -162,12 +162,12 @@ async def cancel(desk: Desk, request: Request) -> Response:
 
 async def found_page(desk: Desk, request: Request) -> Response:
     """What the page draws of a result."""
-    return FileResponse(await desk.found(request) / "page.json", media_type="application/json")
+    return await of_file(await desk.found(request) / "page.json", "application/json")
 
 
 async def found_document(desk: Desk, request: Request) -> Response:
     """The document of a result."""
-    return FileResponse(await desk.found(request) / "document.json", media_type="application/json")
+    return await of_file(await desk.found(request) / "document.json", "application/json")
 
 
 async def ticket(desk: Desk, request: Request) -> Response:
@@ -187,7 +187,7 @@ async def report(desk: Desk, request: Request) -> Response:
     place, made = desk.tickets.pop(request.path_params["ticket"], (None, 0.0))
     if place is None or time.monotonic() - made > TICKET_S:
         raise NotThereError("this address of the report has been used; open the report from the page again")
-    return FileResponse(place, media_type="text/html", headers=REPORT_HEADERS)
+    return await of_file(place, "text/html", REPORT_HEADERS)
 
 
 async def numbers(desk: Desk, request: Request) -> Response:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import math
-from collections.abc import Awaitable, Callable
+import os
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.web.running import VERBS, Runner, Verb, result_folder
@@ -81,6 +82,19 @@ def number(request: Request, name: str, usual: float) -> float:
     if not abs(value) < 1e9:
         raise UsageError(f"{name} is {labelled(str(text))!r}; expected a number")
     return value
+
+
+async def of_file(place: Path, kind: str, headers: Mapping[str, str] | None = None) -> Response:
+    """A file as an answer, opened first: what another tab removes meanwhile is sent whole, or it is gone."""
+    stream = await asyncio.to_thread(place.open, "rb")
+
+    async def pieces() -> AsyncIterator[bytes]:
+        with stream:
+            while part := await asyncio.to_thread(stream.read, 2**20):
+                yield part
+
+    length = {"content-length": str(os.fstat(stream.fileno()).st_size)}
+    return StreamingResponse(pieces(), media_type=kind, headers={**(headers or {}), **length})
 
 
 async def order_of(request: Request) -> dict[str, Any]:

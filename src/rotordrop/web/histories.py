@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response, StreamingResponse
+from starlette.responses import Response, StreamingResponse
 
 from rotordrop.errors import UsageError
-from rotordrop.web.desk import Desk, NotThereError, number
+from rotordrop.web.desk import Desk, NotThereError, number, of_file
 from rotordrop.web.workspace import labelled
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ async def field(desk: Desk, request: Request) -> Response:
             f"{len(told['planes']) - 1} and parts {', '.join(told['parts'])}"
         )
     place = folder / field_name(int(plane), part)
-    return FileResponse(place, media_type="application/octet-stream")
+    return await of_file(place, "application/octet-stream")
 
 
 async def window(desk: Desk, request: Request) -> Response:

@@ -12,13 +12,16 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
+from tests.published import bearing, published, value
 
 from rotordrop.cli import app
 from rotordrop.cli._output import FILLED, OUTPUTS
 from rotordrop.cli._terminal import printable
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
+from rotordrop.files import write_json
 from rotordrop.machine import example_machine, example_path, save_machine
+from rotordrop.record import example_record_path
 
 SMALL = example_path("small")
 
@@ -127,22 +130,91 @@ def test_a_place_that_takes_no_file_is_said_before_anything_is_read(
     assert words in _told(capsys)
 
 
+@pytest.fixture(scope="module")
+def things(tmp_path_factory) -> Path:
+    """A folder with what the commands read."""
+    folder = tmp_path_factory.mktemp("things")
+    save_machine(example_machine("small"), folder / "small.toml")
+    turning = {"speed.aero_linear": 0.1, "speed.aero_quadratic": 0.0}
+    save_machine(example_machine("lp400").with_values(turning), folder / "m.toml")
+    shutil.copy(example_record_path("lp400_drop_060"), folder / "r.h5")
+    (folder / "s.toml").write_text(
+        'machine = "m.toml"\ndrops = 2\nduration = "2 ms"\nreduction = "quick"\n'
+        'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
+    )
+    for name, force in (("a", 3300.0), ("b", 2000.0)):
+        peaks = {"peak_force_N": value(force), "peak_stress_Pa": value(1.5e9)}
+        drop = published(record=name, record_sha256=name * 64, bearings={"DE": bearing(peaks)})
+        write_json(folder / f"{name}.json", drop.as_json(), sealed=True)
+    assert run(["log", "add", str(folder / "log.db"), str(folder / "a.json")]) == 0
+    assert run(["study", "run", str(folder / "s.toml"), "--folder", str(folder / "study")]) == 0
+    return folder
+
+
+CALLS = {
+    "look": "look r.h5 m.toml",
+    "profile": "profile r.h5 --force",
+    "waterfall": "waterfall m.toml r.h5 --points 512",
+    "compare": "compare a.json b.json",
+    "log": "log show log.db",
+    "study run": "study run s.toml --folder study",
+    "study show": "study show study",
+    "simulate": "simulate m.toml --speed 60Hz --duration 2ms --reduction quick",
+    "coast-down": "coast-down m.toml --speed 0.16Hz --until 0.6s --reduction quick",
+    "critical-speeds": "critical-speeds small.toml",
+    "unbalance-response": "unbalance-response small.toml",
+    "check": "check small.toml",
+    "bearings": "bearings 7014",
+    "convert": "convert small.toml --to ross --force",
+    "schema": "schema machine --force",
+    "doctor": "doctor",
+}
+"""Commands that end soon with what they write."""
+LONG = {"clearance", "estimate", "calibrate", "study repeat", "study rare", "study design"}
+"""Commands that compute for long, or need a recording of their own: what they write is written by functions
+that `test_written_files` gives a full disk."""
+BEYOND = {"look share": "--licence CC0-1.0"}
+
+
+def test_every_command_that_writes_is_called_with_a_full_disk_or_computes_for_long():
+    assert {verb.values[0].name for verb in WRITTEN} == set(CALLS) | LONG
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+@pytest.mark.parametrize(("verb", "option"), [one for one in WRITTEN if one.values[0].name in CALLS])
+def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, capsys):
+    file = tmp_path / ("o.h5" if option in ("output", "share") else "o.json")
+    file.symlink_to("/dev/full")
+    monkeypatch.chdir(things)
+    (parameter,) = (one for one in verb.load().params if one.name == option)
+    words = f"{CALLS[verb.name]} {BEYOND.get(f'{verb.name} {option}', '')}".split()
+    assert run([*words, parameter.opts[0], str(file)]) == 6
+    assert "No space left on device" in _told(capsys)
+
+
 @pytest.mark.parametrize(
-    "words",
+    "verb",
     [
-        ("check", "{machine}", "--json"),
-        ("check", "{machine}", "--report"),
-        ("critical-speeds", "{machine}", "--json"),
-        ("schema", "machine", "--force", "--output"),
-        ("bearings", "7014", "--json"),
-        ("doctor", "--json"),
+        pytest.param(verb, id=verb.name)
+        for verb in app.VerbTable.verbs().values()
+        if verb.name in CALLS and any(parameter.name == "data" for parameter in verb.load().params)
     ],
-    ids=" ".join,
 )
-def test_a_full_disk_is_a_sentence(machine, words, capsys):
-    assert run([*(word.format(machine=machine) for word in words), "/dev/full"]) == 6
-    assert "cannot write /dev/full: No space left on device" in _told(capsys)
+@pytest.mark.parametrize("place", ["below a file", "deleted", "read-only"])
+def test_a_folder_that_cannot_be_made_is_a_sentence(verb, place, things, tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").write_text("mine")
+    folder, words = tmp_path / "file" / "data", "cannot make the folder"
+    if place == "deleted":
+        folder = tmp_path / "gone" / "data"
+    if place == "read-only":
+        folder = Path("/proc/data")  # nobody makes a folder there, not even root
+    monkeypatch.chdir(things)
+    code = run([*CALLS[verb.name].split(), "--data", str(folder)])
+    if place == "deleted":  # the folders above are made
+        assert code == 0 and any(folder.iterdir())
+    else:
+        assert code == 6 and words in _told(capsys)
+    assert (tmp_path / "file").read_text() == "mine"
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])

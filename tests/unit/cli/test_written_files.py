@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 import re
+import signal
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -362,6 +365,36 @@ def test_a_file_that_was_changed_by_hand_says_so_and_the_way_out(kind, tmp_path)
     else:
         with pytest.raises(DamagedFileError, match="give it as a command wrote it with --json"):
             entry.read(file)
+
+
+def _make_on_a_full_disk(kind: str, folder: Path) -> None:
+    """Make a file where none may have more than 40 bytes; this process ends with what came of it."""
+    import resource
+
+    ended = 4
+    try:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (40, 40))
+        WRITTEN[kind].make(folder)
+        ended = 5
+    except RotordropError as error:
+        ended = 0 if re.search(r"cannot|full|too large", str(error), re.IGNORECASE) else 3
+    finally:
+        os._exit(ended)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system limits the size of files")
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_a_disk_that_is_full_ends_in_a_sentence_and_leaves_nothing_half_written(kind, tmp_path):
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "full").mkdir()
+    whole = WRITTEN[kind].make(tmp_path / "whole")  # compiles and computes what needs to be
+    if (child := os.fork()) == 0:
+        _make_on_a_full_disk(kind, tmp_path / "full")
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    left = [file for file in (tmp_path / "full").rglob("*") if file.is_file()]
+    assert [file for file in left if file.name == whole.name and file.suffix != ".db"] == []
+    assert [file for file in left if file.name.startswith(".")] == []
 
 
 WRITERS = {

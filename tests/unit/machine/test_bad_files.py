@@ -53,6 +53,8 @@ BAD = [
     ),
     (GAP, "", "'air_gap' is missing; add it, for example air_gap = \"280 um\"", "touchdown_bearings]]"),
     ('name = "small"', "", "'name' is missing; add it", None),
+    # whole numbers
+    ("elements = 2", f"elements = {'9' * 400}", "9{9}... has 400 digits; TOML holds whole numbers", "9999"),
     # units and dimensions
     (GAP, "air_gap = 250", "250 has no unit; a length needs one, for example '280 um'", "250"),
     (GAP, 'air_gap = "250"', "'250' has no unit", '"250"'),

@@ -230,3 +230,19 @@ def test_a_computation_that_goes_on_is_said(served, files, monkeypatch):
     monkeypatch.setattr(running, "_locked", lambda job, verb: verb == "estimate")
     served.new_job({})
     assert set(running.running(served.space)) == {"estimate"}
+
+
+def test_a_file_that_is_removed_while_it_is_asked_for_is_no_error_of_the_server(served, monkeypatch):
+    """Six clients that read and removed at once met a traceback."""
+    job = served.new_job({"record": ("a.csv", b"x" * 3_000_000)})
+    assert served.ask("GET", f"/api/jobs/{job}/files/record").body == b"x" * 3_000_000
+    whole = Job.file
+
+    def removed_meanwhile(self, role):
+        found = whole(self, role)
+        found.unlink()
+        return found
+
+    monkeypatch.setattr(Job, "file", removed_meanwhile)
+    answer = served.ask("GET", f"/api/jobs/{job}/files/record")
+    assert (answer.status, "it has been removed" in answer.text) == (404, True)
