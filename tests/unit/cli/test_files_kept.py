@@ -153,7 +153,7 @@ def things(tmp_path_factory) -> Path:
 
 CALLS = {
     "look": "look r.h5 m.toml",
-    "profile": "profile r.h5 --force",
+    "profile": "profile r.h5",
     "waterfall": "waterfall m.toml r.h5 --points 512",
     "compare": "compare a.json b.json",
     "log": "log show log.db",
@@ -165,7 +165,7 @@ CALLS = {
     "unbalance-response": "unbalance-response small.toml",
     "check": "check small.toml",
     "bearings": "bearings 7014",
-    "convert": "convert small.toml --to ross --force",
+    "convert": "convert small.toml --to ross",
     "schema": "schema machine --force",
     "doctor": "doctor",
 }

@@ -77,6 +77,18 @@ class TestSingleChannels:
         assert found.time == pytest.approx(0.01)
         assert "2 of 11001 samples are NaN or infinite, the first at 0.01 s" in found.message
 
+    @pytest.mark.parametrize("value", [7.5e229, 1e-208, -1e-310], ids=str)
+    def test_bytes_that_are_no_reading(self, drop, machine, edited, value):
+        """Exchanged or zeroed bytes of a file read as numbers that no sensor gives; they went unnoticed."""
+
+        def change(signals):
+            signals[5200, 2] = value
+
+        found = only(edited(drop, change), machine)
+        assert (found.kind, found.channel) == ("damaged block", "S_DE_A")
+        assert "1 of 11001 samples are no readings, the first," in found.message
+        assert "at 0.01 s: bytes of the file have changed" in found.message
+
     def test_clipping(self, drop, machine, edited):
         found = check_record(edited(drop, lambda signals: np.clip(signals, -220e-6, None)), machine)
         assert {one.kind for one in found if one.severity == "stop"} == {"clipping"}

@@ -86,13 +86,39 @@ def _range(values: Array) -> float:
 def _missing(record: Record, channel: str, values: Array) -> list[Finding]:
     bad = np.flatnonzero(~np.isfinite(values))
     if not len(bad):
-        return []
+        return _no_readings(record, channel, values)
     at = float(record.time[bad[0]])
     return [
         Finding(
             kind=Kind.MISSING_SAMPLES,
             message=f"{len(bad)} of {len(values)} samples are NaN or infinite, the first at {at:.6g} s",
             remedy="export the recording without gaps, or cut it before them",
+            severity="stop",
+            channel=channel,
+            time=at,
+        )
+    ]
+
+
+_NO_LENGTH = (1e-30, 1e3)
+"""Between these lies every reading that is not exactly zero [m]; beyond are bytes of a damaged file that
+were taken for a number of double precision (chosen, far from any reading)."""
+
+
+def _no_readings(record: Record, channel: str, values: Array) -> list[Finding]:
+    size = np.abs(values)
+    # a simulated motion may die away to nothing
+    tiny = (size > 0.0) & (size < _NO_LENGTH[0]) & (np.median(size) > 1e-9)
+    odd = np.flatnonzero(tiny | (size > _NO_LENGTH[1]))
+    if not len(odd):
+        return []
+    at = float(record.time[odd[0]])
+    return [
+        Finding(
+            kind=Kind.TORN,
+            message=f"{len(odd)} of {len(values)} samples are no readings, the first, "
+            f"{values[odd[0]]:.3g} m, at {at:.6g} s: bytes of the file have changed",
+            remedy="copy or export the recording again",
             severity="stop",
             channel=channel,
             time=at,
