@@ -306,7 +306,8 @@ def find_wall(
             break
     assert found is not None
     error = _HOLDS * np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
-    gap, exact = float(sought[2]), given is not None and given[1] == 0.0
+    exact = given is not None and given[1] == 0.0
+    gap = given[0] if given is not None and exact else float(sought[2])
     return Wall(
         centre=sought[:2].copy(),
         centre_error=error[:2],
