@@ -44,7 +44,7 @@ class _Windows:
     least: float
     """Least acceleration at a kink over gravity [1]."""
     error: float
-    """Standard error of the kink [s] (from the first half of DropBench)."""
+    """Standard error of the kink [s] (set with all of DropBench in view)."""
 
 
 _HARD_KINK = _Windows(

@@ -42,8 +42,8 @@ _STRAYS = 0.35
 """Standard deviation of the depth of a reversal over ``β v`` [1] (chosen)."""
 
 _KINK, _SLOW_KINK = 0.012, 0.04
-"""Standard deviation of the place of the first touch over the gap [1], of a hard and a soft contact (from the
-first half of DropBench)."""
+"""Standard deviation of the place of the first touch over the gap [1], of a hard and a soft contact
+(chosen)."""
 
 _USUAL_BETA = (6e-4, 1.2)
 """Inverse frequency of rotor on contact [s] and the standard deviation of its logarithm: 5 kg have 2e-4, 6 t
