@@ -81,6 +81,8 @@ def simulate(
     from rotordrop.report.simulate_page import simulate_page
     from rotordrop.report.simulation_numbers import simulation_numbers
     from rotordrop.report.terminal import summary_console
+    from rotordrop.rotor.parameters import DropModel, build_drop_model
+    from rotordrop.simulate.ahead import loop_compiled_ahead
     from rotordrop.simulate.case import DropCase, LevitatedStart, PlacedStart
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.simulate.expected_steps import long_run
@@ -113,9 +115,18 @@ def simulate(
         integrator=integrator.value,
     )
     warning = long_run(described, duration, case.most_steps)
+    errors = summary_console(sys.stderr)
     if warning is not None:
-        summary_console(sys.stderr).print(warning, soft_wrap=True)
-    result = interruptible(lambda: simulate_drop(described, case, certify=certify))
+        errors.print(warning, soft_wrap=True)
+
+    def modelled() -> DropModel:
+        model = build_drop_model(described, case.reduction)
+        compiled()
+        return model
+
+    with loop_compiled_ahead(lambda text: errors.print(text, soft_wrap=True)) as compiled:
+        model = interruptible(modelled)
+    result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
         result.save(output)
     page = simulate_page(result, described)

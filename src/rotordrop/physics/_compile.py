@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from functools import cached_property, lru_cache, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -54,7 +54,7 @@ def cache_folder(beside: Path | None = None) -> str:
 
 def kernel(function: Function) -> Function:
     """Compile a function with strict floating point, without the interpreter lock, cached on disk."""
-    return _compiled(function)
+    return cast(Function, _compiled(function))
 
 
 def lean_kernel(function: Function) -> Function:
@@ -62,22 +62,66 @@ def lean_kernel(function: Function) -> Function:
 
     Views of arrays are allowed; new arrays and the assignment of an array to a slice of another are not.
     """
-    return _compiled(function, _nrt=False)
+    return _part(function, _nrt=False)
 
 
 def inner_kernel(function: Function) -> Function:
     """Compile a lean kernel into its callers: for what is called millions of times and does little."""
-    return _compiled(function, _nrt=False, forceinline=True)
+    return _part(function, _nrt=False, forceinline=True)
 
 
-def _compiled(function: Function, **options: Any) -> Function:
+def _part(function: Function, **options: Any) -> Function:
     settings: Any = config
-    options |= {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False}
+    return function if settings.DISABLE_JIT else cast(Function, _Part(function, options))
+
+
+def compile_for(function: Callable[..., Any], *examples: Any) -> None:
+    """Compile a kernel for arguments of the types of these, and put it into the cache."""
+    compiled: Any = function
+    compiled.compile(tuple(numba.typeof(one) for one in examples))
+
+
+class _Part:
+    """A kernel that other kernels call, and Python seldom.
+
+    The code by which Python calls a kernel takes a third of its time to compile, and nobody needs it of a
+    part. Kernels call `inner`, which has none; the first call from Python compiles `outer`, which has it.
+    """
+
+    def __init__(self, function: Function, options: dict[str, Any]) -> None:
+        self.py_func = function
+        self._options = options
+        # A folder apart: the compiler's index of a cache does not tell the two forms of a function apart.
+        self.inner = _compiled(function, "parts", no_cpython_wrapper=True, **options)
+        self._numba_type_ = self.inner._numba_type_
+        update_wrapper(self, function)
+
+    @cached_property
+    def outer(self) -> Any:
+        return _compiled(self.py_func, **self._options)
+
+    @property
+    def overloads(self) -> Any:
+        return self.inner.overloads
+
+    def __call__(self, *args: Any) -> Any:
+        return self.outer(*args)
+
+
+def _compiled(function: Callable[..., Any], place: str = "", **options: Any) -> Any:
+    settings: Any = config
+    # no_cfunc_wrapper: no kernel is handed to another as a value.
+    options |= {
+        "cache": True,
+        "nogil": True,
+        "error_model": "numpy",
+        "fastmath": False,
+        "no_cfunc_wrapper": True,
+    }
     previous = settings.CACHE_DIR
     home = Path(function.__code__.co_filename).resolve().parent
-    settings.CACHE_DIR = cache_folder(None if home in _FOLDERS else home)
+    settings.CACHE_DIR = str(Path(cache_folder(None if home in _FOLDERS else home)) / place)
     try:
-        compiled = numba.njit(**options)(function)
+        return numba.njit(**options)(function)
     finally:
         settings.CACHE_DIR = previous
-    return cast(Function, compiled)

@@ -4,7 +4,7 @@ BLAS and LAPACK choose their kernels by the processor: sums come in another orde
 roundings, so the modes of one rotor differ in their last digits from machine to machine, and after some
 impacts the drops do. What stands between a machine file and the time loop is small enough to be solved by
 plain loops, whose order of operations is fixed. Everything else (fits, filters, spectra) keeps the
-libraries.
+libraries. The loops run over single numbers, for expressions of whole arrays compile far slower.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics._compile import kernel
+from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 
 Array = NDArray[np.float64]
 
@@ -127,21 +127,17 @@ def _eliminated(a: Array, b: Array) -> tuple[Array, bool]:
         if not abs(a[best, k]) > 0.0:
             return b, False
         if best != k:
-            row = a[k].copy()
-            a[k] = a[best]
-            a[best] = row
-            side = b[k].copy()
-            b[k] = b[best]
-            b[best] = side
+            _exchange(a[k], a[best])
+            _exchange(b[k], b[best])
         for i in range(k + 1, n):
             if a[i, k] != 0.0:
                 factor = a[i, k] / a[k, k]
-                a[i, k:] -= factor * a[k, k:]
-                b[i] -= factor * b[k]
+                _subtract(a[i, k:], factor, a[k, k:])
+                _subtract(b[i], factor, b[k])
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
-            b[i] -= a[i, k] * b[k]
-        b[i] /= a[i, i]
+            _subtract(b[i], a[i, k], b[k])
+        _divide(b[i], a[i, i])
     return b, True
 
 
@@ -149,24 +145,43 @@ def _eliminated(a: Array, b: Array) -> tuple[Array, bool]:
 def _orthonormal(rows: Array, dependent: float) -> tuple[Array, int]:
     count = 0
     for i in range(rows.shape[0]):
-        row = rows[i].copy()
+        row = rows[i]
         before = math.sqrt(_dot(row, row))
         for _ in range(2):
             for j in range(count):
-                row -= _dot(rows[j], row) * rows[j]
+                _subtract(row, _dot(rows[j], row), rows[j])
         left = math.sqrt(_dot(row, row))
         if left > dependent * before:
-            rows[count] = row / left
+            for j in range(rows.shape[1]):
+                rows[count, j] = row[j] / left
             count += 1
     return rows, count
 
 
-@kernel
+@inner_kernel
 def _dot(a: Array, b: Array) -> float:
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]
     return total
+
+
+@inner_kernel
+def _subtract(row: Array, factor: float, other: Array) -> None:
+    for j in range(row.shape[0]):
+        row[j] -= factor * other[j]
+
+
+@inner_kernel
+def _exchange(row: Array, other: Array) -> None:
+    for j in range(row.shape[0]):
+        row[j], other[j] = other[j], row[j]
+
+
+@inner_kernel
+def _divide(row: Array, by: float) -> None:
+    for j in range(row.shape[0]):
+        row[j] /= by
 
 
 @kernel
@@ -190,18 +205,18 @@ def _forward(lower: Array, b: Array) -> Array:
     for i in range(lower.shape[0]):
         for k in range(i):
             if lower[i, k] != 0.0:
-                b[i] -= lower[i, k] * b[k]
-        b[i] /= lower[i, i]
+                _subtract(b[i], lower[i, k], b[k])
+        _divide(b[i], lower[i, i])
     return b
 
 
 @kernel
 def _backward(lower: Array, b: Array) -> Array:
     for i in range(lower.shape[0] - 1, -1, -1):
-        b[i] /= lower[i, i]
+        _divide(b[i], lower[i, i])
         for k in range(i):
             if lower[i, k] != 0.0:
-                b[k] -= lower[i, k] * b[i]
+                _subtract(b[k], lower[i, k], b[i])
     return b
 
 
@@ -213,7 +228,9 @@ def _tridiagonal(a: Array) -> tuple[Array, Array, Array]:
     mirrors = np.zeros((n, n))
     weights = np.zeros(n)
     for k in range(n - 1):
-        mirror = a[k + 1 :, k].copy()
+        mirror = np.empty(n - k - 1)
+        for i in range(n - k - 1):
+            mirror[i] = a[k + 1 + i, k]
         size = math.sqrt(_dot(mirror, mirror))
         if k == n - 2 or size == abs(mirror[0]):
             beside[k] = mirror[0]
@@ -223,20 +240,33 @@ def _tridiagonal(a: Array) -> tuple[Array, Array, Array]:
         weight = 2.0 / _dot(mirror, mirror)
         push = np.zeros(n - k - 1)
         for i in range(n - k - 1):
-            push += mirror[i] * a[k + 1 + i, k + 1 :]
-        push *= weight
-        push -= 0.5 * weight * _dot(mirror, push) * mirror
+            _subtract(push, -mirror[i], a[k + 1 + i, k + 1 :])
+        for j in range(n - k - 1):
+            push[j] *= weight
+        _subtract(push, 0.5 * weight * _dot(mirror, push), mirror)
         for i in range(n - k - 1):
-            a[k + 1 + i, k + 1 :] -= mirror[i] * push + push[i] * mirror
-        mirrors[k, k + 1 :] = mirror
+            for j in range(n - k - 1):
+                a[k + 1 + i, k + 1 + j] -= mirror[i] * push[j] + push[i] * mirror[j]
+            mirrors[k, k + 1 + i] = mirror[i]
         weights[k] = weight
-    rows = np.eye(n)
+    diagonal = np.empty(n)
+    for i in range(n):
+        diagonal[i] = a[i, i]
+    return diagonal, beside, _mirrored(mirrors, weights)
+
+
+@kernel
+def _mirrored(mirrors: Array, weights: Array) -> Array:
+    n = weights.shape[0]
+    rows = np.zeros((n, n))
+    for i in range(n):
+        rows[i, i] = 1.0
     for k in range(n - 3, -1, -1):
         if weights[k] > 0.0:
             mirror = mirrors[k, k + 1 :]
             for i in range(k + 1, n):
-                rows[i, k + 1 :] -= weights[k] * _dot(mirror, rows[i, k + 1 :]) * mirror
-    return np.diag(a).copy(), beside, rows
+                _subtract(rows[i, k + 1 :], weights[k] * _dot(mirror, rows[i, k + 1 :]), mirror)
+    return rows
 
 
 @kernel
@@ -255,7 +285,7 @@ def _ql(diagonal: Array, beside: Array, rows: Array) -> tuple[Array, Array]:
     return diagonal, rows
 
 
-@kernel
+@lean_kernel
 def _sweep(low: int, high: int, diagonal: Array, beside: Array, rows: Array) -> None:
     """One implicit QL sweep of the block from ``low`` to ``high``."""
     g = (diagonal[low + 1] - diagonal[low]) / (2.0 * beside[low])
@@ -279,9 +309,10 @@ def _sweep(low: int, high: int, diagonal: Array, beside: Array, rows: Array) -> 
         shift = sine * r
         diagonal[i + 1] = g + shift
         g = cosine * r - b
-        upper = rows[i + 1].copy()
-        rows[i + 1] = sine * rows[i] + cosine * upper
-        rows[i] = cosine * rows[i] - sine * upper
+        for j in range(rows.shape[1]):
+            lower, upper = rows[i, j], rows[i + 1, j]
+            rows[i + 1, j] = sine * lower + cosine * upper
+            rows[i, j] = cosine * lower - sine * upper
     diagonal[low] -= shift
     beside[low] = g
     beside[high] = 0.0

@@ -161,7 +161,8 @@ class StateLayout:
     def contact_at(self) -> Integers:
         """Bodies of each contact, shape (C, 3), see ``CONTACT_BODY``: the rotor touches each race."""
         bodies = self.bearing_at()[:, [L.RACE, L.RACE_SPIN]]
-        return np.column_stack([np.arange(self.n_bearings), bodies]).astype(np.int64)
+        # C order, as all arrays of the kernels: another order of one compiles every kernel once more.
+        return np.column_stack([np.arange(self.n_bearings), bodies]).astype(np.int64, order="C")
 
     def magnet_at(self, n_magnets: int) -> Integers:
         """Places of the states of each AMB, shape (A, 1), see ``MAGNET_OWN``."""
