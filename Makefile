@@ -22,16 +22,18 @@ demo: $(READY) ## estimate force and stress from a bundled (simulated) recording
 	@echo "The recording is simulated. The report is $(CURDIR)/$(OUTPUT)/report.html"
 
 test: $(READY) ## run the tests
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest $(TESTS)
 
 NUMERIC := tests/unit/physics tests/unit/rotor tests/unit/simulate tests/validation
 FITTED := tests/unit/track/test_filter_and_smoother.py tests/unit/track/test_propagation.py \
 	tests/unit/replay/test_first_impacts.py
 
+# An old processor has another linear algebra and no fused multiply-add at once; tests/unit/simulate/test_fingerprint.py
+# tries each of the two alone.
 arithmetic: $(READY) ## run the numeric tests with the arithmetic of other processors
-	@OPENBLAS_CORETYPE=Prescott $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
+	@OPENBLAS_CORETYPE=Prescott GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2 \
+		$(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
 	@OPENBLAS_CORETYPE=Haswell $(BIN)/python -m pytest -q -m "not slow" $(FITTED)
-	@GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2 $(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
 
 lint: $(READY) ## check style, types and layers
 	@$(BIN)/ruff check .

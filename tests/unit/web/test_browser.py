@@ -158,30 +158,6 @@ def test_other_drops_are_drawn_on_the_axes_of_this_one(browser, tmp_path, files)
         quiet(browser)
 
 
-@pytest.mark.slow
-def test_an_estimate_from_the_button_to_the_report(browser, tmp_path, files):
-    with serving(tmp_path / "served") as server:
-        look_at(browser, server, list(files.values()))
-        press(browser, "estimate")
-        browser.until("document.querySelectorAll('.panel canvas').length === 4", 560)
-        browser.until(
-            "document.getElementById('status').innerText.includes('The model is consistent with the record.')"
-        )
-        job = server.ask("GET", "/api/jobs").told["jobs"][0]["id"]
-        document = server.ask("GET", f"/api/jobs/{job}/estimate/document").told
-        peak = document["bearings"]["NDE"]["peak_force_N"]["value"]
-        shown = words(browser, "#status").replace("\u202f", "")
-        assert f"NDE peak bearing force {peak:.0f} N" in shown
-        quiet(browser)
-        address = server.order(f"/api/jobs/{job}/estimate/report").told["address"]
-        browser.open(f"http://127.0.0.1:{server.port}{address}")
-        browser.until("document.documentElement.getAttribute('data-drawn')")
-        quiet(browser)
-        assert "consistent with the record" in words(browser, "#verdict")
-        again = server.ask("GET", address)
-        assert (again.status, "has been used" in again.text) == (404, True)
-
-
 def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
         number = server.new_job(files)

@@ -59,6 +59,7 @@ def _later(browser, server, files) -> None:
 
 @pytest.mark.slow
 def test_each_gets_an_estimate_and_its_report(people, tmp_path, files):
+    """Three whole estimates, from the button to a report that opens once."""
     with serving(tmp_path / "served") as server:
         look_at(people[0], server, own_files(files, tmp_path, 0))
         for number in (1, 2):
@@ -69,10 +70,18 @@ def test_each_gets_an_estimate_and_its_report(people, tmp_path, files):
         for number, browser in enumerate(people):
             consistent = "The model is consistent with the record."
             browser.until(f"document.getElementById('status').innerText.includes({consistent!r})", 900)
+            assert browser.evaluate("document.querySelectorAll('.panel canvas').length") == 4
             chosen = browser.evaluate("document.getElementById('jobs').value")
-            address = server.order(f"/api/jobs/{chosen}/estimate/report").told["address"]
+            document = server.ask("GET", f"/api/jobs/{chosen}/estimate/document").told
+            peak = document["bearings"]["NDE"]["peak_force_N"]["value"]
+            shown = words(browser, "#status").replace("\u202f", "")
+            assert f"NDE peak bearing force {peak:.0f} N" in shown
             quiet(browser)
+            address = server.order(f"/api/jobs/{chosen}/estimate/report").told["address"]
             browser.open(f"http://127.0.0.1:{server.port}{address}")
             browser.until("document.documentElement.getAttribute('data-drawn')")
             assert f"drop of {number}" in words(browser, "body")
+            assert "consistent with the record" in words(browser, "#verdict")
             quiet(browser)
+            again = server.ask("GET", address)
+            assert (again.status, "has been used" in again.text) == (404, True)
