@@ -64,14 +64,14 @@ def deliver(
     in place of the summary, which is a page or a function that prints on the console it is given. Pages and
     tables need a page.
     """
-    if not callable(summary):
-        from rotordrop.report.csv_files import write_data
+    if not callable(summary) and report is not None:
         from rotordrop.report.page import write_page
 
-        if report is not None:
-            write_page(summary, report)
-        if data is not None:
-            write_data(summary, data)
+        write_page(summary, report)
+    if not callable(summary) and data is not None:
+        from rotordrop.report.csv_files import write_data
+
+        write_data(summary, data)
     if json_file == STANDARD_OUTPUT:
         told = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"

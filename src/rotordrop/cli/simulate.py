@@ -78,7 +78,7 @@ def simulate(
     Example: rotordrop simulate machine.toml --speed "60 Hz" --report drop.html
     """
     from rotordrop.machine import load_machine
-    from rotordrop.report.simulate_page import simulate_page
+    from rotordrop.report.simulate_summary import simulate_summary
     from rotordrop.report.simulation_numbers import simulation_numbers
     from rotordrop.report.terminal import summary_console
     from rotordrop.rotor.parameters import DropModel, build_drop_model
@@ -129,8 +129,13 @@ def simulate(
     result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
         result.save(output)
-    page = simulate_page(result, described)
-    deliver(simulation_numbers(result, described), json, page, report=report, data=data)
+    if report is None and data is None:
+        said = simulate_summary(result, described)  # draws nothing: plotly takes half a second to load
+    else:
+        from rotordrop.report.simulate_page import simulate_page
+
+        said = simulate_page(result, described)
+    deliver(simulation_numbers(result, described), json, said, report=report, data=data)
 
 
 def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:

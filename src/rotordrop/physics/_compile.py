@@ -78,7 +78,8 @@ def _part(function: Function, **options: Any) -> Function:
 def compile_for(function: Callable[..., Any], *examples: Any) -> None:
     """Compile a kernel for arguments of the types of these, and put it into the cache."""
     compiled: Any = function
-    compiled.compile(tuple(numba.typeof(one) for one in examples))
+    type_of: Any = numba.typeof
+    compiled.compile(tuple(type_of(one) for one in examples))
 
 
 class _Part:

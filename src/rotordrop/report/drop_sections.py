@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop, BearingMotions, History
 from rotordrop.report.content import Figure, Section, Statement, Table
 from rotordrop.report.first_contact import first_contact_figure
 from rotordrop.report.impacts import impact_figure, impact_table
 from rotordrop.report.orbit import orbit_figure
-from rotordrop.report.quantity import Quantity, shown
+from rotordrop.report.quantity import shown
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table
 from rotordrop.report.style import MICRO, TURN
 from rotordrop.report.time_panels import Panel, time_panels
@@ -212,18 +211,3 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> obj
         axis = "race speed, × 60 in rpm"
         row.append(Panel(title="inner races", axis=axis, histories=tuple(races), series=True))
     return time_panels([row], 1.0 / TURN, "Hz", height=250)
-
-
-def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
-    """Set a peak stress beside the stress of the static load rating, as information."""
-    peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
-    stress, (low, high) = peak.value, peak.ends
-    share = f"{100.0 * stress / STATIC_STRESS:.0f} %"
-    if not certain:
-        share = f"{100.0 * low / STATIC_STRESS:.0f} to {100.0 * high / STATIC_STRESS:.0f} %"
-    text = (
-        f"{bearing.name}: the peak stress of {peak.text} is {share} of the "
-        f"{shown(STATIC_STRESS, 'pressure')} at which ISO 76 defines the static load rating of ball "
-        "bearings (information, not an acceptance limit)."
-    )
-    return Statement(text, "notice" if (stress if certain else high) < STATIC_STRESS else "warning")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.parameter import Parameter, Role
 from rotordrop.elements.table import LOADS, published
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.known import Known
-from rotordrop.report.content import Card, Column, KeyFigure, Table, table
+from rotordrop.report.content import Card, Column, KeyFigure, Statement, Table, table
 from rotordrop.report.quantity import Quantity, shown
 
 MEANS = (
@@ -42,6 +43,21 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
     source = f"by the {bearing.peak_force.origin.value}"
     return Card(f"{bearing.name} touchdown bearing, {source}", tuple(figures))
+
+
+def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
+    """Set a peak stress beside the stress of the static load rating, as information."""
+    peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
+    stress, (low, high) = peak.value, peak.ends
+    share = f"{100.0 * stress / STATIC_STRESS:.0f} %"
+    if not certain:
+        share = f"{100.0 * low / STATIC_STRESS:.0f} to {100.0 * high / STATIC_STRESS:.0f} %"
+    text = (
+        f"{bearing.name}: the peak stress of {peak.text} is {share} of the "
+        f"{shown(STATIC_STRESS, 'pressure')} at which ISO 76 defines the static load rating of ball "
+        "bearings (information, not an acceptance limit)."
+    )
+    return Statement(text, "notice" if (stress if certain else high) < STATIC_STRESS else "warning")
 
 
 def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", certain: bool = True) -> Table:

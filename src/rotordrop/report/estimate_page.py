@@ -23,8 +23,8 @@ from rotordrop.report.content import (
     Table,
     table,
 )
-from rotordrop.report.drop_sections import drop_sections, static_limit_statement
-from rotordrop.report.estimate_numbers import headline_card, identified_table
+from rotordrop.report.drop_sections import drop_sections
+from rotordrop.report.estimate_numbers import headline_card, identified_table, static_limit_statement
 from rotordrop.report.innovations import innovation_figures
 from rotordrop.report.inspection import assumptions_section, inspection_section, limits_section
 from rotordrop.report.machine_sections import defaults_section, drawing_section, weight_shares

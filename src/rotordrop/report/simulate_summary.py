@@ -1,0 +1,125 @@
+"""The verdict and the headline numbers of a simulated drop, which a terminal shows without any figure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop._version import __version__
+from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
+from rotordrop.machine.plausibility import doubts_of_speed
+from rotordrop.report.content import SIMULATED_MACHINE, Card, ReportContent, Statement, fact
+from rotordrop.report.estimate_numbers import headline_card, static_limit_statement
+from rotordrop.report.quantity import shown
+from rotordrop.simulate.clearances import ClearanceUse, clearance_uses
+from rotordrop.simulate.result import DropResult
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+
+TRUSTED_CHANGE = 5e-3
+"""Change of a peak at a tighter tolerance beyond which it is a warning [1]; chosen, not measured."""
+NO_INTERVAL = (
+    "The numbers have no interval: one simulation with given parameters cannot state one. After about 50 ms "
+    "a drop is chaotic, and only its statistics can be compared with another one."
+)
+BACKWARDS = "The speed is negative: the shaft turns from y towards x, clockwise seen from the DE."
+
+
+def simulate_summary(result: DropResult, machine: Machine | None = None) -> ReportContent:
+    """Give what is said of one simulated drop before any figure; the machine gives the defaults in use."""
+    bearings = simulated_bearings(result)
+    speed, duration = shown(result.initial_speed, "speed"), shown(result.time[-1], "time")
+    path = getattr(machine, "source_path", None)
+    uses = () if machine is None else clearance_uses(machine, result)
+    return ReportContent(
+        title=f"Simulated drop of {result.machine_name}",
+        subtitle=f"from {speed}, {duration} after power-off",
+        simulated=SIMULATED_MACHINE,
+        verdict=_verdict(result, bearings, machine, uses),
+        cards=tuple(_card(result, b, bearing) for b, bearing in enumerate(bearings)),
+        facts=(
+            ("machine", result.machine_name if path is None else f"{result.machine_name} ({path.name})"),
+            ("rotor basis", result.reduction),
+            ("tolerance", f"{result.tolerance:g}"),
+            ("steps", f"{result.steps} taken, {result.rejected_steps} rejected"),
+            ("rotordrop", __version__),
+        ),
+    )
+
+
+def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
+    card = headline_card(bearing)
+    pressure, half_width, pressed_at = result.peak_contact_pressure(index)
+    note = f"at {shown(pressed_at, 'time', 3)}, {shown(2.0 * half_width, 'length', 3)} wide"
+    figures = list(card.figures)
+    figures.insert(2, fact("Peak pressure, rotor on race", pressure, "pressure", note=note))
+    if bearing.first_contact is not None and bearing.air_gap is not None:
+        deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
+        figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
+    lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
+    figures.append(fact("Contacts", len(bearing.impacts), "count"))
+    figures.append(fact("Energy lost in contact", lost, "energy", 3))
+    return Card(card.title, tuple(figures))
+
+
+def _verdict(
+    result: DropResult,
+    bearings: tuple[BearingDrop, ...],
+    machine: Machine | None,
+    uses: tuple[ClearanceUse, ...],
+) -> tuple[Statement, ...]:
+    said = [Statement(result.outcome, "good" if result.finished else "bad")]
+    if result.initial_speed < 0.0:
+        said.append(Statement(BACKWARDS))
+    if machine is not None:
+        doubts = doubts_of_speed(machine, result.initial_speed)
+        said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
+        said += _stops(result, machine)
+    said += [_certificate(result), Statement(NO_INTERVAL)]
+    said += [static_limit_statement(bearing) for bearing in bearings]
+    for use in uses:
+        travel, gap = shown(use.travel, "length", 3), shown(use.gap, "length", 3)
+        touches = use.share >= 1.0
+        text = f"{use.name}: the rotor travels {travel} of a gap of {gap}" + (
+            ", so it touches there; no force acts in a clearance." if touches else "."
+        )
+        said.append(Statement(text, "bad" if touches else "good"))
+    if machine is not None and machine.defaults_in_use:
+        count = len(machine.defaults_in_use)
+        text = (
+            f"{count} values of the machine are defaults; the report and 'rotordrop check --all' list them."
+        )
+        said.append(Statement(text))
+    return tuple(said)
+
+
+def _stops(result: DropResult, machine: Machine) -> list[Statement]:
+    """Whether a mount reached its stop."""
+    said = []
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        if bearing.mount.stop is None:
+            continue
+        travel = np.hypot(*result.support_displacement[:, b].T)
+        gap, largest = float(bearing.mount.stop.gap), float(travel.max())
+        moved, free = shown(largest, "length"), shown(gap, "length")
+        if largest > gap:
+            first = shown(result.time[np.argmax(travel > gap)], "time")
+            text = f"{bearing.name}: the mount reached its stop at {first}; it moved {moved} of {free}."
+            said.append(Statement(text, "warning"))
+        else:
+            said.append(
+                Statement(f"{bearing.name}: the mount did not reach its stop; it moved {moved} of {free}.")
+            )
+    return said
+
+
+def _certificate(result: DropResult) -> Statement:
+    certificate = result.certificate
+    changes = [certificate.peak_change_tolerance, certificate.peak_change_truncation]
+    worst = max((float(np.max(change)) for change in changes if change is not None), default=0.0)
+    text = f"Numerical error: {certificate.sentence()}"
+    if certificate.peak_change_tolerance is None:
+        return Statement(f"{text}; tolerance and truncation were not checked in this run.")
+    return Statement(f"{text}.", "warning" if worst > TRUSTED_CHANGE else "good")
