@@ -5,6 +5,7 @@ After an installation the loop is the longest wait of a first drop, and it needs
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -19,7 +20,10 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate import _histories, _loop
 from rotordrop.simulate._tableau import tsit5
 
-COMMAND = "from rotordrop.simulate.ahead import compile_loop; compile_loop()"
+COMMAND = (
+    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+    "from rotordrop.simulate.ahead import compile_loop; compile_loop()"
+)
 _DIMENSIONS = {"bearing_shape": 2, "bearing": 2, "balls": 3, "polar": 2, "magnet_shape": 2, "magnet": 2}
 _DIMENSIONS |= dict.fromkeys(("bearing_at", "contact_at", "magnet_at", "departure", "load"), 2)
 _DIMENSIONS |= dict.fromkeys(("load_shape", "load_points"), 2)
@@ -60,7 +64,8 @@ def loop_compiled_ahead(say: Callable[[str], None]) -> Iterator[Callable[[], Non
         yield lambda: None
         return
     say("The first drop after an installation compiles its kernels, once, for some ten seconds ...")
-    beside = subprocess.Popen([sys.executable, "-c", COMMAND], stdin=subprocess.DEVNULL)
+    program = [sys.executable, "-I", "-c", COMMAND, json.dumps(sys.path)]  # as a bundled program takes it
+    beside = subprocess.Popen(program, stdin=subprocess.DEVNULL)
 
     def wait() -> None:
         compile_histories()
