@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from rotordrop.machine import machine_schema
-from rotordrop.machine.schema import field_meanings
+from rotordrop.machine.schema import field_meanings, machine_schema
 from rotordrop.record.profile import Profile
 
 MACHINE = """\

@@ -118,7 +118,8 @@ def loaded_kernels() -> Iterator[Any]:
 def commands(folder: Path) -> list[list[str]]:
     """Every way of `calibrate`, `estimate` and `waterfall`; what they read is written first."""
     from rotordrop.cli.app import run
-    from rotordrop.machine import example_machine, example_path, save_machine
+    from rotordrop.machine import example_machine, example_path
+    from rotordrop.machine.saving import save_machine
     from rotordrop.record.examples import example_record_path
 
     owner, drop = str(example_path("lp400")), str(example_record_path("lp400_drop_060"))

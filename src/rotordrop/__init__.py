@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
-    from rotordrop.machine import machine_schema as machine_schema
-    from rotordrop.machine import save_machine as save_machine
+    from rotordrop.machine.saving import save_machine as save_machine
+    from rotordrop.machine.schema import machine_schema as machine_schema
     from rotordrop.record import Record as Record
     from rotordrop.record import example_record_path as example_record_path
     from rotordrop.record import read_record as read_record
@@ -75,12 +75,12 @@ _PUBLIC = {
     "load_result": "rotordrop.simulate.result",
     "load_study": "rotordrop.study",
     "look": "rotordrop.evidence.look",
-    "machine_schema": "rotordrop.machine",
+    "machine_schema": "rotordrop.machine.schema",
     "parse_quantity": "rotordrop.units",
     "read_document": "rotordrop.document",
     "read_record": "rotordrop.record",
     "run_study": "rotordrop.study",
-    "save_machine": "rotordrop.machine",
+    "save_machine": "rotordrop.machine.saving",
     "simulate_drop": "rotordrop.simulate.drop",
     "sweep": "rotordrop.study",
 }

@@ -19,7 +19,8 @@ from typing import Any
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.known import Known
-from rotordrop.machine import Machine, example_path, save_machine
+from rotordrop.machine import Machine, example_path
+from rotordrop.machine.saving import save_machine
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "results" / "cases.json"

@@ -13,7 +13,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from common import arguments, keep, machine_with_drag
 
-from rotordrop.machine import save_machine
+from rotordrop.machine.saving import save_machine
 
 SEED, KILLS, SECONDS = 4, 3, 12
 

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine, load_machine, save_machine
+from rotordrop.machine import Machine, example_machine, load_machine
+from rotordrop.machine.saving import save_machine
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.repeat import place_among, repeat_study

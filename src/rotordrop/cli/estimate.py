@@ -210,7 +210,8 @@ def calibrate(
     """
     from rotordrop.evidence.quality import check_record
     from rotordrop.evidence.quality.finding import refuse_unusable
-    from rotordrop.machine import load_machine, save_machine
+    from rotordrop.machine import load_machine
+    from rotordrop.machine.saving import save_machine
     from rotordrop.twin.calibrated import calibrate_machine, calibration_json
 
     require_own_drops(records)

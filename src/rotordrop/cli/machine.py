@@ -96,7 +96,7 @@ def init(
     if example is not None:
         _copy_example(example, target or Path(example), overwrite=force)
         return
-    from rotordrop.machine import template_text
+    from rotordrop.machine.template import template_text
 
     deliver_text(template_text(), target or TEMPLATE_FILE, overwrite=force)
 
@@ -105,7 +105,7 @@ def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
     from pydantic import ValidationError
 
-    from rotordrop.machine import machine_text
+    from rotordrop.machine.saving import machine_text
     from rotordrop.machine.simple import SimpleMachine, simple_machine
 
     missing = [f"--{name.replace('_', '-')}" for name, value in given.items() if not value]
@@ -274,7 +274,7 @@ def schema(
     Example: rotordrop schema machine > machine.schema.json
     """
     if document is Document.machine:
-        from rotordrop.machine import machine_schema as schema_of
+        from rotordrop.machine.schema import machine_schema as schema_of
     elif document is Document.numbers:
         from rotordrop.machine.simple import simple_schema as schema_of
     elif document is Document.look:
@@ -327,7 +327,7 @@ def convert(
     deliver(imported_json(imported), json, imported_content(imported, source.name))
     if output is None:
         return
-    from rotordrop.machine import machine_text
+    from rotordrop.machine.saving import machine_text
     from rotordrop.machine.simple import SimpleMachine, drafted_machine
 
     made_up = {

@@ -225,7 +225,7 @@ def clearance(
     from rotordrop.elements.touchdown_bearing import AIR_GAP
     from rotordrop.evidence.clearance import measure_clearance, wear_between
     from rotordrop.known import Known
-    from rotordrop.machine import save_machine
+    from rotordrop.machine.saving import save_machine
 
     if output is not None and machine is None:
         raise UsageError("--output writes a machine file with the measured gaps; give --machine too")

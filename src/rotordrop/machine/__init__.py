@@ -16,9 +16,6 @@ from rotordrop.machine.examples import example_machine, example_names, example_p
 from rotordrop.machine.loading import load_machine, loads_machine
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.plausibility import Doubt, doubts
-from rotordrop.machine.saving import machine_text, save_machine
-from rotordrop.machine.schema import machine_schema
-from rotordrop.machine.template import template_text
 
 __all__ = [
     "ActiveMagneticBearing",
@@ -51,8 +48,4 @@ __all__ = [
     "example_path",
     "load_machine",
     "loads_machine",
-    "machine_schema",
-    "machine_text",
-    "save_machine",
-    "template_text",
 ]

@@ -11,8 +11,8 @@ from typing import Any
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import UsageError
 from rotordrop.files import digest_of_file, require_place, write_text
-from rotordrop.machine import Machine, save_machine
-from rotordrop.machine.saving import machine_text
+from rotordrop.machine import Machine
+from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.record.profile import Profile
 from rotordrop.record.record import BY_HAND, SPEED_SOURCE, open_record
 from rotordrop.record.recording import recording_of

@@ -12,7 +12,7 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
-from rotordrop.report.drop_sections import static_limit_statement
+from rotordrop.report.estimate_numbers import static_limit_statement
 from rotordrop.report.estimate_page import estimate_verdict
 from rotordrop.report.quantity import Quantity, shown
 

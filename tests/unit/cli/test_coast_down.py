@@ -18,7 +18,8 @@ from rotordrop.errors import RecordError
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
 from rotordrop.estimate.simulated_coast_down import simulated_coast_down
 from rotordrop.files import new_hdf5
-from rotordrop.machine import example_machine, example_path, load_machine, save_machine
+from rotordrop.machine import example_machine, example_path, load_machine
+from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import read_record
 from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.rotor.parameters import build_drop_model

@@ -20,7 +20,8 @@ from rotordrop.cli._terminal import printable
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.files import write_json
-from rotordrop.machine import example_machine, example_path, save_machine
+from rotordrop.machine import example_machine, example_path
+from rotordrop.machine.saving import save_machine
 from rotordrop.record import example_record_path
 
 SMALL = example_path("small")

@@ -14,7 +14,8 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.cli.simulate import named_pairs
 from rotordrop.errors import UsageError
-from rotordrop.machine import example_machine, example_path, save_machine
+from rotordrop.machine import example_machine, example_path
+from rotordrop.machine.saving import save_machine
 from rotordrop.simulate.result import load_result
 
 PAPER = str(example_path("paper"))

@@ -7,7 +7,8 @@ import pytest
 from rotordrop.errors import MachineFileError
 from rotordrop.evidence import check_record
 from rotordrop.evidence.quality.finding import stops
-from rotordrop.machine import example_machine, example_path, loads_machine, machine_text
+from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop.machine.saving import machine_text
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 

@@ -10,15 +10,8 @@ from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import OutputError
 from rotordrop.known import Known
-from rotordrop.machine import (
-    Machine,
-    example_machine,
-    example_names,
-    load_machine,
-    loads_machine,
-    machine_text,
-    save_machine,
-)
+from rotordrop.machine import Machine, example_machine, example_names, load_machine, loads_machine
+from rotordrop.machine.saving import machine_text, save_machine
 
 PATHS = {
     "NDE.air_gap": (1e-6, 1e-2),

@@ -18,11 +18,11 @@ from rotordrop.machine import (
     TouchdownBearing,
     example_names,
     loads_machine,
-    machine_schema,
-    machine_text,
-    template_text,
 )
 from rotordrop.machine.examples import example_path
+from rotordrop.machine.saving import machine_text
+from rotordrop.machine.schema import machine_schema
+from rotordrop.machine.template import template_text
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,9 @@ from tests.scaled_machines import TWELVE_NUMBERS
 
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
-from rotordrop.machine import load_machine, loads_machine, machine_text
+from rotordrop.machine import load_machine, loads_machine
 from rotordrop.machine.ross_files import read_rotor
+from rotordrop.machine.saving import machine_text
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.machine_summary import summarise_machine

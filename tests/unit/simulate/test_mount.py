@@ -7,7 +7,8 @@ import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
 
 from rotordrop.errors import MachineFileError
-from rotordrop.machine import example_path, load_machine, loads_machine, machine_text
+from rotordrop.machine import example_path, load_machine, loads_machine
+from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from rotordrop.elements.table import parameter, row_of
-from rotordrop.machine import Machine, load_machine, save_machine
+from rotordrop.machine import Machine, load_machine
+from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.unknowns import prior
 from rotordrop.twin.calibrated import Calibration, calibrate_machine, calibration_json
 from rotordrop.twin.search import is_calibrated

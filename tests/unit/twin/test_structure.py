@@ -20,7 +20,8 @@ from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine, load_machine, save_machine
+from rotordrop.machine import Machine, example_machine, load_machine
+from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.track.calibration import track
