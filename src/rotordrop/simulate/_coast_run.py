@@ -185,7 +185,12 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
         _grid(first, first + 1, case.output_step), states[:1], setup.parameters, histories[:1]
     )
     before = (float(run.progress[_loop.TIME]), float(run.state[setup.model.layout.dissipated]))
-    log, already_open = _log_of_window(run, rows * case.output_step), int(run.progress[_loop.LOGGED])
+    already_open, opened = (
+        int(run.progress[_loop.LOGGED]),
+        int(LOG_ROWS_PER_SECOND * (rows * case.output_step)),
+    )
+    log = np.zeros((len(run.open_log) + 100 + opened, _loop.N_LOG_COLUMNS))
+    log[: len(run.open_log)] = run.open_log
     method, filled, try_settled = np.zeros(3), 1, case.settled_scheme and may_be_settled(run)
     while status[PHASE] == RUNNING:
         last = min(window_end, int(status[LAST_SAMPLE]))
@@ -216,12 +221,6 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
 
 def _grid(first: int, last: int, step: float) -> Array:
     return np.asarray(np.arange(first, last, dtype=np.float64) * step)
-
-
-def _log_of_window(run: Run, length: float) -> Array:
-    log = np.zeros((len(run.open_log) + 100 + int(LOG_ROWS_PER_SECOND * length), _loop.N_LOG_COLUMNS))
-    log[: len(run.open_log)] = run.open_log
-    return log
 
 
 def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -> int:

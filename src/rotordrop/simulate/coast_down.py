@@ -116,7 +116,8 @@ def simulate_coast_down(
             write_part(part_path(folder, int(run.status[PARTS])), samples, log)
             run.status[PARTS] += 1.0
             save_checkpoint(folder, digest, run.arrays())
-        tell(_stage(setup, run), _fraction(setup, run))
+        speed = abs(float(run.state[setup.model.layout.rotor_speed])) / (2.0 * math.pi)
+        tell(f"{run.progress[_loop.TIME]:.0f} s, {speed:.2f} Hz", _fraction(setup, run))
     result = _result(setup, run, output)
     if folder is not None and output is not None:
         gaps = model.parameters.bearing[:, L.AIR_GAP]
@@ -141,11 +142,6 @@ def _fraction(setup: Setup, run: Run) -> float:
     speed = abs(float(run.state[setup.model.layout.rotor_speed]))
     begun, stop = abs(setup.case.speed), setup.case.stop_speed
     return 1.0 - math.log(max(speed, stop) / stop) / math.log(begun / stop)
-
-
-def _stage(setup: Setup, run: Run) -> str:
-    speed = abs(float(run.state[setup.model.layout.rotor_speed])) / (2.0 * math.pi)
-    return f"{run.progress[_loop.TIME]:.0f} s, {speed:.2f} Hz"
 
 
 def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:

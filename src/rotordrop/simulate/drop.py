@@ -20,7 +20,7 @@ from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
-from rotordrop.simulate.case import DropCase, UnbalanceJump
+from rotordrop.simulate.case import DropCase, StateStart, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult
@@ -227,29 +227,16 @@ def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certific
         peak_change_tolerance=_peak_change(result, tighter, COMPARABLE_WINDOW),
         peak_change_tolerance_whole=_peak_change(result, tighter, np.inf),
     )
-    richer = _richer(model)
-    if richer is None or not _transferable(case):
+    basis = model.basis.reduction
+    # a start given as a state belongs to the modes of its own model
+    if basis.modes is None or isinstance(case.start, StateStart):
         return certificate
-    finer = _simulate(richer, case)
+    richer = Reduction(modes=basis.modes + 8, attachment=basis.attachment)
+    finer = _simulate(build_drop_model(model.machine, richer), case)
     return replace(
         certificate,
         peak_change_truncation=_peak_change(result, finer, COMPARABLE_WINDOW),
         peak_change_truncation_whole=_peak_change(result, finer, np.inf),
-    )
-
-
-def _transferable(case: DropCase) -> bool:
-    from rotordrop.simulate.case import StateStart
-
-    return not isinstance(case.start, StateStart)
-
-
-def _richer(model: DropModel) -> DropModel | None:
-    reduction = model.basis.reduction
-    if reduction.modes is None:
-        return None
-    return build_drop_model(
-        model.machine, Reduction(modes=reduction.modes + 8, attachment=reduction.attachment)
     )
 
 

@@ -49,7 +49,8 @@ def main(order: dict[str, Any]) -> None:
     told = state_of(job, verb)
     assert told is not None
     try:
-        _limit(job, verb)
+        size = sum(entry["bytes"] for entry in job.read()["files"].values())
+        limit(MEMORY[verb] + MEMORY_PER_BYTE * size, CPU_S[verb])
         of = job.digests()
         made = job.path / f"{verb}.part-{told['run']}"
         made.mkdir()
@@ -76,11 +77,6 @@ def _without_folder(message: str, job: Job) -> str:
         for entry in files:  # the longest first: record.csv is part of record.csv.gz
             message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
     return message.replace(f"{job.path}/", "")
-
-
-def _limit(job: Job, verb: Verb) -> None:
-    size = sum(entry["bytes"] for entry in job.read()["files"].values())
-    limit(MEMORY[verb] + MEMORY_PER_BYTE * size, CPU_S[verb])
 
 
 def limit(memory: int, seconds: int) -> None:

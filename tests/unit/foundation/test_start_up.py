@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 
 import pytest
 from tests.published import bearing, published, value
@@ -43,14 +42,15 @@ def test_no_heavy_module_is_imported(arguments):
 
 @pytest.mark.parametrize("arguments", CASES, ids=["import", "help"])
 def test_it_starts_fast(arguments):
-    """The best of several runs counts: the others measure how busy the machine is."""
+    """Processor time, and the best of several runs: on the clock a busy machine is slow."""
     times = []
     for _ in range(7):
-        start = time.perf_counter()
+        before = os.times()
         subprocess.run(
             [sys.executable, *arguments], capture_output=True, check=True, env=os.environ | {"COLUMNS": "80"}
         )
-        times.append(time.perf_counter() - start)
+        after = os.times()
+        times.append(sum(after[2:4]) - sum(before[2:4]))
         if times[-1] < LIMIT_S:
             break
     assert min(times) < LIMIT_S
