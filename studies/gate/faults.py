@@ -259,7 +259,7 @@ def stepped(samples: int) -> Make:
 
 
 def late(by: float, *, end: bool = False) -> Make:
-    """One channel, or those of one end, are late [s]."""
+    """One channel, or those of one end, are late [s]; the record begins as much later."""
 
     def change(s: Array, record: Record, random: Random) -> None:
         column = _column(random, s)
@@ -268,7 +268,11 @@ def late(by: float, *, end: bool = False) -> Make:
         for c in columns:
             s[:, c] = np.interp(record.time - by, record.time, s[:, c])
 
-    return readings(change)
+    def make(given: Given, random: Random) -> Given:
+        spoilt = readings(change)(given, random)
+        return replace(spoilt, record=spoilt.record.window(float(given.record.time[0]) + by, np.inf))
+
+    return make
 
 
 def speed(change: Callable[[Array, Record], Array] | None) -> Make:
