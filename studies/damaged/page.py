@@ -111,7 +111,6 @@ def strangers(server: Server, dice: random.Random) -> dict[str, Any]:
         "evil.example",
         "127.0.0.1",
         f"127.0.0.2:{server.port}",
-        f"[::1]:{server.port}",
         "",
         "localhost.evil",
     ]

@@ -60,7 +60,7 @@ COMMANDS = {
     "log allow": "log allow out.db --machine LP-400 --drops {number} --source contract",
     "log add": "log add out.db drop.json",
     "study": "study run study.toml --folder study --threads 1",
-    "coast-down": "coast-down machine.toml --speed 0.3Hz --duration 2s --reduction quick -o coast.h5",
+    "coast-down": "coast-down machine.toml --speed 0.3Hz --until 0.6s --reduction quick -o coast.h5",
     "share": "look {record} machine.toml --share shared.h5 --licence CC0-1.0",
     "bench": "synthesize machine.toml --speed 60Hz --duration 0.3s --seed {number} -o hidden",
     "estimate": "estimate",
