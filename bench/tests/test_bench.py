@@ -9,6 +9,7 @@ import math
 import pytest
 
 from rotordrop.errors import UsageError
+from rotordrop.files import write_json
 from rotordrop.machine import load_machine
 from rotordrop.record.record import sha256_of
 from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_bench
@@ -201,7 +202,7 @@ def test_the_table_is_printed_and_written(folder, estimates, tmp_path, capsys):
 def test_another_version_is_refused(folder, estimates, tmp_path):
     (tmp_path / "old/truth").mkdir(parents=True)
     old = json.loads((folder / "truth/drop_004.json").read_text()) | {"bench_version": "0"}
-    (tmp_path / "old/truth/drop_004.json").write_text(json.dumps(old))
+    write_json(tmp_path / "old/truth/drop_004.json", old, sealed=True)
     with pytest.raises(
         UsageError, match="is of version '0' of the bench, this is version '1'; make the bench"
     ):

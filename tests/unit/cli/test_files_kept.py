@@ -171,7 +171,7 @@ CALLS = {
     "doctor": "doctor",
 }
 """Commands that end soon with what they write."""
-LONG = {"clearance", "estimate", "calibrate", "study repeat", "study rare", "study design"}
+LONG = {"clearance", "estimate", "calibrate", "restart", "study repeat", "study rare", "study design"}
 """Commands that compute for long, or need a recording of their own: what they write is written by functions
 that `test_written_files` gives a full disk."""
 BEYOND = {"look share": "--licence CC0-1.0"}
