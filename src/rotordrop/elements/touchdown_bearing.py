@@ -29,7 +29,7 @@ RACE_MASS, RACE_FORM = 1.25, 1.3
 
 Grooves and shoulders make up a fifth of a ring. One with a carrier 2.3 times as heavy was met, with a form
 within 7 %: what spins along has to be stated. A mass within a factor of 2 did not follow it either, and moved
-peaks of ordinary rings by up to 6 % (five drops of DropBench, whose rings are within 10 % of the inferred mass).
+peaks of ordinary rings by up to 6 % (five drops of DropBench, rings within 10 % of the inferred mass).
 """
 _MOUNTING = frozenset(
     ("arrangement", "first_ball_angle", "second_row_offset", "preload_class", "clearance_class")
