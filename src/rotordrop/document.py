@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -89,6 +90,22 @@ def first_fault(error: ValidationError) -> str:
     where = ".".join(str(part) for part in fault["loc"]) or "the document"
     found = "" if fault["type"] == "missing" else f" is {str(fault['input'])[:60]!r}"
     return f"{where}{found}: {fault['msg']}"
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """The table that a file of the user holds (TOML); ``what`` names its kind in messages.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read, or is no TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UsageError(f"{path}: cannot read the {what} file: {error.strerror}") from error
+    except (ValueError, RecursionError) as error:  # not UTF-8, or no TOML
+        raise UsageError(f"{path}: not valid TOML: {error}") from error
 
 
 def read_json(path: Path, made_by: str) -> dict[str, Any]:

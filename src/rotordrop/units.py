@@ -32,6 +32,9 @@ def _metric(unit: str, *prefixes: str) -> tuple[tuple[float, str], ...]:
     return tuple((factors[prefix], prefix + unit) for prefix in prefixes)
 
 
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s²], where no machine file says another."""
+
 KINDS: dict[str, Kind] = {
     "length": Kind(unit="m", example="280 um", scales=_metric("m", "", "m", "µ")),
     "mass": Kind(unit="kg", example="105 kg", scales=((1.0, "kg"), (1e-3, "g"))),

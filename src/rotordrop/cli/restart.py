@@ -39,8 +39,8 @@ def restart(
         Option(metavar="LIMIT", help='Limit of the next drop, "peak_stress=2.5 GPa"; repeat it.'),
     ] = None,
     drops: Annotated[
-        int, Option(min=0, metavar="N", help="Next drops to simulate at each speed; 0 leaves them out.")
-    ] = 40,
+        int | None, Option(min=0, metavar="N", help="Next drops to simulate a speed; 0 leaves them out.")
+    ] = None,
     report: options.Report = None,
     data: options.Data = None,
     json: options.Json = None,
@@ -55,7 +55,7 @@ def restart(
     from rotordrop.report.restart_page import restart_numbers, restart_page
     from rotordrop.restart.assumptions import assumptions_of, load_assumptions
     from rotordrop.restart.card import restart_card
-    from rotordrop.restart.next_drop import next_drops
+    from rotordrop.restart.next_drop import DROPS, next_drops
     from rotordrop.study.repeat import COMPARED
 
     described, drop = load_machine(machine), read_drop(estimate)
@@ -71,9 +71,10 @@ def restart(
     assumed = assumptions_of({}, "the assumptions") if assumptions is None else load_assumptions(assumptions)
     speed = 2.0 * math.pi * drop.speed_Hz
     found: tuple[NextDrop, ...] = ()
-    if drops and described.ambs:
+    count = DROPS if drops is None else drops
+    if count and described.ambs:
         with progress_bar("the next drop") as bar:
-            found = next_drops(described, speed, limits, drops=drops, progress=bar)
+            found = next_drops(described, speed, limits, drops=count, progress=bar)
     card = restart_card(
         drop,
         assumed,

@@ -383,9 +383,7 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
         index = float(np.sqrt(np.mean(velocity**2))) / (speed * path.gap) if speed else None
         wall, touch = path.wall, path.wall.touch
-        touched = (
-            None if touch is None else float(np.interp(touch.sample, np.arange(len(radius)), motion.time))
-        )
+        touched = None if touch is None else touch.when(motion.time)
         found.append(
             PlaneLook(
                 plane=path.name,

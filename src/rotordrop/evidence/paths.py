@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
-from rotordrop.evidence.wall import GRAVITY, Wall, find_wall, reversals_of
+from rotordrop.evidence.wall import Wall, find_wall, reversals_of
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
+from rotordrop.units import GRAVITY
 
 _SLOWEST_FALL = 0.2
 """Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
@@ -315,7 +316,7 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
             and touch is not None
             and abs(touch.sample - first - hits.touched[0]) < 3e-3 * motion.rate
         ):
-            touched[0] = float(np.interp(touch.sample, np.arange(len(motion.time)), motion.time))
+            touched[0] = touch.when(motion.time)
         impacts += [
             Impact(
                 plane=path.name,

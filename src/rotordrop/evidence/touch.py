@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.record.recording import Array
-
-_GRAVITY = 9.81
+from rotordrop.units import GRAVITY
 
 _NEAREST, _FARTHEST = 0.75, 1.08
 """The race is touched between these shares of the way from floating to rest [1] (chosen)."""
@@ -77,7 +76,11 @@ class Touch:
 
     def at(self, values: Array) -> Array:
         """Values (N, K) at the touch."""
-        return np.array([np.interp(self.sample, np.arange(len(values)), column) for column in values.T])
+        return np.array([self.when(column) for column in values.T])
+
+    def when(self, values: Array) -> float:
+        """One value of a series (N,) at the touch, such as the time."""
+        return float(np.interp(self.sample, np.arange(len(values)), values))
 
 
 def first_touch(
@@ -116,14 +119,14 @@ def first_touch(
     far = _first_beyond(way, begin, _FARTHEST * size) or len(way) - 1
     last = min(far, near + int(_LATEST * rate))
     last = near + int(np.argmax(way[near : last + 1]))
-    released = near - int(math.sqrt(2.0 * _NEAREST * size / _GRAVITY) * rate)
+    released = near - int(math.sqrt(2.0 * _NEAREST * size / GRAVITY) * rate)
     samples, inward, unit = _departures(
         place, floated, rate, windows, (max(released, 0), max(last, near + 2))
     )
     after = max(round(windows.after * rate), 3)
     falling = (samples + after < near) & (samples - windows.before * rate > released - 0.5e-3 * rate)
     ringing = float(np.percentile(inward[falling], 95)) if np.count_nonzero(falling) > 10 else 0.0
-    limit = max(5.0 * noise, windows.ringing * ringing, windows.least * _GRAVITY * unit)
+    limit = max(5.0 * noise, windows.ringing * ringing, windows.least * GRAVITY * unit)
     strong = np.flatnonzero((samples >= near) & (inward > limit))
     if not len(strong):
         return None

@@ -18,8 +18,7 @@ from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
-
-GRAVITY = 9.81
+from rotordrop.units import GRAVITY
 
 SMOOTHING = 1e-3
 """Window of velocities [s]."""

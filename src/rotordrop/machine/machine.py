@@ -26,7 +26,7 @@ from rotordrop.elements.values import Acceleration, PositiveTime, default
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
-from rotordrop.units import format_quantity, in_si
+from rotordrop.units import GRAVITY, format_quantity, in_si
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 
@@ -38,7 +38,7 @@ class Machine(Description):
     """Name of the machine."""
     notes: tuple[Text, ...] = ()
     """Remarks of the file's author."""
-    gravity: Acceleration = default(9.81, "usual value")
+    gravity: Acceleration = default(GRAVITY, "usual value")
     """Acceleration of gravity, acting towards -y [m/s²]."""
     speed: SpeedDescription
     """Nominal speed and aerodynamic drag."""

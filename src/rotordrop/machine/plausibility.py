@@ -17,7 +17,7 @@ from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.values import LEFT_OUT
 from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
-from rotordrop.units import format_quantity
+from rotordrop.units import GRAVITY, format_quantity
 
 USUAL_GAP = (30e-6, 1.5e-3)
 """Air gaps of touchdown bearings [m], from small spindles to the largest machines."""
@@ -174,8 +174,10 @@ def _of_the_rotor(machine: Machine) -> Iterator[Doubt]:
         yield from _outside("mass", name, disc.mass.value, 0.0, 20.0 * shaft, "mass", look)
     gravity = machine.gravity.value
     if not 9.7 <= gravity <= 9.9:
-        text = f"gravity is {gravity:.4g} m/s²; it is 9.81 m/s² everywhere on earth, along the vertical"
-        yield _doubt("gravity", "machine", gravity, 9.81, text)
+        text = (
+            f"gravity is {gravity:.4g} m/s²; it is {GRAVITY:g} m/s² everywhere on earth, along the vertical"
+        )
+        yield _doubt("gravity", "machine", gravity, GRAVITY, text)
     if machine.balance_grade is not None:
         grade = machine.balance_grade.grade_mm_s
         look = "turbomachines have G 0.4 to G 6.3; ISO 21940-11 ends at G 4000"
@@ -195,7 +197,7 @@ def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator
         yield _doubt("race inertia", name, reach, radius, text)
     look = f"the rotor weighs {mass:.3g} kg"
     yield from _outside("race mass", name, race.mass.value, 1e-5 * mass, mass, "mass", look)
-    weight = mass * 9.81 / len(machine.touchdown_bearings)
+    weight = mass * GRAVITY / len(machine.touchdown_bearings)
     sag = weight / support.stiffness.value
     text = (
         f"its support of {format_quantity(support.stiffness.value, 'stiffness')} gives way by "

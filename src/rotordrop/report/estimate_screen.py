@@ -102,7 +102,8 @@ def _moment(b: BearingDrop) -> str:
 
 def _displacement(b: BearingDrop) -> str:
     farthest = float(np.nanmax(b.motions[-1].radial.values))
-    if b.air_gap is None:
+    known = b.values.get("air_gap_m")
+    if known is None:
         return shown(farthest, "length")
-    gap = 0.5 * (b.air_gap.lower + b.air_gap.upper)
+    gap = known.value
     return f"{shown(farthest, 'length')}, {farthest / gap:.2f} × the air gap"

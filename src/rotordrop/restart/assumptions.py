@@ -7,14 +7,13 @@ owner holds only what differs (TOML, the same keys).
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError
 
-from rotordrop.document import Document, first_fault
+from rotordrop.document import Document, first_fault, read_toml
 from rotordrop.errors import UsageError
 
 Share = Field(ge=0.0, le=1.0)
@@ -232,11 +231,4 @@ def load_assumptions(path: str | Path) -> Assumptions:
     UsageError
         If the file is not there, is no TOML, or states something that is no assumption.
     """
-    file = Path(path)
-    try:
-        content = tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}; name another file") from error
-    except (ValueError, RecursionError) as error:
-        raise UsageError(f"{file} is no TOML: {error}; write for example machine_cost = 100.0") from error
-    return assumptions_of(content, str(file))
+    return assumptions_of(read_toml(path, "assumptions"), str(path))

@@ -45,6 +45,21 @@ class Suspicion:
     """Chance after that [1]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Moved:
+    """One number that both estimates state."""
+
+    place: str
+    """Bearing, or empty for the rotor."""
+    path: str
+    """Of a damage's ``moves``."""
+    what: str
+    """In words."""
+    change: float
+    error: float
+    """Change and its standard error: of the logarithm, or [m] of a number that is no factor."""
+
+
 def indicators(drop: Drop, since: Drop | None, assumed: Assumptions) -> tuple[Indicator, ...]:
     """What changed since then, as evidence for or against each kind of damage.
 
@@ -53,29 +68,14 @@ def indicators(drop: Drop, since: Drop | None, assumed: Assumptions) -> tuple[In
     """
     if since is None or not (drop.consistent and since.consistent):
         return ()
-    moved = {one.path: one for one in changes(since, drop).found if one.determined}
-    found = []
-    for kind, damage, bearing in places(drop, assumed):
-        for path, effect in damage.moves.items():
-            if path == "unbalance":
-                found += [Indicator(kind=kind, bearing=bearing, what=what, ratio=_ratio(*change, effect))
-                          for what, change in _unbalances(since, drop)]  # fmt: skip
-                continue
-            one = moved.get(f"{bearing}.{path}")
-            if one is None:
-                continue
-            low, high = (math.log(end) for end in one.interval_90) if one.factor else one.interval_90
-            change = math.log(one.change) if one.factor else one.change
-            size = f"× {one.change:.3g}" if one.factor else f"{1e6 * one.change:+.3g} µm"
-            found.append(
-                Indicator(
-                    kind=kind,
-                    bearing=bearing,
-                    what=f"{one.path} {size} since then",
-                    ratio=_ratio(change, (high - low) / (2.0 * NINETY), effect),
-                )
-            )
-    return tuple(found)
+    moved = (*_parameters(since, drop), *_unbalances(since, drop))
+    return tuple(
+        Indicator(kind=kind, bearing=bearing, what=f"{one.what} since then", ratio=_ratio(one, effect))
+        for kind, damage, bearing in places(drop, assumed)
+        for path, effect in damage.moves.items()
+        for one in moved
+        if (one.place, one.path) == (bearing, path)
+    )
 
 
 def places(drop: Drop, assumed: Assumptions) -> Iterator[tuple[str, Damage, str]]:
@@ -85,16 +85,32 @@ def places(drop: Drop, assumed: Assumptions) -> Iterator[tuple[str, Damage, str]
             yield kind, damage, bearing
 
 
-def _unbalances(since: Drop, drop: Drop) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Change of the logarithm of the unbalance of each plane that both drops know, and its error."""
-    before = {one.node: one.amount_kg_m for one in since.unbalance}
+def _parameters(since: Drop, drop: Drop) -> Iterator[_Moved]:
+    """Parameters of the bearings that both records determine."""
+    for one in changes(since, drop).found:
+        if not one.determined:
+            continue
+        place, _, path = one.path.partition(".")
+        low, high = (math.log(end) for end in one.interval_90) if one.factor else one.interval_90
+        yield _Moved(
+            place=place,
+            path=path,
+            what=f"{one.path} " + (f"× {one.change:.3g}" if one.factor else f"{1e6 * one.change:+.3g} µm"),
+            change=math.log(one.change) if one.factor else one.change,
+            error=(high - low) / (2.0 * NINETY),
+        )
+
+
+def _unbalances(since: Drop, drop: Drop) -> Iterator[_Moved]:
+    """The unbalance of each plane that both drops know."""
+    before = {one.node: _logarithm(one.amount_kg_m) for one in since.unbalance}
     for one in drop.unbalance:
-        pair = (before.get(one.node), one.amount_kg_m)
-        sizes = [_logarithm(value) for value in pair if value is not None]
-        if len(sizes) == 2 and None not in sizes:
-            (was, was_error), (now, now_error) = (size for size in sizes if size is not None)
-            what = f"unbalance at node {one.node} × {math.exp(now - was):.3g} since then"
-            yield what, (now - was, math.hypot(was_error, now_error))
+        was, now = before.get(one.node), _logarithm(one.amount_kg_m)
+        if was is not None and now is not None:
+            change = now[0] - was[0]
+            what = f"unbalance at node {one.node} × {math.exp(change):.3g}"
+            error = math.hypot(was[1], now[1])
+            yield _Moved(place="", path="unbalance", what=what, change=change, error=error)
 
 
 def _logarithm(value: Value) -> tuple[float, float] | None:
@@ -105,15 +121,15 @@ def _logarithm(value: Value) -> tuple[float, float] | None:
     return math.log(value.value), math.log(ends[1] / ends[0]) / (2.0 * NINETY)
 
 
-def _ratio(change: float, error: float, effect: Effect) -> float:
-    """Likelihood of a change found with an error, with the damage over that of a sound machine [1].
+def _ratio(moved: _Moved, effect: Effect) -> float:
+    """Likelihood of a change, with the damage over that of a sound machine [1].
 
     The size of the effect is log-normal about its median; a sound machine scatters too.
     """
-    width = math.hypot(error, effect.healthy)
+    width = math.hypot(moved.error, effect.healthy)
     sizes = effect.median * np.exp(effect.spread * _NODES)
-    sound = -0.5 * (change / width) ** 2
-    damaged = -0.5 * ((change - sizes) / width) ** 2
+    sound = -0.5 * (moved.change / width) ** 2
+    damaged = -0.5 * ((moved.change - sizes) / width) ** 2
     most = float(damaged.max())
     # held within e^30: beyond that the shape of the tails decides, which nobody knows
     ratio = most + math.log(float(_WEIGHTS @ np.exp(damaged - most))) - sound

@@ -13,7 +13,7 @@ from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.study.repeat import COMPARED, repeat_study
 from rotordrop.study.run import run_study
-from rotordrop.study.summary import quantile, share_of
+from rotordrop.study.summary import StudyResults, exceedance
 
 DROPS = 40
 """Drops behind the prediction at each speed; chosen, not measured: an interval says what they tell."""
@@ -55,35 +55,30 @@ def next_drops(
     ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]. What the machine
     file leaves open varies as in `repeat_study`; damage is not simulated.
     """
+    names = [bearing.name for bearing in machine.touchdown_bearings]
     found = []
     for k, share in enumerate(shares):
         study = repeat_study(machine, share * speed, duration=duration, drops=drops, seed=seed)
         with TemporaryDirectory() as folder:
             results = run_study(study, Path(folder) / "drops")
-            names = [bearing.name for bearing in machine.touchdown_bearings]
-            values = {name: {c: results.column(f"{name}.{c}") for c in COMPARED.values()} for name in names}
-        over = np.zeros(len(results), dtype=bool)
-        for field, limit in limits.items():
-            for name in names:
-                over |= values[name][COMPARED[field]] > limit
-        count = int(over.sum())
-
-        def low_and_high(
-            column: str, values: Mapping[str, Mapping[str, np.ndarray]] = values
-        ) -> dict[str, tuple[Known, Known]]:
-            return {
-                name: (quantile(columns[column], 0.5), quantile(columns[column], 0.95))
-                for name, columns in values.items()
-            }
-
+        beyond = [
+            results.column(f"{name}.{COMPARED[field]}") / limit
+            for field, limit in limits.items()
+            for name in names
+        ]
         found.append(
             NextDrop(
                 speed=share * speed,
-                peak_force=low_and_high("peak_force"),
-                peak_stress=low_and_high("peak_stress"),
-                beyond_limit=share_of(count / len(over), count, count, len(over)) if limits else None,
+                peak_force={name: _middle_and_high(results, f"{name}.peak_force") for name in names},
+                peak_stress={name: _middle_and_high(results, f"{name}.peak_stress") for name in names},
+                beyond_limit=exceedance(np.max(beyond, axis=0), 1.0) if beyond else None,
             )
         )
         if progress is not None:
             progress("the next drop", (k + 1) / len(shares))
     return tuple(found)
+
+
+def _middle_and_high(results: StudyResults, column: str) -> tuple[Known, Known]:
+    """What half and 95 % of the drops stay below."""
+    return results.quantile(column, 0.5), results.quantile(column, 0.95)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
+from rotordrop.document import read_toml
 from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import following
@@ -419,13 +419,7 @@ def load_study(path: str | Path) -> Study:
 
 def read_file(path: str | Path, what: str, read: Callable[[Mapping[str, Any], Machine], T]) -> T:
     """Read a plan (TOML) with the machine it names; every message names the file."""
-    file = Path(path)
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UsageError(f"{file}: cannot read the {what} file: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: not valid TOML: {error}") from error
+    file, table = Path(path), read_toml(path, what)
     named = table.get("machine")
     if not isinstance(named, str):
         raise UsageError(f'{file}: machine = {named!r}; expected the name of a machine file, "machine.toml"')

@@ -26,6 +26,7 @@ from rotordrop.track.smoother import (
     pass_settings,
     smooth,
 )
+from rotordrop.units import GRAVITY
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -78,7 +79,7 @@ QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, force=0.07, share=0.01, pa
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
 REFERENCE_CONTACT = 0.0075
-REFERENCE_FALL = math.sqrt(2.0 * 0.25e-3 / 9.81)
+REFERENCE_FALL = math.sqrt(2.0 * 0.25e-3 / GRAVITY)
 """First contact and time of a free fall that the windows of the schedules are written for [s]."""
 WHOLE_DROP = 0.1
 """Windows from here on are parts of the drop, not of its first contacts [s]."""

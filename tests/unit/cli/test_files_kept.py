@@ -143,9 +143,12 @@ def things(tmp_path_factory) -> Path:
         'machine = "m.toml"\ndrops = 2\nduration = "2 ms"\nreduction = "quick"\n'
         'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
     )
-    for name, force in (("a", 3300.0), ("b", 2000.0)):
+    small = example_machine("small").name
+    for name, force, machine in (("a", 3300.0, "m"), ("b", 2000.0, "m"), ("small", 900.0, small)):
         peaks = {"peak_force_N": value(force), "peak_stress_Pa": value(1.5e9)}
-        drop = published(record=name, record_sha256=name * 64, bearings={"DE": bearing(peaks)})
+        drop = published(
+            record=name, record_sha256=name * 64, machine=machine, bearings={"DE": bearing(peaks)}
+        )
         write_json(folder / f"{name}.json", drop.as_json(), sealed=True)
     assert run(["log", "add", str(folder / "log.db"), str(folder / "a.json")]) == 0
     assert run(["study", "run", str(folder / "s.toml"), "--folder", str(folder / "study")]) == 0
@@ -156,6 +159,7 @@ CALLS = {
     "look": "look r.h5 m.toml",
     "profile": "profile r.h5",
     "waterfall": "waterfall m.toml r.h5 --points 512",
+    "restart": "restart small.toml small.json --drops 0",
     "compare": "compare a.json b.json",
     "log": "log show log.db",
     "study run": "study run s.toml --folder study",
@@ -171,7 +175,7 @@ CALLS = {
     "doctor": "doctor",
 }
 """Commands that end soon with what they write."""
-LONG = {"clearance", "estimate", "calibrate", "restart", "study repeat", "study rare", "study design"}
+LONG = {"clearance", "estimate", "calibrate", "study repeat", "study rare", "study design"}
 """Commands that compute for long, or need a recording of their own: what they write is written by functions
 that `test_written_files` gives a full disk."""
 BEYOND = {"look share": "--licence CC0-1.0"}

@@ -11,16 +11,21 @@ import pytest
 from scipy.integrate import quad
 from tests.published import bearing, published, value
 
+from rotordrop.cli.app import run
+from rotordrop.document import read_document
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Parameter, Unbalance, Value
+from rotordrop.files import write_json
 from rotordrop.known import NINETY, Known
+from rotordrop.machine import example_machine
+from rotordrop.machine.saving import save_machine
 from rotordrop.report.restart_page import restart_numbers, restart_page
 from rotordrop.report.terminal import print_summary
 from rotordrop.restart import load_assumptions, restart_card
 from rotordrop.restart.assumptions import assumptions_of
 from rotordrop.restart.card import ANSWERS
 from rotordrop.restart.evidence import indicators, suspicions
-from rotordrop.restart.next_drop import NextDrop
+from rotordrop.restart.next_drop import NextDrop, next_drops
 
 ASSUMED = assumptions_of({}, "here")
 
@@ -221,7 +226,7 @@ def test_owner_states_what_differs_and_the_rest_stays(tmp_path):
         ),
         ("[checks.lift.shows]\nworn = 2.0", r"checks\.lift\.shows\.worn = 2; expected a chance from 0 to 1"),
         ("machine_cost = nan", r"machine_cost is 'nan'"),
-        ("machine_cost =", r"is no TOML"),
+        ("machine_cost =", r"not valid TOML"),
     ],
 )
 def test_bad_assumptions_are_named(tmp_path, text, message):
@@ -229,7 +234,7 @@ def test_bad_assumptions_are_named(tmp_path, text, message):
     file.write_text(text)
     with pytest.raises(UsageError, match=message):
         load_assumptions(file)
-    with pytest.raises(UsageError, match=r"cannot be read.*name another file"):
+    with pytest.raises(UsageError, match=r"none\.toml: cannot read the assumptions file"):
         load_assumptions(tmp_path / "none.toml")
 
 
@@ -275,3 +280,35 @@ def test_probabilities_are_reliable_where_the_world_is_as_assumed():
         true.append(worn)
     error = math.sqrt(sum(p * (1 - p) for p in stated))
     assert abs(sum(stated) - sum(true)) < 3.0 * error
+
+
+def test_next_drops_are_at_their_speeds_and_pass_limits_as_they_say():
+    machine = example_machine("small")
+    full, slower = next_drops(machine, 2 * math.pi * 100.0, {"peak_force_N": 1.0}, drops=20, duration=0.01)
+    assert (full.speed, slower.speed) == pytest.approx((2 * math.pi * 100.0, 2 * math.pi * 70.0))
+    for name in full.peak_force:
+        middle, high = full.peak_force[name]
+        assert 0.0 < middle.value <= high.value
+    assert full.beyond == 1.0, "a newton is passed by every drop"
+    between = 0.5 * sum(known[0].value for known in full.peak_force.values()) / len(full.peak_force)
+    high = {"peak_force_N": 1e9, "peak_stress_Pa": 1e12}
+    (none,) = next_drops(machine, 2 * math.pi * 100.0, high, drops=20, duration=0.01, shares=(1.0,))
+    assert none.beyond == 0.0 < between
+    (unasked,) = next_drops(machine, 2 * math.pi * 100.0, {}, drops=20, duration=0.01, shares=(1.0,))
+    assert unasked.beyond_limit is None
+
+
+def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
+    machine = example_machine("small")
+    one = drop(machine=machine.name, speed_Hz=80.0)
+    estimate, file, out = (tmp_path / name for name in ("drop.json", "m.toml", "card.json"))
+    write_json(estimate, one.as_json(), sealed=True)
+    save_machine(machine, file)
+    call = ["restart", str(file), str(estimate), "--drops", "20", "--json", str(out), "--check", "lift=good"]
+    assert run([*call, "--report", str(tmp_path / "card.html")]) == 0
+    card = read_document(out)
+    assert card["next_drops"][0]["speed"] == pytest.approx(2 * math.pi * 80.0)
+    assert card["made"] == {"lift": "good"}
+    assert f"Restart of {machine.name}" in (tmp_path / "card.html").read_text()
+    save_machine(example_machine("lp400"), file)
+    assert run(call) == UsageError.exit_code

@@ -90,16 +90,16 @@ class _Sides:
     at_end: Array
     slope: Array
     """Weights of the value half a sample beyond the last one, and of the slope per sample there."""
-    left_over: Array
-    """Weights of what no parabola explains, shape (count, count - 3)."""
+    explained: Array
+    """Orthonormal weights of what a parabola explains, shape (count, 3)."""
 
     @classmethod
     def of(cls, count: int) -> _Sides:
         """Parabolas through a number of samples."""
         design = np.vander(np.arange(count) + 0.5, 3)
         slope, begin = np.linalg.pinv(design)[1:]
-        left_over = np.linalg.svd(design)[0][:, 3:]
-        return cls(count=count, at_end=begin[::-1].copy(), slope=-slope[::-1].copy(), left_over=left_over)
+        explained = np.linalg.qr(design)[0]
+        return cls(count=count, at_end=begin[::-1].copy(), slope=-slope[::-1].copy(), explained=explained)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,12 +144,14 @@ def check_continuity(record: Record) -> list[Finding]:
 
 def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
     count = sides.count
-    windows = np.lib.stride_tricks.sliding_window_view(part, count, axis=0)
-    left = np.sum((windows @ sides.left_over) ** 2, axis=-1)
+    # about their middle: the difference of two sums of squares loses what an offset takes up of them
+    windows = np.lib.stride_tricks.sliding_window_view(part - np.median(part, axis=0), count, axis=0)
+    left = np.einsum("...k,...k", windows, windows) - np.sum((windows @ sides.explained) ** 2, axis=-1)
     free = count - 3
     smooth = left < (free + _SMOOTH * math.sqrt(2.0 * free)) * noise**2
     # where a channel holds one reading it is stuck, which has its own name
-    smooth &= np.sum(windows[..., 1:] == windows[..., :-1], axis=-1) < count // 2
+    same = np.cumsum(np.vstack([np.zeros(part.shape[1]), part[1:] == part[:-1]]), axis=0)
+    smooth &= same[count - 1 :] - same[: len(smooth)] < count // 2
     ends, begins = windows @ sides.at_end, windows @ sides.at_end[::-1]
     out, into = windows @ sides.slope, windows @ -sides.slope[::-1]
     return _Jumps(

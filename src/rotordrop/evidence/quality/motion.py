@@ -12,7 +12,7 @@ from rotordrop.evidence.events import fall_accelerations, nominal_gaps
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.recording import Array
-from rotordrop.units import format_quantity
+from rotordrop.units import GRAVITY, format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -44,8 +44,6 @@ _POSSIBLE_FALL = (5e-3, 200.0)
 
 _CLEAR = 0.25
 """Logarithm of a factor from which on the fall tells a wrong clock from a wrong speed [1]."""
-
-GRAVITY = 9.81
 
 _LONG_ENOUGH = 0.2
 _LOUD = 3e-6
