@@ -87,9 +87,11 @@ def look(
 
 
 def _loaded(machine: Path | None) -> Machine | None:
-    from rotordrop.machine import load_machine
+    if machine is None:
+        return None
+    from rotordrop.machine import load_machine  # half a second that a look alone does not need
 
-    return None if machine is None else load_machine(machine)
+    return load_machine(machine)
 
 
 def _split(

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,9 @@ from rotordrop.estimate.published import Value
 from rotordrop.known import Known
 from rotordrop.severity.statistics import StressStatistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
-from rotordrop.simulate.result import DropResult
+
+if TYPE_CHECKING:
+    from rotordrop.simulate.result import DropResult
 
 Array = NDArray[np.float64]
 Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]

@@ -285,7 +285,7 @@ def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys
     assert run(["look", record, str(example_path("lp400"))]) == 0
     program = (
         "import sys; from rotordrop.evidence.look import look; "
-        f"look({record!r}); assert not {{'numba', 'plotly', 'scipy.signal'}} & set(sys.modules)"
+        f"look({record!r}); assert not {{'numba', 'pint', 'plotly', 'scipy'}} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
 

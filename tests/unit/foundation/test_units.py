@@ -77,6 +77,24 @@ def test_value_in_si(text, kind, value):
 
 
 @pytest.mark.parametrize(
+    ("kind", "units"),
+    [
+        ("length", "m mm um µm mil"),
+        ("time", "s ms us µs"),
+        ("frequency", "Hz kHz rpm"),
+        ("speed", "rad/s Hz rpm"),
+        ("angle", "rad deg"),
+    ],
+)
+def test_usual_units_are_those_of_the_unit_library(kind, units):
+    """Brackets leave the short way, which needs no library."""
+    for unit in units.split():
+        assert parse_quantity(f"3.25 {unit}", kind) == pytest.approx(
+            parse_quantity(f"3.25 ({unit})", kind), rel=1e-14
+        )
+
+
+@pytest.mark.parametrize(
     ("text", "kind", "message"),
     [
         ("0,27 mm", "length", r"'0,27 mm' has a decimal comma; use 0\.27 mm"),
