@@ -48,7 +48,7 @@ def maxima_of(analysis):
             "largest_um": round(1e6 * plane.history.largest, 2),
             "at_s": round(plane.history.largest_time, 4),
             "later_um": round(1e6 * plane.history.largest_later, 2),
-            "last_lift_off_s": round(plane.settling.last_lift_off, 4),
+            "contact_from_s": plane.settling.contact_from,
             "statement": plane.history.statement,
         }
         for name, plane in analysis.planes.items()

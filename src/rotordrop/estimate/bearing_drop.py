@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rotordrop.estimate import published
 from rotordrop.estimate.published import Value
 from rotordrop.known import Known
+from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.severity.statistics import StressStatistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
 
@@ -207,7 +208,7 @@ class BearingDrop:
     missing: Mapping[str, str] = field(default_factory=dict)
     """Numbers that are not stated, by field name, and why."""
     impacts: tuple[Impact, ...] = ()
-    """In the order of their beginning."""
+    """Every contact in the order of its beginning; `after_flight` marks those that are impacts."""
     impact_force: str = "contact force"
     """Name of the force whose peak the impacts state."""
     first_contact: FirstContact | None = None
@@ -220,6 +221,28 @@ class BearingDrop:
             self.stress.values, time=self.stress.time, preload_stress=self.preload_stress
         )
         return replace(found, maximum=self.peak_stress.value)
+
+    @property
+    def touched(self) -> Array:
+        """When each impact began, by the rule and the displacement that a look goes by [s], shape (K,)."""
+        if self.air_gap is None:
+            return np.empty(0)
+        own = [motion for motion in self.motions if motion.role in ("estimated", "simulated")]
+        motion, gap = (own or self.motions)[0], 0.5 * (self.air_gap.lower + self.air_gap.upper)
+        rate = (len(motion.time) - 1) / float(motion.time[-1] - motion.time[0])
+        return motion.time[find_impacts(motion.displacement, rate, gap, 0.0).touched]
+
+    @property
+    def after_flight(self) -> tuple[bool, ...]:
+        """For every contact, whether it is the one that begins an impact."""
+        starts = np.array([impact.start for impact in self.impacts])
+        begun = {int(np.argmin(np.abs(starts - time))) for time in self.touched} if len(starts) else set()
+        return tuple(number in begun for number in range(len(starts)))
+
+    @property
+    def contact_from(self) -> float | None:
+        """When the last impact began, the rotor in contact from there on [s]; None where it was not."""
+        return lasting_from(self.touched, float(self.force.time[-1]))
 
 
 def deepest(motion: Motion, start: float, end: float, gap: float) -> FirstContact:
@@ -329,8 +352,9 @@ def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = 
                 peak_force_N=Value.of_known(impact.peak_force),
                 impulse_N_s=Value.of_known(impact.impulse),
                 dissipated_energy_J=Value.of_known(impact.dissipated_energy),
+                after_flight=after,
             )
-            for impact in bearing.impacts
+            for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
         ],
         **({"not_stated": dict(bearing.missing)} if bearing.missing else {}),
     )

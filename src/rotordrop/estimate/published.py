@@ -67,7 +67,7 @@ class Value(Document):
 
 
 class Impact(Document):
-    """One impact at one bearing."""
+    """One contact at one bearing."""
 
     start_s: float
     end_s: float | None
@@ -76,6 +76,8 @@ class Impact(Document):
     peak_force_N: Value
     impulse_N_s: Value
     dissipated_energy_J: Value
+    after_flight: bool = False
+    """Whether it begins an impact; the others follow a hop too short to be told from the displacement."""
 
 
 class Statistics(Document):

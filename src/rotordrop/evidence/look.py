@@ -31,11 +31,12 @@ from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
-from rotordrop.evidence.wall import GAIN, LEVER_DOUBT, slope
+from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
 from rotordrop.files import DIGEST
 from rotordrop.json_schema import DIALECT, FLAG, MAYBE, MAYBE_PAIR, NUMBER, PAIR, TEXT, TEXTS, closed, listed
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import Arrangement
+from rotordrop.record.impacts import slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.record import Record, open_record
 from rotordrop.units import in_si

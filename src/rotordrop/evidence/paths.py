@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
-from rotordrop.evidence.wall import Wall, find_wall, reversals_of
+from rotordrop.evidence.wall import Wall, find_wall
 from rotordrop.physics.whirl_spells import whirl_spells
+from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.record.record import Record
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
@@ -22,9 +23,6 @@ _SLOWEST_FALL = 0.2
 
 BEYOND = 0.06
 """A kink so far beyond the air gap, over it, is not that of the first touch [1] (chosen)."""
-
-LASTING = 0.05
-"""Contact without an impact for this long lasts [s]."""
 
 Gap = tuple[float, float]
 """An air gap and its standard error [m]."""
@@ -302,13 +300,13 @@ def _release(motion: Motion, start: int, stop: int) -> float | None:
 
 
 def with_impacts(motion: Motion, drop: Drop) -> Drop:
-    """A drop with its impacts and the begin of lasting contact, by the rule of `reversals_of`."""
+    """A drop with its impacts and the begin of lasting contact, by the rule of `find_impacts`."""
     inside = (motion.time >= drop.release) & (motion.time <= drop.end)
     first, time = int(np.argmax(inside)), motion.time[inside]
     impacts, lasting = [], []
     for path in motion.paths:
         place = path.bearing_position[inside]
-        hits = reversals_of(place, motion.rate, path.gap, path.noise, np.array([0.0, -1.0]))
+        hits = find_impacts(place, motion.rate, path.gap, path.noise)
         touched = time[hits.touched]
         touch = path.wall.touch
         if (
@@ -330,9 +328,7 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
                 touched, hits.deepest, hits.approach, hits.rebound, strict=True
             )
         ]
-        last = float(touched[-1]) if len(touched) else None
-        ends = last is None or drop.end - last < LASTING
-        lasting.append(None if ends else last)
+        lasting.append(lasting_from(touched, drop.end))
     return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), lasting=tuple(lasting))
 
 

@@ -18,12 +18,10 @@ from numpy.typing import NDArray
 
 from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
+from rotordrop.record.impacts import Impacts, find_impacts
 from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY
-
-SMOOTHING = 1e-3
-"""Window of velocities [s]."""
 
 _CENTRED = 0.08
 """Standard deviation of where a rotor floats from the centre, per axis, over the gap [1] (chosen)."""
@@ -78,28 +76,6 @@ _SEARCHED = 2.0
 _LYING = 0.75
 """A rotor further from a centre that is not yet sure than this share of the gap may lie on its race [1]."""
 
-_NEAR = 0.85
-"""A contact turns the rotor back at this share of the gap or beyond [1]."""
-
-HOP = 0.05
-"""A rotor that left its race by less than this share of the gap has not left it [1] (chosen)."""
-
-_FREE, _LEAST_FREE = 0.8, 0.3
-"""Least mean acceleration in a flight over that of a free body, and least of that over gravity [1] (both from
-the first half of DropBench)."""
-
-_LONGEST_FALL = 20e-3
-"""The first approach is looked for so long before the first reversal [s]."""
-
-_SHARPEST_SWING = 0.7
-"""Radial acceleration over gravity above which a reversal is an impact [1]: a swing along the race and the
-wrong centre of a circle give less."""
-
-
-def shortest_flight(gap: float) -> float:
-    """Shortest flight that ends in an impact [s]: gravity moves the rotor by `HOP` of the gap in it."""
-    return math.sqrt(8.0 * HOP * gap / GRAVITY)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Wall:
@@ -128,91 +104,6 @@ class Wall:
     def determined(self) -> bool:
         """Whether the record, or who gave it, tells the radius to `_DOUBTFUL` of itself."""
         return NINETY * self.gap_error < _DOUBTFUL * self.gap
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reversals:
-    """Where a bearing turned the rotor back; K impacts, as samples of the path."""
-
-    deepest: NDArray[np.int64]
-    """Deepest point, shape (K,)."""
-    touched: NDArray[np.int64]
-    """Kink of the radial velocity before it, to about 0.3 ms, shape (K,)."""
-    approach: Array
-    rebound: Array
-    """Largest radial velocity before and after, by straight lines over `SMOOTHING` [m/s], shape (K,)."""
-
-
-def reversals_of(path: Array, rate: float, gap: float, noise: float, down: Array) -> Reversals:
-    """Find the impacts of a path (N, 2) from the centre: back on the race after a flight, and turned sharply.
-
-    A flight lasts as long as gravity needs to take the rotor off the race by `HOP` of the gap, and is
-    accelerated like that of a free body. Shorter hops belong to the impact before; a rotor that swings along
-    its race, or shakes with it, makes none.
-    """
-    radius = np.hypot(*path.T)
-    speed, velocity = slope(radius, rate), slope(path, rate)
-    along = path / np.maximum(radius, 1e-12)[:, None]
-    across = along[:, 0] * velocity[:, 1] - along[:, 1] * velocity[:, 0]
-    free = GRAVITY * (along @ down) + across**2 / gap
-    shortest = shortest_flight(gap)
-    early = round(0.25 * SMOOTHING * rate)  # a velocity over a window turns up to half of it before the kink
-    reach = max(int(max(2e-3, 1.5 * shortest) * rate), 1)
-    found: list[tuple[int, int, float, float]] = []
-    before: int | None = None
-    for at in peaks(radius, _NEAR * gap, max(0.5 * HOP * gap, 6.0 * noise)):
-        begin = max(at - round(_LONGEST_FALL * rate), 0) if before is None else before
-        fastest = begin + int(np.argmax(speed[begin : at + 1]))
-        left = begin if before is None else begin + int(np.argmin(speed[begin : fastest + 1]))
-        leaves = at + int(np.argmin(speed[at : at + reach + 1]))
-        approach, rebound = max(float(speed[fastest]), 0.0), max(float(-speed[leaves]), 0.0)
-        turned = (approach + rebound) * rate / max(leaves - fastest, 1)
-        flew = (fastest - left) / rate
-        gained = float(speed[fastest] - speed[left]) / max(flew, 1.0 / rate)
-        accelerated = gained / max(float(np.mean(free[left : fastest + 1])), _LEAST_FREE * GRAVITY)
-        hopped = float(radius[at] - np.min(radius[left : at + 1])) > 0.5 * HOP * gap
-        flight = flew > shortest and accelerated > _FREE
-        if before is None or (flight and hopped and turned > _SHARPEST_SWING * GRAVITY):
-            found.append((at, min(fastest + early, at), approach, rebound))
-        before = at
-    columns = list(zip(*found, strict=True)) if found else [(), (), (), ()]
-    return Reversals(
-        deepest=np.array(columns[0], dtype=np.int64),
-        touched=np.array(columns[1], dtype=np.int64),
-        approach=np.array(columns[2], dtype=np.float64),
-        rebound=np.array(columns[3], dtype=np.float64),
-    )
-
-
-def slope(values: Array, rate: float) -> Array:
-    """Velocity by a straight line through `SMOOTHING` around every sample [m/s], shape of the values."""
-    half = max(int(0.5 * SMOOTHING * rate), 1)
-    index = np.arange(-half, half + 1)
-    weights = -index * rate / float(np.sum(index**2))  # numpy turns the kernel round
-    columns = [
-        np.convolve(np.pad(column, half, mode="edge"), weights, mode="valid")
-        for column in np.atleast_2d(values.T)
-    ]
-    return np.stack(columns, axis=-1).reshape(values.shape)
-
-
-def peaks(values: Array, floor: float, least: float) -> list[int]:
-    """Maxima above a floor between which the values fall by at least `least`."""
-    found: list[int] = []
-    best, lowest, rising = 0, float(values[0]), True
-    for i, value in enumerate(values.tolist()):
-        if rising:
-            if value > values[best]:
-                best = i
-            elif values[best] - value > least:
-                if values[best] >= floor:
-                    found.append(best)
-                rising, lowest = False, value
-        elif value < lowest:
-            lowest = value
-        elif value - lowest > least:
-            rising, best = True, i
-    return found
 
 
 def find_wall(
@@ -253,7 +144,7 @@ def find_wall(
     touch = first_touch(place, floated, rate, begin, size, noise)
     touched = None if touch is None or not touch.by_kink else (touch.at(place), touch.at(apart))
 
-    def residual(sought: Array, hits: Reversals, strays: Array, lying: NDArray[np.int64]) -> Array:
+    def residual(sought: Array, hits: Impacts, strays: Array, lying: NDArray[np.int64]) -> Array:
         centre, gap, beta, lever = sought[:2], sought[2], math.exp(sought[3]), sought[5]
 
         def beyond(here: Array, aside: Array) -> Array:
@@ -288,7 +179,7 @@ def find_wall(
     for _ in range(10):
         path = place + sought[5] * apart
         radius = np.hypot(*(path - sought[:2]).T)
-        hits = reversals_of(path[sunk:] - sought[:2], rate, float(sought[2]), noise, down)
+        hits = find_impacts(path[sunk:] - sought[:2], rate, float(sought[2]), noise, down)
         strays = _STRAYS * math.exp(sought[3]) * hits.approach
         lying = _lying(
             radius, sunk + (int(hits.deepest[-1]) if len(hits.deepest) else 0), rate, sought[2], noise

@@ -79,7 +79,7 @@ def _loads(estimate: Estimate) -> Table:
         "peak bearing force": lambda b: number(b.peak_force.known, "force"),
         "at, pressed towards": _moment,
         "peak Hertz stress": lambda b: number(b.peak_stress.known, "pressure"),
-        "impacts": lambda b: b.missing.get("impacts", str(len(b.impacts))),
+        "impacts (contacts)": _impacts,
         "largest displacement": _displacement,
         "mean force, 150 to 200 ms": mean,
     }
@@ -89,6 +89,12 @@ def _loads(estimate: Estimate) -> Table:
         values = {name: of(bearing) for name, of in lines.items()}
         columns.append(Column(bearing.name, values.__getitem__))
     return table(lines, columns)
+
+
+def _impacts(b: BearingDrop) -> str:
+    """How many impacts and contacts, and from when on the rotor stayed in contact."""
+    lasts = "" if b.contact_from is None else f", in contact from {shown(b.contact_from, 'time', 3)}"
+    return b.missing.get("impacts", f"{len(b.touched)} ({len(b.impacts)}){lasts}")
 
 
 def _moment(b: BearingDrop) -> str:

@@ -11,24 +11,34 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop.estimate.bearing_drop import BearingDrop, Impact
+from rotordrop.record.impacts import HOP
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity, places_of
 from rotordrop.report.style import MUTED, axis_title, curve, panels, square
 
 LISTED = 24
+IMPACT_RULE = (
+    f"An impact is a return to the race after a flight that takes the rotor {HOP:.0%} of the air gap off it; "
+    "shorter hops belong to the impact before, and a swing along the race is none."
+)
 LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
 
 
 def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
     """List the strongest impacts in the order of time, with the name of the force whose peak is stated."""
-    impacts = [(bearing.name, impact) for bearing in bearings for impact in bearing.impacts]
+    impacts = [
+        (bearing.name, impact, after)
+        for bearing in bearings
+        for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
+    ]
+    count = sum(after for *_, after in impacts)
     strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
     left_out = len(impacts) - len(strongest)
     rest = f" {left_out} weaker ones are left out." if left_out else ""
 
     def number(label: str, field: str, kind: str) -> Column:
         """A number of the impacts, with as many places in every line as the largest needs."""
-        places = places_of((getattr(impact, field).value for _, impact in strongest), kind)
+        places = places_of((getattr(impact, field).value for _, impact, _ in strongest), kind)
         return Column(label, lambda row: replace(Quantity.of(getattr(row[1], field), kind), places=places))
 
     columns = (
@@ -39,12 +49,13 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         number("impulse", "impulse", "impulse"),
         number("dissipated energy", "dissipated_energy", "energy"),
         Column("duration", lambda row: row[1].end - row[1].start, "time", 3),
+        Column("impact", lambda row: "yes" if row[2] else ""),
     )
     return table(
         sorted(strongest, key=lambda item: item[1].peak_time),
         columns,
-        f"Impacts ({len(strongest)} of {len(impacts)})",
-        f"Azimuth counter-clockwise from +x, −90° is the bottom.{rest}",
+        f"Contacts ({len(strongest)} of {len(impacts)}), {count} of them impacts",
+        f"Azimuth counter-clockwise from +x, −90° is the bottom. {IMPACT_RULE}{rest}",
     )
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
-from rotordrop.evidence.wall import HOP
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -22,6 +21,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.drop_sections import motion_section, orbit_section
+from rotordrop.report.impacts import IMPACT_RULE
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.record_quality import quality_statements, record_quality_section
 from rotordrop.units import format_moment
@@ -33,10 +33,6 @@ MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
 ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
-RULE = (
-    f"An impact is a return to the race after a flight that takes the rotor {HOP:.0%} of the air gap off it; "
-    "shorter hops belong to the impact before, and a swing along the race is none."
-)
 VAGUE = 0.05
 """A length whose 90 % interval reaches further to either side is shown as a range [1] (chosen)."""
 SENSOR_PLANES = "Displacement in the planes of the sensors; time counts from the release."
@@ -196,5 +192,5 @@ def _impacts(seen: Look) -> Table:
     )
     note = f"The first {MOST_LISTED} of {len(seen.impacts)}." if len(seen.impacts) > MOST_LISTED else ""
     return table(
-        seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{RULE} {note}".strip()
+        seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{IMPACT_RULE} {note}".strip()
     )

@@ -59,7 +59,9 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
         figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
     lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
-    figures.append(fact("Contacts", len(bearing.impacts), "count"))
+    figures.append(
+        fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
+    )
     figures.append(fact("Energy lost in contact", lost, "energy", 3))
     return Card(card.title, tuple(figures))
 

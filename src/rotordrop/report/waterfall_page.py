@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from rotordrop.report.content import (
     Card,
     Column,
     Figure,
+    KeyFigure,
     ReportContent,
     Section,
     Statement,
@@ -20,7 +22,7 @@ from rotordrop.report.content import (
     fact,
     table,
 )
-from rotordrop.report.quantity import shown, with_error, written
+from rotordrop.report.quantity import Quantity, shown, with_error, written
 from rotordrop.report.style import TURN
 from rotordrop.report.waterfall_figure import (
     displacement_history_figure,
@@ -77,13 +79,17 @@ def waterfall_page(
     """
     cards = []
     for name, plane in analysis.planes.items():
-        history, last = plane.history, plane.settling.last_lift_off
+        history, contact = plane.history, plane.settling.contact_from
         at = f"at {shown(history.largest_time, 'duration', 3)}"
+        largest = Quantity(
+            value=history.largest, kind="length", interval_90=history.largest_interval_90, digits=3
+        )
         figures = (
-            fact("Largest displacement", history.largest, "length", note=at),
+            KeyFigure("Largest displacement", largest, note=at),
             fact("Beyond the air gap", history.largest_indentation, "length", 3),
             fact("Largest after 0.2 s", history.largest_later, "length"),
-            fact("Last lift-off", last, "duration", 3),
+            fact("Impacts", len(plane.settling.touched), "count"),
+            fact("In contact from", math.nan if contact is None else contact, "duration", 3),
         )
         cards.append(Card(f"{name} plane", figures))
     return ReportContent(
@@ -143,7 +149,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
 
 def settling_statement(name: str, plane: PlaneAnalysis) -> Statement:
     """When the rotor came to lie in its bearing for good."""
-    settled = plane.settling.settled
+    settled = plane.settling.contact_from is not None
     return Statement(f"{name}: {plane.settling.statement}", "good" if settled else "notice")
 
 

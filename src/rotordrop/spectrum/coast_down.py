@@ -47,8 +47,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
-BOUNCE_MARGIN = 0.1
-"""Time [s] after the last lift-off from which lines are looked for."""
+BOUNCE_MARGIN = 0.15
+"""Time [s] after the last impact from which lines are looked for (chosen)."""
 LONGEST_BOUNCE = 0.1
 """Share of the signal [1] that is left out at most."""
 RACES_SPUN_UP = 1.0
@@ -87,7 +87,7 @@ class CoastDownSignal:
     recorded: bool
     """False for a simulation."""
     air_gap_error: Mapping[str, float] | None = None
-    """Standard error of the air gaps [m], where the signal shows them."""
+    """Standard error of the air gaps, and of distances from the centre [m], where the signal shows them."""
     centre: str = "the centre of the bearing"
     """Where the displacements count from, in words."""
     standstill: float | None = None
@@ -193,7 +193,9 @@ def analyse_coast_down(
     tell("lines", 0.05)
     read = signal.planes if signal.recorded else _as_read_by_a_sensor(signal.planes)
     settled = {
-        name: find_settling(moved, signal.sampling_rate, start_time=signal.start_time)
+        name: find_settling(
+            moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
+        )
         for name, moved in signal.planes.items()
     }
     lines = find_lines(
@@ -219,8 +221,7 @@ def analyse_coast_down(
 
 def _bouncing(signal: CoastDownSignal, settled: Iterable[Settling]) -> float:
     """How long the rotor bounces at the beginning [s]; nothing if it does not settle soon."""
-    last = max((found.last_lift_off for found in settled if found.settled), default=0.0)
-    last = max(last, 0.0)
+    last = max((found.contact_from for found in settled if found.contact_from is not None), default=0.0)
     duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
     return last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0
 
@@ -255,7 +256,13 @@ def _plane(
         resonances = find_resonances(track, name, candidates=modes)
     return PlaneAnalysis(
         waterfalls=_waterfalls(signal, moved, choice),
-        history=displacement_history(moved, rate, air_gap=signal.air_gap[name], start_time=start),
+        history=displacement_history(
+            moved,
+            rate,
+            air_gap=signal.air_gap[name],
+            error=None if signal.air_gap_error is None else signal.air_gap_error[name],
+            start_time=start,
+        ),
         settling=settled,
         track=track,
         resonances=resonances,
@@ -324,14 +331,15 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
     later = np.isfinite(history.largest_later)
     found: dict[str, Any] = {
         "largest_displacement_m": history.largest,
+        "largest_displacement_interval_90_m": history.largest_interval_90,
         "largest_displacement_time_s": history.largest_time,
         "largest_indentation_m": history.largest_indentation,
         "largest_later_m": history.largest_later if later else None,
         "largest_later_time_s": history.largest_later_time if later else None,
         "first_0.2_s_held_the_maximum": bool(held_maximum(history)),
         "statement": history.statement,
-        "settled": plane.settling.settled,
-        "last_lift_off_s": plane.settling.last_lift_off,
+        "impacts": len(plane.settling.touched),
+        "contact_from_s": plane.settling.contact_from,
         "settling": plane.settling.statement,
         "resonances": [resonance.as_json() for resonance in plane.resonances],
         "waterfalls": [_waterfall_json(item) for item in plane.waterfalls],

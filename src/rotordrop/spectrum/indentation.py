@@ -1,4 +1,4 @@
-"""Displacement over a whole coast-down: envelope, largest indentation and when, end of bouncing (Fig. 17)."""
+"""Displacement over a whole coast-down: envelope, largest indentation and when, impacts (Fig. 17)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import RecordError
+from rotordrop.known import NINETY
+from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 from rotordrop.units import format_moment
@@ -16,6 +18,8 @@ from rotordrop.units import format_moment
 Array = NDArray[np.float64]
 
 BLOCK = 65536
+LONGEST_FLIGHT = 0.1
+"""A rotor is back on its race within this time [s]: across a gap of 2 mm and back gravity takes 0.04 s."""
 PAPER_WINDOW = 0.2
 """How long the paper simulates [s] (Neisi 2020, section 5.4)."""
 
@@ -37,6 +41,8 @@ class DisplacementHistory:
     """Radius of the air-gap window [m]."""
     largest: float
     """Largest magnitude [m]."""
+    largest_interval_90: tuple[float, float] | None
+    """Interval that holds it with 90 % probability [m]; None where the centre is not estimated."""
     largest_time: float
     """When [s]."""
     largest_indentation: float
@@ -55,16 +61,14 @@ class DisplacementHistory:
 
 @dataclass(frozen=True, kw_only=True)
 class Settling:
-    """When the rotor stopped bouncing, and how it lay and swung then."""
+    """The impacts on one bearing, and from when on the rotor stayed in contact."""
 
-    last_lift_off: float
-    """Last time the rotor was off the race [s]; from then on it stayed in contact."""
+    touched: Array
+    """When each impact began, by the rule of `rotordrop.record.impacts` [s], shape (K,)."""
+    contact_from: float | None
+    """When the last impact began, from which on it stayed in contact [s]; None where it did not."""
     contact_radius: float
-    """Magnitude of displacement in contact [m]."""
-    margin: float
-    """By how much the magnitude must fall below ``contact_radius`` to count as off the race [m]."""
-    settled: bool
-    """False when the rotor was still lifting off in the last second of the signal."""
+    """Magnitude of displacement in the last second [m]."""
     statement: str
 
 
@@ -73,6 +77,7 @@ def displacement_history(
     sampling_rate: float,
     *,
     air_gap: float,
+    error: float | None = None,
     start_time: float = 0.0,
     window: float = PAPER_WINDOW,
     intervals: int = 2000,
@@ -88,6 +93,8 @@ def displacement_history(
         [Hz].
     air_gap : float
         Radial clearance between rotor and race [m].
+    error : float, optional
+        Standard error of distances from the centre [m], where it is estimated.
     start_time : float
         Time of the first sample after power-off [s].
     window : float
@@ -126,6 +133,8 @@ def displacement_history(
     lowest, highest = envelope.radius()
     lowest_xy, highest_xy = envelope.directions()
     spread = float(np.median(noise))
+    half = None if error is None else NINETY * error
+    between = None if half is None else (float(largest) - half, float(largest) + half)
     middles = (np.arange(lowest.size, dtype=np.float64) + 0.5) * per_interval / sampling_rate
     return DisplacementHistory(
         time=start_time + middles,
@@ -135,6 +144,7 @@ def displacement_history(
         highest_xy=highest_xy,
         air_gap=air_gap,
         largest=float(largest),
+        largest_interval_90=between,
         largest_time=largest_time,
         largest_indentation=float(largest) - air_gap,
         largest_later=later,
@@ -142,32 +152,24 @@ def displacement_history(
         window=window,
         noise=spread,
         statement=_window_statement(
-            (float(largest), largest_time), (later, later_time), air_gap, window, spread
+            (float(largest), largest_time), (later, later_time), air_gap, window, spread, half
         ),
     )
 
 
 def find_settling(
-    displacement: PlanarSignal,
-    sampling_rate: float,
-    *,
-    contact_radius: float | None = None,
-    margin: float = 8e-6,
-    start_time: float = 0.0,
+    displacement: PlanarSignal, sampling_rate: float, *, air_gap: float, start_time: float = 0.0
 ) -> Settling:
-    """Find the last time the rotor left the race.
+    """Find the impacts of a coast-down and the begin of lasting contact.
 
     Parameters
     ----------
     displacement : shape (N, 2)
-        Displacement (x, y) [m] from the centre of the race, in one plane.
+        Displacement (x, y) [m] from the centre of the race, in one plane, y up; begins with the fall.
     sampling_rate : float
         [Hz].
-    contact_radius : float, optional
-        Magnitude of displacement in contact [m]; the median of the last second if not given.
-    margin : float
-        By how much the magnitude must be smaller to count as off the race [m]: noise, sensor offset, and
-        bending between sensor and bearing make it larger than zero.
+    air_gap : float
+        Radial clearance between rotor and race [m].
     start_time : float
         Time of the first sample [s].
 
@@ -177,26 +179,31 @@ def find_settling(
     """
     samples = displacement.shape[0]
     last_second = np.asarray(displacement[max(0, samples - int(sampling_rate)) : samples], dtype=np.float64)
-    tail = np.hypot(last_second[:, 0], last_second[:, 1])
-    radius = float(np.median(tail)) if contact_radius is None else contact_radius
-    last = -1
-    for start, xy in _blocks(displacement, 1):
-        off = np.flatnonzero(np.hypot(xy[:, 0], xy[:, 1]) < radius - margin)
-        if off.size:
-            last = start + int(off[-1])
-    time = start_time + last / sampling_rate
-    settled = last < samples - int(sampling_rate)
-    if settled:
+    radius = float(np.median(np.hypot(*last_second.T)))
+    around, found = int(LONGEST_FLIGHT * sampling_rate), []
+    for start in range(0, samples, BLOCK):
+        before = max(start - around, 0)
+        part = np.asarray(displacement[before : start + BLOCK + around], dtype=np.float64)
+        hits = find_impacts(part, sampling_rate, air_gap, noise_by_differences(part, 3), falls=start == 0)
+        touched = before + hits.touched
+        found.append(touched[(touched >= start) & (touched < start + BLOCK)])
+    times = start_time + np.concatenate(found) / sampling_rate
+    end = start_time + samples / sampling_rate
+    contact = lasting_from(times, end)
+    count = f"{len(times)} impact{'' if len(times) == 1 else 's'}"
+    if contact is not None:
         text = (
-            f"in contact without interruption from {format_moment(time)} on, at {radius * 1e6:.1f} µm from "
-            f"the centre; bounces below {margin * 1e6:.0f} µm count as contact"
+            f"{count}, the last one at {format_moment(contact)}, in contact from there on, at "
+            f"{radius * 1e6:.1f} µm from the centre in the end"
+        )
+    elif len(times):
+        text = (
+            f"{count}, the last one at {format_moment(float(times[-1]))}, {1e3 * (end - times[-1]):.0f} ms "
+            "before the signal ends: it did not settle"
         )
     else:
-        text = (
-            f"still lifting off at {format_moment(time)}, within the last second of the signal: "
-            "it did not settle"
-        )
-    return Settling(last_lift_off=time, contact_radius=radius, margin=margin, settled=settled, statement=text)
+        text = "no impact: the rotor did not reach the air gap"
+    return Settling(touched=times, contact_from=contact, contact_radius=radius, statement=text)
 
 
 class _Envelope:
@@ -242,11 +249,17 @@ def _block_noise(xy: Array) -> float:
 
 
 def _window_statement(
-    maximum: tuple[float, float], after: tuple[float, float], air_gap: float, window: float, noise: float
+    maximum: tuple[float, float],
+    after: tuple[float, float],
+    air_gap: float,
+    window: float,
+    noise: float,
+    half: float | None,
 ) -> str:
     (largest, time), (later, later_time) = maximum, after
+    size = f"{largest * 1e6:.1f} µm" if half is None else f"{largest * 1e6:.0f} ± {half * 1e6:.0f} µm"
     first = (
-        f"largest displacement {largest * 1e6:.1f} µm ({(largest - air_gap) * 1e6:+.1f} µm beyond the air "
+        f"largest displacement {size} ({(largest - air_gap) * 1e6:+.1f} µm beyond the air "
         f"gap) at {format_moment(time, 4)}"
     )
     if not np.isfinite(later):

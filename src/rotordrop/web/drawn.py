@@ -176,10 +176,10 @@ def _events(estimate: Estimate) -> list[dict[str, Any]]:
     """What happened when, times [s] from power-off: the estimate knows better than the first look."""
     events = [(0.0, "power-off")]
     for bearing in estimate.bearings:
-        for words, at in (("first", 0), ("last", -1)):
-            if bearing.impacts:
-                impact = sorted(bearing.impacts, key=lambda one: one.start)[at]
-                events.append((impact.start, f"{words} contact at {bearing.name} begins"))
+        if bearing.impacts:
+            events.append((min(impact.start for impact in bearing.impacts), f"first touch at {bearing.name}"))
+        if bearing.contact_from is not None:
+            events.append((bearing.contact_from, f"last impact at {bearing.name}, in contact from here on"))
         peak = bearing.peak_force
         events.append((peak.time, f"largest force at {bearing.name}"))
     return [{"time": time, "words": words} for time, words in sorted(events) if math.isfinite(time)]

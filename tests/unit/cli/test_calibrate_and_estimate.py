@@ -11,17 +11,21 @@ from typing import Any
 
 import h5py
 import jsonschema
+import numpy as np
 import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
+from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
-from rotordrop.known import Known
+from rotordrop.evidence.look import look
+from rotordrop.known import NINETY, Known
 from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
+from rotordrop.spectrum.indentation import find_settling
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
 from rotordrop.twin.search import is_calibrated
@@ -138,6 +142,42 @@ def test_quick_estimate_writes_numbers_and_report(
     told = words(capsys.readouterr().out)
     assert written["consistency"]["sentence"] in told
     assert str(page) in told.replace(" ", "")
+
+
+def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder: Path, tmp_path: Path) -> None:
+    """Gap, first touch, impacts, begin of lasting contact: one rule, numbers within their intervals."""
+    out = tmp_path / "out.json"
+    assert run(["estimate", str(folder / "calibrated.toml"), RECORD, "--quick", "--json", str(out)]) == 0
+    estimate, seen = json.loads(out.read_text()), look(RECORD)
+    machine = load_machine(LP400)
+    signal = recorded_coast_down(machine, read_record(RECORD, machine))
+    off = estimate["drop_instant_s"]
+    assert signal.air_gap_error is not None
+    for plane in seen.planes:
+        name = plane.plane
+        down = find_settling(
+            signal.planes[name],
+            signal.sampling_rate,
+            air_gap=signal.air_gap[name],
+            start_time=signal.start_time,
+        )
+        own = [hit.time - off for hit in seen.impacts if hit.plane == name]
+        contacts = estimate["bearings"][name]["impacts"]
+        begun = [contact["start_s"] for contact in contacts if contact["after_flight"]]
+        assert len(contacts) > len(begun) >= 1
+        # the estimate ends after 30 ms here
+        for found, until in ((down.touched, 0.25), (np.array(begun), SHORT)):
+            assert abs(np.sum(found < until) - sum(time < until for time in own)) <= 1
+        assert down.contact_from == pytest.approx(plane.contact_from - off, abs=2e-3)
+        assert plane.touch_interval_90 is not None
+        low, high = plane.touch_interval_90
+        assert low < contacts[0]["start_s"] + off < high
+        gaps = [
+            plane.gap_interval_90,
+            estimate["bearings"][name]["air_gap_m"]["interval_90"],
+            [signal.air_gap[name] + sign * NINETY * signal.air_gap_error[name] for sign in (-1, 1)],
+        ]
+        assert max(gap[0] for gap in gaps) < min(gap[1] for gap in gaps)
 
 
 def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path: Path) -> None:

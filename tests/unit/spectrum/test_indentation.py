@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.spectrum.indentation import displacement_history, find_settling, held_maximum
+from rotordrop.record.impacts import shortest_flight
+from rotordrop.spectrum.indentation import BLOCK, displacement_history, find_settling, held_maximum
+from rotordrop.units import GRAVITY
 
 FS = 5000.0
 GAP = 280e-6
@@ -65,22 +67,65 @@ def test_a_short_record_says_that_it_ends_within_the_window():
     assert np.isnan(found.largest_later)
 
 
-def test_bouncing_ends_where_the_last_hop_ends():
-    xy = swing(noise=0.4e-6)
-    for start in (500, 900, 2600):
-        xy[start : start + 100] *= 0.9
-    found = find_settling(xy, FS, start_time=-0.1)
-    assert found.settled
-    assert found.last_lift_off == pytest.approx(2699 / FS - 0.1)
-    assert found.contact_radius == pytest.approx(GAP, abs=0.5e-6)
+def bouncing(restitution: float, duration: float = 8.0) -> tuple[np.ndarray, np.ndarray]:
+    """A mass that falls on a damped spring of 300 Hz: its path, and the times at which it lands [s]."""
+    stiffness = (2.0 * np.pi * 300.0) ** 2
+    share = -np.log(restitution) / np.hypot(np.pi, np.log(restitution))
+    damping, steps = 2.0 * share * np.sqrt(stiffness), 10
+    heights, landings = np.empty(int(duration * FS)), []
+    height, velocity, touching = 0.0, 0.0, False
+    for sample in range(len(heights)):
+        heights[sample] = height
+        for _ in range(steps):
+            depth = -GAP - height
+            push = max(stiffness * depth - damping * velocity, 0.0) if depth > 0.0 else 0.0
+            if depth > 0.0 and not touching:
+                landings.append(sample / FS)
+            touching = depth > 0.0
+            velocity += (push - GRAVITY) / (FS * steps)
+            height += velocity / (FS * steps)
+    return np.column_stack([np.full(len(heights), 1e-6), heights]), np.array(landings)
+
+
+def after_flights(landings: np.ndarray) -> np.ndarray:
+    """The landings that end a flight of a twentieth of the gap or more."""
+    flown = np.diff(landings, prepend=-np.inf)
+    return landings[flown > shortest_flight(GAP) + 2e-3]
+
+
+def test_impacts_are_flights_that_end_and_contact_lasts_from_the_last():
+    xy, landings = bouncing(0.6)
+    xy += 0.2e-6 * np.random.default_rng(0).standard_normal(xy.shape)
+    found = find_settling(xy, FS, air_gap=GAP, start_time=-0.1)
+    assert len(landings) > len(after_flights(landings)) > 2
+    assert found.touched == pytest.approx(after_flights(landings) - 0.1, abs=0.7e-3)
+    assert found.contact_from == found.touched[-1]
+    assert f"{len(found.touched)} impacts, the last one at" in found.statement
+
+
+def test_an_impact_late_in_a_long_signal_counts():
+    """Read in blocks: a hop in the third of them is an impact, and lying on the race in between is none."""
+    one, landings = bouncing(0.6, 1.0)
+    once = after_flights(landings)
+    late = int((once[0] + 2e-3) * FS)
+    xy = np.tile(one[-1], (35 * int(FS), 1))
+    xy[: len(one)] = one
+    xy[2 * BLOCK + 1000 :][: len(one) - late] = one[late:]
+    found = find_settling(xy, FS, air_gap=GAP)
+    again = (2 * BLOCK + 1000 - late) / FS + once[1:]
+    assert found.touched == pytest.approx(np.concatenate([once, again]), abs=0.7e-3)
 
 
 def test_a_rotor_that_still_hops_did_not_settle():
-    xy = swing()
-    xy[-500:-400] *= 0.8
-    found = find_settling(xy, FS)
-    assert not found.settled
+    xy, _ = bouncing(0.95, duration=0.25)
+    found = find_settling(xy, FS, air_gap=GAP)
+    assert len(found.touched) > 5
+    assert found.contact_from is None
     assert "did not settle" in found.statement
+
+
+def test_a_swing_along_the_race_makes_no_impacts():
+    assert len(find_settling(swing(noise=0.4e-6), FS, air_gap=GAP).touched) <= 1
 
 
 def test_an_empty_signal_is_refused():

@@ -207,7 +207,7 @@ def test_lines_of_another_plane_are_no_neighbours_of_an_order(monkeypatch: pytes
     kinds = (("here", "steady", "DE"), ("there", "steady", "NDE"), ("sum", "combination", "DE"))
     known: Any = [SimpleNamespace(path=p, kind=k, forward={plane: 1e-6}) for p, k, plane in kinds]
     known.append(SimpleNamespace(path="1X", kind="order", forward={"DE": 1e-6}))
-    settled = find_settling(down.xy, down.sampling_rate)
+    settled = find_settling(down.xy, down.sampling_rate, air_gap=285e-6)
     coast_down._plane(signal, "DE", down.xy, settled, known, (), coast_down.WaterfallChoice())
     assert given == [["here", "sum"]]
 
