@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from functools import partial
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, Strict
@@ -24,6 +25,7 @@ from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
+from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
 from rotordrop.units import format_quantity
 
@@ -45,6 +47,11 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
         "ball_density": (7800.0, "kg/m^3"),
     },
 }
+
+_SPRUNG = ("spring_rate", "ring_mass", "ring_travel", "fit_friction")
+_STEEL_DENSITY = 7800.0
+_BALL_HEIGHT = 1.16
+"""Ball diameter over half the height of the cross-section [1], 2 · 0.58 of spindle bearings."""
 
 STATIC_STRESS = 4.2e9
 """Hertz stress [Pa] of the static load rating C0 of a ball bearing, ISO 76: the race is dented beyond it."""
@@ -134,8 +141,23 @@ class BallBearing(RaceBearing):
         "clearance": ("clearance_class",),
     }
 
+    preload_kind: Literal["rigid", "spring"] = Field(
+        default="rigid", description='rigid spacers; say "spring" where springs press on the outer rings'
+    )
+    """How the preload is made: by spacers, which hold the rings, or by springs, which let them give way."""
+    spring_rate: V.Stiffness | None = None
+    """With springs: their rate at each outer ring [N/m]; a tenth of the rigidity of the pair."""
+    ring_mass: V.PositiveMass | None = None
+    """With springs: mass of each outer ring that they move [kg]; a steel ring of its size."""
+    ring_travel: V.PositiveLength | None = None
+    """With springs: way of each outer ring from its balls up to a stop [m]; 0.2 mm."""
+    fit_friction: V.NonNegative | None = None
+    """With springs: friction coefficient of each outer ring in its housing, on its share of the radial force
+    [1]; 0.15, 0 to 0.4, which decides how much of the peak the springs take."""
+
+    states_at: ClassVar[int] = L.RING_STATES
+
     reserved: ClassVar[Mapping[str, str]] = {
-        "preload_kind": "a preload by springs (rigid today)",
         "row_spacing": "the axial distance of two rows, which only tilt would feel",
     }
 
@@ -188,6 +210,9 @@ class BallBearing(RaceBearing):
         if self.preload_class is not None and "preload" in known:
             told = "the preload is given both as a force and as a class; keep one of them"
             raise Misfit(told, ("preload",))
+        if not self.sprung and (said := [name for name in _SPRUNG if name in known]):
+            told = f'{said[0]!r} belongs to springs, and the preload is rigid; add preload_kind = "spring"'
+            raise Misfit(f"{told}, or leave it out", (said[0],))
         if self.preload_class is not None and not listed:
             raise Misfit(
                 f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "
@@ -199,6 +224,16 @@ class BallBearing(RaceBearing):
             raise Misfit(
                 'the bearing has no \'preload\'; write for example preload = "100 N", or clearance = "12 um"'
             )
+
+    @property
+    def sprung(self) -> bool:
+        """Whether springs press on the outer rings."""
+        return self.preload_kind == "spring"
+
+    @property
+    def further_states(self) -> tuple[int, ...]:
+        """Way and speed of outer rings that springs press on."""
+        return (L.POSITION, L.VELOCITY) if self.sprung else ()
 
     def _has_clearance(self, entry: CatalogueBearing | None = None) -> bool:
         """Whether the rows have play: a clearance is given, or the grooves are deep."""
@@ -269,7 +304,36 @@ class BallBearing(RaceBearing):
             )
         if loose:
             _check_play(given)
+        if self.sprung:
+            values |= self._of_springs(given)
         return {name: value for name, value in values.items() if name not in known}
+
+    def _of_springs(self, given: dict[str, Any]) -> dict[str, Any]:
+        """What springs, rings and fits are where the file does not say it."""
+        from rotordrop.physics.ball_bearing import bearing_constants  # compiled, as the numbers are
+        from rotordrop.physics.ring import row_rigidity
+
+        if not given["preload"].value > 0.0:
+            told = 'springs press the rings together, but the preload is zero; give it, such as "100 N"'
+            raise Misfit(f'{told}, or preload_kind = "rigid"', ("preload_kind",))
+        whole = SimpleNamespace(**{name: getattr(self, name) for name in type(self).model_fields} | given)
+        rate = 0.2 * row_rigidity(bearing_constants(whole))
+        ball, pitch = whole.ball_diameter.value, whole.pitch_diameter.value
+        bore = 0.5 * whole.bore_diameter.value if whole.bore_diameter else 0.5 * pitch - ball / _BALL_HEIGHT
+        width = whole.width.value if whole.width else 1.6 * ball
+        mass = _STEEL_DENSITY * math.pi * ((pitch - bore) ** 2 - 0.25 * (pitch + 0.6 * ball) ** 2) * width
+        rows = (
+            ("spring_rate", rate, 3.0, "a tenth of the rigidity of the pair, chosen and not measured", "N/m"),
+            ("ring_mass", mass, 1.3, "a steel ring from 0.6 ball diameters outside the pitch circle", "kg"),
+            ("ring_travel", 0.2e-3, 2.0, "usual room of springs, chosen and not measured", "m"),
+        )
+        values = {
+            name: Known(value=one, status="default", range=(one / by, one * by), source=why, unit=unit)
+            for name, one, by, why, unit in rows
+        }
+        why = "nobody knows it: 0.1 to 0.2 of steel in steel, more where it tilts"
+        friction = Known(value=0.15, status="default", range=(0.0, 0.4), source=why, unit="1")
+        return values | {"fit_friction": friction}
 
     def _of_clearance(self, entry: CatalogueBearing | None) -> dict[str, Any]:
         """Clearance of a class, and what goes without saying beside one: no preload, no contact angle."""
@@ -472,3 +536,42 @@ PARAMETERS: tuple[Parameter, ...] = (
     ),
 )
 """Unknowns of a ball bearing."""
+
+STATED: tuple[Parameter, ...] = (
+    Parameter(
+        path="bearing.fit_friction",
+        label="friction of the outer rings in their housing",
+        kind="dimensionless",
+        logarithmic=False,
+        guess_sigma=0.1,
+        given_sigma=1e-4,
+        lower=0.0,
+        entries=bearing_entries(L.RING + blocks.RING_FRICTION),
+    ),
+    Parameter(
+        path="bearing.spring_rate",
+        label="rate of the preload springs",
+        kind="stiffness",
+        guess_sigma=0.7,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.RING + blocks.RING_RATE),
+    ),
+    Parameter(
+        path="bearing.ring_mass",
+        label="mass of an outer ring",
+        kind="mass",
+        measured_by="an outer ring of {owner}, weighed",
+        guess_sigma=0.2,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.RING + blocks.RING_MASS),
+    ),
+    Parameter(
+        path="bearing.ring_travel",
+        label="way of the outer rings up to their stop",
+        kind="length",
+        guess_sigma=0.4,
+        given_sigma=1e-4,
+        entries=bearing_entries(L.RING + blocks.RING_TRAVEL),
+    ),
+)
+"""Unknowns of rings that springs press on."""

@@ -22,6 +22,7 @@ from rotordrop.elements.race_bearing import (
     Spread,
 )
 from rotordrop.known import NINETY, Known
+from rotordrop.physics import blocks
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
@@ -29,8 +30,15 @@ from rotordrop.physics.ball_bearing import (
 )
 from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
 from rotordrop.physics.ball_loads import ball_loads, displacement_under
-from rotordrop.physics.ball_set import ball_set_entries, balls_of, loose_race_seat, static_deflection
+from rotordrop.physics.ball_set import (
+    ball_set_entries,
+    ball_set_gradient,
+    balls_of,
+    loose_race_seat,
+    static_deflection,
+)
 from rotordrop.physics.hertz import compliance, race_contact
+from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -42,6 +50,9 @@ CENTRIFUGAL_SHARE = 0.25
 """Ball centrifugal force over preload ball load from which it counts."""
 
 _STEEL = (208e9, 0.3)
+_HARD_PUSH, _PUSHES = 10.0, 101
+"""Load over that at rest [1] for which rigid and sprung preload are compared, as of a first impact; forces
+tried up to it."""
 
 
 @lru_cache(maxsize=64)
@@ -71,12 +82,15 @@ class BallNumbers(BearingNumbers):
         """Radial play [m], half the clearance of deep grooves."""
         return self.constants.radial_play
 
-    def element_loads(self, moved: Array) -> Array:
+    def element_loads(self, moved: Array, rings: Array) -> Array:
         """Load of every ball [N]."""
-        return ball_loads(self.constants, moved)
+        return ball_loads(self.constants, moved, rings)
 
     def element_loads_under(self, force: Array) -> Array:
         """Load of every ball [N] where they push the race with a force."""
+        if self.balls.sprung:
+            seats = seat_on_springs(self.constants, self.rings(), force)
+            return ball_loads(self.constants, seats[:, :2], seats[:, 2])
         return ball_loads(self.constants, displacement_under(self.constants, force))
 
     def load_of_stress(self, stress: Array) -> Array:
@@ -120,12 +134,27 @@ class BallNumbers(BearingNumbers):
         """Stiffness of a ball, groove distance and offsets, stress coefficient."""
         return ball_set_entries(self.constants)
 
+    def rings(self) -> Array:
+        """Mass, springs, stop and fit of outer rings that springs press on."""
+        numbers, balls = np.zeros(blocks.RING_N_ENTRIES), self.balls
+        if balls.sprung:
+            numbers[blocks.RING_MASS], numbers[blocks.RING_RATE] = balls.ring_mass, balls.spring_rate
+            numbers[blocks.RING_TRAVEL], numbers[blocks.RING_FRICTION] = balls.ring_travel, balls.fit_friction
+            numbers[blocks.RING_STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
+            numbers[blocks.RING_BALLS] = self.constants.ball_count
+            numbers[blocks.RING_ROWS] = self.constants.row_count
+        return numbers
+
     def places(self, least: int = 0) -> Array:
         """Direction of every ball and how many stand there."""
         return balls_of(self.constants, least)
 
     def deflection(self, load: float) -> tuple[float, float]:
         """Way of the race under a load [N] and tangent stiffness there [N/m]."""
+        if self.balls.sprung:
+            _, y, q = seat_on_springs(self.constants, self.rings(), np.array([[0.0, load]]))[0]
+            # small and fast motion does not slide the rings in their fits: the tangent is that of held ones
+            return -y, float(ball_set_gradient(self.entries(), self.places(), 0.0, y, q)[4])
         return static_deflection(self.constants, load)
 
     def seat(self, load: float) -> tuple[float, float]:
@@ -161,6 +190,7 @@ class BallNumbers(BearingNumbers):
             return (
                 _figure("preload_N", "preload of a row", "force", float(balls.preload), balls.preload),
                 _figure("preload_stress_Pa", "stress by preload", "pressure", self._preload_stress),
+                *self._on_springs(load),
             )
         loads, clearance = self.ball_loads(load), 2.0 * self.play
         axial = _figure("axial_play_m", "axial play", "length", constants.axial_play)
@@ -175,6 +205,23 @@ class BallNumbers(BearingNumbers):
                 value=float(np.max(loads)),
                 note=f"on {np.count_nonzero(loads)} balls",
             ),
+        )
+
+    def _on_springs(self, load: float) -> Iterator[BearingFigure]:
+        """What springs in place of spacers would leave of the force, at a push of many times a load [N]."""
+        if self.balls.sprung or load <= 0.0:
+            return
+        springs = self.balls.changed(preload_kind="spring").numbers()
+        heavy = _HARD_PUSH * load
+        pushes = np.column_stack([np.zeros(_PUSHES), np.linspace(0.0, heavy, _PUSHES)])
+        way = -seat_on_springs(springs.constants, springs.rings(), pushes)[:, 1]
+        left = float(np.interp(static_deflection(self.constants, heavy)[0], way, pushes[:, 1])) / heavy
+        yield BearingFigure(
+            field="force_on_springs",
+            label="force left on preload springs",
+            kind="dimensionless",
+            value=left,
+            note=f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind",
         )
 
     def excesses(self, omega: float, load: float) -> Iterator[Excess]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.description import Description, Text
 from rotordrop.known import Known
+from rotordrop.physics import blocks
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -153,6 +154,10 @@ class BearingNumbers(ABC):
     def entries(self) -> Array:
         """Numbers of the force law, shape (N,), in the order of `rotordrop.physics.ball_set`."""
 
+    def rings(self) -> Array:
+        """Numbers of outer rings that springs press on, in the order of `rotordrop.physics.ring`; no such."""
+        return np.zeros(blocks.RING_N_ENTRIES)
+
     @abstractmethod
     def places(self, least: int = 0) -> Array:
         """Where the force acts around the race, shape (3, Z), padded to ``least`` places."""
@@ -190,8 +195,11 @@ class BearingNumbers(ABC):
         """Relative standard deviation [1] of its stress at a force, by what is inferred of it."""
         return 0.0
 
-    def element_loads(self, moved: Array) -> Array:
-        """Load of every rolling element [N], (T, rows, Z), of a race moved (x, y) [m], (T, 2); none here."""
+    def element_loads(self, moved: Array, rings: Array) -> Array:
+        """Load of every rolling element [N], (T, rows, Z); none here.
+
+        The race has moved (x, y) [m], (T, 2), sprung rings have moved from it [m], (T,).
+        """
         return np.zeros((len(moved), 0, 0))
 
     def element_loads_under(self, force: Array) -> Array:

@@ -70,7 +70,7 @@ class TouchdownBearing(Placed):
     @property
     def parts(self) -> tuple[Description, ...]:
         """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
-        return self.contact, self.friction, self.race, self.mount, self.support
+        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support
 
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of clearance and parts."""

@@ -19,8 +19,10 @@ _SETTLED = 1e-9
 """Last step [m] above which the search has not found a displacement: a thousandth of what matters."""
 
 
-def ball_loads(constants: BearingConstants, displacement: Array) -> Array:
+def ball_loads(constants: BearingConstants, displacement: Array, rings: Array | float = 0.0) -> Array:
     """Load of every ball [N], shape (T, rows, Z), of a race displaced (x, y) from the outer ring [m], (T, 2).
+
+    ``rings`` (T,) [m] is the way of outer rings from their balls, zero between rigid spacers.
 
     Source: Neisi 2020, eqs. (2)–(6), ball by ball.
     """
@@ -30,7 +32,8 @@ def ball_loads(constants: BearingConstants, displacement: Array) -> Array:
         + displacement[:, 0, None, None] * np.cos(angles)
         + displacement[:, 1, None, None] * np.sin(angles)
     )
-    approach = np.maximum(np.hypot(radial, constants.axial_offset) - constants.groove_distance, 0.0)
+    axial = np.asarray(constants.axial_offset - rings)[..., None, None]
+    approach = np.maximum(np.hypot(radial, axial) - constants.groove_distance, 0.0)
     return np.asarray(constants.ball_stiffness * approach * np.sqrt(approach))
 
 

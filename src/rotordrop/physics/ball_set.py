@@ -121,15 +121,19 @@ def lane_sum(values: Array) -> float:
 
 
 @inner_kernel
-def ball_set_force(entries: Array, balls: Array, dx: float, dy: float, work: Array) -> tuple[float, float]:
+def ball_set_force(
+    entries: Array, balls: Array, dx: float, dy: float, work: Array, ring: float = 0.0
+) -> tuple[float, float]:
     """Restoring force [N] of a race moved by (dx, dy) [m], x and y; the force *on* the race is its negative.
 
     ``entries`` (5,) and ``balls`` (3, Z8) as `ball_set_entries` and `balls_of` make them, ``work`` (2, Z8) is
-    scratch. Source: Neisi 2020, eqs. (2)–(6). Differs from the paper: axial offset of an angular-contact row;
+    scratch; ``ring`` [m] is the way of sprung outer rings from their balls.
+
+    Source: Neisi 2020, eqs. (2)–(6). Differs from the paper: axial offset of an angular-contact row;
     algebraic form, the distance of the groove centres instead of contact angles: no ``atan``, no ``cos``.
     """
     K, A_0 = entries[BALL_STIFFNESS], entries[GROOVE_DISTANCE]
-    radial_offset, axial_offset = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET]
+    radial_offset, axial_offset = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET] - ring
     cosines, sines, weights = balls[COSINE], balls[SINE], balls[COUNT]
     axial2 = axial_offset * axial_offset
     for j in range(cosines.shape[0]):
@@ -181,15 +185,63 @@ def bearing_reaction(
     return F_x + C_b * vx, F_y + C_b * vy, drag, C_b * (vx * vx + vy * vy), drag * spin
 
 
+@inner_kernel
+def ball_set_axial_force(
+    entries: Array, balls: Array, dx: float, dy: float, work: Array, ring: float
+) -> float:
+    """Axial force [N] with which all balls push the outer rings away, at a displacement of the race [m].
+
+    Arguments as of `ball_set_force`. Source: Neisi 2020, eqs. (2)–(6), with the axial offset of a row.
+    """
+    K, A_0 = entries[BALL_STIFFNESS], entries[GROOVE_DISTANCE]
+    radial_offset, axial_offset = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET] - ring
+    cosines, sines, weights = balls[COSINE], balls[SINE], balls[COUNT]
+    axial2 = axial_offset * axial_offset
+    for j in range(cosines.shape[0]):
+        radial = radial_offset + dx * cosines[j] + dy * sines[j]
+        A = math.sqrt(radial * radial + axial2)
+        delta = max(A - A_0, 0.0)
+        work[0, j] = weights[j] * K * delta * math.sqrt(delta) * axial_offset / A
+    return lane_sum(work[0])
+
+
+@lean_kernel
+def ball_set_axial_gradient(
+    entries: Array, balls: Array, dx: float, dy: float, ring: float
+) -> tuple[float, float, float, float]:
+    """Axial force [N] of `ball_set_axial_force` and its slopes [N/m] by x, y and the axial offset.
+
+    The slopes by x and y are those of the radial force by the axial offset: both come from one energy.
+    Source: Neisi 2020, eqs. (2)–(6), differentiated.
+    """
+    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET] - ring
+    f_a = k_ax = k_ay = k_aa = 0.0
+    for j in range(balls.shape[1]):
+        radial = entries[RADIAL_OFFSET] + dx * balls[COSINE, j] + dy * balls[SINE, j]
+        A = math.sqrt(radial * radial + axial_offset * axial_offset)
+        delta = A - entries[GROOVE_DISTANCE]
+        if delta <= 0.0:
+            continue
+        root = math.sqrt(delta)
+        cosine, sine = radial / A, axial_offset / A
+        across = balls[COUNT, j] * K * delta * root / A
+        along = balls[COUNT, j] * K * 1.5 * root
+        f_a += across * axial_offset
+        k_ax += (along - across) * cosine * sine * balls[COSINE, j]
+        k_ay += (along - across) * cosine * sine * balls[SINE, j]
+        k_aa += along * sine * sine + across * cosine * cosine
+    return f_a, k_ax, k_ay, k_aa
+
+
 @lean_kernel
 def ball_set_gradient(
-    entries: Array, balls: Array, dx: float, dy: float
+    entries: Array, balls: Array, dx: float, dy: float, ring: float = 0.0
 ) -> tuple[float, float, float, float, float]:
     """Restoring force ``F_x, F_y`` [N], stiffness ``k_xx, k_xy, k_yy`` [N/m] of a race moved (dx, dy) [m].
 
     Source: Neisi 2020, eqs. (2)–(6), differentiated.
     """
-    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET]
+    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET] - ring
     cosines, sines, weights = balls[COSINE], balls[SINE], balls[COUNT]
     f_x = f_y = k_xx = k_xy = k_yy = 0.0
     axial2 = axial_offset * axial_offset
@@ -213,12 +265,12 @@ def ball_set_gradient(
 
 
 @lean_kernel
-def ball_set_energy(entries: Array, balls: Array, dx: float, dy: float) -> float:
+def ball_set_energy(entries: Array, balls: Array, dx: float, dy: float, ring: float = 0.0) -> float:
     """Elastic energy [J] of a race moved by (dx, dy) [m]: ``Σ 2/5 K δ^(5/2)``.
 
     Source: integral of Neisi 2020, eq. (6).
     """
-    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET]
+    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET] - ring
     energy = 0.0
     for j in range(balls.shape[1]):
         radial = entries[RADIAL_OFFSET] + dx * balls[COSINE, j] + dy * balls[SINE, j]
@@ -229,12 +281,14 @@ def ball_set_energy(entries: Array, balls: Array, dx: float, dy: float) -> float
 
 
 @inner_kernel
-def ball_set_load(entries: Array, balls: Array, dx: float, dy: float) -> tuple[float, float]:
+def ball_set_load(
+    entries: Array, balls: Array, dx: float, dy: float, ring: float = 0.0
+) -> tuple[float, float]:
     """Largest load of a single ball [N] and its Hertz pressure on the inner race [Pa].
 
     Source: Neisi 2020, eqs. (6) and (7).
     """
-    axial_offset = entries[AXIAL_OFFSET]
+    axial_offset = entries[AXIAL_OFFSET] - ring
     largest = 0.0
     for j in range(balls.shape[1]):
         if balls[COUNT, j] > 0.0:

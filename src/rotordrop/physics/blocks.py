@@ -34,6 +34,16 @@ ROLLING_PITCH_DIAMETER = BALLS_N_ENTRIES + 2
 ROLLING_DAMPING = BALLS_N_ENTRIES + 3
 ROLLING_N_ENTRIES = BALLS_N_ENTRIES + 4
 
+# Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers.
+RING_MASS = 0
+RING_RATE = 1
+RING_TRAVEL = 2
+RING_STOP = 3
+RING_FRICTION = 4
+RING_BALLS = 5
+RING_ROWS = 6
+RING_N_ENTRIES = 7
+
 # Entries of a form; SI units. All at zero is the plain support.
 SUPPORT_PRESENT = 0
 SUPPORT_COUPLING = 1

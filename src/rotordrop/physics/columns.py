@@ -56,7 +56,9 @@ SUPPORT_FORM = ROLLING_END + 6
 SUPPORT_FORM_END = SUPPORT_FORM + blocks.SUPPORT_N_ENTRIES
 MOUNT = SUPPORT_FORM_END
 MOUNT_END = MOUNT + blocks.MOUNT_N_ENTRIES
-N_BEARING_COLUMNS = MOUNT_END
+RING = MOUNT_END
+RING_END = RING + blocks.RING_N_ENTRIES
+N_BEARING_COLUMNS = RING_END
 FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`.
@@ -118,8 +120,8 @@ N_ROTOR_PLACES = 10
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
-# Then its first contact and the one behind its last, and the first state of its departure and of its mount;
-# -1 without one.
+# Then its first contact and the one behind its last, and the first state of its departure, of its mount and
+# of its sprung rings; -1 without one.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
@@ -128,7 +130,8 @@ CONTACTS = 4
 CONTACTS_END = 5
 DEPARTURE = 6
 MOUNT_STATES = 7
-N_BEARING_PLACES = 8
+RING_STATES = 8
+N_BEARING_PLACES = 9
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that

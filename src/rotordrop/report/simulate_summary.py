@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -78,7 +79,7 @@ def _verdict(
     if machine is not None:
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
-        said += _stops(result, machine)
+        said += [*_stops(result, machine), *_springs(result, machine)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
     said += [static_limit_statement(bearing) for bearing in bearings]
     for use in uses:
@@ -115,6 +116,17 @@ def _stops(result: DropResult, machine: Machine) -> list[Statement]:
                 Statement(f"{bearing.name}: the mount did not reach its stop; it moved {moved} of {free}.")
             )
     return said
+
+
+def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """How far rings that springs press on gave way."""
+    for bearing in machine.touchdown_bearings:
+        if bearing.bearing.ring_travel is None:
+            continue
+        most, room = float(np.max(result.ring_travel(bearing.name))), float(bearing.bearing.ring_travel)
+        moved, free = shown(most, "length"), shown(room, "length")
+        text = f"{bearing.name}: the outer rings gave way on their springs by {moved} of {free}"
+        yield Statement(f"{text}, up to their stop." if most > room else f"{text}.")
 
 
 def _certificate(result: DropResult) -> Statement:

@@ -143,7 +143,7 @@ class StateLayout:
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 8), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 9), see ``RACE`` and the names beside it."""
         places = np.full((self.n_bearings, L.N_BEARING_PLACES), -1, dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
@@ -179,14 +179,27 @@ class StateLayout:
             *coordinates,
             *(f"{name} velocity" for name in coordinates),
             *(f"race {name} spin" for name in bearing_names),
-            *(f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)),
+            *self._names_of_further(bearing_names),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
             *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )
 
+    def _names_of_further(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
+        names = [f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)]
+        for name, first in zip(bearing_names, self.bearing_at()[:, L.RING_STATES], strict=True):
+            if first >= 0:
+                at = first - self.race_spin.stop
+                names[at : at + 2] = ring_state(name), f"{ring_state(name)} velocity"
+        return tuple(names)
+
     def zeros(self) -> Array:
         """State with everything at zero."""
         return np.zeros(self.size)
+
+
+def ring_state(bearing: str) -> str:
+    """Name of the state that holds the way of the sprung rings of a bearing."""
+    return f"rings {bearing}"
 
 
 def _first_of(counts: tuple[int, ...], start: int, owners: int) -> Integers:

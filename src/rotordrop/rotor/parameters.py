@@ -193,6 +193,7 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     numbers = numbers_of(bearing)
     row = np.zeros(L.N_BEARING_COLUMNS)
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
+    row[L.RING : L.RING_END] = numbers.rings()
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
     row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
     bearing.fill(row)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import blocks, departure, mount, support
+from rotordrop.physics import blocks, departure, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy, ball_set_load
@@ -23,6 +23,7 @@ from rotordrop.simulate._rhs import (
     project,
     race_deflection,
     relative_motion,
+    ring_travel,
     support_deflection,
 )
 
@@ -51,7 +52,7 @@ def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Array, o
     out[H_BEARING_FORCE_Y] = -F_y
     dx, dy = race_deflection(b, y, p)
     numbers = p.bearing[b][L.ROLLING : L.ROLLING_END]
-    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(numbers, p.balls[b], dx, dy)
+    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(numbers, p.balls[b], dx, dy, ring_travel(b, y, p))
 
 
 @kernel
@@ -120,7 +121,11 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
             elif delta > 0.0:
                 energy += contact_energy(law, delta)
         dx, dy = race_deflection(b, y, p)
-        energy += ball_set_energy(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
+        balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
+        energy += ball_set_energy(balls, p.balls[b], dx, dy, way)
+        if p.bearing_at[b, L.RING_STATES] >= 0:
+            speed = y[p.bearing_at[b, L.RING_STATES] + 1]
+            energy += ring.ring_energy(row[L.RING : L.RING_END], balls, way, speed)
         energy += row[L.RACE_WEIGHT] * y[r + 1]
         energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
         energy += (

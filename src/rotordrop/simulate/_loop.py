@@ -27,6 +27,7 @@ from rotordrop.simulate._rhs import (
     gap_at,
     race_deflection,
     relative_motion,
+    ring_travel,
     scratch_of,
 )
 from rotordrop.simulate._tableau import Tableau
@@ -340,7 +341,8 @@ def force_and_stress(b: int, y: Array, p: KernelParameters, work: Array) -> tupl
     """Magnitude of the ball force [N] and largest Hertz stress [Pa] of one bearing in a state."""
     F_x, F_y = ball_force(b, y, p, work)
     dx, dy = race_deflection(b, y, p)
-    _load, stress = ball_set_load(p.bearing[b][L.ROLLING : L.ROLLING_END], p.balls[b], dx, dy)
+    numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
+    _load, stress = ball_set_load(numbers, p.balls[b], dx, dy, way)
     return math.sqrt(F_x * F_x + F_y * F_y), stress
 
 
@@ -361,7 +363,8 @@ def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks:
             continue
         dx, dy = race_deflection(b, y, p)
         travel = dx * dx + dy * dy
-        if travel < 0.9 * peaks[b, PEAK_TRAVEL]:
+        # a ring that gives way leaves no order between travel and force
+        if travel < 0.9 * peaks[b, PEAK_TRAVEL] and p.bearing_at[b, L.RING_STATES] < 0:
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
         force, stress = force_and_stress(b, y, p, work)

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, departure, mount, support
+from rotordrop.physics import aerodynamics, blocks, departure, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
-from rotordrop.physics.ball_set import ball_set_force, bearing_reaction
+from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force, bearing_reaction
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.load import load_now
@@ -134,10 +134,18 @@ def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float
 
 
 @inner_kernel
+def ring_travel(b: int, y: Array, p: KernelParameters) -> float:
+    """Way [m] of the sprung outer rings of one bearing from their balls; zero between rigid spacers."""
+    at = p.bearing_at[b, L.RING_STATES]
+    return y[at] if at >= 0 else 0.0
+
+
+@inner_kernel
 def ball_force(b: int, y: Array, p: KernelParameters, balls: Array) -> tuple[float, float]:
     """Force of the balls of one bearing [N] against the deflection of its race, x and y."""
     x, z = race_deflection(b, y, p)
-    F_x, F_y = ball_set_force(p.bearing[b][L.ROLLING : L.ROLLING_END], p.balls[b], x, z, balls)
+    numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
+    F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, balls, way)
     if p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
         return departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
@@ -367,6 +375,21 @@ def add_race(
 
 
 @lean_kernel
+def add_rings(b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls: Array) -> float:
+    """Rates of sprung outer rings under a radial force F [N]; power that their friction takes [W]."""
+    at, row = p.bearing_at[b, L.RING_STATES], p.bearing[b]
+    x, z = race_deflection(b, y, p)
+    numbers = row[L.RING : L.RING_END]
+    pushed = ball_set_axial_force(row[L.ROLLING : L.ROLLING_END], p.balls[b], x, z, balls, y[at])
+    held, _rate = ring.spring_force(numbers, row[L.ROLLING : L.ROLLING_END], y[at])
+    friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
+    rows = numbers[blocks.RING_ROWS]
+    dy[at] = y[at + 1]
+    dy[at + 1] = (pushed / rows - held - friction) / numbers[blocks.RING_MASS]
+    return float(rows * friction * y[at + 1])
+
+
+@lean_kernel
 def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
     race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
@@ -442,6 +465,8 @@ def bearing_accelerations(
     by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work.balls)
+    sprung = p.bearing_at[b, L.RING_STATES] >= 0
+    by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls) if sprung else 0.0
     sx = y[n_q + h]
     sy = y[n_q + h + 1]
     by_support = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
@@ -457,6 +482,8 @@ def bearing_accelerations(
         by_support = add_support_form(b, y, p, dy)
     if departs:
         by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy)
+    if sprung:
+        by_support += by_fit
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
     power[SLIDING], power[IN_CONTACT] = sliding, lost

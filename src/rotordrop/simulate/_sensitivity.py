@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, mount, support
+from rotordrop.physics import aerodynamics, blocks, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import ball_set_gradient
+from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.spin import race_drag_gradient
@@ -24,6 +24,7 @@ from rotordrop.simulate._rhs import (
     mount_states,
     race_deflection,
     relative_motion,
+    ring_travel,
     support_deflection,
 )
 
@@ -122,7 +123,8 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     dx, dy = race_deflection(b, y, p)
-    F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(row[L.BALL_SET : L.BALL_SET_END], p.balls[b], dx, dy)
+    entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
+    F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
     k, c = (k_xx, k_xy, k_yy), (row[L.BEARING_DAMPING], 0.0, row[L.BEARING_DAMPING])
     for i in range(2):
         m_h = row[L.SUPPORT_MASS_X + i]
@@ -140,6 +142,52 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
             along = F_x * k_xx + F_y * k_xy if j == 0 else F_x * k_xy + F_y * k_yy
             J[spin, r + j] -= by_force / row[L.RACE_INERTIA] * along / F
             J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
+    if p.bearing_at[b, L.RING_STATES] >= 0:
+        _ring_jacobian(b, y, p, J, (F_x, F_y), k)
+
+
+@lean_kernel
+def _ring_jacobian(
+    b: int, y: Array, p: KernelParameters, J: Array, F: tuple[float, float], k: Slopes
+) -> None:
+    """Add sprung rings: their own motion, and what their way changes of the force [N] on race and support.
+
+    ``k`` are the slopes of the force of the balls by the deflection of the race.
+    """
+    n_q, at = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RING_STATES]
+    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
+    row = p.bearing[b]
+    entries, numbers = row[L.BALL_SET : L.BALL_SET_END], row[L.RING : L.RING_END]
+    dx, dy = race_deflection(b, y, p)
+    _pushed, k_ax, k_ay, k_aa = ball_set_axial_gradient(entries, p.balls[b], dx, dy, y[at])
+    _held, rate = ring.spring_force(numbers, entries, y[at])
+    C = row[L.BEARING_DAMPING]
+    total_x = F[0] + C * (y[n_q + r] - y[n_q + h])
+    total_y = F[1] + C * (y[n_q + r + 1] - y[n_q + h + 1])
+    size = math.sqrt(total_x * total_x + total_y * total_y)
+    _friction, by_force, by_speed = ring.fit_friction(numbers, size, y[at + 1])
+    mass, rows = numbers[blocks.RING_MASS], numbers[blocks.RING_ROWS]
+    along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
+    elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
+    by_drag, _by_spin = race_drag_gradient(
+        elastic, y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+    )
+    J[at, at + 1] = 1.0
+    J[at + 1, at] -= (k_aa / rows + rate - by_force * (along_x * k_ax + along_y * k_ay)) / mass
+    J[at + 1, at + 1] -= by_speed / mass
+    for j in range(2):
+        axial, along = (k_ax, along_x) if j == 0 else (k_ay, along_y)
+        # as the rings give way, the force of the balls falls
+        J[n_q + r + j, at] += axial / row[L.RACE_MASS]
+        J[n_q + h + j, at] -= axial / row[L.SUPPORT_MASS_X + j]
+        if elastic > 0.0:
+            J[spin, at] += by_drag / row[L.RACE_INERTIA] * F[j] * axial / elastic
+        radial = along_x * k[0] + along_y * k[1] if j == 0 else along_x * k[1] + along_y * k[2]
+        slope = (axial / rows - by_force * radial) / mass
+        J[at + 1, r + j] += slope
+        J[at + 1, h + j] -= slope
+        J[at + 1, n_q + r + j] -= by_force * along * C / mass
+        J[at + 1, n_q + h + j] += by_force * along * C / mass
 
 
 @inner_kernel

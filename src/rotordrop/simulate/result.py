@@ -13,6 +13,7 @@ from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.physics.hertz import LineContact
+from rotordrop.rotor.layout import ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.units import format_quantity
 
@@ -134,7 +135,14 @@ class DropResult:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
         b = self.index_of(bearing)
         moved = self.race_displacement[:, b] - self.support_displacement[:, b]
-        return numbers_of(machine.bearing(self.bearing_names[b])).element_loads(moved)
+        return numbers_of(machine.bearing(self.bearing_names[b])).element_loads(moved, self.ring_travel(b))
+
+    def ring_travel(self, bearing: int | str) -> Array:
+        """Way of sprung outer rings of a bearing from their balls [m], (T,); zero between spacers."""
+        name = ring_state(self.bearing_names[self.index_of(bearing)])
+        if name not in self.state_names:
+            return np.zeros(len(self.time))
+        return self.state[:, self.state_names.index(name)]
 
     def __repr__(self) -> str:
         """Machine, speed, length, peaks and outcome."""

@@ -13,7 +13,7 @@ from rotordrop.physics._compile import kernel
 from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate._loop import contact_at
-from rotordrop.simulate._rhs import race_deflection
+from rotordrop.simulate._rhs import race_deflection, ring_travel
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
 from rotordrop.track.problem import DropProblem, private_copy
@@ -57,8 +57,8 @@ def force_values(
 ) -> None:
     """Fill values (N, B, 4), their gradients (N, B, 4, 3) and contacts (N, B, 6) at ``times`` (N,) [s].
 
-    Gradients are by race deflection x, y and axial offset. Values are ball force on the race x, y, its
-    magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
+    Gradients are by race deflection x, y and axial offset, less the way of sprung rings. Values are ball
+    force on the race x, y, its magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
     """
     work = np.empty((2, p.balls.shape[2]))
     above = np.empty(N_VALUES)
@@ -70,7 +70,8 @@ def force_values(
         y[:s] = means[i, :s]
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
-            axial = p.bearing[b, L.SET_UNKNOWN]
+            described = p.bearing[b, L.SET_UNKNOWN]
+            axial = described - ring_travel(b, y, p)
             contact_at(times[i], p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
             bearing_values(dx, dy, axial, b, p, work, values[i, b])
             for c in range(3):
@@ -81,7 +82,7 @@ def force_values(
                 bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
                 for v in range(N_VALUES):
                     gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
-            p.bearing[b, L.SET_UNKNOWN] = axial
+            p.bearing[b, L.SET_UNKNOWN] = described
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,6 +30,8 @@ SPEED_SIGMA = 0.5
 """Rotor speed at power-off beside its standard error [rad/s]."""
 OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
 """How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
+RING_SIGMA = (0.3e-6, 1e-3)
+"""The same of rings that springs press on: way [m] and speed [m/s] at power-off, where they rest."""
 
 
 def fall_time(machine: Machine, gap: float | None = None) -> float:
@@ -78,6 +80,8 @@ def prior_at_power_off(
         mean[offset], sigma[offset] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
     sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap
+    rings = layout.further_at(L.RING_STATES)
+    sigma[rings] = np.resize(RING_SIGMA, rings.stop - rings.start)
     own = layout.further_at(L.BEARING_OWN)
     sigma[own] = np.resize(OWN_SIGMA, own.stop - own.start)
     covariance = np.diag(sigma**2)

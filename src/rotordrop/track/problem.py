@@ -182,6 +182,8 @@ class DropProblem:
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
         rows[2, self.entries_that_set("bearing", b, L.SET_UNKNOWN)] = 1.0
+        if (ring := layout.bearing_at()[b, L.RING_STATES]) >= 0:  # the rows stand apart by so much less
+            rows[2, ring] = -1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
         return rows
