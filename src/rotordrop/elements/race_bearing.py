@@ -53,6 +53,9 @@ class RaceBearing(Description):
 
 Array = NDArray[np.float64]
 
+THROWN = "ball centrifugal force"
+"""Kind of excess of rolling elements that turn fast."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class BearingFigure:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop._version import __version__
+from rotordrop.elements.race_bearing import THROWN, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.machine.plausibility import doubts_of_speed
 from rotordrop.report.content import SIMULATED_MACHINE, Card, ReportContent, Statement, fact
@@ -79,7 +80,7 @@ def _verdict(
     if machine is not None:
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
-        said += [*_stops(result, machine), *_springs(result, machine)]
+        said += [*_stops(result, machine), *_springs(result, machine), *_thrown(result, machine)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
     said += [static_limit_statement(bearing) for bearing in bearings]
     for use in uses:
@@ -127,6 +128,16 @@ def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:
         moved, free = shown(most, "length"), shown(room, "length")
         text = f"{bearing.name}: the outer rings gave way on their springs by {moved} of {free}"
         yield Statement(f"{text}, up to their stop." if most > room else f"{text}.")
+
+
+def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """What the inertia of balls would change at the race speeds that were reached."""
+    share = machine.rotor.mass * float(machine.gravity) / len(machine.touchdown_bearings)
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        fastest = float(np.max(np.abs(result.race_speed[:, b])))
+        for excess in numbers_of(bearing).excesses(fastest, share):
+            if excess.kind == THROWN:
+                yield Statement(f"{bearing.name}: {excess.text}.", "warning")
 
 
 def _certificate(result: DropResult) -> Statement:

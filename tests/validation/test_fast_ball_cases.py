@@ -1,0 +1,155 @@
+"""Balls at speed: angles, loads and stiffness of one ball between grooves under its centrifugal force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import Compute, check, fails_with, load_case
+
+from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
+from rotordrop.physics.fast_balls import (
+    FastBalls,
+    ball_equilibrium,
+    centred_balls,
+    gyroscopic_moment,
+    offset_on_springs,
+)
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+
+
+def row_of(v: Inputs) -> tuple[BearingConstants, FastBalls]:
+    described: Any = SimpleNamespace(
+        ball_diameter=v["ball_diameter"],
+        pitch_diameter=v["pitch_diameter"],
+        ball_count=v["balls"],
+        contact_angle=math.radians(v["contact_angle"]),
+        conformity_inner=v["conformity"],
+        conformity_outer=v["conformity"],
+        preload=v["preload"],
+        clearance=None,
+        ring_youngs_modulus=v["ring_modulus"],
+        ring_poisson_ratio=0.3,
+        ball_youngs_modulus=v["ball_modulus"],
+        ball_poisson_ratio=v["ball_poisson"],
+        ball_density=v["ball_density"],
+        first_ball_angle=0.0,
+        second_row_offset=0.0,
+        arrangement="X",
+    )
+    constants = bearing_constants(described)
+    return constants, FastBalls.of(described, constants)
+
+
+def at_speeds(v: Inputs) -> dict[str, float]:
+    constants, balls = row_of(v)
+    found = {"approach by preload": constants.preload_approach}
+    for speed, names in v["shown"].items():
+        ball, _ = centred_balls(balls, 2.0 * math.pi * float(speed))
+        inner, outer = float(ball.inner_load[0]), float(ball.outer_load[0])
+        numbers = {
+            "ball load": inner,
+            "inner load": inner,
+            "outer load": outer,
+            "contact angle": math.degrees(ball.inner_angle[0]),
+            "inner angle": math.degrees(ball.inner_angle[0]),
+            "outer angle": math.degrees(ball.outer_angle[0]),
+            "inner stress": constants.stress_coefficient_inner * math.cbrt(inner),
+            "outer stress": constants.stress_coefficient_outer * math.cbrt(outer),
+            "axial force of a row": v["balls"] * float(ball.axial_force[0]),
+            # two rows; the sum of squared cosines around a row is half its balls
+            "radial stiffness": v["balls"] * float(ball.radial_stiffness[0]),
+        }
+        found |= {f"{name} at {speed} Hz": numbers[name] for name in names}
+    return found
+
+
+def governing_speed(v: Inputs) -> float:
+    """Speed [Hz] at which the stress on the outer race overtakes that on the inner one."""
+    constants, balls = row_of(v)
+    low, high = 1.0, 600.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        ball, _ = centred_balls(balls, 2.0 * math.pi * middle)
+        inner = constants.stress_coefficient_inner * math.cbrt(ball.inner_load[0])
+        outer = constants.stress_coefficient_outer * math.cbrt(ball.outer_load[0])
+        low, high = (middle, high) if outer < inner else (low, middle)
+    return middle
+
+
+def others(v: Inputs) -> dict[str, float]:
+    omega = 2.0 * math.pi * v["speed"]
+    _, balls = row_of(v)
+    offset = offset_on_springs(balls, v["balls"], v["preload"], omega)
+    sprung, _ = centred_balls(balls, omega, offset)
+    modulus, poisson, density = v["steel"]
+    steel = {**v, "ball_modulus": modulus, "ball_poisson": poisson, "ball_density": density}
+    heavy, _ = centred_balls(row_of(steel)[1], omega)
+    return {
+        "outer load on springs": float(sprung.outer_load[0]),
+        "outer angle on springs": math.degrees(sprung.outer_angle[0]),
+        "outer load with steel balls": float(heavy.outer_load[0]),
+        "outer race governs from": governing_speed(v),
+        "outer race governs from with steel balls": governing_speed(steel),
+    }
+
+
+def slopes(v: Inputs) -> dict[str, float]:
+    _, balls = row_of(v)
+    force = np.array([0.0, v["step"]])
+    ball = ball_equilibrium(balls, balls.axial_offset, balls.radial_offset, force)
+    return {
+        "outer load by centrifugal force": float(np.diff(ball.outer_load)[0]) / v["step"],
+        "outer angle by centrifugal force": math.degrees(np.diff(ball.outer_angle)[0]) / v["step"],
+    }
+
+
+def controlled(v: Inputs) -> dict[str, float]:
+    """A thrust on one row, whose balls gyrate, held by friction at the outer race."""
+    _, balls = row_of(v)
+    omega = 2.0 * math.pi * v["speed"]
+    low, high = balls.axial_offset - 1e-4, balls.axial_offset + 5e-5
+    inner = outer = math.radians(v["contact_angle"])
+    for _ in range(40):
+        offset = 0.5 * (low + high)
+        for _ in range(40):
+            moment, orbit = gyroscopic_moment(balls, omega, inner, outer)
+            force = balls.centrifugal_force(orbit)
+            ball = ball_equilibrium(balls, offset, balls.radial_offset, force, v["sense"] * moment)
+            change = abs(float(ball.inner_angle[0]) - inner)
+            inner, outer = float(ball.inner_angle[0]), float(ball.outer_angle[0])
+            if change < 1e-10:
+                break
+        pushed = v["balls"] * float(ball.axial_force[0])
+        low, high = (offset, high) if pushed < v["preload"] else (low, offset)
+    return {"inner angle": math.degrees(inner), "outer angle": math.degrees(outer)}
+
+
+CASES: dict[str, Compute] = {"FB01": at_speeds, "FB02": others, "FB03": slopes, "FB04": controlled}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("FB01", {"ball_density": 3300.0}),
+        ("FB01", {"preload": 535.0}),
+        ("FB02", {"speed": 560.0}),
+        ("FB03", {"contact_angle": 25.3}),
+        ("FB04", {"sense": -1.0}),
+        ("FB04", {"ball_density": 7600.0}),
+    ],
+)
+def test_a_changed_input_is_noticed(name: str, change: dict[str, Any]) -> None:
+    fails_with(name, change, CASES)
