@@ -11,7 +11,7 @@ from rotordrop.record.profile import Profile
 MACHINE = """\
 # Machine file
 
-Every key of a machine file, from the schema that reads it (`rotordrop schema machine` prints it for editors).
+Every key of a machine file, from the schema that reads it (`rotordrop init --schema machine` prints it).
 A value with a unit is a text such as `"0.25 mm"`, or a table: `{ guess = …, range = […, …], source = "…" }`
 for what is only guessed, `{ value = …, interval = […, …] }` for what was measured with an error. Keys in bold
 are needed. `rotordrop init` writes a commented file to start from.

@@ -167,7 +167,7 @@ CASES: tuple[Case, ...] = (
     *(
         Case(
             name=f"schema-{document}",
-            commands=(f"rotordrop schema {document}", "rotordrop_bench schema"),
+            commands=(f"rotordrop init --schema {document}", "rotordrop_bench schema"),
             files=("stdout",),
             quick=True,
         )
@@ -198,7 +198,7 @@ CASES: tuple[Case, ...] = (
     ),
     Case(
         name="unbalance-response",
-        commands=("rotordrop unbalance-response paper/machine.toml --json {name}.json",),
+        commands=("rotordrop critical-speeds paper/machine.toml --unbalance --json {name}.json",),
         needs=("example-paper",),
         quick=True,
     ),

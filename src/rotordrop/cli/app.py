@@ -73,6 +73,7 @@ VERBS: dict[str, tuple[Verb, ...]] = {
     ),
     "Estimate": (
         Verb("estimate", "Estimate bearing force and stress from recorded drops", _HERE + "estimate"),
+        Verb("watch", "Watch a folder: estimate and log every record that arrives", _HERE + "watch"),
         Verb("calibrate", "Calibrate a machine on several recorded drops", _HERE + "estimate"),
     ),
     "Judge": (
@@ -88,15 +89,13 @@ VERBS: dict[str, tuple[Verb, ...]] = {
     "Simulate": (
         Verb("simulate", "Simulate a drop and show forces, stresses and contacts", _HERE + "simulate"),
         Verb("coast-down", "Simulate a whole coast-down, from power-off to standstill", _HERE + "simulate"),
-        Verb("critical-speeds", "Show critical speeds, Campbell diagrams and mode shapes", _HERE + "rotor"),
-        Verb("unbalance-response", "Show the response to unbalance, with margins", _HERE + "rotor"),
+        Verb("critical-speeds", "Show critical speeds and modes, or the unbalance response", _HERE + "rotor"),
     ),
     "Describe a machine": (
         Verb("init", "Write a machine file to start from, or copy an example", _HERE + "machine"),
         Verb("check", "Check a machine file and show what it amounts to", _HERE + "machine"),
         Verb("bearings", "Search bearings by designation, however it is written", _HERE + "machine"),
         Verb("convert", "Convert rotors between ROSS, shaft tables and machine files", _HERE + "machine"),
-        Verb("schema", "Print the JSON Schema of a file, an estimate or a look", _HERE + "machine"),
     ),
     "Serve": (
         Verb("serve", "Serve a local page: look at drops, estimate, read reports", _HERE + "computer"),
@@ -115,6 +114,8 @@ NOW = {
     "repeat": "rotordrop study repeat",
     "import-rotor": "rotordrop convert",
     "export-rotor": "rotordrop convert --to ross",
+    "schema": "rotordrop init --schema machine, numbers, estimate or look",
+    "unbalance-response": "rotordrop critical-speeds --unbalance",
     "synthesize": "rotordrop-bench synthesize",
     "score": "rotordrop-bench score",
     "bench": "rotordrop-bench list, make or score-all",

@@ -19,7 +19,7 @@ from typer import Argument
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
-from rotordrop.cli._output import console, deliver, require_places
+from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import RotordropError, UsageError
 
 if TYPE_CHECKING:
@@ -31,14 +31,17 @@ WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
 WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
 
 
-Action = StrEnum("Action", ["add", "show", "allow", "remove", "export"])
+Action = StrEnum("Action", ["add", "show", "allow", "remove", "export", "reestimate"])
 """What to do with a log."""
 
 
 def log(
     action: Annotated[
         Action,
-        Argument(metavar="ACTION", help="add an estimate, show, allow, remove a drop, export a table."),
+        Argument(
+            metavar="ACTION",
+            help="add an estimate, show, allow, remove a drop, export a table, reestimate what was kept.",
+        ),
     ],
     where: Annotated[str, Argument(metavar="LOG", help="SQLite file, or postgresql://….")],
     what: Annotated[str | None, Argument(metavar="[WHAT]", help=WHAT)] = None,
@@ -54,6 +57,9 @@ def log(
     drops: Annotated[int | None, typer.Option(metavar="N", help="allow: number of drops.")] = None,
     seconds: Annotated[float | None, measured("time", "allow: time in all, as in '600 s'.")] = None,
     source: Annotated[str, text_option("TEXT", "allow: who agreed on it, and where.")] = "",
+    keep: Annotated[
+        Path | None, text_option("DIR", "reestimate: where 'rotordrop watch' kept the records.")
+    ] = None,
     json: options.Json = None,
 ) -> None:
     """Add a drop to the log of a machine, list what is there, and count it against an allowance.
@@ -77,16 +83,10 @@ def log(
         book.remove_drop(where, int(what))
         console().print(f"drop {what} was removed")
     elif action is Action.allow:
-        if machine is None:
-            raise UsageError("an allowance belongs to a machine; name it with --machine")
-        book.allow(where, machine, bearings, drops=drops, seconds=seconds, source=source)
-        logged = {drop.machine for drop in book.logged_drops(where).values()}
-        if logged and machine not in logged:  # a name written otherwise would never count
-            console().print(
-                f"note: no drop of {machine!r} is in the log, only of "
-                f"{', '.join(sorted(map(repr, logged)))}; an allowance counts drops of the machine of "
-                "exactly its name"
-            )
+        _allow(where, machine, bearings, drops, seconds, source)
+    if action is Action.reestimate:
+        _reestimate(where, keep, machine, json)
+        return
     found = book.logged_drops(where, machine=machine)
     if action is Action.export:
         _export(found, what)
@@ -101,6 +101,34 @@ def log(
     }
     said = [*(share.sentence() for share in shares), *(one.sentence() for one in rising)]
     deliver(content, json, lambda out: out.print(_table(found), *said, book.STATEMENT, sep="\n"))
+
+
+def _allow(
+    where: str, machine: str | None, bearings: str, drops: int | None, seconds: float | None, source: str
+) -> None:
+    from rotordrop.ledger import book
+
+    if machine is None:
+        raise UsageError("an allowance belongs to a machine; name it with --machine")
+    book.allow(where, machine, bearings, drops=drops, seconds=seconds, source=source)
+    logged = {drop.machine for drop in book.logged_drops(where).values()}
+    if logged and machine not in logged:  # a name written otherwise would never count
+        console().print(
+            f"note: no drop of {machine!r} is in the log, only of "
+            f"{', '.join(sorted(map(repr, logged)))}; an allowance counts drops of the machine of "
+            "exactly its name"
+        )
+
+
+def _reestimate(where: str, keep: Path | None, machine: str | None, json: Path | None) -> None:
+    from rotordrop.cli.watch import kept_beside
+    from rotordrop.watch.again import reestimate
+
+    with progress_bar("estimating again") as progress:
+        found = reestimate(where, kept_beside(where, keep), machine, lambda name: progress(name, 0.0))
+    numbers = [asdict(one) | {"moved": one.moved} for one in found.numbers]
+    content = {"numbers": numbers, "left_out": {str(key): why for key, why in found.left_out.items()}}
+    deliver(content, json, lambda out: out.print(*found.sentences(), sep="\n", markup=False))
 
 
 def _say_what_has_no_digest(where: str) -> None:

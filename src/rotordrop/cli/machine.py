@@ -43,6 +43,10 @@ MADE_UP = "made up: put yours here"
 """Remark behind a value of a machine file that nobody gave."""
 
 
+Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
+"""Documents with a published schema."""
+
+
 def _number(name: str) -> Any:
     return text_option("TEXT", f"For --simple: {_QUESTIONS[name]}.")
 
@@ -76,6 +80,12 @@ def init(
     grade: Annotated[str | None, _number("grade")] = None,
     support: Annotated[str | None, _number("support")] = None,
     preload: Annotated[str | None, text_option("TEXT", "For --simple: preload of a row.")] = None,
+    schema: Annotated[
+        Document | None,
+        Option(
+            help="Write the JSON Schema of a document for editors and programs; it is printed by default."
+        ),
+    ] = None,
 ) -> None:
     """Write a commented machine file to start from, or copy an example machine into a folder.
 
@@ -85,6 +95,9 @@ def init(
     """
     numbers = locals()
     given: dict[str, str | None] = {name: numbers[name] for name in _QUESTIONS}
+    if schema is not None:
+        deliver_text(_schema_text(schema), target, overwrite=force)
+        return
     if simple:
         made = target or TEMPLATE_FILE
         deliver_text(_simple_text(given, preload), made, overwrite=force)
@@ -255,24 +268,8 @@ def bearings(
     deliver([bearing_json(bearing) for bearing in found], json, bearing_content(designation, found))
 
 
-Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
-"""Documents with a published schema."""
-
-
-def schema(
-    document: Annotated[
-        Document,
-        Argument(
-            help="A machine file, the numbers of 'init --simple', or what 'rotordrop estimate --json' writes."
-        ),
-    ] = Document.machine,
-    output: options.TextFile = None,
-    force: options.Force = False,
-) -> None:
-    """Print the JSON Schema of a file or of an estimate, for editors and programs.
-
-    Example: rotordrop schema machine > machine.schema.json
-    """
+def _schema_text(document: Document) -> str:
+    """The JSON Schema of a document, for editors and programs."""
     if document is Document.machine:
         from rotordrop.machine.schema import machine_schema as schema_of
     elif document is Document.numbers:
@@ -281,9 +278,7 @@ def schema(
         from rotordrop.evidence.look import look_schema as schema_of
     else:
         from rotordrop.estimate.published import estimate_schema as schema_of
-
-    text = json_module.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
-    deliver_text(text, output, overwrite=force)
+    return json_module.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
 
 
 Target = StrEnum("Target", ["machine", "ross"])

@@ -15,6 +15,7 @@ from typing import Any
 from rotordrop.errors import DamagedFileError, UsageError
 from rotordrop.estimate.published import Drop
 from rotordrop.ledger._store import Transaction, name_of, transaction
+from rotordrop.ledger._store import is_url as is_url
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",
@@ -31,6 +32,14 @@ STATEMENT = (
     "This is bookkeeping: it counts drops against an allowance that somebody agreed on. It is no verdict on "
     "the state of a bearing."
 )
+
+
+class LoggedAlreadyError(UsageError):
+    """A recording that is in the log already, as the drop of a number."""
+
+    def __init__(self, message: str, number: int) -> None:
+        self.number = number
+        super().__init__(message)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,9 +203,10 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
         key = (kept.machine, kept.bearing_set, kept.sha256)
         there = log.run("SELECT id FROM drops WHERE machine = ? AND bearing_set = ? AND sha256 = ?", key)
         if there:
-            raise UsageError(
+            raise LoggedAlreadyError(
                 f"{drop.record} is in the log already, as drop {there[0][0]} of {drop.machine} with bearings "
-                f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it"
+                f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it",
+                there[0][0],
             )
         _seal_what_has_none(log)
         number = int(

@@ -65,6 +65,18 @@ class Card:
     figures: tuple[KeyFigure, ...]
 
 
+class Link(str):
+    """A cell that leads to another file, by its address from that of the page."""
+
+    href: str
+
+    def __new__(cls, text: str, href: str) -> Link:
+        """Make the cell."""
+        made = super().__new__(cls, text)
+        made.href = href
+        return made
+
+
 @dataclass(frozen=True)
 class Column:
     """One column of a table: its heading, where its value stands in a typed row, and how it is shown."""
@@ -80,8 +92,10 @@ class Column:
     def cell(self, row: object) -> Cell:
         """What the column shows of a row."""
         found = attrgetter(self.value)(row) if isinstance(self.value, str) else self.value(row)
-        if isinstance(found, Quantity | str) or not self.kind:
-            return found if isinstance(found, Quantity) else str(found)
+        if isinstance(found, Quantity | str):
+            return found
+        if not self.kind:
+            return str(found)
         return Quantity.of(found, self.kind, self.digits)
 
 

@@ -36,11 +36,12 @@ def write_page(content: ReportContent, path: str | os.PathLike[str]) -> None:
 def render_page(content: ReportContent) -> str:
     """Give the HTML of a report.
 
-    The page carries its own content security policy: only the two scripts that belong to it run,
-    and nothing is loaded from anywhere. Figures travel as JSON, which no browser executes.
+    The page carries its own content security policy: only the scripts that belong to it run, and nothing is
+    loaded from anywhere. Figures travel as JSON, which no browser executes.
     """
-    scripts = (_text("assets", "plotly-cartesian.min.js"), _text("templates", "page.js"))
     numbered = _numbered_sections(content)
+    drawing = (_text("assets", "plotly-cartesian.min.js"),) if content.figures else ()
+    scripts = (*drawing, _text("templates", "page.js"))
     html: str = (
         _environment()
         .get_template("page.html")
@@ -49,8 +50,7 @@ def render_page(content: ReportContent) -> str:
             sections=numbered,
             running_title=css_text(" · ".join(filter(None, (content.title, content.subtitle)))),
             style=_text("templates", "page.css"),
-            plotly=scripts[0],
-            starter=scripts[1],
+            scripts=scripts,
             policy=content_security_policy(scripts),
             level_words=LEVEL_WORDS,
         )

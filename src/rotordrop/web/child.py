@@ -16,7 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotordrop.errors import DamagedFileError, MachineFileError, RotordropError, UsageError
+from rotordrop.errors import DamagedFileError, MachineFileError, OutputError, RotordropError, UsageError
 from rotordrop.files import write_json
 from rotordrop.web.running import Verb, clear, publish, result_folder, state_of, write_state
 from rotordrop.web.workspace import Job, Workspace, beside, is_path
@@ -58,14 +58,18 @@ def main(order: dict[str, Any]) -> None:
         publish(job, verb, told["run"], made, of)
         ended = {"state": "done", "fraction": 1.0, "stage": ""}
     except RotordropError as error:
-        ended = {"state": "failed", "error": _without_folder(str(error), job)}
+        ended = {"state": "failed", "error": _without_folder(str(error), job), "code": error.exit_code}
     except MemoryError:
         ended = {
             "state": "failed",
             "error": "there is not enough memory for this; cut the record to the drop",
         }
+    except OSError as error:
+        wrong = f"cannot write the result: {error.strerror or error}; make room on the disk"
+        ended = {"state": "failed", "error": wrong, "code": OutputError.exit_code}
     except Exception as error:  # noqa: BLE001 - whatever it is, the page must say that it happened
-        ended = {"state": "failed", "error": f"this should not happen: {type(error).__name__}: {error}"}
+        wrong = f"this should not happen: {type(error).__name__}: {error}"
+        ended = {"state": "failed", "error": wrong, "code": RotordropError.exit_code}
     clear(job, verb)
     write_state(job, verb, {**(state_of(job, verb) or told), **ended, "ended": time.time()})
 
@@ -243,6 +247,7 @@ def _machine_and_record(job: Job, options: dict[str, Any]) -> tuple[Machine, Rec
 
 def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
     from rotordrop.estimation import Replay, Tracked, estimate_drop
+    from rotordrop.twin.search import is_calibrated
     from rotordrop.web.drawn import write_estimate
 
     progress = _told_progress(job, "estimate", told)
@@ -250,7 +255,11 @@ def _estimate(job: Job, made: Path, told: dict[str, Any]) -> None:
     options = told["options"]
     machine, record = _machine_and_record(job, options)
     tail = record_of(job, machine, "tail", options)
-    method = Replay() if options.get("method") == "replay" else Tracked(quick=bool(options.get("quick")))
+    method = (
+        Replay()
+        if options.get("method") == "replay"
+        else Tracked(quick=bool(options.get("quick")) and is_calibrated(machine))
+    )
     name = job.read()["name"]
     estimate = estimate_drop(machine, record, tail, method=method, name=name, progress=progress)
     progress("drawing", 1.0)

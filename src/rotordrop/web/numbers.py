@@ -28,7 +28,7 @@ _PROGRAM = (
 @lru_cache(maxsize=1)
 def schema_of_numbers() -> str:
     """The JSON Schema of the twelve numbers."""
-    return _said_by(["schema", "numbers"])
+    return _said_by(["init", "--schema", "numbers"])
 
 
 def machine_of_numbers(given: dict[str, Any]) -> str:

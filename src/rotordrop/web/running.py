@@ -134,11 +134,11 @@ class Runner:
         """Ask for a computation; it begins when there is room. What waits or runs is not asked for twice."""
         with self._one:
             told = state_of(job, verb)
+            self._open[job.number, verb] = job  # also what an earlier process asked for
             if told is None or told["state"] not in ("waiting", "running"):
                 now = time.time()
                 told = {"state": "waiting", "run": secrets.token_hex(8), "asked": now, "options": options}
                 write_state(job, verb, told)
-                self._open[job.number, verb] = job
             self.tend()
             return state_of(job, verb) or told
 
@@ -170,7 +170,7 @@ class Runner:
     def _begin(self, job: Job, verb: Verb, told: dict[str, Any]) -> None:
         lock = os.open(_lock_file(job, verb), os.O_RDWR | os.O_CREAT, 0o600)
         try:
-            if not _lock(lock):
+            if not take_lock(lock):
                 return
             write_state(job, verb, {**told, "state": "running", "started": time.time(), "fraction": 0.0})
             order = {"job": str(job.path), "verb": verb, "sys_path": [entry for entry in sys.path if entry]}
@@ -265,7 +265,7 @@ def _lock_file(job: Job, verb: Verb) -> Path:
     return job.path / f"{verb}.lock"
 
 
-def _lock(descriptor: int) -> bool:
+def take_lock(descriptor: int) -> bool:
     """Take the lock that the child inherits; elsewhere than on POSIX systems there is none to inherit."""
     if os.name != "posix":
         return True
@@ -287,6 +287,6 @@ def _locked(job: Job, verb: Verb) -> bool:
     except OSError:
         return False
     try:
-        return not _lock(descriptor)
+        return not take_lock(descriptor)
     finally:
         os.close(descriptor)

@@ -70,7 +70,7 @@ def test_an_unknown_example_is_named_with_those_there_are(capsys):
 
 
 def test_the_schema_accepts_the_template_and_refuses_a_wrong_key(capsys):
-    assert run(["schema"]) == 0
+    assert run(["init", "--schema", "machine"]) == 0
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
     run(["init"])
@@ -81,17 +81,17 @@ def test_the_schema_accepts_the_template_and_refuses_a_wrong_key(capsys):
 
 
 def test_the_schema_goes_to_a_file(capsys):
-    assert run(["schema", "-o", "machine.schema.json"]) == 0
+    assert run(["init", "--schema", "machine", "machine.schema.json"]) == 0
     assert (
         json.loads(Path("machine.schema.json").read_text(encoding="utf-8"))["title"]
         == "rotordrop machine file"
     )
-    assert run(["schema", "-o", "nowhere/machine.schema.json"]) == 6
+    assert run(["init", "--schema", "machine", "nowhere/machine.schema.json"]) == 6
     assert "the folder nowhere does not exist; create it first" in capsys.readouterr().err
 
 
 def test_the_schema_of_an_estimate_knows_its_fields(capsys):
-    assert run(["schema", "estimate"]) == 0
+    assert run(["init", "--schema", "estimate"]) == 0
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
     value = {"value": 2907.0}

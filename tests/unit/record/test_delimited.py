@@ -209,6 +209,11 @@ def test_an_empty_file_is_refused(write, machine):
         read_record(write(""), machine)
 
 
+def test_a_blank_file_is_refused(write, machine):
+    with pytest.raises(RecordError, match=r"drop.csv is blank \(3 bytes\)"):
+        read_record(write(" \n "), machine)
+
+
 def test_a_file_that_is_no_text_is_refused(write, machine):
     with pytest.raises(RecordError, match=r"not a text file: character 3 is a zero byte"):
         read_record(write("ab\x00cd" * 50), machine)

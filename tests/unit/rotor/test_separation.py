@@ -101,7 +101,7 @@ def test_a_peak_between_the_samples_is_not_put_on_one_of_them():
 
 
 def test_one_mode_seen_in_many_planes_is_one_sentence(capsys):
-    assert run(["unbalance-response", str(example_path("lp400"))]) == 0
+    assert run(["critical-speeds", "--unbalance", str(example_path("lp400"))]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert said.count("API 617 asks for") == 1
     planes = said.split("problem: ")[1].split(": the peak at")[0]
@@ -123,7 +123,8 @@ def test_a_machine_without_unbalance_says_so():
 def test_the_command_shows_peaks_margins_and_figures(tmp_path, capsys):
     report, data = tmp_path / "page.html", tmp_path / "data"
     arguments = [
-        "unbalance-response",
+        "critical-speeds",
+        "--unbalance",
         str(example_path("lp400")),
         "--report",
         str(report),
@@ -143,7 +144,8 @@ def test_the_command_shows_peaks_margins_and_figures(tmp_path, capsys):
 def test_the_command_shows_a_run_up(tmp_path, capsys):
     data, document = tmp_path / "data", tmp_path / "rise.json"
     arguments = [
-        "unbalance-response",
+        "critical-speeds",
+        "--unbalance",
         str(example_path("small")),
         "--top-speed",
         "120 Hz",
@@ -168,7 +170,7 @@ def test_the_command_shows_a_run_up(tmp_path, capsys):
 
 
 def test_a_free_rotor_has_no_response(capsys):
-    assert run(["unbalance-response", str(example_path("small")), "--held", "free-free"]) == 64
+    assert run(["critical-speeds", "--unbalance", str(example_path("small")), "--held", "free-free"]) == 64
     assert "nothing holds a free rotor" in capsys.readouterr().err
 
 

@@ -100,6 +100,8 @@ def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
     complete = lines[-1] == ""
     while lines and not lines[-1].strip():
         lines.pop()
+    if not lines:
+        raise RecordError(f"{path} is blank ({len(content)} bytes); export the recording again")
     return lines, complete, encoding
 
 

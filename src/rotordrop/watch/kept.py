@@ -1,0 +1,220 @@
+"""Where records are kept: the folder of a page, in which every drop is called after the digest of its record.
+
+A drop appears whole or not at all under that name, so whoever is second finds it there. Beside what the page
+keeps lies ``watch.json``: where the record came from, what became of it, and which steps are done.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rotordrop.errors import DamagedFileError, OutputError, UsageError
+from rotordrop.files import (
+    atomic_folder,
+    atomic_path,
+    digest_of_file,
+    make_folder,
+    read_sealed,
+    write_json,
+    write_text,
+)
+from rotordrop.web.workspace import Job, Role, Workspace, labelled, stored_as
+
+TOLD = "watch.json"
+QUARANTINE = "quarantine"
+PASSED_OVER = ("thumbs.db", "desktop.ini")
+UNFINISHED = (".part", ".tmp", ".temp", ".filepart", ".crdownload", ".swp", ".lock")
+"""Ends of names under which programs write what is not finished."""
+TAIL = ("_tail", "-tail", ".tail")
+"""How the name of a settled tail ends, after that of its record."""
+DIGITS = 16
+"""Of a digest in the number of a drop: the number of a drop of the page."""
+
+
+class ChangedMeanwhileError(OutputError):
+    """A record changed while it was copied."""
+
+
+@dataclass(frozen=True, order=True)
+class Arrived:
+    """A file as it stood in the folder at one moment."""
+
+    path: Path
+    size: int
+    mtime_ns: int
+
+    @classmethod
+    def at(cls, path: Path) -> Arrived | None:
+        """The file as it stands now; None where it is gone or no plain file."""
+        with suppress(OSError):
+            now = path.stat()
+            if path.is_file():
+                return cls(path, now.st_size, now.st_mtime_ns)
+        return None
+
+
+def arrived(folder: Path, leave: Path) -> Iterator[Arrived]:
+    """Every record under a folder; what lies under ``leave``, tails and samples beside a record left out."""
+    for place, folders, names in os.walk(folder):
+        folders[:] = [
+            name for name in folders if not name.startswith(".") and (Path(place) / name).resolve() != leave
+        ]
+        here = set(names)
+        for name in names:
+            if name.startswith((".", "~$")) or name.lower() in PASSED_OVER:
+                continue
+            path = Path(place) / name
+            if path.suffix.lower() in UNFINISHED or _belongs_to_another(path, here):
+                continue
+            if (one := Arrived.at(path)) is not None:
+                yield one
+
+
+def _belongs_to_another(path: Path, here: set[str]) -> bool:
+    """Whether a file is the tail of a record, or holds the samples of a COMTRADE configuration."""
+    if path.suffix.lower() == ".dat" and {f"{path.stem}.cfg", f"{path.stem}.CFG"} & here:
+        return True
+    return path.stem.lower().endswith(TAIL)
+
+
+def parts_of(record: Path) -> dict[str, Path]:
+    """A record with its settled tail and the samples of a COMTRADE configuration, where there are any."""
+    found = {"record": record}
+    if record.suffix.lower() == ".cfg":
+        samples = (record.with_suffix(suffix) for suffix in (".dat", ".DAT"))
+        found |= {f"beside {file.name}": file for file in samples if file.is_file()}
+    with suppress(OSError):
+        for file in sorted(record.parent.iterdir()):
+            if file.stem.lower() in {f"{record.stem}{end}".lower() for end in TAIL} and file.is_file():
+                found["tail"] = file
+    return found
+
+
+@dataclass(frozen=True)
+class Kept:
+    """All records that were taken."""
+
+    space: Workspace
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.space.path
+
+    def prepare(self) -> None:
+        """Make the folders, and remove what killed watchers left half written."""
+        make_folder(self.path)
+        self.space.prepare()
+        make_folder(self.path / QUARANTINE)
+
+    def job(self, number: str) -> Job:
+        """The drop of a number."""
+        return Job(self.space.jobs_folder / number)
+
+    def numbers(self) -> list[str]:
+        """Numbers of all drops, those made on the page included."""
+        return [name for name in os.listdir(self.space.jobs_folder) if len(name) == DIGITS]  # noqa: PTH208
+
+    def take(self, one: Arrived) -> str:
+        """Copy a record under the number of its content, if nobody has; its number.
+
+        Raises
+        ------
+        ChangedMeanwhileError
+            If it changed while it was copied.
+        OutputError
+            If there is no room.
+        """
+        try:
+            digest = digest_of_file(one.path)
+            number = digest[:DIGITS]
+            if self.job(number).path.is_dir():
+                return number
+            with atomic_folder(self.job(number).path) as folder:
+                (folder / "files").mkdir()
+                job = Job(folder)
+                entries = put(job, parts_of(one.path))
+                if Arrived.at(one.path) != one or entries["record"]["sha256"] != digest:
+                    raise ChangedMeanwhileError(f"{one.path} changed while it was copied; it is tried again")
+                job.write(
+                    {
+                        "name": labelled(one.path.name),
+                        "created": time.time(),
+                        "options": {},
+                        "files": entries,
+                    }
+                )
+                tell(
+                    job, {"source": str(one.path), "size": one.size, "mtime_ns": one.mtime_ns, "outcome": ""}
+                )
+            return number
+        except OSError as error:
+            if (place := self.job(number).path).is_dir():
+                return number  # somebody else was faster
+            raise OutputError(f"{one.path} cannot be kept in {place.parent}: {error.strerror}") from error
+
+    def quarantined(self, job: Job) -> Path:
+        """Where a record that cannot be used lies with the reason."""
+        return self.path / QUARANTINE / job.number
+
+    def quarantine(self, job: Job, why: str) -> None:
+        """Put a record beside the sentence why, once; it is tried again when that folder is deleted."""
+        place = self.quarantined(job)
+        if place.is_dir():
+            return
+        entry = job.read()["files"]["record"]
+        try:
+            with atomic_folder(place) as folder:
+                stored, copy = job.path / "files" / entry["stored"], folder / entry["name"]
+                try:
+                    os.link(stored, copy)
+                except OSError:
+                    shutil.copyfile(stored, copy)
+                write_text(folder / "why.txt", f"{why}\n")
+        except OSError as error:
+            if not place.is_dir():  # else somebody was faster
+                raise OutputError(f"{place} cannot be written: {error.strerror}") from error
+
+
+def put(job: Job, files: Mapping[str, Path]) -> dict[str, Any]:
+    """Copy files into a drop by role, synced; what a drop says of its files."""
+    entries = {}
+    for role, file in files.items():
+        kind: Role = "beside" if role.startswith("beside ") else role  # type: ignore[assignment]
+        name = role.removeprefix("beside ") if kind == "beside" else file.name
+        try:
+            stored = stored_as(kind, name)
+        except UsageError:
+            stored = kind  # without a suffix: the reader says so
+        with atomic_path(job.path / "files" / stored) as place:
+            shutil.copyfile(file, place)
+        kept = job.path / "files" / stored
+        entries[role] = {
+            "name": labelled(name),
+            "stored": stored,
+            "bytes": kept.stat().st_size,
+            "sha256": digest_of_file(kept),
+        }
+    return entries
+
+
+def told_of(job: Job) -> dict[str, Any] | None:
+    """What is known of a drop that a watcher took; None for one of the page. What is damaged has failed."""
+    try:
+        return read_sealed(job.path / TOLD, "remove this drop, and its record is taken again")
+    except FileNotFoundError:
+        return None
+    except DamagedFileError as error:
+        return {"source": job.number, "outcome": "failed", "why": str(error), "done": True}
+
+
+def tell(job: Job, told: Mapping[str, Any]) -> None:
+    """Keep what became of a drop."""
+    write_json(job.path / TOLD, told, sealed=True)

@@ -1,0 +1,109 @@
+"""What a drop amounts to in a few numbers: for the hook, the overview and the line on the screen."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from rotordrop.estimate.published import Drop, Value, read_drop
+from rotordrop.report.compared_drop import ComparedDrop
+from rotordrop.report.limits import limit_statement
+from rotordrop.report.quantity import Quantity
+from rotordrop.units import format_quantity
+from rotordrop.watch.fleet import Watched
+from rotordrop.web.running import Verb, result_folder
+from rotordrop.web.workspace import Job
+
+NOT_KNOWN = "the machine is not known"
+PEAKS = (("peak_force", "N"), ("peak_stress", "Pa"))
+KINDS = ("force", "pressure")
+"""Numbers of a drop and the kinds they are of."""
+NO_PEAKS: dict[str, Any] = dict.fromkeys(
+    f"{name}{end}_{unit}" for name, unit in PEAKS for end in ("", "_lower", "_upper")
+)
+VERBS: dict[str, Verb] = {"estimated": "estimate", "looked": "look"}
+"""Computations of the page by what came of them."""
+
+
+def scalars_of(job: Job, told: dict[str, Any], watched: Watched | None) -> dict[str, Any]:
+    """At most fifteen numbers and texts of a drop, flat, SI, the unit in the key; null where none is known.
+
+    ``needs_person`` says why somebody should look, and is empty where nobody needs to.
+    """
+    entry, outcome, why = job.read()["files"]["record"], told["outcome"], told.get("why", "")
+    found: dict[str, Any] = {
+        "sha256": entry["sha256"],
+        "record": entry["name"],
+        "machine": told.get("serial", ""),
+        "recorded": "",
+        "outcome": outcome,
+        "verdict": why,
+        "needs_person": why,
+        "speed_Hz": None,
+        "bearing": "",
+        **NO_PEAKS,
+    }
+    folder = None if outcome not in VERBS else result_folder(job, VERBS[outcome], "document.json")
+    if folder is None:
+        return found
+    if outcome == "estimated":
+        return found | _of_estimate(read_drop(folder / "document.json"), watched)
+    speed = json.loads((folder / "document.json").read_bytes())["speed_rad_per_s"]
+    warned = f"{NOT_KNOWN}: {why}"
+    return found | {
+        "verdict": warned,
+        "needs_person": warned,
+        "speed_Hz": None if speed is None else speed / (2.0 * math.pi),
+    }
+
+
+def _of_estimate(drop: Drop, watched: Watched | None) -> dict[str, Any]:
+    """Peaks of the bearing where each is largest, and what the limits of the owner say of them."""
+    found: dict[str, Any] = {"recorded": drop.recorded, "speed_Hz": drop.speed_Hz, "verdict": drop.verdict}
+    places = []
+    for name, unit in PEAKS:
+        stated: dict[str, Value] = {
+            bearing: one.numbers[f"{name}_{unit}"] for bearing, one in drop.bearings.items()
+        }
+        place = max(stated, key=lambda bearing: stated[bearing].value)
+        lower, upper = stated[place].interval or (None, None)
+        places.append(place)
+        found[f"{name}_{unit}"] = stated[place].value
+        found[f"{name}_lower_{unit}"], found[f"{name}_upper_{unit}"] = lower, upper
+    force, stress = places
+    found["bearing"] = force if force == stress else f"{force} (force), {stress} (stress)"
+    limits = {} if watched is None else watched.limits
+    judged = limit_statement([ComparedDrop(drop.record, drop)], limits)
+    doubts = [] if drop.consistent else [drop.verdict]
+    if limits:
+        found["verdict"] = f"{drop.verdict} {judged.text}"
+        doubts += [judged.text] if judged.level != "good" else []
+    found["needs_person"] = " ".join(doubts)
+    return found
+
+
+def line_of(found: dict[str, Any], number: int | None) -> str:
+    """A drop on one line."""
+    who = f"{found['record']}: {found['machine'] or 'unknown machine'}"
+    if found["peak_force_N"] is None:
+        return f"{who}, {found['outcome']}: {found['verdict']}"
+    force, stress = (shown_peak(found, *peak, kind) for peak, kind in zip(PEAKS, KINDS, strict=True))
+    speed = format_quantity(2.0 * math.pi * found["speed_Hz"], "speed")
+    logged = "" if number is None else f", drop {number} of the log"
+    person = f"; needs a person: {found['needs_person']}" if found["needs_person"] else ""
+    return (
+        f"{who}, {speed}, {found['bearing']}: {force.text} ({force.interval_text}), "
+        f"{stress.text} ({stress.interval_text}){logged}{person}"
+    )
+
+
+def shown_peak(found: dict[str, Any], name: str, unit: str, kind: str) -> Quantity:
+    """A peak with its interval."""
+    low, high = found[f"{name}_lower_{unit}"], found[f"{name}_upper_{unit}"]
+    value = found[f"{name}_{unit}"]
+    return Quantity(
+        value=math.nan if value is None else value,
+        kind=kind,
+        interval_90=None if low is None else (low, high),
+    )

@@ -1,0 +1,292 @@
+"""A folder that is watched: every record is taken once, kept, judged, and reported."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
+from pathlib import Path
+
+import pytest
+from tests.published import bearing, published, value
+
+from rotordrop._version import __version__
+from rotordrop.cli.app import run
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.files import write_json
+from rotordrop.ledger import logged_drops
+from rotordrop.watch import Kept, Watcher, read_fleet
+from rotordrop.watch.again import reestimate
+from rotordrop.watch.kept import Arrived, arrived, tell, told_of
+from rotordrop.web.running import publish, write_state
+from rotordrop.web.workspace import Workspace
+
+PACKAGE = Path(str(resources.files("rotordrop")))
+DROP = PACKAGE / "examples" / "lp400" / "drop_060.h5"
+PEAKS = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.5e9, 1.4e9, 1.6e9)}
+
+
+@pytest.fixture
+def machines(tmp_path):
+    folder = tmp_path / "machines"
+    folder.mkdir()
+    for serial in ("4711", "4711-B"):
+        shutil.copy(PACKAGE / "machine" / "examples" / "lp400.toml", folder / f"{serial}.toml")
+    shutil.copy(PACKAGE / "machine" / "examples" / "lp400_shaft.csv", folder)
+    return folder
+
+
+@pytest.fixture
+def drops(tmp_path):
+    folder = tmp_path / "drops"
+    folder.mkdir()
+    return folder
+
+
+@pytest.fixture
+def kept(tmp_path):
+    made = Kept(Workspace(tmp_path / "kept"))
+    made.prepare()
+    return made
+
+
+@pytest.fixture
+def watcher(tmp_path, machines, drops, kept):
+    def made(**more):
+        said: list[str] = []
+        one = Watcher(drops, machines, kept, str(tmp_path / "drops.db"), every=0.1, say=said.append, **more)
+        one.prepare()
+        return one, said
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "serial", "why"),
+    [
+        ("2026-03-14_4711_drop.csv", "", "4711", ""),
+        ("4711-B drop.csv", "", "4711-B", ""),
+        ("4711/drop.csv", "", "4711", ""),
+        ("drop.csv", "Anlage: 4711\nt;x\n0,1;2", "4711", ""),
+        ("14711.csv", "x", None, "neither its name nor its head"),
+        ("drop.csv", "t;x\n4711;2\n", None, "neither its name nor its head"),
+        ("drop.csv", "Anlagen 4711 und 9", "4711", ""),
+    ],
+)
+def test_the_machine_of_a_record_is_found_by_name_folder_or_head(name, head, serial, why, machines, drops):
+    record = drops / name
+    record.parent.mkdir(exist_ok=True)
+    record.write_text(head)
+    found, said = read_fleet(machines).of(Path(name), record)
+    assert (found and found.serial) == serial
+    assert why in said
+
+
+def test_two_serial_numbers_in_one_name_are_not_guessed_between(machines, drops):
+    shutil.copy(machines / "4711.toml", machines / "0815.toml")
+    found, said = read_fleet(machines).of(Path("4711_0815.csv"), drops)
+    assert found is None
+    assert "its name holds the serial numbers 0815 and 4711" in said
+
+
+def test_limits_and_bearings_of_a_machine(machines):
+    (machines / "4711.limits.toml").write_text('bearings = "2026"\npeak_stress = "2.5 GPa"\n')
+    fleet = read_fleet(machines)
+    assert fleet.machines["4711"].limits == {"peak_stress_Pa": 2.5e9}
+    assert [one.bearings for one in fleet.machines.values()] == ["4711-B", "2026"]
+    (machines / "4711.limits.toml").write_text('peak_strain = "2"\n')
+    with pytest.raises(UsageError, match=r"4711.limits.toml.*peak_strain"):
+        read_fleet(machines)
+    with pytest.raises(UsageError, match="holds no machine file"):
+        read_fleet(machines.parent)
+
+
+def test_what_is_no_record_is_left_where_it_is(drops, kept):
+    for name in ("a.csv", "a_tail.csv", ".b.csv", "c.csv.part", "d.cfg", "d.dat", "e.dat", "Thumbs.db"):
+        (drops / name).write_text("x")
+    inside = drops / "kept"
+    inside.mkdir()
+    (inside / "f.csv").write_text("x")
+    assert sorted(one.path.name for one in arrived(drops, inside)) == ["a.csv", "d.cfg", "e.dat"]
+    job = kept.job(kept.take(Arrived.at(drops / "a.csv")))
+    assert sorted(job.read()["files"]) == ["record", "tail"]
+
+
+def test_many_who_take_one_record_keep_it_once(drops, kept):
+    for k in range(8):
+        (drops / f"{k}.csv").write_text("one and the same content")
+    with ThreadPoolExecutor(8) as pool:
+        numbers = set(pool.map(lambda k: kept.take(Arrived.at(drops / f"{k}.csv")), range(8)))
+    assert kept.numbers() == [*numbers]
+
+
+def test_a_record_that_changed_since_it_was_seen_is_not_taken(drops, kept):
+    file = drops / "a.csv"
+    file.write_text("half")
+    seen = Arrived.at(file)
+    file.write_text("half and half")
+    with pytest.raises(OutputError, match="changed while it was copied"):
+        kept.take(seen)
+    assert kept.numbers() == []
+
+
+def hook_into(file: Path) -> str:
+    program = file.with_suffix(".py")
+    program.write_text(f"import sys; open({str(file)!r}, 'a').write(sys.stdin.read() + '\\n')")
+    return f"{sys.executable} {program}"
+
+
+def reported(file: Path) -> list[dict]:
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def test_records_of_unknown_machines_are_looked_at_and_bad_ones_are_quarantined(
+    tmp_path, drops, kept, watcher
+):
+    shutil.copy(DROP, drops / "good.h5")
+    (drops / "empty.csv").write_bytes(b"")
+    told = tmp_path / "told"
+    watcher(hook=hook_into(told))[0].run(once=True)
+    found = {one["record"]: one for one in reported(told)}
+    assert found["good.h5"]["outcome"] == "looked"
+    assert found["good.h5"]["speed_Hz"] == pytest.approx(60.0, abs=0.1)
+    assert "the machine is not known" in found["good.h5"]["needs_person"]
+    assert found["empty.csv"]["outcome"] == "quarantined"
+    assert all(len(one) <= 15 for one in found.values())
+    assert not any(isinstance(value, dict | list) for one in found.values() for value in one.values())
+    (reason,) = kept.path.glob("quarantine/*/why.txt")
+    assert reason.read_text() == "empty.csv is empty (0 bytes); export the recording again\n"
+    page = (kept.path / "overview.html").read_text()
+    assert "2 records need a person" in page
+    assert 'href="quarantine/' in page
+
+    again, said = watcher(hook=hook_into(told))
+    again.run(once=True)
+    assert said == []
+    assert len(reported(told)) == 2
+
+    shutil.rmtree(reason.parent)  # somebody wants it to be tried again
+    again, said = watcher(hook=hook_into(told))
+    again.run(once=True)
+    assert said == [
+        "empty.csv: unknown machine, quarantined: empty.csv is empty (0 bytes); export the recording again"
+    ]
+
+
+def test_what_a_killed_watcher_left_is_done_by_the_next(tmp_path, drops, kept, watcher):
+    (drops / "a.csv").write_bytes(b"")
+    kept.take(Arrived.at(drops / "a.csv"))  # and killed here
+    (drops / "a.csv").unlink()
+    one, said = watcher()
+    one.run(once=True)
+    assert len(said) == 1
+    assert "quarantined" in said[0]
+
+
+def test_a_record_that_grew_after_it_was_taken_is_taken_as_it_is_now(drops, kept, watcher):
+    file = drops / "a.csv"
+    file.write_bytes(b" ")
+    number = kept.take(Arrived.at(file))
+    job = kept.job(number)
+    found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
+    file.write_bytes(b"")
+    watcher()[0].run(once=True)
+    outcomes = {told_of(kept.job(name))["outcome"] for name in kept.numbers()}
+    assert told_of(job)["outcome"] == "superseded"
+    assert outcomes == {"superseded", "quarantined"}
+
+
+def found(kept: Kept, number: str, verb: str, content: dict, serial: str = "") -> None:
+    """What a computation of a drop found, as the child leaves it."""
+    job = kept.job(number)
+    tell(job, told_of(job) | {"verb": verb, "serial": serial, "why": ""})
+    write_state(job, verb, {"state": "done", "run": "abc", "options": {}, "asked": time.time()})
+    made = job.path / f"{verb}.part"
+    made.mkdir()
+    write_json(made / "document.json", content, sealed=True)
+    publish(job, verb, "abc", made)
+
+
+@pytest.fixture
+def estimated(drops, kept):
+    """A kept drop of the machine 4711 with its estimate."""
+    (drops / "4711.csv").write_text("x")
+    number = kept.take(Arrived.at(drops / "4711.csv"))
+    sha256 = kept.job(number).read()["files"]["record"]["sha256"]
+    peaks = {"NDE": bearing(PEAKS), "DE": bearing(PEAKS)}
+    content = published(
+        machine="LP-400", record_sha256=sha256, bearings=peaks, rotordrop_version=__version__
+    ).as_json()
+    found(kept, number, "estimate", content, "4711")
+    return number
+
+
+def test_an_estimate_is_logged_once_and_judged_by_the_limits(
+    tmp_path, machines, kept, watcher, estimated, capsys
+):
+    (machines / "4711.limits.toml").write_text('bearings = "2026"\npeak_stress = "1.2 GPa"\n')
+    one, said = watcher(hook=f"{sys.executable} -c 'import sys; sys.exit(3)'")
+    one.run(once=True)
+    assert said == []  # logged, but the hook has not taken it
+    log = str(tmp_path / "drops.db")
+    assert [drop.bearing_set for drop in logged_drops(log).values()] == ["2026"]
+    told = tmp_path / "told"
+    one, said = watcher(hook=hook_into(told))
+    one.run(once=True)
+    assert len(logged_drops(log)) == 1
+    assert "drop 1 of the log; needs a person: By the limits given: peak Hertz stress" in said[0]
+    (news,) = reported(told)
+    assert (news["peak_force_N"], news["peak_force_lower_N"]) == (3300.0, 3200.0)
+    assert news["machine"] == "4711"
+    assert "passed" in news["needs_person"]
+
+    here = reestimate(log, kept)
+    assert [one.moved for one in here.numbers] == [False] * 4
+    assert here.sentences() == ("0 of 4 numbers of 1 drops moved beyond the logged interval",)
+    assert run(["log", "reestimate", log, "--keep", str(kept.path)]) == 0
+    assert "0 of 4 numbers" in capsys.readouterr().out
+    os.rename(kept.job(estimated).path, tmp_path / "away")
+    assert "is not in" in reestimate(log, kept).sentences()[-1]
+
+
+def test_a_number_that_left_its_interval_is_named(tmp_path, kept, watcher, estimated):
+    watcher()[0].run(once=True)
+    moved = {"NDE": bearing(PEAKS | {"peak_force_N": value(3500.0, 3400.0, 3600.0)}), "DE": bearing(PEAKS)}
+    shutil.rmtree(kept.job(estimated).path / "estimate.abc")
+    found(
+        kept,
+        estimated,
+        "estimate",
+        published(machine="LP-400", bearings=moved, rotordrop_version=__version__).as_json(),
+    )
+    assert reestimate(str(tmp_path / "drops.db"), kept).sentences() == (
+        "drop 1, drop.h5: peak_force_N at NDE was 3200 to 3400 N and is 3500 N now",
+        "1 of 4 numbers of 1 drops moved beyond the logged interval",
+    )
+
+
+def test_a_machine_file_that_comes_later_is_used(machines, drops, kept, watcher):
+    (drops / "9000.csv").write_text("x")
+    number = kept.take(Arrived.at(drops / "9000.csv"))
+    found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
+    watcher()[0].run(once=True)
+    assert told_of(kept.job(number))["outcome"] == "looked"
+    shutil.copy(machines / "4711.toml", machines / "9000.toml")
+    watcher()[0].run(once=True)
+    told = told_of(kept.job(number))
+    assert (told["serial"], told["outcome"]) == ("9000", "quarantined")  # an x is no record
+
+
+def test_the_command_says_what_is_missing(tmp_path, machines, drops, capsys):
+    call = ["watch", str(drops), "--machines", str(machines), "--once", "--log"]
+    assert run([*call, "postgresql://nobody@nowhere/log"]) == 64
+    assert "name one for the records with --keep" in capsys.readouterr().err
+    assert run(["watch", str(tmp_path / "no"), *call[2:], str(tmp_path / "drops.db")]) == 64
+    assert "is no folder" in capsys.readouterr().err
+    assert run([*call, str(tmp_path / "drops.db")]) == 0
+    assert "overview.html" in capsys.readouterr().out.replace("\n", "")
+    assert (tmp_path / "drops.kept" / "overview.html").exists()
