@@ -85,20 +85,10 @@ def compare_orbits(
     at: Array | None = None,
     expected_horizon: float | None = None,
 ) -> Agreement:
-    """Compare a measured and a simulated orbit at the times of the measured one.
+    """Compare a measured and a simulated orbit, shapes (T, B, 2) [m], at the times of the measured one.
 
-    Parameters
-    ----------
-    time : ndarray, shape (T,)
-        From power-off [s].
-    measured, simulated : ndarray, shape (T, B, 2)
-        Displacements at the bearings [m].
-    gaps : ndarray, shape (B,)
-        Air gaps [m].
-    at : ndarray, optional
-        Times of the simulated orbit [s], where they differ from those of the measured one.
-    expected_horizon : float, optional
-        Horizon that the spread of draws leaves [s].
+    Times (T,) count from power-off [s], ``at`` are those of the simulated orbit where they differ; gaps have
+    shape (B,) [m]; the expected horizon is what the spread of draws leaves [s].
     """
     if at is not None:
         columns = simulated.reshape(len(at), -1).T
@@ -106,8 +96,8 @@ def compare_orbits(
         simulated = simulated.reshape(measured.shape)
     apart = np.hypot(*np.moveaxis(simulated - measured, -1, 0))
     contacts = [
-        (_contacts(time, measured[:, b], gaps[b]), _contacts(time, simulated[:, b], gaps[b]))
-        for b in range(len(gaps))
+        tuple(contact_intervals(time, np.hypot(*one[:, b].T), float(gap)) for one in (measured, simulated))
+        for b, gap in enumerate(gaps)
     ]
     firsts = [seen[0] for seen, _ in contacts if len(seen)]
     begin = min((first[0] for first in firsts), default=float(time[0]))
@@ -116,8 +106,14 @@ def compare_orbits(
     return Agreement(
         windows=_windows(time, apart, begin, close),
         bearings=tuple(
-            _bearing(time, measured[:, b], simulated[:, b], float(gaps[b]), apart[:, b], *contacts[b])
-            for b in range(len(gaps))
+            BearingAgreement(
+                measured_contacts=seen[:CONTACTS_LISTED],
+                simulated_contacts=made[:CONTACTS_LISTED],
+                measured_bounce=_bounce(time, measured[:, b], seen, float(gaps[b])),
+                simulated_bounce=_bounce(time, simulated[:, b], made, float(gaps[b])),
+                horizon=horizon(time, apart[:, b], float(gaps[b])),
+            )
+            for b, (seen, made) in enumerate(contacts)
         ),
         disagreement=orbit_disagreement(time[inside], apart[inside], begin),
         expected_horizon=expected_horizon,
@@ -134,22 +130,6 @@ def _windows(time: Array, apart: Array, begin: float, close: float) -> tuple[Win
             rms = np.sqrt(np.mean(apart[inside] ** 2, axis=0))
             found.append(WindowAgreement(name=name, start=start, end=min(end, float(time[-1])), rms=rms))
     return tuple(found)
-
-
-def _contacts(time: Array, place: Array, gap: float) -> Array:
-    return contact_intervals(time, np.hypot(place[:, 0], place[:, 1]), float(gap))
-
-
-def _bearing(
-    time: Array, measured: Array, simulated: Array, gap: float, apart: Array, seen: Array, made: Array
-) -> BearingAgreement:
-    return BearingAgreement(
-        measured_contacts=seen[:CONTACTS_LISTED],
-        simulated_contacts=made[:CONTACTS_LISTED],
-        measured_bounce=_bounce(time, measured, seen, gap),
-        simulated_bounce=_bounce(time, simulated, made, gap),
-        horizon=horizon(time, apart, gap),
-    )
 
 
 def _bounce(time: Array, place: Array, contacts: Array, gap: float) -> float:
@@ -176,16 +156,9 @@ def spread_horizon(time: Array, spread: Array, gaps: Array) -> float:
 
 
 def orbit_disagreement(time: Array, distance: Array, contact: float) -> float:
-    """One number for how far two orbits lie apart [m rms], robust to chaos.
+    """One number for how far two orbits lie apart [m rms], from their distance (T, B) [m], robust to chaos.
 
-    Parameters
-    ----------
-    time : ndarray, shape (T,)
-        Time from power-off [s].
-    distance : ndarray, shape (T, B)
-        Distance of the two orbits in each bearing [m].
-    contact : float
-        First contact [s]; from there on differences grow.
+    Times (T,) and the first contact, from which on differences grow, count from power-off [s].
 
     Notes
     -----

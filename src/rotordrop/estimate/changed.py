@@ -117,29 +117,19 @@ class Changes:
         beside = f" Smaller changes than these may hide: {hidden}." if hidden else ""
         if not self.named:
             return f"Between {self.first} and {self.second} no parameter changed beyond chance.{beside}"
-        parts = [
-            f"{name_of(one.path)} ({_words(one)}, {format_chance(one.probability)})" for one in self.named
-        ]
+        parts = []
+        for one in self.named:
+            low, high = one.interval_90
+            moved = f"{1e6 * one.change:+.3g} µm, 90 %: {1e6 * low:+.3g} to {1e6 * high:+.3g} µm"
+            if one.factor:
+                moved = f"× {one.change:.3g}, 90 %: {low:.3g} to {high:.3g}"
+            parts.append(f"{name_of(one.path)} ({moved}, {format_chance(one.probability)})")
         return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{beside}"
 
 
-def _words(one: Change) -> str:
-    low, high = one.interval_90
-    if one.factor:
-        return f"× {one.change:.3g}, 90 %: {low:.3g} to {high:.3g}"
-    return f"{1e6 * one.change:+.3g} µm, 90 %: {1e6 * low:+.3g} to {1e6 * high:+.3g} µm"
-
-
 def changes(first: Drop, second: Drop) -> Changes:
-    """Compare the parameters of two estimates of one machine.
+    """Compare the parameters of two published estimates that were made with one machine file.
 
-    Parameters
-    ----------
-    first, second : Drop
-        As published, made with one machine file.
-
-    Notes
-    -----
     What was known before stands in both estimates; it is taken out of each (the quotient of posterior and
     prior), so that two records of an unchanged machine differ by their own errors alone, and a tight prior
     does not hide a change. Of m parameters the level of each is `FALSE_ALARM` over m (Bonferroni).

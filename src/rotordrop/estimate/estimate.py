@@ -84,7 +84,7 @@ class CrossCheck:
     accuracy: float
     """Known accuracy of the latter, relative [1]; a larger difference is a warning."""
     replaced: bool = False
-    """Whether the estimate has given way to the cross-check."""
+    """Whether the cross-check stands in place of the estimate."""
 
     @property
     def difference(self) -> float:
@@ -142,7 +142,7 @@ class Structure:
     """What it is called."""
     gain: float
     """Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
-    it needed larger unknown impulses."""
+    it needed larger process noise."""
     sentence: str
     """What was found, with intervals."""
 
@@ -361,16 +361,28 @@ class Estimate:
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per bearing with peaks, intervals and air gap, for a table of many drops [SI]."""
-        return [_row(self, bearing) for bearing in self.bearings]
+        found = []
+        for bearing in self.bearings:
+            row: dict[str, Any] = {
+                "drop": self.name,
+                "bearing": bearing.name,
+                "consistent": self.consistent,
+                "speed [Hz]": self.speed / (2.0 * math.pi),
+            }
+            for name, known in (
+                ("peak force [N]", bearing.peak_force.known),
+                ("peak stress [Pa]", bearing.peak_stress.known),
+                ("air gap [m]", bearing.values.get("air_gap_m")),
+            ):
+                low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
+                row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
+            found.append(row)
+        return found
 
     def __repr__(self) -> str:
         """Drop, machine and the peak force of every bearing."""
-        return (
-            f"<Estimate {self.name} of {self.machine.name}: {'; '.join(self._peaks())}. {self.verdict.value}>"
-        )
-
-    def _peaks(self) -> list[str]:
-        return [f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings]
+        peaks = "; ".join(f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings)
+        return f"<Estimate {self.name} of {self.machine.name}: {peaks}. {self.verdict.value}>"
 
     def _repr_html_(self) -> str:
         return summary_html([self])
@@ -414,24 +426,6 @@ def _peak_text(known: Known, kind: str = "force") -> str:
         return text
     low, high = (format_quantity(value, kind) for value in known.interval_90)
     return f"{text} (90 %: {low} to {high})"
-
-
-def _row(estimate: Estimate, bearing: BearingDrop) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "drop": estimate.name,
-        "bearing": bearing.name,
-        "consistent": estimate.consistent,
-        "speed [Hz]": estimate.speed / (2.0 * math.pi),
-    }
-    numbers = {
-        "peak force [N]": bearing.peak_force.known,
-        "peak stress [Pa]": bearing.peak_stress.known,
-        "air gap [m]": bearing.values.get("air_gap_m"),
-    }
-    for name, known in numbers.items():
-        low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
-        row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
-    return row
 
 
 def _above(module: str, name: str) -> Any:

@@ -79,13 +79,8 @@ def _columns(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Co
             text = f"displacement of the rotor along {axis}, {motion.label}"
             name = f"{motion.role.replace(', ', ' ').replace(' ', '_')}_{axis}"
             yield column(name, "m", text, motion.time, motion.displacement[:, k])
-    load = _largest_load(bearing, machine)
+    load = numbers_of(machine.bearing(bearing.name)).load_of_stress(bearing.stress.values)
     yield column("largest_ball_load", "N", "load of the most loaded ball", bearing.stress.time, load)
-
-
-def _largest_load(bearing: BearingDrop, machine: Machine) -> Array:
-    """Load of the most loaded ball [N], from its stress."""
-    return numbers_of(machine.bearing(bearing.name)).load_of_stress(bearing.stress.values)
 
 
 def loads_of_balls(estimate: Estimate, name: str) -> Array:

@@ -51,18 +51,8 @@ def later_motion(
 ) -> tuple[LaterMotion, ...]:
     """Compare the rest of a record with its estimated part, bearing by bearing; empty where nothing follows.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the B bearings.
-    time : ndarray, shape (N,)
-        Time from power-off [s].
-    motion : ndarray, shape (N, B, 2)
-        Measured displacement at the bearings from their centres [m].
-    until : float
-        End of the estimated part [s].
-    noise : float
-        Standard deviation of the noise of the motion [m].
+    The motion (N, B, 2) is the measured displacement from the centres of the bearings [m], the noise its
+    standard deviation [m]; times (N,) and the end of the estimated part count from power-off [s].
     """
     radius = np.hypot(motion[..., 0], motion[..., 1])
     parts = ((time >= 0.0) & (time <= until), time > until)

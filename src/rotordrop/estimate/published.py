@@ -211,7 +211,7 @@ class Structure(Document):
 
     name: str
     log_likelihood_rise: float | None
-    """Of the readings, by it; null where the model without it needed larger impulses."""
+    """Of the readings, by it; null where the model without it needed larger process noise."""
     sentence: str
 
 

@@ -34,20 +34,6 @@ class RecordFacts:
         return tuple(dict.fromkeys((*self.warnings, *further)))
 
 
-def _findings(evidence: Evidence) -> tuple[Finding, ...]:
-    """What the gate finds; a lost sensor keeps it from looking, but not the twin from following."""
-    try:
-        return checked(evidence)
-    except RecordError as error:
-        unseen = Finding(
-            kind=Kind.NOT_LOOKED_AT,
-            message=f"the plausibility checks could not look at this record: {error}",
-            remedy="look at its channels by eye",
-            severity="warning",
-        )
-        return (unseen,)
-
-
 def facts_of(evidence: Evidence) -> RecordFacts:
     """What a record of a machine, with its settled tail, gives every estimate.
 
@@ -57,7 +43,16 @@ def facts_of(evidence: Evidence) -> RecordFacts:
         If the gate finds that results would be wrong.
     """
     record, name = evidence.record, evidence.name
-    findings = _findings(evidence)
+    try:
+        findings = checked(evidence)
+    except RecordError as error:  # a lost sensor keeps the gate from looking, but not the twin from following
+        unseen = Finding(
+            kind=Kind.NOT_LOOKED_AT,
+            message=f"the plausibility checks could not look at this record: {error}",
+            remedy="look at its channels by eye",
+            severity="warning",
+        )
+        findings = (unseen,)
     refuse_unusable(findings, name)
     warnings = [finding.message for finding in findings if finding.severity == "warning"]
     if evidence.tail is None and isinstance(evidence.still, Missing):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.coast_down_law import fit_drag
-from rotordrop.spectrum.speed_profile import SpeedProfile, fit_speed_profile
+from rotordrop.spectrum.speed_profile import fit_speed_profile
 
 Array = NDArray[np.float64]
 
@@ -64,14 +64,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
 
     The settled rotor lies straight below the centre: horizontally the centre is where it rests, vertically it
     is the zero of the sensors, from which the rest also gives the air gap, as in an estimate of the drop. The
-    levitated rotor tells neither; it may float anywhere.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    record : Record
-        The coast-down; one that ends at rest shows centre and air gap.
+    levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap.
     """
     evidence = read_evidence(build_drop_model(machine), record)
     off, names = evidence.power_off.value, evidence.model.bearing_names
@@ -89,7 +82,9 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         gaps = np.array([float(bearing.air_gap) for bearing in machine.touchdown_bearings])
         errors = None
         centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
-    time, speed = _speed(record, off)
+    # A speed given by hand says from where the rotor fell, not how it slowed down.
+    measured = record.measured_speed
+    time, speed = (None, None) if measured is None else (measured[0] - off, measured[1])
     return CoastDownSignal(
         planes={
             name: RecordedPlane(record.signals[first:], record.sensors, sensing, b, float(sideways[b]))
@@ -100,7 +95,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         centre=centre,
         sampling_rate=record.sampling_rate,
         start_time=float(record.time[first]) - off,
-        profile=_profile(time, speed),
+        profile=None if time is None or speed is None else fit_speed_profile(time, speed, power_off=0.0),
         speed_time=time,
         speed=speed,
         recorded=True,
@@ -111,33 +106,12 @@ def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:
     """Give a machine the air gaps that its coast-down shows; itself where none was found."""
     if signal.air_gap_error is None:
         return machine
-    found = {
-        AIR_GAP.path_of(name): Known(
-            value=gap,
-            status="estimated",
-            interval_90=(
-                gap - NINETY * signal.air_gap_error[name],
-                gap + NINETY * signal.air_gap_error[name],
-            ),
-            lower=max(gap - NINETY * signal.air_gap_error[name], 0.5 * gap),
-            upper=gap + NINETY * signal.air_gap_error[name],
-            unit="m",
-        )
-        for name, gap in signal.air_gap.items()
-    }
+    found = {}
+    for name, gap in signal.air_gap.items():
+        low, high = (gap + side * NINETY * signal.air_gap_error[name] for side in (-1.0, 1.0))
+        known = Known(value=gap, status="estimated", interval_90=(low, high), unit="m")
+        found[AIR_GAP.path_of(name)] = replace(known, lower=max(low, 0.5 * gap), upper=high)
     return machine.with_values(found)
-
-
-def _speed(record: Record, off: float) -> tuple[Array | None, Array | None]:
-    # A speed given by hand says from where the rotor fell, not how it slowed down.
-    measured = record.measured_speed
-    return (None, None) if measured is None else (measured[0] - off, measured[1])
-
-
-def _profile(time: Array | None, speed: Array | None) -> SpeedProfile | None:
-    if time is None or speed is None:
-        return None
-    return fit_speed_profile(time, speed, power_off=0.0)
 
 
 def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
@@ -147,13 +121,6 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
     coefficient becomes the one whose torque under the weight stops the rotor as recorded. The exponential
     time constant, which would count the same drag twice, is left alone; it does not act in a coast-down once
     these values are there.
-
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    signal : CoastDownSignal
-        Its coast-down, long enough for a fit.
     """
     if signal.speed_time is None or signal.speed is None:
         raise RecordError(

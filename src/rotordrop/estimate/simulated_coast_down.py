@@ -18,15 +18,10 @@ LEAST_KNOTS = 20
 
 
 def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDownSignal:
-    """Open the samples of a simulated coast-down where a recording would have its sensors.
+    """Open the samples that ``rotordrop coast-down --output`` wrote where a recording would have its sensors.
 
-    Parameters
-    ----------
-    path : Path
-        File written by ``rotordrop coast-down --output``.
-    machine : Machine, optional
-        With it the planes are those of its sensors, named by the end they belong to; without it, or when
-        it has none, those of the bearings.
+    With a machine the planes are those of its sensors, named by the end they belong to; without it, or when
+    it has none, those of the bearings.
     """
     result, samples = load_coast_down(path), open_samples(path)
     planes: dict[str, PlanarSignal] = {name: samples.planes[name] for name in samples.air_gap}

@@ -146,28 +146,21 @@ def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> obj
 
     Differs from the paper: vertical is y and horizontal is x here, z runs along the rotor.
     """
-    rows = [[_sideways(bearing), _upwards(bearing)] for bearing in bearings]
+    axes = (("horizontal", "x", (-1.0, 1.0)), ("vertical", "y", (-1.0,)))
+    rows = [
+        [
+            Panel(
+                title=f"{bearing.name}: {way}, {axis}",
+                axis=f"displacement {axis}",
+                histories=tuple(getattr(motion, way) for motion in bearing.motions),
+                air_gap=bearing.air_gap,
+                gap_signs=signs,
+            )
+            for way, axis, signs in axes
+        ]
+        for bearing in bearings
+    ]
     return time_panels(rows, MICRO, "µm", height=250, together=True)
-
-
-def _upwards(bearing: BearingMotions | BearingDrop) -> Panel:
-    return Panel(
-        title=f"{bearing.name}: vertical, y",
-        axis="displacement y",
-        histories=tuple(motion.vertical for motion in bearing.motions),
-        air_gap=bearing.air_gap,
-        gap_signs=(-1.0,),
-    )
-
-
-def _sideways(bearing: BearingMotions | BearingDrop) -> Panel:
-    return Panel(
-        title=f"{bearing.name}: horizontal, x",
-        axis="displacement x",
-        histories=tuple(motion.horizontal for motion in bearing.motions),
-        air_gap=bearing.air_gap,
-        gap_signs=(-1.0, 1.0),
-    )
 
 
 def orbit_section(

@@ -196,17 +196,12 @@ class Quantity:
             return FIXED_PLACES[self.kind]
         if not PLACES_OF_SCIENCE[0] < _magnitude(value) < PLACES_OF_SCIENCE[1]:
             return None
-        error = self._error()
+        error = abs(self._in_unit(self.standard_error or 0.0))
+        if self.interval_90 is not None:
+            error = 0.5 * abs(self._in_unit(self.interval_90[1] - self.interval_90[0]))
         if error > 0.0 and math.isfinite(error):
             return min(12, max(0, 1 - _magnitude(error)))
         return max(0, self.digits - 1 - _magnitude(value))
-
-    def _error(self) -> float:
-        if self.interval_90 is not None:
-            return 0.5 * abs(self._in_unit(self.interval_90[1] - self.interval_90[0]))
-        if self.standard_error is not None:
-            return abs(self._in_unit(self.standard_error))
-        return 0.0
 
 
 def places_of(values: Iterable[float], kind: str, digits: int = 3) -> int:

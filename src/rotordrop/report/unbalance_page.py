@@ -119,6 +119,13 @@ def unbalance_page(
         "Half the major axis of the orbits along the rotor, at the nominal speed and at the peaks.",
         "deflected shapes",
     )
+    run_up: tuple[Section, ...] = ()
+    if rising is not None:
+        caption = (
+            f"The same in a run-up of {shown(rising.run_up, 'time')}: the largest amplitude comes late, and "
+            "behind it the vibration that dies away beats with the unbalance."
+        )
+        run_up = (Section("Run-up", figures=(Figure(bode_figure(rising, nominal), caption, "run-up"),)),)
     return ReportContent(
         title=f"Unbalance response of {machine.name}",
         subtitle=f"in its {response.suspension}, nominal speed {shown(nominal, 'speed')}",
@@ -128,7 +135,7 @@ def unbalance_page(
         sections=(
             Section("Bode and polar plots", figures=(bode, polar)),
             Section("Deflected shapes", figures=(shapes,)),
-            *([] if rising is None else [Section("Run-up", figures=(_run_up_figure(rising, nominal),))]),
+            *run_up,
         ),
     )
 
@@ -182,14 +189,6 @@ def _rise(steady: MachineResponse, rising: MachineResponse | None) -> tuple[Stat
             )
         )
     return tuple(said)
-
-
-def _run_up_figure(rising: MachineResponse, nominal: float) -> Figure:
-    caption = (
-        f"The same in a run-up of {shown(rising.run_up, 'time')}: the largest amplitude comes late, and "
-        "behind it the vibration that dies away beats with the unbalance."
-    )
-    return Figure(bode_figure(rising, nominal), caption, "run-up")
 
 
 def peak_table(peaks: Sequence[PlanePeak]) -> Table:

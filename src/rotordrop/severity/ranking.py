@@ -68,23 +68,10 @@ def rank_drops(
 
     Two questions are kept apart. Which of the recorded drops was the worst? Only the errors of the estimates
     matter. Which speed is the worst? Then each drop is one sample, and the scatter between equal drops
-    matters too.
+    matters too: ``drop_scatter`` is the standard deviation between drops under equal conditions [unit of
+    value], from repeated drops. The drops, at least two, are independent of each other; of a safety factor
+    less is worse.
 
-    Parameters
-    ----------
-    drops : sequence of DropSeverity
-        At least two, independent of each other.
-    drop_scatter : float, optional
-        Standard deviation between drops under equal conditions [unit of value], from repeated drops.
-    more_is_worse : bool
-        Whether the largest value is the worst; of a safety factor the smallest is.
-
-    Returns
-    -------
-    Ranking
-
-    Notes
-    -----
     Source: own method. Differs from the paper: section 5.3 ranks speeds by one drop each.
     """
     if len(drops) < 2:

@@ -77,25 +77,11 @@ def stress_statistics(
     rule: QuartileRule = "hazen",
     preload_stress: float | None = None,
 ) -> StressStatistics:
-    """Summarise a stress history as a box plot does, and say which rules were followed.
+    """Summarise a stress history (T,) [Pa] as a box plot does, and say which rules were followed.
 
-    Parameters
-    ----------
-    stress : shape (T,)
-        [Pa].
-    time : shape (T,), optional
-        [s], rising; each value then counts by the time around it, which matters where the steps differ.
-    rule : {"hazen", "linear"}
-        How quartiles are taken.
-    preload_stress : float, optional
-        Stress the preload alone makes [Pa].
+    With rising times (T,) [s] each value counts by the time around it, which matters where the steps differ;
+    ``preload_stress`` is what the preload alone makes [Pa].
 
-    Returns
-    -------
-    StressStatistics
-
-    Notes
-    -----
     Source: Neisi 2020, Table 5. Differs from the paper: the paper draws MATLAB boxes (Hazen, 1.5
     interquartile ranges) but writes "3 σ"; both outlier counts are given here.
     """

@@ -106,23 +106,9 @@ def calibrate_machine(
     names: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Fit the parameters of a machine to several recorded drops.
+    """Fit the parameters of a machine with guesses to several of its recorded drops.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine with guesses.
-    records, tails : sequence of Record
-        Drops of this machine, and their settled tails (None where there is none).
-    names : sequence of str, optional
-        Names of the drops.
-    progress : callable, optional
-        Called with a sentence and the fraction done.
-
-    Returns
-    -------
-    Calibration
-        The machine with estimates, what the records determine and what not.
+    A tail is None where a drop has none; progress is called with a sentence and the fraction done.
     """
     stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
     model = build_drop_model(machine)
@@ -191,24 +177,19 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     at, machine = parameter_sample(smoothed), problem.model.machine
     mean, sigma = smoothed.means[at], np.sqrt(np.maximum(np.diag(smoothed.covariance(at)), 0.0))
     share = weight_per_magnet(machine)
-    found = {
-        unknown.path: (
-            float(mean[problem.n_dynamic + k]) / share,
-            float(sigma[problem.n_dynamic + k]) / share,
+    places = {unknown.path: problem.n_dynamic + k for k, unknown in enumerate(problem.unknowns)}
+    lifts = []
+    for amb in machine.ambs:
+        entries = [places[row.path_of(amb.name)] for row in FORCES]
+        (sideways, up), (sideways_error, up_error) = (
+            [float(values[k]) / share for k in entries] for values in (mean, sigma)
         )
-        for k, unknown in enumerate(problem.unknowns)
-    }
-    sideways, up = FORCES
-    return tuple(
-        RecordedLift(
-            magnet=amb.name,
-            sideways=found[sideways.path_of(amb.name)][0],
-            sideways_error=found[sideways.path_of(amb.name)][1],
-            up=found[up.path_of(amb.name)][0],
-            up_error=found[up.path_of(amb.name)][1],
+        lifts.append(
+            RecordedLift(
+                magnet=amb.name, sideways=sideways, sideways_error=sideways_error, up=up, up_error=up_error
+            )
         )
-        for amb in machine.ambs
-    )
+    return tuple(lifts)
 
 
 def _with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:

@@ -27,20 +27,9 @@ def joint_spread(
 ) -> JointSpread:
     """Joint distribution of the calibrated values of the touchdown bearings.
 
-    Parameters
-    ----------
-    problem : DropProblem
-        Of the last drop: the unknowns with their measures.
-    mean, covariance : ndarray, shapes (n,), (n, n)
-        What the fit holds of all states and unknowns.
-    known : mapping
-        The values as the machine file states them, with the intervals it states.
-
-    Returns
-    -------
-    JointSpread
-        Correlations as the fit holds them, spreads as wide as the stated intervals: a study of drops must not
-        believe a value more than the file says.
+    The correlations are those of the fit to the last drop, with mean (n,) and covariance (n, n); the spreads
+    are as wide as the intervals that the machine file states: a study of drops must not believe a value more
+    than the file says.
     """
     chosen = [
         (problem.n_dynamic + k, unknown)

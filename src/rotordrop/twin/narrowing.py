@@ -29,16 +29,8 @@ def narrowing(
 
     A number that becomes known takes away the part of the variance of a force that it explains: of a normal
     distribution that is ``cᵀ P⁻¹ c`` with the covariance c of force and numbers, and P of the numbers. What
-    every model here leaves out stays.
-
-    Parameters
-    ----------
-    problem, smoothed : DropProblem, Smoothed
-        A followed drop, estimated alone.
-    forces : ForceHistory
-        Its forces.
-    widening : float
-        Factor on all intervals [1].
+    every model here leaves out stays. The drop was estimated alone; the widening is a factor on all intervals
+    [1].
     """
     names = problem.model.bearing_names
     peaks = [int(np.argmax(forces.magnitude[:, b])) for b in range(len(names))]
@@ -59,10 +51,13 @@ def narrowing(
             known = explained(covariance[np.ix_(entries, entries)], shared[entries])
             left = max(variance - known, 0.0)
             after[measurement][name] = NINETY * widening * math.sqrt(left + rest)
+    first = problem.n_dynamic + len(problem.unknowns)
+    paths = {problem.n_dynamic + k: unknown.path for k, unknown in enumerate(problem.unknowns)}
+    paths |= {first + c: f"sensors.{one.name}.gain" for c, one in enumerate(problem.model.machine.sensors)}
     listed = [
         Advice(
             measurement=measurement,
-            paths=tuple(_paths(problem)[entry] for entry in entries),
+            paths=tuple(paths[entry] for entry in entries),
             half_widths=before,
             narrowed=after[measurement],
         )
@@ -92,12 +87,3 @@ def _measurements(problem: DropProblem) -> Iterator[tuple[str, list[int]]]:
     first = problem.n_dynamic + len(problem.unknowns)
     groups["a calibration of the displacement sensors"] = list(range(first, first + problem.n_channels))
     yield from groups.items()
-
-
-def _paths(problem: DropProblem) -> dict[int, str]:
-    """Paths of the entries of the estimate."""
-    first = problem.n_dynamic + len(problem.unknowns)
-    paths = {problem.n_dynamic + k: unknown.path for k, unknown in enumerate(problem.unknowns)}
-    return paths | {
-        first + c: f"sensors.{sensor.name}.gain" for c, sensor in enumerate(problem.model.machine.sensors)
-    }

@@ -29,7 +29,7 @@ WINDOW = 0.2
 """Part of a drop that is estimated [s]."""
 
 FALL_SHARE = 1.7e-7
-"""Largest unknown impulse per 50 µs while the rotor falls, over its weight [s]."""
+"""Largest impulse of process noise per 50 µs while the rotor falls, over its weight [s]."""
 
 
 def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) -> DropProblem:

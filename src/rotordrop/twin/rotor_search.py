@@ -60,14 +60,12 @@ class _Unknown:
 def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedDrop]]) -> Machine:
     """The machine with the rotor that makes its records likeliest, where a beam stands for it; else itself.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine; of its rotor, what has a range is sought.
-    drops : sequence of (Evidence, RecordedDrop)
-        What the records say, and the readings of the time after power-off that is looked at.
+    Of the rotor, what has a range is sought; the records have the readings of the time that is looked at.
     """
-    unknowns = _sought(machine)
+    unknowns = []
+    for row in machine.rotor.sought():
+        known = prior(row, row.described(machine.rotor))
+        unknowns.append(_Unknown(row=row, path=row.path_of(""), mean=known.mean, sigma=known.sigma))
     if not unknowns:
         return machine
     model = build_drop_model(machine, BASIS)
@@ -94,15 +92,6 @@ def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedD
     ).x
     found = np.clip(found, -FARTHEST, FARTHEST)
     return machine.with_values({u.path: _known(u, u.value(d)) for u, d in zip(unknowns, found, strict=True)})
-
-
-def _sought(machine: Machine) -> list[_Unknown]:
-    """What is only guessed of the form of the rotor."""
-    sought = []
-    for row in machine.rotor.sought():
-        known = prior(row, row.described(machine.rotor))
-        sought.append(_Unknown(row=row, path=row.path_of(""), mean=known.mean, sigma=known.sigma))
-    return sought
 
 
 def _known(unknown: _Unknown, value: float) -> Known:

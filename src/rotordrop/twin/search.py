@@ -204,7 +204,7 @@ def track_drops(
         base = Candidate(machine=machine, fit=search.fit_base(machine))
         if not base.inconsistent:
             base = extension_when_consistent(base, search)
-        # First: the coarse basis alone may end beside a record that the finer one fits, or lose it there.
+        # First: the coarse basis alone may not fit a record that the finer one fits, or lose it there.
         found = search.refine_if_followed(base)
     if found is None or not _fits(found):
         if progress is not None:
@@ -225,7 +225,7 @@ def score_of(fit: TrackedDrops) -> Score:
 
 
 def gain_of(candidate: Candidate, before: Candidate) -> float:
-    """Rise of the log marginal likelihood [1]; without limit where the other needed larger impulses."""
+    """Rise of the log marginal likelihood [1]; without limit where the other needed larger process noise."""
     if candidate.score[:2] != before.score[:2]:
         return math.inf if candidate.score < before.score else -math.inf
     return before.score[2] - candidate.score[2]
@@ -236,13 +236,6 @@ def best_structure(base: Candidate, search: Fits) -> Candidate:
 
     The windows of a search leave it a few passes short, and an extension may have only led to a better start.
     So the model without it is given what both have found, and the rise of the likelihood counts from there.
-
-    Parameters
-    ----------
-    base : Candidate
-        The base model, which does not fit the record.
-    search : Fits
-        Fits machines to the record.
     """
     best = _base_again(base, base, search)
     for _ in range(MOST_EXTENSIONS):
@@ -284,7 +277,7 @@ def _base_again(base: Candidate, better: Candidate, search: Fits) -> Candidate:
 
 
 def best_start(best: Candidate, search: Fits) -> Candidate:
-    """The same machine from other places in its prior, where it ended beside the record.
+    """The same machine from other places in its prior, where it ended inconsistent with the record.
 
     The objective has several minima.
     """
@@ -344,13 +337,6 @@ def extension_when_consistent(base: Candidate, search: Fits) -> Candidate:
 
     A mild departure may not show in the size of the innovations, which nobody knows to a tenth, and yet move
     peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, cross-axis sensitivity a gap by 30 µm.
-
-    Parameters
-    ----------
-    base : Candidate
-        The base model, which follows the record.
-    search : Fits
-        Fits machines to the record.
     """
     able = [one for one in EXTENSIONS if one.shows_when_consistent and one.values(base.machine)]
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
@@ -390,7 +376,7 @@ class Search:
         return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.drops.evidence])
 
     def fit_base(self, machine: Machine) -> TrackedDrops:
-        """Fit of a machine from its guesses by the coarse basis; beside the record, again in short steps."""
+        """Fit of a machine from its guesses by the coarse basis; where inconsistent, again in short steps."""
         problems, found = self.drops.coarse(machine), None
         with suppress(IdentificationError):
             found = track(problems, self.drops.scaled(machine, BLIND_SCHEDULE), progress=self.progress)
@@ -478,7 +464,7 @@ class Search:
         return silent
 
     def refine_if_followed(self, first: Candidate) -> Candidate | None:
-        """The same; None where the finer basis loses a record beside which the coarse one ended."""
+        """The same; None where the finer basis loses a record with which the coarse one was inconsistent."""
         try:
             return self.refine(first)
         except IdentificationError:
@@ -530,8 +516,8 @@ def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDro
         if done < samples:
             raise IdentificationError(
                 f"the filter lost the drop {item.name} at {1e3 * problem.time[done]:.1f} ms of "
-                f"{1e3 * problem.time[samples - 1]:.0f} ms, even with {LOOSER[-1]:g} × the usual unknown "
-                "impulses; the machine description is too far from the machine that was recorded. Check the "
+                f"{1e3 * problem.time[samples - 1]:.0f} ms, even with {LOOSER[-1]:g} × the usual process "
+                "noise; the machine description is too far from the machine that was recorded. Check the "
                 "sensors (planes, angles, signs), or calibrate anew with this drop."
             )
     return tracked

@@ -1,4 +1,4 @@
-"""From a followed drop to its estimate: which numbers hold, which give way, and nothing of the filter."""
+"""From a followed drop to its estimate: which numbers hold, which are replaced, and nothing of the filter."""
 
 from __future__ import annotations
 
@@ -188,8 +188,8 @@ def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inp
 
     A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor
     apart from the cross-check is not called consistent, nor is one with a beam in place of the rotor, whose
-    innovations are white by larger impulses, beyond the accuracy of the cross-check. The twin lends nothing
-    to the cross-check, since what it says of gaps and sensors may be as wrong as what it says of forces. A
+    innovations are white by larger process noise, beyond the accuracy of the cross-check. That one takes
+    nothing from the twin, since what it says of gaps and sensors may be as wrong as what it says of forces. A
     quick estimate does without it, but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
@@ -292,6 +292,7 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+    """Loads of the twin, replaced or not."""
     numbers = numbers_of(drop.problem.model.machine.touchdown_bearings[b])
     return twin_loads(drop.forces, b, judged.widening, numbers.stress_sigma)
 

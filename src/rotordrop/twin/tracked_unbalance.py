@@ -34,18 +34,9 @@ def plane_unbalances(
     """Unbalance of every plane of the machine, from its two components and their joint covariance.
 
     The filter counts the rotor angle from its first sample, so that instant is where the shaft stands
-    against its mark.
-
-    Parameters
-    ----------
-    marks : ndarray, shape (M,), optional
-        When the mark passed, in record time [s].
-    power_off : float
-        Power-off in record time [s].
-    fits : bool
-        Whether model and record agree; where not, nothing is known but what was before.
-    widening : float
-        Factor on standard errors [1].
+    against its mark, which passed at ``marks`` (M,) in record time [s], like power-off. Without agreement of
+    model and record (``fits``) nothing is known but what was before; the widening is a factor on standard
+    errors [1].
     """
     first = power_off + float(problem.time[0])
     turned = None if marks is None else angle_since_mark(marks, first)
@@ -56,7 +47,9 @@ def plane_unbalances(
         entries = np.array(problem.entries_that_set("unbalance", plane), dtype=np.intp)
         first = problem.unknowns[entries[0] - problem.n_dynamic]
         prior = first.sigma
-        factor = parameter_widening(first, _largest(covariance, entries), widening)
+        (a, b), (_, d) = covariance[np.ix_(entries, entries)]
+        largest = math.sqrt(max(0.5 * (a + d) + math.hypot(0.5 * (a - d), b), 0.0))  # in any direction
+        factor = parameter_widening(first, largest, widening)
         joint = factor**2 * covariance[np.ix_(entries, entries)]
         amount, phase = _polar(complex(*mean[entries]), joint, prior, turned, fits)
         reason = NO_MARK if marks is None else NO_PASSAGE if turned is None else NO_DIRECTION
@@ -66,12 +59,6 @@ def plane_unbalances(
             )
         )
     return tuple(found)
-
-
-def _largest(covariance: Array, entries: NDArray[np.intp]) -> float:
-    """Standard error of two components in the direction where it is largest."""
-    (a, b), (_, d) = covariance[np.ix_(entries, entries)]
-    return math.sqrt(max(0.5 * (a + d) + math.hypot(0.5 * (a - d), b), 0.0))
 
 
 def _polar(

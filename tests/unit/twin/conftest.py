@@ -70,26 +70,6 @@ def calibrated(known: Machine, hidden: HiddenMachine) -> Machine:
 
 
 @pytest.fixture(scope="session")
-def informed(known: Machine, hidden: HiddenMachine) -> Machine:
-    """The machine with the true parameters of the hidden one, known to half a per cent, friction to five."""
-    values: dict[str, Known] = {}
-    for bearing in hidden.machine.touchdown_bearings:
-        for path in (*CALIBRATED, "air_gap", "contact.exponent"):
-            part = bearing.bearing if path == "preload" else bearing
-            for name in path.split("."):
-                part = getattr(part, name)
-            value = float(part)
-            share = 0.05 if path.startswith("friction") else 0.005
-            values[f"{bearing.name}.{path}"] = Known(
-                value=value,
-                status="estimated",
-                interval_90=(value * (1.0 - share), value * (1.0 + share)),
-                source="truth",
-            )
-    return known.with_values(values)
-
-
-@pytest.fixture(scope="session")
 def workshop(calibrated: Machine, synthetic: SyntheticDrop) -> TrackedDrop:
     """The drop followed over its 0.2 s by the drop model of a calibrated machine, with its filter."""
     item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")

@@ -15,16 +15,12 @@ from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest
 from rotordrop.estimate.bearing_values import equivalent_stiffness
-from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
 from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.track.consistency import Check
-from rotordrop.twin import tracked_estimate
 from rotordrop.twin.calibrated import CONFOUNDED, _confounded, _values
-from rotordrop.twin.tracked_loads import twin_impacts
 from rotordrop.twin.tracked_parameters import (
     PARAMETER_WIDENING,
     determination,
@@ -164,108 +160,6 @@ def test_what_is_called_confounded_is_what_correlates(problem: Any) -> None:
     ]
     assert [pair.correlation for pair in found] == pytest.approx([-0.95, 0.92])
     assert all(abs(pair.correlation) > CONFOUNDED and pair.way_out for pair in found)
-
-
-def test_innovations_keep_their_channels_and_their_deviation() -> None:
-    """The last column of the filter is the speed; behind the last sample followed there is nothing."""
-    dice = np.random.default_rng(6)
-    innovations, variances = dice.normal(size=(50, 5)), dice.uniform(1.0, 2.0, (50, 5))
-    filtered = SimpleNamespace(done=40, innovations=innovations, innovation_variances=variances)
-    sensors = tuple(SimpleNamespace(name=name) for name in "ABCD")
-    machine = SimpleNamespace(sensors=sensors)
-    drop: Any = SimpleNamespace(
-        judged=filtered,
-        problem=SimpleNamespace(time=np.arange(50.0), model=SimpleNamespace(machine=machine)),
-    )
-    found = tracked_estimate._innovations(drop)
-    assert found.channels == ("A", "B", "C", "D")
-    assert found.values.shape == found.deviation.shape == (40, 4) and found.time[-1] == 39.0
-    assert found.values == pytest.approx(innovations[:40, :4])
-    assert found.deviation**2 == pytest.approx(variances[:40, :4])
-
-
-def test_the_rest_of_the_record_counts_above_the_noise_of_the_sensors(
-    problem: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    time = np.arange(0.0, 0.4, 1e-3)
-    monkeypatch.setattr(tracked_estimate, "_measured", lambda *_: np.ones((400, 2, 2)))
-    evidence = SimpleNamespace(time=time, readings=lambda until: np.zeros((400, 4)))
-    drop: Any = SimpleNamespace(
-        evidence=evidence,
-        problem=SimpleNamespace(model=problem.model, time=time[:200], variances=problem.variances),
-    )
-    judged: Any = None
-    found = tracked_estimate._later(drop, judged)
-    assert [one.bearing for one in found] == ["NDE", "DE"]
-    noise = math.sqrt((1.0 + 4.0 + 9.0 + 16.0) / 4.0) * 1e-7
-    for one in found:
-        assert one.resolved == pytest.approx(RESOLVED * noise)
-        assert one.first_time <= time[199] < one.later_time
-
-
-def test_an_impact_lasts_from_its_first_to_its_last_indented_sample() -> None:
-    time = 5e-5 * np.arange(60)
-    depth = np.full((60, 1), -1e-6)
-    depth[10:16], depth[30:31] = 2e-6, 1e-6
-    force = np.where(depth > 0.0, 100.0, 0.0)
-    force[12], force[30] = 400.0, 300.0
-    forces: Any = SimpleNamespace(
-        time=time,
-        indentation=depth,
-        magnitude=force + 5.0,
-        magnitude_sigma=np.full((60, 1), 4.0),
-        contact_force=force,
-        contact_power=0.01 * force,
-        azimuth=np.arange(60.0)[:, None],
-        friction_sigma=np.array([0.03]),
-    )
-    long, short = twin_impacts(forces, 0, 1.0, None)
-    for impact, first, last, strongest in ((long, 10, 15, 12), (short, 30, 30, 30)):
-        assert (impact.start, impact.end) == (time[first], time[last])
-        assert impact.azimuth == strongest
-        total = 5e-5 * float(force[first : last + 1].sum())
-        assert impact.impulse.value == pytest.approx(total)
-        assert impact.dissipated_energy.value == pytest.approx(0.01 * total)
-        assert force[strongest, 0] + 5.0 <= impact.peak_force.value < 1.2 * (force[strongest, 0] + 5.0)
-        assert impact.peak_time == pytest.approx(time[strongest], abs=2.6e-5)
-
-
-@pytest.mark.parametrize(
-    ("consistent", "checked", "verdict", "widening"),
-    [
-        (True, True, Verdict.CONSISTENT, 1.0),
-        (True, False, Verdict.CONSISTENT, 1.0),
-        (True, False, Verdict.CONSISTENT, 1.4),
-        (False, True, Verdict.WIDENED, 2.0),
-    ],
-)
-def test_a_twin_that_fits_stands_whether_it_was_cross_checked_or_not(
-    consistent: bool,
-    checked: bool,
-    verdict: Verdict,
-    widening: float,
-    problem: Any,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    seen: list[tuple[bool, float]] = []
-
-    def parameters(*_: Any, fits: bool, widening: float) -> tuple[Any, ...]:
-        seen.append((fits, widening))
-        return tuple(SimpleNamespace(path=f"{name}.air_gap", estimate=None) for name in ("NDE", "DE"))
-
-    monkeypatch.setattr(tracked_estimate, "parameters", parameters)
-    monkeypatch.setattr(tracked_estimate, "sensor_errors", lambda *_, **__: ())
-    for name in ("is_beyond_factor", "is_lost"):
-        monkeypatch.setattr(tracked_estimate, name, lambda *_: False)
-    noted = Check(name="parameters", passed=consistent, message="", widening=widening if consistent else 1.0)
-    drop: Any = SimpleNamespace(
-        problem=problem, smoothed=None, consistent=consistent, checks=(noted,), drops=1, accepted=()
-    )
-    drop.forces = SimpleNamespace(magnitude=np.ones((3, 2)))
-    check: Any = object() if checked else None
-    judged = tracked_estimate._judge(drop, check)
-    assert judged.verdict is verdict and judged.widening == widening
-    assert seen == [(consistent, widening)] and judged.replaced_at == (False, False)
 
 
 def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:

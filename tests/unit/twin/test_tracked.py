@@ -120,12 +120,6 @@ def test_every_large_impact_is_found_and_half_of_them_within_five_per_cent(
         assert np.max(np.abs(found["relative_errors"])) < 0.25
 
 
-def test_true_parameters_give_the_truth(informed: Machine, synthetic: SyntheticDrop) -> None:
-    drop = estimate_drop(informed, synthetic.record, tail=synthetic.tail, method=Tracked(quick=True))
-    assert drop.consistent, drop.sentence
-    assert_right(drop, synthetic)
-
-
 def test_one_pass_agrees_with_three(tracked: Estimate, quick: Estimate) -> None:
     for name in BEARINGS:
         for field, limit in LIMITS.items():
