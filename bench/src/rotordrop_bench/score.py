@@ -50,7 +50,7 @@ def score_estimate(
     -------
     dict
         ``method`` and ``consistent`` (what the estimate says of itself); ``named``, what it says the machine
-        has beyond the usual model, and ``violated``, what it has; ``drop``,
+        has beyond the base model, and ``violated``, what it has; ``drop``,
         ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
         ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
         bearing where the estimate lists impacts; ``coverage`` over all intervals.

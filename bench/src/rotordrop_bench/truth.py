@@ -42,7 +42,7 @@ class Truth:
 
     @property
     def bearing_load(self) -> float:
-        """Mean weight on a bearing [N]; where it is not told, the mean force late in the drop."""
+        """Mean weight on a bearing [N]; where it is not stated, the mean force late in the drop."""
         weight = self.values.get("rotor_weight_N")
         if weight is None:
             return float(np.mean(list(self.values.get("mean_force_0p15_0p2_N", {}).values() or [0.0])))
@@ -56,7 +56,7 @@ class Truth:
 
     @property
     def structure(self) -> dict[str, float]:
-        """True values of structures beyond the usual model [SI], by path such as ``"NDE.support.cubic"``."""
+        """True values of structures beyond the base model [SI], by path such as ``"NDE.support.cubic"``."""
         return {path: float(value) for path, value in self.values.get("structure", {}).items()}
 
     def _of_bearing(self, bearing: str, place: tuple[str, ...], unit: float = 1.0) -> float | None:

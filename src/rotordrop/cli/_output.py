@@ -73,9 +73,9 @@ def deliver(
 
         write_data(summary, data)
     if json_file == STANDARD_OUTPUT:
-        told = with_digest(content) if isinstance(content, dict) else content
+        sealed = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
-        sys.stdout.write(json.dumps(told, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
+        sys.stdout.write(json.dumps(sealed, indent=2, ensure_ascii=not whole, allow_nan=False) + "\n")
         return
     if json_file is not None:
         write_json(json_file, content, sealed=isinstance(content, dict))

@@ -96,7 +96,7 @@ def interruptions_kept() -> Iterator[Callable[[], bool]]:
 
 
 def interruptible(compute: Callable[[], Result]) -> Result:
-    """Compute in a thread of its own, so that Ctrl-C is heard while compiled code runs for minutes.
+    """Compute in a thread of its own, so that Ctrl-C is noticed while compiled code runs for minutes.
 
     The thread is left behind then; it ends with the program.
     """

@@ -186,12 +186,12 @@ def profile(
             "edge": edge,
         },
     }
-    told = {
+    stated = {
         key: {k: v for k, v in entry.items() if v is not None} if isinstance(entry, dict) else entry
         for key, entry in entries.items()
         if entry is not None
     }
-    given = rules_of(profile_of(told, "the options"), [*(channel or []), *(mapping or [])])
+    given = rules_of(profile_of(stated, "the options"), [*(channel or []), *(mapping or [])])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors
@@ -267,9 +267,9 @@ def clearance(
             )
         for change in wear:
             low, high = (1e6 * limit for limit in change.interval_90)
-            told = "" if low <= 0.0 <= high else "; it has worn" if change.growth > 0 else "; it has shrunk"
+            said = "" if low <= 0.0 <= high else "; it has worn" if change.growth > 0 else "; it has shrunk"
             span = f"{low:+.1f} to {high:+.1f} µm"
-            out.print(f"{change.bearing}: grown by {1e6 * change.growth:+.1f} µm (90 %: {span}){told}")
+            out.print(f"{change.bearing}: grown by {1e6 * change.growth:+.1f} µm (90 %: {span}){said}")
         if not any(found.sag for found in checks[-1]):
             out.print(
                 "The gain of the sensors comes on top: an error of 1 % is 1 % of the gap. What the bearing "

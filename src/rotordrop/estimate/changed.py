@@ -20,7 +20,7 @@ from rotordrop.physics.linear_algebra import solve, symmetric_eigen
 from rotordrop.units import format_chance
 
 Array = NDArray[np.float64]
-Told = Mapping[str, published.Parameter]
+ByPath = Mapping[str, published.Parameter]
 """Parameters of one estimate by path."""
 
 FALSE_ALARM = 0.01
@@ -114,9 +114,9 @@ class Changes:
     def sentence(self, name_of: Callable[[str], str] = str) -> str:
         """The outcome in words, with parameters by their paths or by other names."""
         hidden = ", ".join(f"{name_of(one.path)} {one.smallest_text}" for one in self.found if one.may_hide)
-        beside = f" Smaller changes than these may hide: {hidden}." if hidden else ""
+        unseen = f" Smaller changes than these may hide: {hidden}." if hidden else ""
         if not self.named:
-            return f"Between {self.first} and {self.second} no parameter changed beyond chance.{beside}"
+            return f"Between {self.first} and {self.second} no parameter changed beyond chance.{unseen}"
         parts = []
         for one in self.named:
             low, high = one.interval_90
@@ -124,7 +124,7 @@ class Changes:
             if one.factor:
                 moved = f"× {one.change:.3g}, 90 %: {low:.3g} to {high:.3g}"
             parts.append(f"{name_of(one.path)} ({moved}, {format_chance(one.probability)})")
-        return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{beside}"
+        return f"Between {self.first} and {self.second} changed: {', '.join(parts)}.{unseen}"
 
 
 def changes(first: Drop, second: Drop) -> Changes:
@@ -155,16 +155,16 @@ def changes(first: Drop, second: Drop) -> Changes:
             f"the drops are of {first.machine!r} and {second.machine!r}; only drops of one machine can "
             "show what changed"
         )
-    told = [{one.path: one for one in drop.parameters} for drop in (first, second)]
-    paths = [path for path in told[0] if path in told[1] and _watched(path) is not None]
-    pairs = {path: [_alone(one[path], row_of(path)) for one in told] for path in paths}
+    both = [{one.path: one for one in drop.parameters} for drop in (first, second)]
+    paths = [path for path in both[0] if path in both[1] and _watched(path) is not None]
+    pairs = {path: [_alone(one[path], row_of(path)) for one in both] for path in paths}
     if first.joint is not None and second.joint is not None:
         # a parameter that hardly leaves its prior is one that the linearised fit knows least of
         seen = [path for path, pair in pairs.items() if None not in pair]
-        found = _jointly(first.joint, second.joint, told, seen, paths)
+        found = _jointly(first.joint, second.joint, both, seen, paths)
     else:
         level = _level(sum(None not in pair for pair in pairs.values()))
-        found = [_compared(path, told, pair, level) for path, pair in pairs.items()]
+        found = [_compared(path, both, pair, level) for path, pair in pairs.items()]
     return Changes(
         first=first.record,
         second=second.record,
@@ -212,19 +212,19 @@ def _level(count: int) -> float:
 
 
 def _compared(
-    path: str, told: Sequence[Told], pair: Sequence[tuple[float, float] | None], level: float
+    path: str, both: Sequence[ByPath], pair: Sequence[tuple[float, float] | None], level: float
 ) -> Change:
     one, other = pair
     if one is None or other is None:
-        return _change(path, told, 0.0, math.inf, smallest=math.inf, named=False)
+        return _change(path, both, 0.0, math.inf, smallest=math.inf, named=False)
     moved, sigma = other[0] - one[0], math.hypot(one[1], other[1])
     named = abs(moved) > level * sigma
-    return _change(path, told, moved, sigma, smallest=(level + FOUND) * sigma, named=named)
+    return _change(path, both, moved, sigma, smallest=(level + FOUND) * sigma, named=named)
 
 
 def _change(
     path: str,
-    told: Sequence[Told],
+    both: Sequence[ByPath],
     moved: float,
     sigma: float,
     *,
@@ -238,7 +238,7 @@ def _change(
     """
     factor, least = row_of(path).logarithmic, _watched(path)
     assert least is not None
-    before, after = (one[path].estimate.value for one in told)
+    before, after = (one[path].estimate.value for one in both)
     smallest = 1.0 + smallest if factor else smallest
     if math.isinf(sigma):
         nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
@@ -265,7 +265,7 @@ def _change(
 def _jointly(
     first: Joint,
     second: Joint,
-    told: Sequence[Told],
+    both: Sequence[ByPath],
     seen: Sequence[str],
     paths: Sequence[str],
 ) -> list[Change]:
@@ -290,7 +290,7 @@ def _jointly(
     found = []
     for path in paths:
         if path not in common:
-            found.append(_change(path, told, 0.0, math.inf, smallest=math.inf, named=False))
+            found.append(_change(path, both, 0.0, math.inf, smallest=math.inf, named=False))
             continue
         others = [one for one in chosen if one != path]
         moved, sigma = fit.change([common.index(one) for one in (*others, path)])
@@ -299,7 +299,7 @@ def _jointly(
         found.append(
             _change(
                 path,
-                told,
+                both,
                 moved * scale[path],
                 sigma * scale[path] if known else math.inf,
                 smallest=(level + FOUND) * sigma * scale[path] if shows else math.inf,
@@ -344,9 +344,9 @@ class _CommonFit:
 
     def change(self, places: Sequence[int]) -> tuple[float, float]:
         """Change of the last of some places while all of them may change, and its standard error."""
-        beside = [place for place in self._unseen if place not in places]
-        held = np.array([0.5] * len(beside) + [LITTLE] * len(places))
-        places = [*beside, *places]
+        unseen = [place for place in self._unseen if place not in places]
+        held = np.array([0.5] * len(unseen) + [LITTLE] * len(places))
+        places = [*unseen, *places]
         inside = self._other[:, places]
         carried = solve(self._shared, np.column_stack([inside, self._sum]))
         known = self._other[np.ix_(places, places)] - inside.T @ carried[:, :-1]

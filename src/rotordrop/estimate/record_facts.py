@@ -15,7 +15,7 @@ COUNTED_TWICE = (
 )
 
 
-BESIDE = (
+INCONSISTENT_CALIBRATION = (
     "the machine file was calibrated on drops that its model is not consistent with, so its air gaps and "
     "supports may be far off; use the file from before that calibration"
 )
@@ -61,5 +61,5 @@ def facts_of(evidence: Evidence) -> RecordFacts:
     if origin is not None:
         same = [d.name for d in origin.drops if d.name == name or (d.sha256 and d.sha256 == record.sha256)]
         warnings += [COUNTED_TWICE.format(one) for one in same]
-        warnings += [] if origin.consistent else [BESIDE]
+        warnings += [] if origin.consistent else [INCONSISTENT_CALIBRATION]
     return RecordFacts(findings=findings, warnings=tuple(warnings), simulated=record.is_simulated)

@@ -203,12 +203,12 @@ def with_draws(value: Known, sample: Array | None, model: float) -> Known:
         return replace(value, status="the record does not determine it")
     low, high = (float(limit) for limit in np.quantile(sample, QUANTILES))
     middle = float(np.median(sample))
-    beside = NINETY * model * value.value
-    low, high = middle - math.hypot(middle - low, beside), middle + math.hypot(high - middle, beside)
+    allowance = NINETY * model * value.value
+    low, high = middle - math.hypot(middle - low, allowance), middle + math.hypot(high - middle, allowance)
     return replace(
         value,
         standard_error=math.hypot(float(np.std(sample, ddof=1)), model * value.value),
-        interval_90=(max(min(low, value.value - beside), 0.0), max(high, value.value + beside)),
+        interval_90=(max(min(low, value.value - allowance), 0.0), max(high, value.value + allowance)),
     )
 
 

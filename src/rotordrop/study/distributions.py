@@ -92,8 +92,8 @@ def normal_score(share: Array) -> Array:
     """
     u = np.clip(np.asarray(share, dtype=np.float64), 1e-16, 1.0 - 1e-16)
     from_middle = u - 0.5
-    beside = np.sqrt(-ln_each(np.minimum(u, 1.0 - u)))
-    outer = np.where(beside <= 5.0, _ratio(_SIDE, beside - 1.6), _ratio(_END, beside - 5.0))
+    tail = np.sqrt(-ln_each(np.minimum(u, 1.0 - u)))
+    outer = np.where(tail <= 5.0, _ratio(_SIDE, tail - 1.6), _ratio(_END, tail - 5.0))
     inner = from_middle * _ratio(_MIDDLE, 0.180625 - from_middle * from_middle)
     return np.where(np.abs(from_middle) <= 0.425, inner, np.copysign(outer, from_middle))
 

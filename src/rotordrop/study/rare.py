@@ -167,7 +167,7 @@ def rare_drops(
     """Probability that a quantity of a drop exceeds a limit [SI], with the spreads of a study.
 
     Its number of drops and its design do not matter. One in a million takes about six levels of 0.9 times
-    ``samples`` drops a repeat. ``progress`` hears a sentence and the drops done over the expected number.
+    ``samples`` drops a repeat. ``progress`` is called with a sentence and the share of drops done.
     """
     place = columns_of(study.machine).index(column_of(study.machine, column))
     model, varied = build_drop_model(study.machine, study.reduction), list(study.varied)

@@ -91,8 +91,8 @@ def repeat_study(
     gap = smallest_gap(machine)
     for amb in machine.ambs:
         vary |= {f"{amb.name}.remanent_share": up, f"{amb.name}.remanent_share_x": sideways}
-        beside = Distribution(shape="normal", numbers=(0.0, OFF_CENTRE * gap))
-        vary |= {f"{amb.name}.{name}": beside for name in ("offset_x", "offset_y")}
+        off_centre = Distribution(shape="normal", numbers=(0.0, OFF_CENTRE * gap))
+        vary |= {f"{amb.name}.{name}": off_centre for name in ("offset_x", "offset_y")}
         vary[f"{amb.name}.orbit"] = Distribution(shape="uniform", numbers=(0.0, LARGEST_ORBIT * gap))
         vary[f"{amb.name}.orbit_phase"] = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
     for k, unbalance in enumerate(machine.unbalances):

@@ -272,6 +272,6 @@ def _save_parquet(results: StudyResults, path: Path) -> None:
 
     columns = {"drop": results.drop, **results.varied, **results.numbers, "failure": list(results.reasons)}
     units = {q.name: q.unit for q in results.columns}
-    told = {"study": results.study.name, "digest": results.study.digest, "units": json.dumps(units)}
+    metadata = {"study": results.study.name, "digest": results.study.digest, "units": json.dumps(units)}
     with atomic_path(path) as temporary:
-        parquet.write_table(pyarrow.table(columns).replace_schema_metadata(told), temporary)
+        parquet.write_table(pyarrow.table(columns).replace_schema_metadata(metadata), temporary)

@@ -26,7 +26,7 @@ from rotordrop.track.consistency import Check, consistency_checks, judged_by
 from rotordrop.track.noise_size import likeliest_noise, with_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
-from rotordrop.twin.joint_spread import joint_spread
+from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.search import CALIBRATION_SCHEDULE, track_drops
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
@@ -114,9 +114,9 @@ def calibrate_machine(
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
-    machine, usual = found.machine, found.fit
-    factor = likeliest_noise(usual, CALIBRATION_SCHEDULE[-1])
-    tracked = with_noise(usual, CALIBRATION_SCHEDULE[-1], factor)
+    machine, base = found.machine, found.fit
+    factor = likeliest_noise(base, CALIBRATION_SCHEDULE[-1])
+    tracked = with_noise(base, CALIBRATION_SCHEDULE[-1], factor)
     checks = {
         name: consistency_checks(
             problem,
@@ -124,7 +124,7 @@ def calibrate_machine(
             factor,
         )
         for name, problem, smoothed, past in zip(
-            stems, tracked.problems, tracked.smoothed, usual.smoothed, strict=True
+            stems, tracked.problems, tracked.smoothed, base.smoothed, strict=True
         )
     }
     consistent = all(check.passed for one in checks.values() for check in one)
@@ -137,10 +137,10 @@ def calibrate_machine(
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
     known = _as_known(as_filed(machine, values), identifiability)
-    beside = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
-    source = f"calibrated on {', '.join(stems)}{beside}"
+    marked = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
+    source = f"calibrated on {', '.join(stems)}{marked}"
     fitted = machine_values(bearings, known, source)
-    joint = joint_spread(problem, mean, covariance, known)
+    joint = joint_covariance(problem, mean, covariance, known)
     said = values | _of_drop(problem, mean, covariance)
     drops = [
         CalibrationDrop(name=name, sha256=record.sha256, lift=_lift(one, followed))
@@ -156,7 +156,7 @@ def calibrate_machine(
         confounded=_confounded(problem, covariance),
         checks=checks,
         consistent=consistent,
-        nis=dict(zip(stems, usual.nis, strict=True)),
+        nis=dict(zip(stems, base.nis, strict=True)),
         structure=tuple(one.structure(machine, said, believed=consistent) for one in found.accepted),
     )
 

@@ -94,7 +94,7 @@ the better half, and first from the next window on (three structures, both ways:
 FEWEST = 2
 
 Score = tuple[bool, float, float]
-"""Lost, process noise over the usual one [1], negative log likelihood: what is smaller fits better, and
+"""Lost, process noise over that of the schedule [1], negative log likelihood: what is smaller fits better;
 likelihoods compare at equal process noise only."""
 
 
@@ -493,7 +493,7 @@ def _fits(found: Candidate) -> bool:
 
 
 def _other_start(problem: DropProblem, number: int) -> DropProblem:
-    """The problem with its unknowns starting at another checkpoint of their prior, one for each start."""
+    """The problem with its unknowns starting at another point of their prior, one for each start."""
     start, chosen = problem.start.copy(), problem.parameter_slice
     sigma = np.array([unknown.sigma for unknown in problem.unknowns])
     start[chosen] += OTHER_START_SPREAD * sigma * np.random.default_rng(number).standard_normal(len(sigma))

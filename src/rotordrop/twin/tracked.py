@@ -23,7 +23,7 @@ class TrackedDrop:
     """A drop that the twin has followed, with the arrays of its filter: the workshop, not the result."""
 
     evidence: Evidence
-    """What the record says beside the contacts."""
+    """What the record says without the contacts."""
     problem: DropProblem
     smoothed: Smoothed
     """The estimation problem and its smoothed estimate with the likeliest process noise."""
@@ -34,17 +34,19 @@ class TrackedDrop:
     checks: tuple[Check, ...]
     """Consistency of model and record."""
     noise_factor: float
-    """Size of the process noise over the usual one [1]."""
+    """Size of the process noise over that of the schedule [1]."""
     drops: int = 1
     """Number of drops that were fitted together."""
     accepted: tuple[Accepted, ...] = ()
     """Extensions of the base model that the readings paid for."""
-    unaided: Future[InputEstimate] | None = None
-    """The estimate without contact law, where it was begun beside the passes."""
+    cross_check: Future[InputEstimate] | None = None
+    """The estimate without contact law, where it was begun while the passes ran."""
 
     def without_contact_law(self) -> InputEstimate:
         """The estimate without contact law: as it was begun, or made now."""
-        return check_without_contact_law(self.problem) if self.unaided is None else self.unaided.result()
+        return (
+            check_without_contact_law(self.problem) if self.cross_check is None else self.cross_check.result()
+        )
 
     @property
     def consistent(self) -> bool:
@@ -61,15 +63,15 @@ def tracked_drop(
     evidence: Evidence,
     problem: DropProblem,
     smoothed: Smoothed,
-    usual: Forward,
+    base: Forward,
     noise_factor: float,
     drops: int = 1,
     accepted: tuple[Accepted, ...] = (),
-    unaided: Future[InputEstimate] | None = None,
+    cross_check: Future[InputEstimate] | None = None,
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     forces = force_history(problem, smoothed)
-    seen = judged_by(problem, smoothed.filtered, usual)
+    seen = judged_by(problem, smoothed.filtered, base)
     return TrackedDrop(
         evidence=evidence,
         problem=problem,
@@ -80,7 +82,7 @@ def tracked_drop(
         noise_factor=noise_factor,
         drops=drops,
         accepted=accepted,
-        unaided=unaided,
+        cross_check=cross_check,
     )
 
 
@@ -93,20 +95,20 @@ def followed_drops(
 ) -> Iterator[TrackedDrop]:
     """Follow recorded drops of one machine, and hand them out one by one.
 
-    Each is given away with its arrays, so that no more than one is accepted when its result has been made.
+    Each is handed out with its arrays, so that no more than one is held when its result has been made.
     """
     found = track_drops(machine, evidence, quick=quick, progress=progress)
     fit, factor, count, accepted = found.fit, max(found.fit.noise_factors), len(evidence), found.accepted
-    usual = [drop.filtered for drop in fit.smoothed]
-    unaided: list[Future[InputEstimate] | None] = [None] * count
+    base = [drop.filtered for drop in fit.smoothed]
+    cross_check: list[Future[InputEstimate] | None] = [None] * count
     if not quick:
         # The estimate without contact law takes nothing from these passes, which leave a core to it.
-        with ThreadPoolExecutor(max_workers=1) as beside:
-            unaided = checks_begun(beside, fit)
+        with ThreadPoolExecutor(max_workers=1) as pool:
+            cross_check = checks_begun(pool, fit)
             factor = likeliest_noise(fit, FINE_SCHEDULE[-1])
             fit = with_noise(fit, FINE_SCHEDULE[-1], factor)
-    waiting = list(zip(evidence, fit.problems, fit.smoothed, usual, unaided, strict=True))
-    del fit, found, usual, unaided
+    waiting = list(zip(evidence, fit.problems, fit.smoothed, base, cross_check, strict=True))
+    del fit, found, base, cross_check
     while waiting:
         item, problem, smoothed, judged, check = waiting.pop(0)
         yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check)

@@ -29,7 +29,6 @@ from rotordrop.estimate.unbalance import unbalance_notes
 from rotordrop.known import Known
 from rotordrop.track.consistency import NIS_RANGE, Check
 from rotordrop.track.input_state import InputEstimate, at_bearings
-from rotordrop.twin.narrowing import DRAWING, narrowing
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_loads import (
     Loads,
@@ -52,6 +51,7 @@ from rotordrop.twin.tracked_parameters import (
     sensor_errors,
 )
 from rotordrop.twin.tracked_unbalance import plane_unbalances
+from rotordrop.twin.value_of_information import DRAWING, value_of_information
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     if not unsure or drop.drops != 1:
         return ()
     if judged.fits:
-        return narrowing(drop.problem, drop.smoothed, drop.forces, judged.widening)
+        return value_of_information(drop.problem, drop.smoothed, drop.forces, judged.widening)
     return _by_a_drawing(drop, judged)
 
 

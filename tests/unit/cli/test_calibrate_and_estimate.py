@@ -17,7 +17,7 @@ import pytest
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.estimate.published import estimate_schema
-from rotordrop.estimate.record_facts import BESIDE, COUNTED_TWICE, facts_of
+from rotordrop.estimate.record_facts import COUNTED_TWICE, INCONSISTENT_CALIBRATION, facts_of
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.look import look
@@ -193,14 +193,14 @@ def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path
     assert ">Independent cross-check<" in html and "Quick estimate" not in html
 
 
-def beside(*_: object) -> tuple[Check, ...]:
+def inconsistent(*_: object) -> tuple[Check, ...]:
     return (Check(name="innovation size", passed=False, message="mean squared innovation 9.00 × expected"),)
 
 
-def test_an_estimate_beside_its_record_is_written_and_ends_with_its_own_code(
+def test_an_estimate_inconsistent_with_its_record_is_written_and_ends_with_its_own_code(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", beside)
+    monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", inconsistent)
     out, page = tmp_path / "out.json", tmp_path / "report.html"
     arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
     code = run([*arguments, "--json", str(out), "--report", str(page)])
@@ -215,10 +215,10 @@ def test_an_estimate_beside_its_record_is_written_and_ends_with_its_own_code(
     assert "9.00 × expected" in words(streams.err)
 
 
-def test_a_calibration_beside_its_drops_is_not_written(
+def test_a_calibration_inconsistent_with_its_drops_is_not_written(
     shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", beside)
+    monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", inconsistent)
     output = tmp_path / "calibrated.toml"
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]
     assert run(arguments) == ConsistencyError.exit_code
@@ -344,9 +344,12 @@ def test_two_records_of_one_name_are_refused(
     assert "2 records are named 'drop_060'; expected a name of its own" in words(capsys.readouterr().err)
 
 
-def told_of(machine: Machine, name: str) -> set[str]:
+def warnings_for(machine: Machine, name: str) -> set[str]:
     """Warnings that the bundled record, under a name, gets for the calibration of a machine."""
-    known = {BESIDE, *(COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second"))}
+    known = {
+        INCONSISTENT_CALIBRATION,
+        *(COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second")),
+    }
     return known & set(
         facts_of(
             Evidence(record=read_record(RECORD, machine), machine=machine, tail=None, name=name)
@@ -358,7 +361,7 @@ def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration() -> None
     text = "calibrated on drop_060 (not consistent with them)"
     written = Known(value=1e8, status="estimated", interval_90=(9e7, 1.1e8), source=text)
     machine = load_machine(LP400).with_values({f"{end}.support.stiffness": written for end in ("NDE", "DE")})
-    assert told_of(machine, "drop_060") == set()
+    assert warnings_for(machine, "drop_060") == set()
 
 
 def test_a_drop_of_the_calibration_is_known_by_its_whole_name_or_its_hash() -> None:
@@ -368,4 +371,4 @@ def test_a_drop_of_the_calibration_is_known_by_its_whole_name_or_its_hash() -> N
     for sha256, name, told in (("", "first, second", twice), ("", "first", set()), (digest, "copy", twice)):
         drop = CalibrationDrop(name="first, second", sha256=sha256)
         machine = load_machine(LP400).calibrated_on(CalibrationOrigin(drops=(drop,), consistent=True))
-        assert told_of(machine, name) == told, (sha256, name)
+        assert warnings_for(machine, name) == told, (sha256, name)

@@ -21,7 +21,6 @@ from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import InputEstimate
-from rotordrop.twin.narrowing import explained
 from rotordrop.twin.problems import recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_loads import (
@@ -31,6 +30,7 @@ from rotordrop.twin.tracked_loads import (
     with_form_error,
     without_form_error,
 )
+from rotordrop.twin.value_of_information import explained
 
 RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
 

@@ -389,14 +389,16 @@ def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: Sy
 
 
 @pytest.mark.parametrize(
-    ("nis", "factor", "diverged", "beside"),
+    ("nis", "factor", "diverged", "inconsistent"),
     [(0.95, 1.0, False, False), (1.3, 1.0, False, True), (0.95, 8.0, False, True), (0.95, 1.0, True, True)],
 )
-def test_a_fit_beside_the_record_is_noticed(nis: float, factor: float, diverged: bool, beside: bool) -> None:
+def test_a_fit_inconsistent_with_the_record_is_noticed(
+    nis: float, factor: float, diverged: bool, inconsistent: bool
+) -> None:
     fit = TrackedDrops(
         problems=(), smoothed=(), nis=(0.9, nis), diverged=(False, diverged), noise_factors=(1.0, factor)
     )
-    assert is_inconsistent(fit) == beside
+    assert is_inconsistent(fit) == inconsistent
 
 
 def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: TrackedDrop) -> None:
@@ -430,7 +432,7 @@ def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDro
     assert _cross_checked(workshop, Tracked(quick=True))[1] is None
 
 
-def test_a_twin_far_from_the_cross_check_gives_way_to_it(workshop: TrackedDrop, tracked: Estimate) -> None:
+def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop, tracked: Estimate) -> None:
     problem, forces = workshop.problem, workshop.forces
     check = input_state_estimate(problem, corrections_by_record(problem))
     own = twin_loads(forces, 0, 1.0)
@@ -517,14 +519,14 @@ def test_an_estimate_keeps_no_array_of_the_filter(workshop: TrackedDrop, tracked
     assert kept < 10e6 < 0.1 * samples * estimated**2 * 4
 
 
-def test_the_cross_check_made_beside_the_passes_is_that_made_alone(workshop: TrackedDrop) -> None:
-    assert workshop.unaided is not None
-    beside, alone = workshop.without_contact_law(), check_without_contact_law(workshop.problem)
-    np.testing.assert_array_equal(beside.force, alone.force)
-    np.testing.assert_array_equal(beside.stress, alone.stress)
+def test_the_cross_check_made_while_the_passes_run_is_that_made_alone(workshop: TrackedDrop) -> None:
+    assert workshop.cross_check is not None
+    begun, alone = workshop.without_contact_law(), check_without_contact_law(workshop.problem)
+    np.testing.assert_array_equal(begun.force, alone.force)
+    np.testing.assert_array_equal(begun.stress, alone.stress)
 
 
-def test_nothing_gives_way_to_a_cross_check_that_found_nothing(workshop: TrackedDrop) -> None:
+def test_nothing_is_replaced_by_a_cross_check_that_found_nothing(workshop: TrackedDrop) -> None:
     check = input_state_estimate(workshop.problem, corrections_by_record(workshop.problem))
     assert not is_beyond_factor(3000.0, replace(check, peak=np.full(2, math.nan)), 0)
     assert not is_beyond_factor(0.0, check, 0)

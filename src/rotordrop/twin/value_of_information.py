@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 
 DRAWING = "the rotor by its sections, from a drawing,"
 MOST_NAMED = 3
-"""Measurements that are told."""
+"""Measurements that are named."""
 
 
-def narrowing(
+def value_of_information(
     problem: DropProblem, smoothed: Smoothed, forces: ForceHistory, widening: float = 1.0
 ) -> tuple[Advice, ...]:
     """Measurements worth making, the one that narrows most first.

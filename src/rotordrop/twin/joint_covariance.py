@@ -22,7 +22,7 @@ from rotordrop.track.problem import DropProblem
 Array = NDArray[np.float64]
 
 
-def joint_spread(
+def joint_covariance(
     problem: DropProblem, mean: Array, covariance: Array, known: Mapping[str, Known]
 ) -> JointSpread:
     """Joint distribution of the calibrated values of the touchdown bearings.
