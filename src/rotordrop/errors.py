@@ -75,6 +75,14 @@ class NoDropError(RecordError):
         super().__init__(f"{record}: {seen}; {remedy}")
 
 
+class NothingFallsError(RecordError):
+    """Nothing falls in a record: its rotor is held throughout, or lies on its bearings throughout."""
+
+
+class UnpairedError(RecordError):
+    """No two channels of a recording look at one plane."""
+
+
 class UnsettledError(RecordError):
     """Readings do not show the rotor at rest on its touchdown bearings."""
 

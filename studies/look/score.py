@@ -5,7 +5,7 @@ Usage: python studies/look/score.py DROPBENCH RECORDS RESULTS [--half odd|even]
 DROPBENCH is what ``rotordrop-bench make`` wrote; RECORDS holds further records and their truth in ``truth``.
 Writes ``drops.csv`` (a line for every bearing) and ``table.md`` to RESULTS.
 
-The rule of an impact is that of `rotordrop.evidence.wall`: a contact of the truth after a flight as long as
+The rule of an impact is that of `rotordrop.record.impacts`: a contact of the truth after a flight as long as
 gravity needs to take the rotor off its race by 5 % of the gap, the first contact included; what follows the
 last of them counts as lasting contact.
 """

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter, itemgetter
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NothingFallsError, RecordError, UnpairedError
 from rotordrop.evidence.events import expected_gap
+from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
 from rotordrop.evidence.paths import (
     Drop,
     Gap,
@@ -21,7 +23,9 @@ from rotordrop.evidence.paths import (
     Path,
     Whirl,
     drops_of,
+    held_motion,
     motion_of,
+    whirls_along,
     whirls_of,
     with_impacts,
 )
@@ -33,12 +37,25 @@ from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
 from rotordrop.files import DIGEST
-from rotordrop.json_schema import DIALECT, FLAG, MAYBE, MAYBE_PAIR, NUMBER, PAIR, TEXT, TEXTS, closed, listed
+from rotordrop.json_schema import (
+    DIALECT,
+    FLAG,
+    MAYBE,
+    MAYBE_PAIR,
+    NUMBER,
+    PAIR,
+    TEXT,
+    TEXTS,
+    Schema,
+    closed,
+    listed,
+)
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import Arrangement
 from rotordrop.record.impacts import slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
-from rotordrop.record.record import Record, open_record
+from rotordrop.record.readers import read_recording
+from rotordrop.record.record import Record, open_record, sha256_of
 from rotordrop.units import in_si
 
 if TYPE_CHECKING:
@@ -98,7 +115,13 @@ class Look:
     findings: tuple[Finding, ...]
     """What the quality gate says, the worst first."""
     drops: tuple[Drop, ...]
-    """Every fall in the record, with its impacts."""
+    """Every fall in the record, with its impacts; empty where nothing falls."""
+    contacts: tuple[HeldContact, ...] = ()
+    """Where a race turned the rotor back though nothing falls, in the order of time."""
+    levels: tuple[Level, ...] = ()
+    """What every channel reads, where nothing falls."""
+    no_fall: str = ""
+    """Why there is no drop, in words."""
     whirls: tuple[Whirl, ...]
     """Of the first drop."""
     planes: tuple[PlaneLook, ...]
@@ -115,7 +138,7 @@ class Look:
     @property
     def impacts(self) -> tuple[Impact, ...]:
         """Impacts of the first drop, in the order of time."""
-        return self.drops[0].impacts
+        return self.drops[0].impacts if self.drops else ()
 
     @property
     def first_end(self) -> str | None:
@@ -125,7 +148,7 @@ class Look:
             for plane in self.planes
             if plane.touch is not None and plane.touch_interval_90 is not None
         )
-        if len(touched) < len(self.planes):
+        if not touched or len(touched) < len(self.planes):
             return None
         for (first, error, _), (then, doubt, _) in pairwise(touched[:2]):
             if then - first <= math.hypot(error, doubt):
@@ -134,7 +157,12 @@ class Look:
 
     def timeline(self) -> tuple[tuple[float, str], ...]:
         """Events in the order of time: time [s] and words."""
-        events = [(float(self.record.time[0]), "record begins, rotor levitated")]
+        events = [(float(self.record.time[0]), f"record begins{', rotor levitated' if self.drops else ''}")]
+        if not self.drops:
+            events.append((float(self.record.time[-1]), "record ends"))
+        events += [
+            (one.time, f"contact at {one.plane}, {math.degrees(one.azimuth):.0f}°") for one in self.contacts
+        ]
         for number, drop in enumerate(self.drops, start=1):
             events.append((drop.release, "released" if number == 1 else f"released again, drop {number}"))
             if drop.permanent_contact is not None:
@@ -157,97 +185,7 @@ class Look:
 
     def as_json(self) -> dict[str, Any]:
         """Everything as JSON-ready numbers and text, in SI units; times in record time."""
-        record = self.record
-        return {
-            "record": record.name,
-            "sha256": record.sha256,
-            "channels": [
-                {"name": sensor.name, "plane": sensor.bearing, "angle_rad": float(sensor.angle)}
-                for sensor in record.sensors
-            ],
-            "sampling_rate_Hz": record.sampling_rate,
-            "start_s": float(record.time[0]),
-            "end_s": float(record.time[-1]),
-            "speed_rad_per_s": self.speed,
-            "standstill_s": self.standstill,
-            "findings": [
-                {
-                    "kind": found.kind,
-                    "severity": found.severity,
-                    "channel": found.channel,
-                    "time_s": found.time,
-                    "message": found.message,
-                    "remedy": found.remedy,
-                }
-                for found in self.findings
-            ],
-            "drops": [
-                {
-                    "release_s": drop.release,
-                    "end_s": drop.end,
-                    "permanent_contact_s": drop.permanent_contact,
-                    "lifted": drop.lifted,
-                }
-                for drop in self.drops
-            ],
-            "planes": [
-                {
-                    "plane": plane.plane,
-                    "air_gap_m": plane.gap,
-                    "air_gap_interval_90_m": None
-                    if plane.gap_interval_90 is None
-                    else list(plane.gap_interval_90),
-                    "air_gap_determined": plane.gap_determined,
-                    "first_touch_s": plane.touch,
-                    "first_touch_interval_90_s": (
-                        None if plane.touch_interval_90 is None else list(plane.touch_interval_90)
-                    ),
-                    "contact_from_s": plane.contact_from,
-                    "largest_displacement_m": plane.largest,
-                    "largest_displacement_interval_90_m": list(plane.largest_interval_90),
-                    "largest_displacement_time_s": plane.largest_time,
-                    "beyond_air_gap_m": plane.excess,
-                    "position_index": plane.position_index,
-                    "velocity_index": plane.velocity_index,
-                }
-                for plane in self.planes
-            ],
-            "impacts": [
-                {
-                    "plane": impact.plane,
-                    "time_s": impact.time,
-                    "azimuth_rad": impact.azimuth,
-                    "depth_m": impact.depth,
-                    "approach_m_per_s": impact.approach,
-                    "rebound_m_per_s": impact.rebound,
-                }
-                for impact in self.impacts
-            ],
-            "whirls": [
-                {
-                    "plane": whirl.plane,
-                    "start_s": whirl.start,
-                    "end_s": whirl.end,
-                    "turns": whirl.turns,
-                    "frequency_Hz": whirl.frequency,
-                    "sense": whirl.sense,
-                }
-                for whirl in self.whirls
-            ],
-            "synchronous": [
-                {
-                    "plane": found.plane,
-                    "amplitude_m": found.amplitude,
-                    "amplitude_interval_90_m": list(found.amplitude_interval_90),
-                    "phase_rad": found.phase,
-                    "phase_interval_90_rad": list(found.phase_interval_90),
-                    "turns": found.turns,
-                }
-                for found in self.synchronous
-            ],
-            "timeline": [{"time_s": time, "event": words} for time, words in self.timeline()],
-            "notes": list(self.notes),
-        }
+        return {name: of(self) for name, (_, of) in _DOCUMENT.items()}
 
 
 def look(
@@ -279,7 +217,7 @@ def look(
     Raises
     ------
     RecordError
-        When the recording cannot be read, no channels make a plane, or nothing falls.
+        When the recording cannot be read.
 
     Notes
     -----
@@ -287,21 +225,28 @@ def look(
     paper 52, the position index that of its counterpart by distance; window and normalisation are those given
     at `PlaneLook`. Displacements are those of the sensor planes.
     Not validated: impacts are those of the displacement alone, without a model of the contact.
+    Where nothing falls, the look has no drop but the contacts of a rotor that its magnets hold; where no two
+    channels make a plane, it has the levels of the channels.
     """
     gap = None if gap is None else in_si(gap, "length", "gap")
     speed = None if speed is None else in_si(speed, "speed", "speed")
-    read, arrangement = _read(record, machine, speed, mapping, profile)
+    try:
+        read, arrangement = _read(record, machine, speed, mapping, profile)
+    except UnpairedError as error:
+        return _look_at_channels(FilePath(str(record)), profile, str(error))
     findings = _checked(read, machine)
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
     if blocking:
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
     gaps = _gaps(read, machine, gap)
-    motion = motion_of(read, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
-    drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
-    if not drops:
-        raise RecordError(
-            f"{read.name}: the rotor does not fall from where it floated; check channels and gap"
-        )
+    guessed = (*read.notes, *(arrangement.notes if arrangement else ()))
+    try:
+        motion = motion_of(read, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
+        drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
+        if not drops:
+            raise NothingFallsError("the rotor does not fall from where it floated; check channels and gap")
+    except NothingFallsError as error:
+        return _look_at_held(read, findings, gaps, guessed, machine, str(error))
     turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
@@ -313,9 +258,96 @@ def look(
         standstill=standstill_of(read),
         speed=turning,
         synchronous=_synchronous(read, motion, drops[0].release),
-        notes=(*read.notes, *(arrangement.notes if arrangement else ()), *motion.notes),
+        notes=(*guessed, *motion.notes),
     )
 
+
+def _look_at_held(
+    record: Record,
+    findings: tuple[Finding, ...],
+    gaps: tuple[Gap | None, ...],
+    notes: tuple[str, ...],
+    machine: Machine | None,
+    why: str,
+) -> Look:
+    """A record in which nothing falls: contacts, whirl and levels."""
+    motion = held_motion(record, gaps)
+    contacts: list[HeldContact] = []
+    whirls: list[Whirl] = []
+    for path, plane, gap in zip(motion.paths, record.planes, gaps, strict=True):
+        found = held_contacts(
+            path.name,
+            motion.time,
+            path.position,
+            motion.rate,
+            gap=None if gap is None else gap[0],
+            masses=None if machine is None else masses_at(machine, plane.node),
+        )
+        contacts += found
+        if found:  # a rotor runs round its race, if at all, from a contact on
+            reach = min(one.distance for one in found)
+            whirls += whirls_along(path, motion, reach, (found[0].time, float(motion.time[-1])))
+    levels = tuple(
+        level_of(name, "m", column, record.sampling_rate)
+        for name, column in zip(record.channel_names, record.signals.T, strict=True)
+    )
+    return Look(
+        record=record,
+        motion=motion,
+        findings=findings,
+        drops=(),
+        contacts=tuple(sorted(contacts, key=lambda one: one.time)),
+        levels=levels,
+        no_fall=why,
+        whirls=tuple(sorted(whirls, key=lambda whirl: whirl.start)),
+        planes=(),
+        standstill=standstill_of(record),
+        speed=_speed_at(record, float(record.time[-1])),
+        synchronous=_synchronous(record, motion, float(record.time[-1]) + BEFORE_RELEASE),
+        notes=(*notes, *motion.notes),
+    )
+
+
+def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, why: str) -> Look:
+    """A recording of single channels: what each reads, on the clock of the first."""
+    recording = read_recording(path, rules_of(profile, ()))
+    channels = [one for one in recording.channels if len(one.values) >= _FEWEST and np.ptp(one.time) > 0.0]
+    if not channels:
+        raise UnpairedError(why)
+    time = channels[0].time
+    record = Record(
+        time=time,
+        signals=np.empty((len(time), 0)),
+        sensors=(),
+        sampling_rate=(len(time) - 1) / float(np.ptp(time)),
+        path=path,
+        sha256=sha256_of(path),
+        metadata=recording.metadata,
+        notes=recording.notes,
+        warnings=recording.warnings,
+    )
+    levels = tuple(
+        level_of(one.label, one.unit, one.values, (len(one.time) - 1) / float(np.ptp(one.time)))
+        for one in channels
+    )
+    return Look(
+        record=record,
+        motion=held_motion(record, ()),
+        findings=(),
+        drops=(),
+        levels=levels,
+        no_fall=why,
+        whirls=(),
+        planes=(),
+        standstill=None,
+        speed=None,
+        synchronous=(),
+        notes=record.notes,
+    )
+
+
+_FEWEST = 16
+"""Samples a channel needs to show a level."""
 
 _UNREADABLE = (Kind.MISSING_SAMPLES, Kind.BACKWARD_TIME, Kind.WRONG_RATE)
 
@@ -418,71 +450,131 @@ def _largest_between(path: Path, at: int) -> tuple[float, float]:
     return here + min(aside, 0.0) - half, here + max(aside, 0.0) + half
 
 
-__all__ = ["Drop", "Impact", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]
+__all__ = ["Drop", "HeldContact", "Impact", "Level", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]
+
+Part = tuple[Schema, Callable[[Any], Any]]
+"""A part of the document: its schema, and how it is read off."""
+
+
+def _read_off(schema: Schema, path: str) -> Part:
+    """A number or a text by the name of a field, with dots; pairs become lists, as JSON has them."""
+    of = attrgetter(path)
+    return schema, lambda one: list(value) if isinstance(value := of(one), tuple) else value
+
+
+def _rows(of: Callable[[Any], Iterable[Any]], **columns: Part) -> Part:
+    """A list of objects with these parts."""
+    schema = listed(**{name: part for name, (part, _) in columns.items()})
+    return schema, lambda whole: [
+        {name: read(row) for name, (_, read) in columns.items()} for row in of(whole)
+    ]
+
+
+_DOCUMENT: dict[str, Part] = {
+    "record": _read_off(TEXT, "record.name"),
+    "sha256": _read_off(TEXT, "record.sha256"),
+    "channels": _rows(
+        lambda seen: seen.record.sensors,
+        name=_read_off(TEXT, "name"),
+        plane=_read_off(TEXT, "bearing"),
+        angle_rad=(NUMBER, lambda sensor: float(sensor.angle)),
+    ),
+    "sampling_rate_Hz": _read_off(NUMBER, "record.sampling_rate"),
+    "start_s": (NUMBER, lambda seen: float(seen.record.time[0])),
+    "end_s": (NUMBER, lambda seen: float(seen.record.time[-1])),
+    "speed_rad_per_s": _read_off(MAYBE, "speed"),
+    "standstill_s": _read_off(MAYBE, "standstill"),
+    "findings": _rows(
+        lambda seen: seen.findings,
+        kind=_read_off(TEXT, "kind"),
+        severity=_read_off({"enum": ["stop", "warning", "note"]}, "severity"),
+        channel=_read_off({"type": ["string", "null"]}, "channel"),
+        time_s=_read_off(MAYBE, "time"),
+        message=_read_off(TEXT, "message"),
+        remedy=_read_off(TEXT, "remedy"),
+    ),
+    "no_fall": _read_off(TEXT, "no_fall"),
+    "drops": _rows(
+        lambda seen: seen.drops,
+        release_s=_read_off(NUMBER, "release"),
+        end_s=_read_off(NUMBER, "end"),
+        permanent_contact_s=_read_off(MAYBE, "permanent_contact"),
+        lifted=_read_off(FLAG, "lifted"),
+    ),
+    "planes": _rows(
+        lambda seen: seen.planes,
+        plane=_read_off(TEXT, "plane"),
+        air_gap_m=_read_off(NUMBER, "gap"),
+        air_gap_interval_90_m=_read_off(MAYBE_PAIR, "gap_interval_90"),
+        air_gap_determined=_read_off(FLAG, "gap_determined"),
+        first_touch_s=_read_off(MAYBE, "touch"),
+        first_touch_interval_90_s=_read_off(MAYBE_PAIR, "touch_interval_90"),
+        contact_from_s=_read_off(MAYBE, "contact_from"),
+        largest_displacement_m=_read_off(NUMBER, "largest"),
+        largest_displacement_interval_90_m=_read_off(PAIR, "largest_interval_90"),
+        largest_displacement_time_s=_read_off(NUMBER, "largest_time"),
+        beyond_air_gap_m=_read_off(NUMBER, "excess"),
+        position_index=_read_off(NUMBER, "position_index"),
+        velocity_index=_read_off(MAYBE, "velocity_index"),
+    ),
+    "impacts": _rows(
+        lambda seen: seen.impacts,
+        plane=_read_off(TEXT, "plane"),
+        time_s=_read_off(NUMBER, "time"),
+        azimuth_rad=_read_off(NUMBER, "azimuth"),
+        depth_m=_read_off(NUMBER, "depth"),
+        approach_m_per_s=_read_off(NUMBER, "approach"),
+        rebound_m_per_s=_read_off(NUMBER, "rebound"),
+    ),
+    "contacts": _rows(
+        lambda seen: seen.contacts,
+        plane=_read_off(TEXT, "plane"),
+        time_s=_read_off(NUMBER, "time"),
+        azimuth_rad=_read_off(NUMBER, "azimuth"),
+        distance_m=_read_off(NUMBER, "distance"),
+        approach_m_per_s=_read_off(NUMBER, "approach"),
+        departure_m_per_s=_read_off(NUMBER, "departure"),
+        velocity_change_bounds_m_per_s=_read_off(PAIR, "velocity_change"),
+        impulse_bounds_N_s=_read_off(MAYBE_PAIR, "impulse"),
+    ),
+    "levels": _rows(
+        lambda seen: seen.levels,
+        channel=_read_off(TEXT, "channel"),
+        unit=_read_off(TEXT, "unit"),
+        mean=_read_off(NUMBER, "mean"),
+        rms=_read_off(NUMBER, "rms"),
+        peak_to_peak=_read_off(NUMBER, "peak_to_peak"),
+        lines=_rows(
+            lambda level: level.lines, frequency_Hz=(NUMBER, itemgetter(0)), amplitude=(NUMBER, itemgetter(1))
+        ),
+    ),
+    "whirls": _rows(
+        lambda seen: seen.whirls,
+        plane=_read_off(TEXT, "plane"),
+        start_s=_read_off(NUMBER, "start"),
+        end_s=_read_off(NUMBER, "end"),
+        turns=_read_off(NUMBER, "turns"),
+        frequency_Hz=_read_off(NUMBER, "frequency"),
+        sense=_read_off({"enum": ["forward", "backward"]}, "sense"),
+    ),
+    "synchronous": _rows(
+        lambda seen: seen.synchronous,
+        plane=_read_off(TEXT, "plane"),
+        amplitude_m=_read_off(NUMBER, "amplitude"),
+        amplitude_interval_90_m=_read_off(PAIR, "amplitude_interval_90"),
+        phase_rad=_read_off(NUMBER, "phase"),
+        phase_interval_90_rad=_read_off(PAIR, "phase_interval_90"),
+        turns=_read_off(NUMBER, "turns"),
+    ),
+    "timeline": _rows(
+        lambda seen: seen.timeline(), time_s=(NUMBER, itemgetter(0)), event=(TEXT, itemgetter(1))
+    ),
+    "notes": _read_off(TEXTS, "notes"),
+}
+"""The document of a look: SI units, times in record time, positive turns with the spin."""
 
 
 def look_schema() -> dict[str, Any]:
-    """JSON Schema of a look at a record: SI units, times in record time, positive turns with the spin."""
-    content = closed(
-        {DIGEST: TEXT},
-        record=TEXT,
-        sha256=TEXT,
-        channels=listed(name=TEXT, plane=TEXT, angle_rad=NUMBER),
-        sampling_rate_Hz=NUMBER,
-        start_s=NUMBER,
-        end_s=NUMBER,
-        speed_rad_per_s=MAYBE,
-        standstill_s=MAYBE,
-        findings=listed(
-            kind=TEXT,
-            severity={"enum": ["stop", "warning", "note"]},
-            channel={"type": ["string", "null"]},
-            time_s=MAYBE,
-            message=TEXT,
-            remedy=TEXT,
-        ),
-        drops=listed(release_s=NUMBER, end_s=NUMBER, permanent_contact_s=MAYBE, lifted=FLAG),
-        planes=listed(
-            plane=TEXT,
-            air_gap_m=NUMBER,
-            air_gap_interval_90_m=MAYBE_PAIR,
-            air_gap_determined=FLAG,
-            first_touch_s=MAYBE,
-            first_touch_interval_90_s=MAYBE_PAIR,
-            contact_from_s=MAYBE,
-            largest_displacement_m=NUMBER,
-            largest_displacement_interval_90_m=PAIR,
-            largest_displacement_time_s=NUMBER,
-            beyond_air_gap_m=NUMBER,
-            position_index=NUMBER,
-            velocity_index=MAYBE,
-        ),
-        impacts=listed(
-            plane=TEXT,
-            time_s=NUMBER,
-            azimuth_rad=NUMBER,
-            depth_m=NUMBER,
-            approach_m_per_s=NUMBER,
-            rebound_m_per_s=NUMBER,
-        ),
-        whirls=listed(
-            plane=TEXT,
-            start_s=NUMBER,
-            end_s=NUMBER,
-            turns=NUMBER,
-            frequency_Hz=NUMBER,
-            sense={"enum": ["forward", "backward"]},
-        ),
-        synchronous=listed(
-            plane=TEXT,
-            amplitude_m=NUMBER,
-            amplitude_interval_90_m=PAIR,
-            phase_rad=NUMBER,
-            phase_interval_90_rad=PAIR,
-            turns=NUMBER,
-        ),
-        timeline=listed(time_s=NUMBER, event=TEXT),
-        notes=TEXTS,
-    )
-    head = {"$schema": DIALECT, "title": "rotordrop look"}
-    return {**head, **content}
+    """JSON Schema of a look at a record."""
+    content = closed({DIGEST: TEXT}, **{name: schema for name, (schema, _) in _DOCUMENT.items()})
+    return {"$schema": DIALECT, "title": "rotordrop look", **content}

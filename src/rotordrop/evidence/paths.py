@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.errors import RecordError
+from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import Wall, find_wall
@@ -83,7 +83,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
 
     Raises
     ------
-    RecordError
+    NothingFallsError
         When nothing falls.
     """
     raw, rate = record.motion, record.sampling_rate
@@ -122,6 +122,40 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     )
 
 
+def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
+    """The paths of a record in which nothing falls, from where the rotor usually is."""
+    paths = []
+    for number, gap in enumerate(gaps):
+        plane, position = record.planes[number], record.motion[:, number]
+        usual = np.median(position, axis=0)
+        wall = Wall(
+            centre=usual,
+            centre_error=np.full(2, np.nan),
+            gap=np.nan if gap is None else gap[0],
+            gap_error=np.nan if gap is None else gap[1],
+            lever=0.0,
+            touch=None,
+        )
+        away = position - usual
+        paths.append(
+            Path(
+                name=plane.bearing,
+                position=away,
+                levitated=np.zeros(2),
+                bearing_position=away,
+                wall=wall,
+                noise=_noise(position),
+            )
+        )
+    return Motion(
+        time=record.time,
+        rate=record.sampling_rate,
+        paths=tuple(paths),
+        floats=np.ones(len(record.time), dtype=np.bool_),
+        notes=("displacements count from where the rotor usually is; the record shows no centre",),
+    )
+
+
 def _gap_note(path: Path) -> str:
     low, high = (1e6 * end for end in path.wall.interval_90)
     if path.wall.determined:
@@ -144,7 +178,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
     reach = np.percentile(away, 98, axis=0)
     usual = np.max(away[:first], axis=0)
     if np.any(reach < 4.0 * usual) or np.any(reach < 5e-6):
-        raise RecordError(
+        raise NothingFallsError(
             f"nothing falls in the record: the shaft strays by {1e6 * float(np.min(reach)):.3g} µm and moved "
             f"by {1e6 * float(np.max(usual)):.3g} µm in its first 10 ms; check that it begins before the drop"
         )
@@ -152,7 +186,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
     sunk = int(np.argmax(moved))
     fastest = max(fall_accelerations(path, far, rate).max() for path, far in zip(away.T, reach, strict=True))
     if fastest < _SLOWEST_FALL * GRAVITY:
-        raise RecordError(
+        raise NothingFallsError(
             f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm, but "
             f"with {fastest:.2g} m/s², a rotor falls with up to {GRAVITY:g} m/s²; a rotor that lies on its "
             "bearings swings like that: give the recording of the drop (a settled tail belongs to "
@@ -334,14 +368,16 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
 
 def whirls_of(motion: Motion, drop: Drop) -> tuple[Whirl, ...]:
     """Find the spells of a drop in which the rotor runs round, in every plane."""
-    found = [whirl for path in motion.paths for whirl in _whirls(motion, path, drop)]
+    span = (drop.release, drop.end)
+    found = [whirl for path in motion.paths for whirl in whirls_along(path, motion, path.gap, span)]
     return tuple(sorted(found, key=lambda whirl: whirl.start))
 
 
-def _whirls(motion: Motion, path: Path, drop: Drop) -> list[Whirl]:
-    inside = np.flatnonzero((motion.time >= drop.release) & (motion.time <= drop.end))
+def whirls_along(path: Path, motion: Motion, reach: float, span: tuple[float, float]) -> list[Whirl]:
+    """Spells between two times [s] in which the rotor runs round a circle of about a radius [m]."""
+    inside = np.flatnonzero((motion.time >= span[0]) & (motion.time <= span[1]))
     chosen = inside[:: max(int(_FOLLOWED * motion.rate), 1)]
-    spells = whirl_spells(motion.time[chosen], path.position[chosen], path.gap)
+    spells = whirl_spells(motion.time[chosen], path.position[chosen], reach)
     return [
         Whirl(plane=path.name, start=s.start, end=s.end, turns=s.turns, frequency=abs(s.frequency))
         for s in spells

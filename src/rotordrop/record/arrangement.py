@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.known import Known
 from rotordrop.record.profile import Profile
 from rotordrop.record.recording import FULL_SCALE, Channel, Recording, listed
@@ -85,11 +85,11 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         labels = [channel.label for channel in recording.channels if _may_read(channel)]
         if len(labels) < 2:
             have = listed(f"{channel.label} in {channel.unit or '?'}" for channel in recording.channels)
-            raise RecordError(
+            raise UnpairedError(
                 f"the recording holds {len(labels)} channels that can be displacements (in a unit of length "
                 f"or in volts); a plane needs two. It has {have}: export two of a plane together"
             )
-        raise RecordError(
+        raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
             "their names (X and Y, A and B, H and V, left and right); say which look at one plane, for "
             f'example --map "NDE: {labels[0]} 0 deg, {labels[1]} 90 deg"'

@@ -12,6 +12,7 @@ from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
     Column,
+    Figure,
     KeyFigure,
     ReportContent,
     Section,
@@ -24,10 +25,11 @@ from rotordrop.report.drop_sections import motion_section, orbit_section
 from rotordrop.report.impacts import IMPACT_RULE
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.record_quality import quality_statements, record_quality_section
+from rotordrop.report.style import axis_title, curve, panels
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.look import Look, PlaneLook, Synchronous
+    from rotordrop.evidence.look import HeldContact, Level, Look, PlaneLook, Synchronous
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
@@ -39,7 +41,9 @@ SENSOR_PLANES = "Displacement in the planes of the sensors; time counts from the
 
 
 def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
-    """Build the page of a look at a recorded drop, with figures where they are wanted."""
+    """Build the page of a look at a record, with figures where they are wanted."""
+    if not seen.drops:
+        return _page_without_drop(seen, drawn=drawn)
     record = seen.record
     speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
     notes = tuple(Statement(note) for note in seen.notes)
@@ -71,6 +75,101 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     )
 
 
+def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
+    """Contacts of a held rotor, levels and spectra of a record in which nothing falls."""
+    record, facts = seen.record, _facts(seen)
+    notes = tuple(Statement(note) for note in seen.notes)
+    if seen.contacts:
+        ends = dict.fromkeys(one.plane for one in seen.contacts)
+        parts = [f"{sum(one.plane == end for one in seen.contacts)} at {end}" for end in ends]
+        said = [
+            Statement(f"The rotor touched while its magnets hold or pull it: {', '.join(parts)}.", "warning")
+        ]
+    elif seen.motion.paths:
+        said = [Statement(f"No contact is seen; {seen.no_fall}")]
+    else:
+        said = [Statement(seen.no_fall)]
+    said += [Statement(f"From {whirl.start:.4g} s: {whirl.words}.", "warning") for whirl in seen.whirls[:3]]
+    events = (
+        Column("record time", lambda row: format_moment(row[0], 4)),
+        Column("event", lambda row: row[1]),
+    )
+    levels = (
+        Column("channel", lambda row: f"{row.channel} [{_scale(row)[1]}]"),
+        Column("mean", lambda row: f"{_scale(row)[0] * row.mean:.4g}"),
+        Column("r.m.s. about it", lambda row: f"{_scale(row)[0] * row.rms:.3g}"),
+        Column("peak to peak", lambda row: f"{_scale(row)[0] * row.peak_to_peak:.3g}"),
+        Column(
+            "strongest lines [Hz] (amplitude, zero to peak)",
+            lambda row: ", ".join(f"{at:.4g} ({_scale(row)[0] * size:.2g})" for at, size in row.lines) or "–",
+        ),
+    )
+    summary = [table(seen.levels, levels, "Levels, in the unit of each channel")]
+    if seen.contacts:
+        summary.insert(0, _contact_table(seen))
+    spectra = Section("Spectrum", figures=tuple(_spectrum(level) for level in seen.levels)) if drawn else None
+    return ReportContent(
+        title=f"A look at {record.name}",
+        subtitle="no drop in this record",
+        facts=facts,
+        simulated=SIMULATED_RECORD if record.is_simulated else "",
+        verdict=(
+            *said,
+            *quality_statements(seen.findings),
+            *(() if drawn else (Statement(f"Read: {dict(facts)['samples']}."), *notes)),
+        ),
+        cards=(),
+        summary=tuple(summary),
+        sections=(
+            *(() if spectra is None else (spectra,)),
+            Section("What happened when", tables=(table(seen.timeline(), events, "What happened when"),)),
+            record_quality_section(seen.findings),
+            Section("What was read and guessed", statements=notes),
+        ),
+    )
+
+
+def _scale(level: Level) -> tuple[float, str]:
+    """Factor and unit in which a channel is shown: metres as micrometres."""
+    return (1e6, "µm") if level.unit == "m" else (1.0, level.unit or "?")
+
+
+def _contact_table(seen: Look) -> Table:
+    def bounds(row: HeldContact) -> str:
+        if row.impulse is None:
+            low, high = row.velocity_change
+            return f"{low:.2g} to {high:.2g} N s/kg"
+        return "{:.2g} to {:.2g} N s".format(*row.impulse)
+
+    columns = (
+        Column("plane", "plane"),
+        Column("record time", lambda row: format_moment(row.time, 4)),
+        Column("direction", lambda row: f"{degrees(row.azimuth):.0f}°"),
+        Column("from the usual place", "distance", "length"),
+        Column("approaches with", "approach", "velocity"),
+        Column("departs with", "departure", "velocity"),
+        Column("impulse", bounds),
+    )
+    note = (
+        "A contact turns the rotor back at least three times as sharply as it came, far outside of its usual "
+        "orbit. Direction counter-clockwise from +x, −90° is the bottom."
+    )
+    more = f" The first {MOST_LISTED} of {len(seen.contacts)}." if len(seen.contacts) > MOST_LISTED else ""
+    return table(
+        seen.contacts[:MOST_LISTED], columns, "Contacts while the magnets hold the rotor", note + more
+    )
+
+
+def _spectrum(level: Level) -> Figure:
+    factor, unit = _scale(level)
+    figure = panels([level.channel], height=260)
+    curve(figure, level.frequency[1:], factor * level.amplitude[1:], level.channel, legend=False, hover=None)
+    figure.update_xaxes(title_text=axis_title("frequency", "Hz"))
+    figure.update_yaxes(title_text=axis_title("amplitude, zero to peak", unit), type="log")
+    words = f"Spectrum of {level.channel}: Hann windows, averaged over the record."
+    return Figure(figure, words, f"spectrum {level.channel}")
+
+
 def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
     record = seen.record
     planes = [
@@ -81,7 +180,7 @@ def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
     return (
         ("record", str(record.path.name if record.path else record.name)),
         ("SHA-256", record.sha256 or "-"),
-        ("channels", "; ".join(planes)),
+        ("channels", "; ".join(planes) or ", ".join(level.channel for level in seen.levels)),
         ("samples", f"{len(record.time)} at {record.sampling_rate:.6g} Hz, {span}"),
         ("program", f"rotordrop {__version__}"),
     )

@@ -16,7 +16,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotordrop.errors import DamagedFileError, MachineFileError, OutputError, RotordropError, UsageError
+from rotordrop.errors import (
+    DamagedFileError,
+    MachineFileError,
+    OutputError,
+    RecordError,
+    RotordropError,
+    UsageError,
+)
 from rotordrop.files import write_json
 from rotordrop.web.running import Verb, clear, publish, result_folder, state_of, write_state
 from rotordrop.web.workspace import Job, Workspace, beside, is_path
@@ -219,6 +226,8 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
         mapping=tuple(filter(None, map(str.strip, options.get("planes", "").split(";")))),
         profile=profile_of(job, options),
     )
+    if not seen.motion.paths:  # the page asks which channels make a plane
+        raise RecordError(seen.no_fall)
     write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options, machine)
 
 

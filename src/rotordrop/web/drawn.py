@@ -66,11 +66,11 @@ def write_look(
             **_common("motion", tuple(columns), seen.motion.time),
             "rotor": None if machine is None else rotor_outline(machine),
             "labels": labels,
-            "zero": seen.drops[0].release,
+            "zero": seen.drops[0].release if seen.drops else float(seen.motion.time[0]),
             "places": [
                 {
                     "name": path.name,
-                    "gap": list(path.wall.interval_90),
+                    "gap": list(path.wall.interval_90) if math.isfinite(path.gap) else None,
                     "measured": [f"x{b}", f"y{b}"],
                     "radius": f"r{b}",
                 }
@@ -86,8 +86,21 @@ def write_look(
                     Quantity(value=impact.approach, kind="velocity", digits=3),
                 )
                 for impact in seen.impacts
+            ]
+            + [
+                _impact(
+                    one.plane,
+                    one.time,
+                    one.azimuth,
+                    Quantity(value=one.distance, kind="length", digits=3),
+                    Quantity(value=one.approach, kind="velocity", digits=3),
+                )
+                for one in seen.contacts
             ],
-            "impact_columns": ["beyond the air gap", "radial velocity before"],
+            "impact_columns": [
+                "beyond the air gap" if seen.drops else "from the usual place",
+                "radial velocity before",
+            ],
             "findings": _findings(seen.findings),
             "python": look_lines(job.read()["files"], options, len(seen.motion.paths)),
         },

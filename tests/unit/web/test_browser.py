@@ -133,6 +133,18 @@ def test_twelve_numbers_and_a_record_with_names_of_its_own_get_to_an_estimate(br
         quiet(browser)
 
 
+def test_the_empty_page_offers_a_simulated_drop_to_try(browser, tmp_path):
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        browser.until("!document.getElementById('empty').hidden")
+        press(browser, "tryit")
+        browser.until(LOOKED, 120)
+        (job,) = server.ask("GET", "/api/jobs").told["jobs"]
+        assert {"machine", "record", "tail"} < set(job["files"])
+        assert browser.evaluate("!document.getElementById('simulated').hidden")
+        quiet(browser)
+
+
 def test_other_drops_are_drawn_on_the_axes_of_this_one(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
         for name in ("first", "second"):

@@ -1,5 +1,5 @@
 // The page: one job, its tabs and its status, and what every button and key does.
-import { askChannels, chooseFiles, tellFormats } from "./sending.js";
+import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
 import { chooseOthers, compareTab, learnDrops } from "./compare.js";
 import { nextImpact, pan, play, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
@@ -184,7 +184,7 @@ async function askedChannels() {
 
 const click = (id, handler) => by(id).addEventListener("click", () => Promise.resolve(handler()).catch((error) => say(error.message, "bad")));
 const openFiles = () => by("files").click();
-click("open", openFiles); click("open2", openFiles); click("help", () => by("keys").showModal());
+click("open", openFiles); click("open2", openFiles); click("tryit", async () => sent(await sendExample())); click("help", () => by("keys").showModal());
 by("files").addEventListener("change", () => { const list = [...by("files").files]; by("files").value = ""; openChosen(list); });
 click("channels", () => channels());
 click("tomachine", () => chooseFiles([], sent));

@@ -71,6 +71,10 @@ async function sendFiles(pairs) {
   return last;
 }
 
+// The bundled machine with its simulated drop, as if its files had been dropped here.
+const EXAMPLE = [["machine", "lp400.toml"], ["beside", "lp400_shaft.csv"], ["record", "drop_060.h5"], ["tail", "drop_060_tail.csv"]];
+export const sendExample = async () => sendFiles(await Promise.all(EXAMPLE.map(async ([what, name]) => [what, await server.example(name)])));
+
 // ---- channels
 
 const toml = (value) => (Array.isArray(value) ? `[${value.map(toml).join(", ")}]` : typeof value === "string" ? JSON.stringify(value).replaceAll("\u007f", "\\u007f") : String(value));

@@ -37,6 +37,7 @@ export async function formats() {
   ({ largest } = told);
   return told.formats;
 }
+export const example = async (name) => new File([await (await ask("GET", `/api/example/${name}`)).blob()], name);
 export const drops = async () => (await ask("GET", "/api/drops")).json();
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const numbers = async () => (await ask("GET", "/api/numbers")).json();

@@ -1,0 +1,221 @@
+"""What a record shows in which nothing falls: levels and lines of its channels, and contacts of a held rotor.
+
+A rotor touches while its magnets hold it under an overload, a surge, an earthquake, a rub or a failed lift.
+No air gap need be known: a magnet turns the rotor back as gently as it came, a race much more sharply.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotordrop.known import NINETY
+from rotordrop.record.impacts import SMOOTHING, peaks, slope
+from rotordrop.record.recording import Array
+from rotordrop.series import noise_by_differences
+from rotordrop.units import GRAVITY
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
+
+_AWAY, _LEAST_AWAY = 3.0, 40e-6
+"""A contact lies this many times further from where the rotor usually is than its orbit reaches [1], and at
+least this far [m] (chosen; smaller air gaps are not built)."""
+
+_NEAR_RACE = 0.8
+"""With a known air gap, a contact lies at least this share of it away [1] (chosen)."""
+
+_SHARPER, _SHARPER_AGAIN = 3.0, 1.5
+"""A race turns the rotor back with at least so many times the largest acceleration of its approach [1], and
+where one contact has shown where the race is (chosen; a swing turns as it came, a scratch under a sensor
+twice as sharply)."""
+
+_BACK_AT_RACE = 0.85
+"""Share of the distance of a contact from which on a turn is one at the same race [1] (chosen)."""
+
+_RETURNED = 0.25
+"""Least ratio of the velocities after and before the first contact, or before and after [1] (chosen)."""
+
+_LEAST_TURN = 1.0
+"""Least acceleration of a turn at a race over gravity [1] (chosen)."""
+
+_ABOVE_USUAL = 4.0
+"""A contact turns the rotor this many times more sharply than its orbit does around [1] (chosen)."""
+
+_TURN = 4e-3
+"""The turn lasts up to this long on either side of the furthest point [s] (chosen)."""
+
+_APPROACH, _AROUND = 30e-3, 0.15
+"""How far back an approach is followed, and what counts as around [s] (chosen)."""
+
+_POINTS = 8192
+"""Samples of a stretch whose spectrum is taken; stretches overlap by half."""
+
+_LINES = 5
+"""Lines listed of a channel."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldContact:
+    """A rotor that its magnets hold, turned back by a race."""
+
+    plane: str
+    """Sensor plane."""
+    time: float
+    """When it touches, by the kink of its velocity [s]."""
+    azimuth: float
+    """Direction in which it is turned back, from where it usually is [rad], counter-clockwise from +x."""
+    distance: float
+    """Distance from where it usually is [m]."""
+    approach: float
+    departure: float
+    """Radial velocities before and after, by straight lines over 1 ms [m/s], both positive outwards and
+    inwards."""
+    velocity_change: tuple[float, float]
+    """Bounds of the change of velocity, which is the impulse per mass that takes part [m/s]: noise, and what
+    the magnets can have done during the turn."""
+    impulse: tuple[float, float] | None
+    """Bounds of the impulse [N s], between the mass that a rigid rotor has at this plane and all of it; None
+    without a machine."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """What one channel reads on average, and its strongest lines."""
+
+    channel: str
+    unit: str
+    mean: float
+    rms: float
+    """About the mean."""
+    peak_to_peak: float
+    """Largest less smallest reading."""
+    lines: tuple[tuple[float, float], ...]
+    """Frequency [Hz] and amplitude, zero to peak, of the strongest lines."""
+    frequency: Array
+    amplitude: Array
+    """The whole spectrum, shape (K,)."""
+
+
+def level_of(channel: str, unit: str, values: Array, rate: float) -> Level:
+    """Levels and spectrum of a channel: Hann windows, amplitudes averaged by their squares."""
+    values = np.asarray(values, dtype=np.float64)
+    values = values[np.isfinite(values)]
+    points = min(_POINTS, len(values))
+    window = np.hanning(points + 1)[:-1]
+    starts = range(0, len(values) - points + 1, max(points // 2, 1))
+    frames = (values[start : start + points] for start in starts)
+    power = np.mean([np.abs(np.fft.rfft((one - one.mean()) * window)) ** 2 for one in frames], axis=0)
+    amplitude: Array = 2.0 * np.sqrt(power) / max(window.sum(), 1e-12)
+    frequency: Array = np.asarray(np.fft.rfftfreq(points, 1.0 / rate), dtype=np.float64)
+    inner = np.flatnonzero((amplitude[1:-1] > amplitude[:-2]) & (amplitude[1:-1] >= amplitude[2:])) + 1
+    strongest = sorted(inner[np.argsort(amplitude[inner])[::-1][:_LINES]].tolist())
+    return Level(
+        channel=channel,
+        unit=unit,
+        mean=float(np.mean(values)),
+        rms=float(np.std(values)),
+        peak_to_peak=float(np.ptp(values)),
+        lines=tuple((float(frequency[at]), float(amplitude[at])) for at in strongest),
+        frequency=frequency,
+        amplitude=amplitude,
+    )
+
+
+def held_contacts(
+    plane: str,
+    time: Array,
+    position: Array,
+    rate: float,
+    *,
+    gap: float | None = None,
+    masses: tuple[float, float] | None = None,
+) -> tuple[HeldContact, ...]:
+    """Find where a race turned a held rotor back, in one plane.
+
+    Parameters
+    ----------
+    plane : str
+        Name of the plane.
+    time : array, shape (N,)
+        [s].
+    position : array, shape (N, 2)
+        Displacement [m], y up.
+    rate : float
+        Samples per second [Hz].
+    gap : float, optional
+        Air gap, where it is known [m].
+    masses : tuple of float, optional
+        Mass that a rigid rotor has at this plane, and all of it [kg].
+
+    Notes
+    -----
+    A contact is a turn far outside of the usual orbit that is at least three times as sharp as any on the way
+    to it, four times as sharp as the orbit around, and above the acceleration of gravity; further turns at
+    the same distance are contacts too. A scratch under a sensor rises nearly as sharply as it turns, and so
+    does a swing on the magnets. Not validated on measured contacts.
+    """
+    usual = np.median(position, axis=0)
+    away = position - usual
+    distance = np.hypot(*away.T)
+    noise = noise_by_differences(position, 3)
+    orbit = float(np.percentile(distance, 90))
+    floor = max(_AWAY * orbit, _LEAST_AWAY) if gap is None else _NEAR_RACE * gap
+    floor = max(floor, 20.0 * noise)
+    if not len(distance) or float(distance.max()) < floor:
+        return ()
+    velocity = slope(position, rate)
+    accelerated = slope(velocity, rate)
+    usual_turn = np.hypot(*accelerated.T)
+    window = max(2 * int(0.5 * SMOOTHING * rate) + 1, 3)
+    doubt = noise * rate * math.sqrt(12.0 / window**3)  # of a velocity by a straight line
+    turn, back, around = (max(round(span * rate), 2) for span in (_TURN, _APPROACH, _AROUND))
+
+    def contacts(floor: float, sharper: float, returned: float) -> Iterator[HeldContact]:
+        for at in peaks(distance, floor, max(0.1 * floor, 6.0 * noise)):
+            outward, begin = away[at] / distance[at], max(at - back, 0)
+            speed, here = velocity[begin : at + turn + 1] @ outward, at - begin
+            fastest = max(here - turn, 0)
+            fastest += int(np.argmax(speed[fastest : here + 1]))
+            leaves = here + int(np.argmin(speed[here:]))
+            outwards = accelerated[begin : at + turn + 1] @ outward
+            approach, departure = float(speed[fastest]), float(-speed[leaves])
+            turned = float(-np.min(outwards[fastest : leaves + 1]))
+            came = float(np.max(outwards[: fastest + 1]))
+            usually = float(np.median(usual_turn[max(at - around, 0) : at + around]))
+            gentle = turned <= max(sharper * came, _ABOVE_USUAL * usually, _LEAST_TURN * GRAVITY)
+            least, most = sorted((approach, departure))
+            if gentle or least <= max(returned * most, 0.0) or most + least <= 10.0 * doubt:
+                continue
+            half = NINETY * math.sqrt(2.0) * doubt + usually * (leaves - fastest) / rate
+            change = (max(approach + departure - half, 0.0), approach + departure + half)
+            kink = min(begin + fastest + round(0.25 * SMOOTHING * rate), at)
+            yield HeldContact(
+                plane=plane,
+                time=float(time[kink]),
+                azimuth=float(np.arctan2(outward[1], outward[0])),
+                distance=float(distance[at]),
+                approach=approach,
+                departure=departure,
+                velocity_change=change,
+                impulse=None if masses is None else (masses[0] * change[0], masses[1] * change[1]),
+            )
+
+    sure = tuple(contacts(floor, _SHARPER, _RETURNED))
+    if not sure:
+        return ()
+    race = min(one.distance for one in sure)
+    return tuple(contacts(_BACK_AT_RACE * race, _SHARPER_AGAIN, 0.0))
+
+
+def masses_at(machine: Machine, node: int) -> tuple[float, float]:
+    """Mass [kg] that a rigid rotor opposes to a push at a node, and all of it."""
+    from rotordrop.rotor.assembly import build_rotor_fe
+
+    fe = build_rotor_fe(machine)
+    arm = machine.rotor.node_positions[node - 1] - fe.centre_of_gravity
+    return 1.0 / (1.0 / fe.total_mass + arm**2 / fe.diametral_inertia), fe.total_mass
