@@ -155,6 +155,11 @@ class BallBearing(RaceBearing):
     """With springs: friction coefficient of each outer ring in its housing, on its share of the radial force
     [1]; 0.15, 0 to 0.4, which decides how much of the peak the springs take."""
 
+    ball_inertia: Annotated[bool, Strict()] = Field(
+        default=False, description="a drop hardly gets the race up to speed before its first impacts"
+    )
+    """Whether the centrifugal force of the balls counts in a simulated drop."""
+
     states_at: ClassVar[int] = L.RING_STATES
 
     reserved: ClassVar[Mapping[str, str]] = {
@@ -213,6 +218,12 @@ class BallBearing(RaceBearing):
         if not self.sprung and (said := [name for name in _SPRUNG if name in known]):
             told = f'{said[0]!r} belongs to springs, and the preload is rigid; add preload_kind = "spring"'
             raise Misfit(f"{told}, or leave it out", (said[0],))
+        if self.ball_inertia and self.sprung:
+            told = "ball_inertia = true goes with a rigid preload today; leave out one of it and springs"
+            raise Misfit(told, ("ball_inertia",))
+        if self.ball_inertia and self._has_clearance(entry):
+            told = "ball_inertia = true goes with a preloaded pair today, and this bearing has a clearance"
+            raise Misfit(f"{told}; leave it out", ("ball_inertia",))
         if self.preload_class is not None and not listed:
             raise Misfit(
                 f"preload = {self.preload_class!r} needs a 'designation' that is in the catalogue; "

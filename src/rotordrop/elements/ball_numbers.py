@@ -38,6 +38,7 @@ from rotordrop.physics.ball_set import (
     loose_race_seat,
     static_deflection,
 )
+from rotordrop.physics.ball_table import BallTable, ball_table
 from rotordrop.physics.fast_balls import FastBalls, centred_balls, offset_on_springs
 from rotordrop.physics.hertz import compliance, race_contact
 from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
@@ -61,6 +62,13 @@ tried up to it."""
 def _constants(balls: BallBearing) -> BearingConstants:
     """Found once for equal bearings: a study asks for them six times a drop, and they cost milliseconds."""
     return bearing_constants(balls)
+
+
+@lru_cache(maxsize=8)
+def _speed_table(balls: BallBearing, fastest: float) -> BallTable:
+    """Found once for equal bearings: it takes a second."""
+    constants = _constants(balls)
+    return ball_table(FastBalls.of(balls, constants), fastest, constants.stress_coefficient_outer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +154,10 @@ class BallNumbers(BearingNumbers):
             numbers[blocks.RING_BALLS] = self.constants.ball_count
             numbers[blocks.RING_ROWS] = self.constants.row_count
         return numbers
+
+    def speed_table(self, fastest: float) -> BallTable | None:
+        """Balls up to a speed of the race [rad/s], where their inertia counts."""
+        return _speed_table(self.balls, fastest) if self.balls.ball_inertia else None
 
     def places(self, least: int = 0) -> Array:
         """Direction of every ball and how many stand there."""
@@ -233,6 +245,15 @@ class BallNumbers(BearingNumbers):
             allowed = format_quantity(float(limit), "speed")
             text = f"a race that reaches the rotor's {speed} turns faster than the {allowed} its maker allows"
             yield Excess(kind="limiting speed", value=omega, limit=float(limit), text=text)
+        stress = self._preload_stress
+        if stress > STATIC_STRESS:
+            pressed, rated = (format_quantity(value, "pressure") for value in (stress, STATIC_STRESS))
+            text = (
+                f"the preload alone presses the balls with {pressed}, and ISO 76 rates bearings up to {rated}"
+            )
+            yield Excess(kind="preload", value=stress, limit=STATIC_STRESS, text=text, doubtful=True)
+        if self.balls.ball_inertia:
+            return
         force = float(ball_centrifugal_force(self.balls, omega))
         carried = self.constants.preload_ball_load if self.held else float(np.max(self.ball_loads(load)))
         if force > CENTRIFUGAL_SHARE * carried:
@@ -243,13 +264,6 @@ class BallNumbers(BearingNumbers):
             )
             text = f"{text} {against}; {self._at_speed(omega)}the drop model leaves this out"
             yield Excess(kind=THROWN, value=force, limit=carried, text=text)
-        stress = self._preload_stress
-        if stress > STATIC_STRESS:
-            pressed, rated = (format_quantity(value, "pressure") for value in (stress, STATIC_STRESS))
-            text = (
-                f"the preload alone presses the balls with {pressed}, and ISO 76 rates bearings up to {rated}"
-            )
-            yield Excess(kind="preload", value=stress, limit=STATIC_STRESS, text=text, doubtful=True)
 
     def _at_speed(self, omega: float) -> str:
         """What the inertia of the balls makes of a preloaded pair that turns at ω [rad/s]."""

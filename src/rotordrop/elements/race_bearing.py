@@ -16,6 +16,7 @@ from rotordrop.physics import blocks
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
+    from rotordrop.physics.ball_table import BallTable
 
 Oddity = tuple[str, float, float, str]
 """Name of an entry, its value and the limit it is compared with [SI], and what to say."""
@@ -160,6 +161,10 @@ class BearingNumbers(ABC):
     def rings(self) -> Array:
         """Numbers of outer rings that springs press on, in the order of `rotordrop.physics.ring`; no such."""
         return np.zeros(blocks.RING_N_ENTRIES)
+
+    def speed_table(self, fastest: float) -> BallTable | None:
+        """Table of rolling elements whose inertia counts, for a race up to a speed [rad/s]; None without."""
+        return None
 
     @abstractmethod
     def places(self, least: int = 0) -> Array:

@@ -444,6 +444,11 @@ def insisted(evidence: Evidence) -> Evidence:
             "before the first contact is taken as one under gravity alone. Leave it out to estimate without "
             "it; 'rotordrop simulate' and 'study' know it"
         )
+    if any(bearing.bearing.ball_inertia for bearing in machine.touchdown_bearings):
+        raise RecordError(
+            f"the machine {machine.name!r} has balls with inertia, with which a record cannot be estimated "
+            "yet; leave out ball_inertia: 'rotordrop check' says what it would change"
+        )
     if evidence.record.speed_readings is None:
         raise RecordError(
             f"the record {evidence.name} has no rotor speed; expected one. Name its channel in a profile "

@@ -44,6 +44,14 @@ RING_BALLS = 5
 RING_ROWS = 6
 RING_N_ENTRIES = 7
 
+# Entries of a table of balls at speed; SI units. A step of the speed of zero is balls without inertia.
+FAST_SPEED_STEP = 0
+FAST_TOUCH = 1
+FAST_FIRST = 2
+FAST_STEP = 3
+FAST_OUTER_STRESS = 4
+FAST_N_ENTRIES = 5
+
 # Entries of a form; SI units. All at zero is the plain support.
 SUPPORT_PRESENT = 0
 SUPPORT_COUPLING = 1

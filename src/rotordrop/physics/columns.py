@@ -58,7 +58,10 @@ MOUNT = SUPPORT_FORM_END
 MOUNT_END = MOUNT + blocks.MOUNT_N_ENTRIES
 RING = MOUNT_END
 RING_END = RING + blocks.RING_N_ENTRIES
-N_BEARING_COLUMNS = RING_END
+FAST = RING_END
+FAST_END = FAST + blocks.FAST_N_ENTRIES
+FAST_SPEED_STEP = FAST + blocks.FAST_SPEED_STEP
+N_BEARING_COLUMNS = FAST_END
 FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`.
@@ -154,7 +157,8 @@ class KernelParameters(NamedTuple):
     """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z
     balls.
 
-    Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`;
+    Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`,
+    ``ball_table`` (B, ·, ·, ·, ·) or (0, ·, ·, ·, ·) what `physics.ball_table` reads of balls at speed;
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
     of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
     (B, ·) or (0, ·) holds what `physics.departure` reads. ``load`` (K, ·), ``load_shape`` (K, m) and
@@ -172,6 +176,7 @@ class KernelParameters(NamedTuple):
     bearing_shape: Array
     bearing: Array
     balls: Array
+    ball_table: Array
     magnet_shape: Array
     magnet: Array
     spin: Array

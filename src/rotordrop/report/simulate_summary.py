@@ -131,7 +131,14 @@ def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:
 
 
 def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
-    """What the inertia of balls would change at the race speeds that were reached."""
+    """What the inertia of balls made of the races, or would make of them at the speeds that they reached."""
+    if result.race_stress is not None:
+        highest = np.max(result.race_stress, axis=0)
+        for name, (inner, outer) in zip(result.bearing_names, highest, strict=True):
+            if outer > 0.0:
+                one, other = shown(inner, "pressure"), shown(outer, "pressure")
+                text = f"{name}: the largest stress is {one} on the inner and {other} on the outer race."
+                yield Statement(text)
     share = machine.rotor.mass * float(machine.gravity) / len(machine.touchdown_bearings)
     for b, bearing in enumerate(machine.touchdown_bearings):
         fastest = float(np.max(np.abs(result.race_speed[:, b])))

@@ -78,6 +78,10 @@ class DropModel:
         return tuple(bearing.name for bearing in self.machine.touchdown_bearings)
 
 
+FASTEST = 1.25
+"""Largest speed of a race over the nominal speed for which balls with inertia are tabulated [1]: chosen."""
+
+
 def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") -> DropModel:
     """Assemble, reduce and flatten a machine for the time loop.
 
@@ -161,10 +165,25 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
         **_loads(machine, basis, uniform),
         "bearing": rows,
         "balls": places_of([numbers_of(bearing) for bearing in bearings]),
+        **_of_fast_balls(machine, rows),
         "unbalance_cos": cosine,
         "unbalance_sin": sine,
         "spin": spin,
     }
+
+
+def _of_fast_balls(machine: Machine, rows: Array) -> dict[str, Array]:
+    """Tables of balls whose inertia counts, and their entries in the rows of the bearings."""
+    fastest = FASTEST * float(machine.speed.nominal)
+    tables = [numbers_of(bearing).speed_table(fastest) for bearing in machine.touchdown_bearings]
+    shapes = [table.values.shape for table in tables if table is not None]
+    if not shapes:
+        return {"ball_table": np.zeros((0, 1, 1, 1, 1))}
+    values = np.zeros((len(tables), *shapes[0]))
+    for row, one, table in zip(rows, values, tables, strict=True):
+        if table is not None:
+            row[L.FAST : L.FAST_END], one[:] = table.entries, table.values
+    return {"ball_table": values}
 
 
 def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Array]:

@@ -7,14 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import blocks, departure, mount, ring, support
+from rotordrop.physics import ball_table, blocks, departure, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import ball_set_energy, ball_set_load
+from rotordrop.physics.ball_set import ball_set_energy
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
-from rotordrop.simulate._loop import contact_at
+from rotordrop.simulate._loop import contact_at, race_loads
 from rotordrop.simulate._rhs import (
+    Scratch,
     ball_force,
     departing,
     gap_at,
@@ -24,6 +25,7 @@ from rotordrop.simulate._rhs import (
     race_deflection,
     relative_motion,
     ring_travel,
+    scratch_of,
     support_deflection,
 )
 
@@ -40,28 +42,29 @@ H_BEARING_FORCE_X = 6
 H_BEARING_FORCE_Y = 7
 H_BALL_LOAD = 8
 H_STRESS = 9
-N_HISTORIES = 10
+H_INNER_STRESS = 10
+H_OUTER_STRESS = 11
+N_HISTORIES = 12
 
 
 @inner_kernel
-def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Array, out: Array) -> None:
-    """Fill ``out`` (10,) with what one bearing does in a state."""
+def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Scratch, out: Array) -> None:
+    """Fill ``out`` (12,) with what one bearing does in a state."""
     contact_at(t, p.bearing_at[b, L.CONTACTS], y, p, out)
-    F_x, F_y = ball_force(b, y, p, work)
+    F_x, F_y, _exchanged = ball_force(b, y, p, work)
     out[H_BEARING_FORCE_X] = -F_x
     out[H_BEARING_FORCE_Y] = -F_y
-    dx, dy = race_deflection(b, y, p)
-    numbers = p.bearing[b][L.ROLLING : L.ROLLING_END]
-    out[H_BALL_LOAD], out[H_STRESS] = ball_set_load(numbers, p.balls[b], dx, dy, ring_travel(b, y, p))
+    out[H_BALL_LOAD], out[H_INNER_STRESS], out[H_OUTER_STRESS] = race_loads(b, y, p)
+    out[H_STRESS] = max(out[H_INNER_STRESS], out[H_OUTER_STRESS])
 
 
 @kernel
 def bearing_histories(times: Array, states: Array, p: KernelParameters, out: Array) -> None:
-    """Fill ``out`` (T, B, 10) from ``times`` (T,) [s] and ``states`` (T, n); SI units, columns ``H_*``.
+    """Fill ``out`` (T, B, 12) from ``times`` (T,) [s] and ``states`` (T, n); SI units, columns ``H_*``.
 
     The ball force is that on the race.
     """
-    work = np.empty((2, p.balls.shape[2]))
+    work = scratch_of(p)
     for i in range(states.shape[0]):
         for b in range(p.bearing.shape[0]):
             fill_history(times[i], b, states[i], p, work, out[i, b])
@@ -101,6 +104,22 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @lean_kernel
+def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
+    """Energy [J] of the balls of one bearing and of the rings that springs press on."""
+    row = p.bearing[b]
+    balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
+    dx, dy = race_deflection(b, y, p)
+    if row[L.FAST_SPEED_STEP] > 0.0:
+        grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
+        return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
+    energy: float = ball_set_energy(balls, p.balls[b], dx, dy, way)
+    if p.bearing_at[b, L.RING_STATES] >= 0:
+        speed = y[p.bearing_at[b, L.RING_STATES] + 1]
+        energy += ring.ring_energy(row[L.RING : L.RING_END], balls, way, speed)
+    return energy
+
+
+@lean_kernel
 def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     n_q = p.rotor_at[L.N_COORDINATES]
@@ -120,12 +139,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
                 energy += departure.energy_in_contact(p.departure[b], law, delta)
             elif delta > 0.0:
                 energy += contact_energy(law, delta)
-        dx, dy = race_deflection(b, y, p)
-        balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
-        energy += ball_set_energy(balls, p.balls[b], dx, dy, way)
-        if p.bearing_at[b, L.RING_STATES] >= 0:
-            speed = y[p.bearing_at[b, L.RING_STATES] + 1]
-            energy += ring.ring_energy(row[L.RING : L.RING_END], balls, way, speed)
+        energy += ball_energy(b, y, p)
         energy += row[L.RACE_WEIGHT] * y[r + 1]
         energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
         energy += (

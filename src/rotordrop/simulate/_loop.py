@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import ball_table, blocks
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import atan2, exp, ln, power
+from rotordrop.physics.elementary import atan2, cube_root, exp, ln, power
 from rotordrop.simulate._rhs import (
     N_PLACES,
     Scratch,
@@ -135,7 +136,9 @@ def runge_kutta_stages(
     """Fill stages 2 to 7 (stage 1 is ``k[0]``), their ``powers`` (7, B + 1, 5) by place and the new state."""
     for stage in range(1, 7):
         combine(y, h, tab.a[stage], k, stage, y_new)
-        drop_derivative(t + tab.c[stage] * h, y_new, p, k[stage], Scratch(work.balls, powers[stage]))
+        drop_derivative(
+            t + tab.c[stage] * h, y_new, p, k[stage], Scratch(work.balls, powers[stage], work.blend)
+        )
 
 
 @inner_kernel
@@ -336,18 +339,36 @@ def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: 
     return n_log
 
 
-@lean_kernel
-def force_and_stress(b: int, y: Array, p: KernelParameters, work: Array) -> tuple[float, float]:
-    """Magnitude of the ball force [N] and largest Hertz stress [Pa] of one bearing in a state."""
-    F_x, F_y = ball_force(b, y, p, work)
+@inner_kernel
+def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float]:
+    """Largest load of a ball of one bearing [N], and its Hertz stress on inner and outer race [Pa].
+
+    The stress on the outer race is zero where it carries the same loads as the inner one, which governs.
+    """
     dx, dy = race_deflection(b, y, p)
-    numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
-    _load, stress = ball_set_load(numbers, p.balls[b], dx, dy, way)
+    numbers, grid = p.bearing[b][L.ROLLING : L.ROLLING_END], p.bearing[b, L.FAST : L.FAST_END]
+    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+        spin = y[p.bearing_at[b, L.RACE_SPIN]]
+        inner, outer = ball_table.fast_loads(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
+        stress = numbers[blocks.BALLS_STRESS_COEFFICIENT] * cube_root(inner)
+        return max(inner, outer), stress, grid[blocks.FAST_OUTER_STRESS] * cube_root(outer)
+    load, stress = ball_set_load(numbers, p.balls[b], dx, dy, ring_travel(b, y, p))
+    return load, stress, 0.0
+
+
+@lean_kernel
+def force_and_stress(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float]:
+    """Magnitude of the ball force [N] and largest Hertz stress [Pa] of one bearing in a state."""
+    F_x, F_y, _exchanged = ball_force(b, y, p, work)
+    _load, inner, outer = race_loads(b, y, p)
+    stress = max(inner, outer)
     return math.sqrt(F_x * F_x + F_y * F_y), stress
 
 
 @lean_kernel
-def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks: Array, work: Array) -> None:
+def update_peaks(
+    t: float, y: Array, p: KernelParameters, running: Array, peaks: Array, work: Scratch
+) -> None:
     """Keep the largest indentation, ball force and stress of each bearing with an accepted state.
 
     Force and stress are computed only where the race has travelled nearly as far as ever, for they grow with
@@ -363,8 +384,9 @@ def update_peaks(t: float, y: Array, p: KernelParameters, running: Array, peaks:
             continue
         dx, dy = race_deflection(b, y, p)
         travel = dx * dx + dy * dy
-        # a ring that gives way leaves no order between travel and force
-        if travel < 0.9 * peaks[b, PEAK_TRAVEL] and p.bearing_at[b, L.RING_STATES] < 0:
+        # rings that give way and balls that press outwards leave no order between travel and force
+        ordered = p.bearing_at[b, L.RING_STATES] < 0 and p.bearing[b, L.FAST_SPEED_STEP] == 0.0
+        if ordered and travel < 0.9 * peaks[b, PEAK_TRAVEL]:
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
         force, stress = force_and_stress(b, y, p, work)
@@ -435,7 +457,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     tried = 0
     done = 0
     outcome = FINISHED
-    drop_derivative(t, y, p, k[0], Scratch(work.balls, powers[0]))
+    drop_derivative(t, y, p, k[0], Scratch(work.balls, powers[0], work.blend))
     while t < t_end:
         if tried >= control.most_steps:
             outcome = TOO_MANY_STEPS
@@ -472,7 +494,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         n_log = log_contacts(t, step, y, y_new, k, tab, p, running, log, n_log, scratch)
         book_losses(step, powers, tab, books)
         if peaks.shape[0] > 0:
-            update_peaks(t_new, y_new, p, running, peaks, work.balls)
+            update_peaks(t_new, y_new, p, running, peaks, work)
         remember(t_new, y_new, p)
         # PI control (Gustafsson): the error of the step before damps the swing between steps too long and too
         # short that every opening of a contact starts.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, departure, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, blocks, departure, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -35,16 +35,20 @@ BENDING = 0
 
 
 class Scratch(NamedTuple):
-    """What a right-hand side writes beside the rates: ``balls`` (2, Z8) and ``power`` (B + 1, 5) lost [W]."""
+    """What a right-hand side writes beside the rates: ``balls`` (2, Z8), ``power`` (B + 1, 5) lost [W], and
+    ``blend`` (3, T) of a table of balls at speed.
+    """
 
     balls: Array
     power: Array
+    blend: Array
 
 
 @kernel
 def scratch_of(p: KernelParameters) -> Scratch:
     """Scratch for the right-hand sides of a machine."""
-    return Scratch(np.empty((2, p.balls.shape[2])), np.zeros((p.bearing.shape[0] + 1, N_PLACES)))
+    power, blend = np.zeros((p.bearing.shape[0] + 1, N_PLACES)), np.empty((3, p.ball_table.shape[4]))
+    return Scratch(np.empty((2, p.balls.shape[2])), power, blend)
 
 
 @lean_kernel
@@ -141,15 +145,22 @@ def ring_travel(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @inner_kernel
-def ball_force(b: int, y: Array, p: KernelParameters, balls: Array) -> tuple[float, float]:
-    """Force of the balls of one bearing [N] against the deflection of its race, x and y."""
+def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
+    """Force of the balls of one bearing [N] against the deflection of its race, x and y.
+
+    The last number is the slope of their energy by the speed of the race [J s], of balls with inertia.
+    """
     x, z = race_deflection(b, y, p)
+    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+        grid = p.bearing[b, L.FAST : L.FAST_END]
+        spin = y[p.bearing_at[b, L.RACE_SPIN]]
+        return ball_table.fast_force(grid, p.ball_table[b], p.balls[b], x, z, spin, work.balls[0], work.blend)
     numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
-    F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, balls, way)
+    F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
     if p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
-        return departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
-    return F_x, F_y
+        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
+    return F_x, F_y, 0.0
 
 
 @inner_kernel
@@ -353,7 +364,7 @@ def add_contact(
 
 @inner_kernel
 def add_race(
-    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, balls: Array
+    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
 ) -> tuple[float, float, float, float]:
     """Rates of a race under its contacts and its balls.
 
@@ -363,7 +374,7 @@ def add_race(
     n_q = p.rotor_at[L.N_COORDINATES]
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
-    F_x, F_y = ball_force(b, y, p, balls)
+    F_x, F_y, exchanged = ball_force(b, y, p, work)
     wx = y[n_q + r] - y[n_q + h]
     wy = y[n_q + r + 1] - y[n_q + h + 1]
     numbers = row[L.ROLLING : L.ROLLING_END]
@@ -371,6 +382,8 @@ def add_race(
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
+    # what the balls gain in energy while the race changes its speed comes from its orbit, not from a push
+    dy[p.rotor_at[L.WORK_IN]] += exchanged * dy[spin]
     return F_x, F_y, by_balls, by_drag
 
 
@@ -464,7 +477,7 @@ def bearing_accelerations(
     departs = p.bearing_at[b, L.DEPARTURE] >= 0
     by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
     if p.bearing_at[b, L.RACE] >= 0:
-        F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work.balls)
+        F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
     by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls) if sprung else 0.0
     sx = y[n_q + h]
@@ -513,6 +526,7 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
     accelerations = dy[n_q : 2 * n_q]
     for i in range(n_q):
         accelerations[i] = 0.0
+    dy[p.rotor_at[L.WORK_IN]] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
     for b in range(p.bearing.shape[0]):
@@ -551,5 +565,5 @@ def add_rotor_rates(
     dy[i_w] = omega_dot
     dy[p.rotor_at[L.ROTOR_ANGLE]] = omega
     dy[p.rotor_at[L.DISSIPATED]] = dissipated + lost
-    dy[p.rotor_at[L.WORK_IN]] = put_in + gained
+    dy[p.rotor_at[L.WORK_IN]] += put_in + gained
     return lost

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, blocks, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, blocks, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
@@ -125,6 +125,12 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     dx, dy = race_deflection(b, y, p)
     entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
     F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
+    w_x = w_y = 0.0
+    if row[L.FAST_SPEED_STEP] > 0.0:
+        grid = row[L.FAST : L.FAST_END]
+        F_x, F_y, k_xx, k_xy, k_yy, w_x, w_y = ball_table.fast_gradient(
+            grid, p.ball_table[b], p.balls[b], dx, dy, y[spin]
+        )
     k, c = (k_xx, k_xy, k_yy), (row[L.BEARING_DAMPING], 0.0, row[L.BEARING_DAMPING])
     for i in range(2):
         m_h = row[L.SUPPORT_MASS_X + i]
@@ -142,6 +148,13 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
             along = F_x * k_xx + F_y * k_xy if j == 0 else F_x * k_xy + F_y * k_yy
             J[spin, r + j] -= by_force / row[L.RACE_INERTIA] * along / F
             J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
+    if row[L.FAST_SPEED_STEP] > 0.0:
+        for i in range(2):
+            slope = w_x if i == 0 else w_y
+            J[n_q + r + i, spin] -= slope / row[L.RACE_MASS]
+            J[n_q + h + i, spin] += slope / row[L.SUPPORT_MASS_X + i]
+        if F > 0.0:
+            J[spin, spin] -= by_force / row[L.RACE_INERTIA] * (F_x * w_x + F_y * w_y) / F
     if p.bearing_at[b, L.RING_STATES] >= 0:
         _ring_jacobian(b, y, p, J, (F_x, F_y), k)
 

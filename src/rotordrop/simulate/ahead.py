@@ -24,7 +24,15 @@ COMMAND = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
     "from rotordrop.simulate.ahead import compile_loop; compile_loop()"
 )
-_DIMENSIONS = {"bearing_shape": 2, "bearing": 2, "balls": 3, "polar": 2, "magnet_shape": 2, "magnet": 2}
+_DIMENSIONS = {
+    "bearing_shape": 2,
+    "bearing": 2,
+    "balls": 3,
+    "ball_table": 5,
+    "polar": 2,
+    "magnet_shape": 2,
+    "magnet": 2,
+}
 _DIMENSIONS |= dict.fromkeys(("bearing_at", "contact_at", "magnet_at", "departure", "load"), 2)
 _DIMENSIONS |= dict.fromkeys(("load_shape", "load_points"), 2)
 

@@ -151,6 +151,7 @@ def _result(
         bearing_force=force,
         max_ball_load=histories[..., H.H_BALL_LOAD],
         max_stress=histories[..., H.H_STRESS],
+        race_stress=_race_stress(parameters, histories),
         line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
         speed=states[:, layout.rotor_speed],
         race_speed=states[:, layout.race_spin],
@@ -169,6 +170,13 @@ def _result(
         finished=outcome == _loop.FINISHED,
         certificate=_energy_certificate(model, parameters, times, states, force),
     )
+
+
+def _race_stress(parameters: KernelParameters, histories: Array) -> Array | None:
+    """Stress on inner and outer race [Pa], (T, B, 2), where a ball presses them by different loads."""
+    if not len(parameters.ball_table):
+        return None
+    return histories[..., [H.H_INNER_STRESS, H.H_OUTER_STRESS]]
 
 
 def _contact_log(parameters: KernelParameters, log: Array) -> ContactLog:

@@ -12,8 +12,9 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
-from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.parameters import FASTEST, DropModel
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
+from rotordrop.units import format_quantity
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,7 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     magnets).
     """
     parameters = _with_spin(model.parameters, case)
+    _refuse_overspeed(model, case.speed)
     start = case.start
     if isinstance(start, StateStart):
         return _given_state(model, start), parameters
@@ -41,6 +43,17 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     if isinstance(start, PlacedStart):
         return _placed(model, start, state), parameters
     return _levitated(model, case.speed, start, state, parameters)
+
+
+def _refuse_overspeed(model: DropModel, speed: float) -> None:
+    """Refuse a speed [rad/s] beyond the table of balls with inertia."""
+    most = FASTEST * float(model.machine.speed.nominal)
+    if len(model.parameters.ball_table) and abs(speed) > most:
+        shown = [format_quantity(one, "speed") for one in (abs(speed), most)]
+        raise SimulationError(
+            f"{shown[0]} is beyond the {shown[1]} up to which balls with inertia are tabulated, {FASTEST:g} "
+            "times the nominal speed; raise speed.nominal, or leave out ball_inertia"
+        )
 
 
 def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters:

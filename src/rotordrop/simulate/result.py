@@ -115,6 +115,10 @@ class DropResult:
     """Energy lost by place [J], for `rotordrop.simulate.losses`; None where none were booked, shape (B + 1,
     5)."""
 
+    race_stress: Array | None = field(default=None, repr=False)
+    """Largest Hertz stress on inner and outer race [Pa], shape (T, B, 2), of a machine with ball_inertia; a
+    bearing of it without has zero on its outer race. None where the inner race governs everywhere."""
+
     def index_of(self, bearing: int | str) -> int:
         """Place of a bearing, given by name or by number from 0.
 
@@ -259,6 +263,10 @@ def _write(result: DropResult, file: Any) -> None:
         _scale(file, "loss_column", np.arange(result.lost.shape[1], dtype=np.int64))
         words = "energy lost by place; columns as in rotordrop.simulate.losses"
         _dataset(file, "lost", result.lost, ("owner", "loss_column"), "J", words)
+    if result.race_stress is not None:
+        _scale(file, "race", np.array(["inner", "outer"], dtype=text))
+        words = "largest Hertz stress of a ball on each race"
+        _dataset(file, "race_stress", result.race_stress, ("time", "bearing", "race"), "Pa", words)
     for item in fields(Certificate):
         value = getattr(result.certificate, item.name)
         if value is not None:
@@ -322,5 +330,6 @@ def _read(file: Any) -> DropResult:
         if f"certificate_{f.name}" in file.attrs
     }
     values["certificate"] = Certificate(**certificate)
-    values["lost"] = file["lost"][()] if "lost" in file else None
+    for name in ("lost", "race_stress"):
+        values[name] = file[name][()] if name in file else None
     return DropResult(**values)
