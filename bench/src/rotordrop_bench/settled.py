@@ -86,16 +86,9 @@ def lowest_energy(
 ) -> Array:
     """Coordinates of lowest energy near a start, by Newton steps damped until the energy falls.
 
-    Parameters
-    ----------
-    start, mass : ndarray, shape (n,)
-        Coordinates to begin with, and the mass behind each.
-    weight : float
-        Largest generalised weight, which sets the scale of the damping.
-    energy_at, force_and_stiffness : callable
-        Potential energy [J], and the force left over (n,) with the tangent stiffness (n, n).
-    name : str
-        Name of the machine, for the message when none is found.
+    Start and the mass behind each coordinate have shape (n,), the largest generalised weight sets the scale
+    of the damping; energies are in [J], the force left over has shape (n,), the tangent stiffness (n, n); the
+    name of the machine is for the message when none is found.
     """
     # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
     # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.

@@ -35,22 +35,16 @@ class ExpandedState:
 def expansion_matrix(rows: Array, modes: int) -> Array:
     """Amplitudes of the lowest modes per measured displacement, ``(QΦ)^+``, shape (2·modes, S).
 
-    Parameters
-    ----------
-    rows : ndarray, shape (S, 2m)
-        Displacement along each sensor per amplitude, QΦ of all modes, x amplitudes before y.
-    modes : int
-        Modes per plane used; at most half the number of sensors.
+    ``rows`` (S, 2m) is the displacement along each sensor per amplitude, QΦ of all modes, x amplitudes before
+    y; of the modes per plane at most half the number of sensors can be used.
+
+    Source: Neisi 2020, eqs. (14)–(16). Differs from the paper: pseudo-inverse with a rank check instead of
+    the normal equations.
 
     Raises
     ------
     IdentificationError
         If the sensors cannot tell these modes apart.
-
-    Notes
-    -----
-    Source: Neisi 2020, eqs. (14)–(16). Differs from the paper: pseudo-inverse with a rank check instead of
-    the normal equations.
     """
     m = rows.shape[1] // 2
     chosen = rows[:, [*range(modes), *range(m, m + modes)]]
@@ -71,21 +65,9 @@ def expand_initial_state(
 ) -> ExpandedState:
     """Initial displacement and velocity at all degrees of freedom by modal expansion.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Record time [s].
-    along : ndarray, shape (N, S)
-        Displacements along the sensors, zeros taken off [m].
-    power_off : float
-        Power-off in record time [s].
-    model, sensing
-        The rotor and what the sensors see of it.
-    modes : int
-        Modes per plane: 2 are the rigid ones of the paper.
+    Displacements along the sensors (N, S) [m] have their zeros taken off, times (N,) and power-off are those
+    of the record [s]; 2 modes per plane are the rigid ones of the paper.
 
-    Notes
-    -----
     Source: Neisi 2020, section 3.1. The velocity comes from a local polynomial through samples on both sides
     of power-off. Sensors need not sit at the bearing nodes.
     """

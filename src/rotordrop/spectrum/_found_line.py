@@ -75,19 +75,9 @@ class FoundLine:
 def path_range(line: FoundLine, time: Array, length: Array, unit: Array) -> tuple[Array, Array]:
     """Lowest and highest frequency of a line within frames, in units [Hz] that change with time.
 
-    Parameters
-    ----------
-    line : FoundLine
-    time, length : shape (F,)
-        Middle and length of the frames [s].
-    unit : shape (F, 5)
-        What one step of the view is worth at five moments of each frame [Hz]: 1, or the rotor speed for
-        orders.
-
-    Returns
-    -------
-    low, high : shape (F,)
-        Infinite where the line is not there.
+    Time and length of the frames have shape (F,) [s]; the unit (F, 5) is what one step of the view is worth
+    at five moments of each frame [Hz]: 1, or the rotor speed for orders. The result is infinite where the
+    line is not there.
     """
     places = np.array(
         [line.frequency_at(time + share * length) / unit[:, k] for k, share in enumerate(FIVE_MOMENTS)]

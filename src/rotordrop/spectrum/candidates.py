@@ -135,24 +135,9 @@ def bearing_defect_candidates(
     """Ball-pass and cage frequencies of a touchdown bearing whose inner race turns, as orders of the rotor
     speed.
 
-    Parameters
-    ----------
-    bearing : str
-        Name of the touchdown bearing.
-    ball_count : int
-    ball_diameter, pitch_diameter : float
-        [m].
-    contact_angle : float
-        [rad].
-    race_speed_ratio : tuple of float
-        Lowest and highest race speed over rotor speed [1] once the race rolls with the rotor.
-    slip : float
-        How much the balls may lag behind pure rolling [1].
-    harmonics : int
-        Multiples of each ball-pass frequency.
+    Lengths are in [m], the contact angle in [rad]. The race speed ratio is its lowest and highest speed over
+    that of the rotor once it rolls along, the slip how much the balls may lag behind pure rolling [1].
 
-    Notes
-    -----
     Source: kinematics of rolling bearings, outer race at rest (ISO 15243 gives the same formulas).
     """
     gamma = ball_diameter / pitch_diameter * math.cos(contact_angle)

@@ -176,16 +176,8 @@ def analyse_coast_down(
 ) -> CoastDownAnalysis:
     """Take a coast-down apart; the same for a recording and for a simulation.
 
-    Parameters
-    ----------
-    signal : CoastDownSignal
-        Displacements and speed.
-    candidates : sequence of Candidate
-        What lines could be, e.g. from `rotordrop.spectrum.machine_candidates.machine_candidates`.
-    choice : WaterfallChoice
-        Which waterfalls are drawn.
-    progress : callable, optional
-        Called with a stage and the fraction done.
+    The candidates are what lines could be, e.g. from `machine_candidates`; progress is called with a stage
+    and the fraction done.
     """
     if not signal.planes:
         raise RecordError("coast-down: no plane given; at least one displacement (x, y) is needed")

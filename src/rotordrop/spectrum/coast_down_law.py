@@ -101,21 +101,9 @@ def fit_exponential(
 ) -> ExponentialFit:
     """Fit one time constant to a recorded coast-down and say how far from exponential it is.
 
-    Parameters
-    ----------
-    time : shape (K,)
-        [s], rising.
-    speed : shape (K,)
-        Recorded rotor speed [rad/s].
-    start, end : float
-        Window of the fit [s]; to the end of the record if not given.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the window goes from ``start`` to ``end`` [s]
+    or the end of the record.
 
-    Returns
-    -------
-    ExponentialFit
-
-    Notes
-    -----
     Source: Neisi 2020, eq. (13). The intervals are widened where neighbouring residuals are alike, because a
     wrong law does not scatter like noise.
     """
@@ -152,21 +140,9 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
     Let the window start after the races have spun up (about a second after the drop): until then the rotor
     hands spin to the races, which is no drag.
 
-    Parameters
-    ----------
-    time : shape (K,)
-        [s], rising.
-    speed : shape (K,)
-        Recorded rotor speed [rad/s].
-    start, end : float
-        Window of the fit [s]; to the end of the record if not given.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the window goes from ``start`` to ``end`` [s]
+    or the end of the record.
 
-    Returns
-    -------
-    DragFit
-
-    Notes
-    -----
     Source: drag laws behind Neisi 2020, eq. (13). Differs from the paper: the deceleration is a function of
     speed, with a dry part that the recorded speed contains besides the aerodynamic ones.
     """
@@ -204,19 +180,7 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
     before, or a rotor that only creeps ever slower, is said to determine nothing; ``lower`` is then the time
     up to which it surely turned.
 
-    Parameters
-    ----------
-    time : shape (K,)
-        [s], rising.
-    speed : shape (K,)
-        Recorded rotor speed [rad/s].
-    share : float
-        Share of the highest speed [1] at which the fit begins.
-
-    Returns
-    -------
-    Known
-        Time of standstill [s] on the clock of ``time``.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s].
     """
     t, omega = _window(time, speed, -math.inf, None)
     turning = np.flatnonzero(omega > share * float(omega.max()))

@@ -68,22 +68,9 @@ def clearest_peak(
 ) -> Peak | None:
     """Find the peak that noise explains worst, over all channels and all given stretches of frames.
 
-    Parameters
-    ----------
-    frames : FramePower
-    allowed : shape (F, K)
-        Where a line may be looked for.
-    settings : DetectionSettings
-    stretches : sequence of (int, int)
-        First frame and last one, excluded, of every stretch in which a line must be seen half the time.
-
-    usual : shape (K, C), optional
-        Power [m²] that is not to count as a line: the floor is nowhere lower.
-
-    Returns
-    -------
-    Peak or None
-        None when noise explains everything.
+    ``allowed`` (F, K) says where a line may be looked for; a line must be seen in half the frames of a
+    stretch, given by its first frame and the one after its last; ``usual`` (K, C) is power [m²] that is not
+    to count as a line: the floor is nowhere lower. None where noise explains everything.
     """
     trials = max(int(np.sum(allowed.any(axis=0))), 1) * frames.power.shape[2] * max(len(stretches), 1)
     threshold = math.log(trials / settings.false_alarm)

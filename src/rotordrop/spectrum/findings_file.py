@@ -21,13 +21,6 @@ def write_findings(analysis: CoastDownAnalysis, path: Path) -> None:
 
     Every data set carries its ``units``, a waterfall its ``amplitude_kind``. Lines, resonances and statements
     are in the JSON.
-
-    Parameters
-    ----------
-    analysis : CoastDownAnalysis
-        What was found.
-    path : Path
-        HDF5 file to write.
     """
     with new_hdf5(path) as file:
         file.attrs["format"] = FORMAT

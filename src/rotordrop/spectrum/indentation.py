@@ -85,29 +85,10 @@ def displacement_history(
     """Give the envelope of a displacement over the whole coast-down and say when the largest indentation
     came.
 
-    Parameters
-    ----------
-    displacement : shape (N, 2)
-        Displacement (x, y) [m] from the centre of the race, in one plane; read in blocks.
-    sampling_rate : float
-        [Hz].
-    air_gap : float
-        Radial clearance between rotor and race [m].
-    error : float, optional
-        Standard error of distances from the centre [m], where it is estimated.
-    start_time : float
-        Time of the first sample after power-off [s].
-    window : float
-        The time [s] that is asked about: did the maximum fall into it?
-    intervals : int
-        Length of the envelope [1].
+    The displacement (N, 2) [m] counts from the centre of the race, in one plane, and is read in blocks;
+    ``error`` is the standard error of that distance [m], where it is estimated; the window [s] is the time
+    that is asked about: did the maximum fall into it?
 
-    Returns
-    -------
-    DisplacementHistory
-
-    Notes
-    -----
     Source: Neisi 2020, section 5.4 and Fig. 17. Differs from the paper: it says whether 0.2 s held the
     maximum.
     """
@@ -162,20 +143,8 @@ def find_settling(
 ) -> Settling:
     """Find the impacts of a coast-down and the begin of lasting contact.
 
-    Parameters
-    ----------
-    displacement : shape (N, 2)
-        Displacement (x, y) [m] from the centre of the race, in one plane, y up; begins with the fall.
-    sampling_rate : float
-        [Hz].
-    air_gap : float
-        Radial clearance between rotor and race [m].
-    start_time : float
-        Time of the first sample [s].
-
-    Returns
-    -------
-    Settling
+    The displacement (N, 2) [m] counts from the centre of the race, in one plane, y up, and begins with the
+    fall.
     """
     samples = displacement.shape[0]
     last_second = np.asarray(displacement[max(0, samples - int(sampling_rate)) : samples], dtype=np.float64)

@@ -85,14 +85,7 @@ def _share_inside(count: int, size: int) -> Array:
 def near_path(signal: Array, path: Array, factor: int) -> Near:
     """Turn a signal back by the phase of a path and keep every so manieth sample of what lies near it.
 
-    Parameters
-    ----------
-    signal : shape (N, C)
-        [m], without its mean.
-    path : shape (N,)
-        Phase [rad].
-    factor : int
-        Samples of which one is left [1].
+    The signal (N, C) [m] is without its mean, the path (N,) is a phase [rad].
     """
     channels = signal.shape[1]
     turned = np.empty((2 * channels, len(signal)))  # one row per channel: real parts, then imaginary parts
@@ -120,16 +113,8 @@ def _share_thinned(count: int, factor: int) -> Array:
 def extract(near: Near, sampling_rate: float, turn: Array, *, bandwidth: float) -> Envelope:
     """Take the part out that follows a path and a further phase, with an amplitude that changes slowly.
 
-    Parameters
-    ----------
-    near : Near
-        The signal near the path.
-    sampling_rate : float
-        Of its samples [Hz].
-    turn : shape (M,)
-        What the phase of the line has more than that of the path [rad].
-    bandwidth : float
-        Distance from the line up to which amplitude changes are followed [Hz].
+    ``turn`` (M,) is what the phase of the line has more than that of the path [rad], the bandwidth the
+    distance from the line up to which amplitude changes are followed [Hz].
     """
     samples = round(0.5 * sampling_rate / bandwidth)
     back = (near.value * np.exp(-1j * turn)[:, None]).T
@@ -161,16 +146,9 @@ class Offset:
 def mean_offset(envelope: ComplexArray, advance: Array, *, lag: int, present: NDArray[np.bool_]) -> Offset:
     """Mean offset of a line from the turning of its envelope, weighted by power.
 
-    Parameters
-    ----------
-    envelope : shape (N, C)
-        Complex amplitude [m].
-    advance : shape (N,)
-        What the offset is counted in: time times 2π [s rad] gives Hz, rotor angle [rad] gives orders.
-    lag : int
-        Samples between compared values [1].
-    present : shape (N,)
-        Where the line is there.
+    The envelope (N, C) is a complex amplitude [m]; the advance (N,) is what the offset is counted in: time
+    times 2π [s rad] gives Hz, rotor angle [rad] gives orders; the lag is between compared samples;
+    ``present`` (N,) is where the line is there.
     """
     pairs = present[:-lag] & present[lag:]
     product = np.where(pairs[:, None], envelope[lag:] * envelope[:-lag].conj(), 0.0).sum(axis=1)

@@ -44,19 +44,10 @@ def frame_power(
 ) -> FramePower:
     """Power over frequency in half-overlapping Hann frames.
 
-    Parameters
-    ----------
-    signal : shape (N, C)
-        Displacement of every channel [m]; or, complex, twice the displacement turned back by the phase of a
-        path, whose power is found on both sides of the path.
-    sampling_rate : float
-        [Hz].
-    start_time : float
-        Time of the first sample [s].
-    frame : float
-        Length of a frame [s]; it is drawn out to a number of samples that transforms fast.
-    highest : float
-        Highest frequency, or largest distance from the path, that is kept [Hz].
+    The signal (N, C) is the displacement of every channel [m]; or, complex, twice the displacement turned
+    back by the phase of a path, whose power is found on both sides of the path. A frame [s] is drawn out to a
+    number of samples that transforms fast; kept is what lies below the highest frequency, or nearer to the
+    path [Hz].
     """
     turned = np.iscomplexobj(signal)
     half = next_fast_len(max(round(frame * sampling_rate / 2), 8), real=not turned)
@@ -92,20 +83,9 @@ def order_power(
 ) -> FramePower | None:
     """Power over order in half-overlapping Hann frames of equal rotor angle; None if not one frame fits.
 
-    Parameters
-    ----------
-    signal : shape (N, C)
-        Displacement of every channel [m].
-    time, angle, speed : shape (N,)
-        Time [s], rotor angle [rad] and speed [rad/s] at every sample.
-    turns : int
-        Turns of the rotor in a frame [1].
-    highest_order : float
-        [1].
-    highest_frequency : float
-        Frequencies above it are not in the signal any more [Hz].
-    lowest_speed : float
-        Frames that reach below it [rad/s] are left out.
+    The signal (N, C) is the displacement of every channel [m], with time [s], rotor angle [rad] and speed
+    [rad/s] (N,) at every sample. Frequencies above the highest [Hz] are not in the signal any more; frames
+    that reach below the lowest speed [rad/s] are left out.
     """
     angle = angle / TURN
     slow = np.flatnonzero(speed < lowest_speed)

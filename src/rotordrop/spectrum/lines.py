@@ -118,31 +118,10 @@ def find_lines(
     goes on with the rest: so a strong order does not appear as a steady line where it is smeared, nor a
     strong steady line as an order. Afterwards sums and differences of orders and steady lines are looked for.
 
-    Parameters
-    ----------
-    planes : mapping of str to shape (N, 2)
-        Displacement (x, y) [m] in each plane, after power-off.
-    sampling_rate : float
-        [Hz].
-    profile : SpeedProfile, optional
-        Rotor speed; without it every line stays undecided.
-    start_time : float
-        Time of the first sample [s].
-    skip : float
-        How much of the beginning to leave out [s]: while the rotor bounces it shows everything at once.
-    candidates : sequence of Candidate
-        What lines could be.
-    air_gap : float, optional
-        [m]; needed to recognise whirl.
-    settings : LineSettings
+    The displacement in each plane (N, 2) [m] begins with power-off. Without a profile of the speed every line
+    stays undecided; ``skip`` leaves out so much of the beginning [s], since a rotor that bounces shows
+    everything at once; the air gap [m] is needed to recognise whirl. The strongest line comes first.
 
-    Returns
-    -------
-    tuple of Line
-        Strongest first.
-
-    Notes
-    -----
     Source: own method; names after Neisi 2020, section 5.4.
     """
     if not planes:

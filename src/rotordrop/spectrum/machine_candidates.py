@@ -54,12 +54,7 @@ class SwingRange:
 def machine_candidates(machine: Machine, planes: dict[str, str] | None = None) -> tuple[Candidate, ...]:
     """Everything a machine is expected to show, for `rotordrop.spectrum.lines.find_lines`.
 
-    Parameters
-    ----------
-    machine : Machine
-        The machine.
-    planes : dict of str to str, optional
-        Name of the plane in which each touchdown bearing is seen best, by bearing.
+    ``planes`` names the plane in which each touchdown bearing is seen best.
     """
     swings = [
         pendulum_candidate(

@@ -88,12 +88,7 @@ def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: f
     the list, which could be anywhere in the band. A candidate known to ± 20 Hz therefore never names a line
     alone, one known to ± 0.2 Hz does.
 
-    Parameters
-    ----------
-    line : LineEvidence
-    candidates : sequence of Candidate
-    air_gap : float, optional
-        [m]; a round orbit of such size that does not follow the speed is called whirl.
+    With an air gap [m] a round orbit of such size that does not follow the speed is called whirl.
     """
     whirl = _whirl(line, air_gap)
     if whirl is not None:

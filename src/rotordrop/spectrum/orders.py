@@ -116,28 +116,10 @@ def track_orders(
     speed therefore smears nothing, and a strong steady line next to an order is explained instead of leaking
     into it.
 
-    Parameters
-    ----------
-    displacement : shape (N, 2)
-        Displacement (x, y) [m] in one plane; read window by window.
-    sampling_rate : float
-        [Hz].
-    profile : SpeedProfile
-        Rotor speed on the clock of ``start_time``.
-    orders : sequence of float
-        Multiples of the rotor speed [1] to follow.
-    start_time : float
-        Time of the first sample [s].
-    steady_lines : sequence of FrequencyPath
-        Lines that do not follow the speed (pendulum, hum), to be explained besides the orders.
-    settings : TrackingSettings
+    The displacement (N, 2) [m] of one plane is read window by window; the profile is on the clock of
+    ``start_time`` [s]; steady lines do not follow the speed (pendulum, hum) and are explained besides the
+    orders.
 
-    Returns
-    -------
-    OrderTrack
-
-    Notes
-    -----
     Source: own method. Differs from the paper: section 5.4 uses fixed frames, in which 1X at 60 Hz reads 41
     % of its amplitude.
     """

@@ -31,23 +31,8 @@ def reduce_rate(
     Frequencies up to the highest keep their amplitude within 2e-5; what lies beyond half the new rate is gone
     (100 dB). The first sample keeps its time. A signal that cannot be thinned out is returned as it is.
 
-    Parameters
-    ----------
-    displacement : shape (N, 2)
-        Displacement (x, y) [m].
-    sampling_rate : float
-        [Hz].
-    highest_frequency : float
-        [Hz].
-    samples_per_turn : float
-        Samples per period of the highest frequency that must remain [1].
-
-    Returns
-    -------
-    displacement : shape (M, 2)
-        [m].
-    sampling_rate : float
-        [Hz].
+    The displacement has shape (N, 2) [m], the thinned one (M, 2); the new rate comes with it. So many samples
+    per period of the highest frequency remain [1].
     """
     factor = int(sampling_rate // (samples_per_turn * highest_frequency))
     if factor < 2:

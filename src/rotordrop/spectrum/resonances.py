@@ -83,24 +83,8 @@ def find_resonances(
     it is taken to be no higher than on the better known side, and a rise found so is reported as uncertain,
     with the least amplitude it must have had.
 
-    Parameters
-    ----------
-    track : OrderTrack
-    plane : str
-        Its name.
-    candidates : sequence of Candidate
-        Modes; those of kind "steady" are compared, mains hum left out.
-    least_rise : float
-        [1].
-    lowest_frequency : float
-        Excitation below it [Hz] is left out.
-    band : float
-        Width of the band in which modes may lie [Hz].
-
-    Returns
-    -------
-    tuple of PassedResonance
-        In the order of time.
+    Candidates are modes; those of kind "steady" are compared, mains hum left out. Excitation below the lowest
+    frequency [Hz] is left out; modes may lie in a band so wide [Hz]. The result is in the order of time.
     """
     modes = [c for c in candidates if c.kind == "steady" and not c.family.startswith("mains")]
     found: list[PassedResonance] = []

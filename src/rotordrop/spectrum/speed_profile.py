@@ -63,12 +63,7 @@ class SpeedProfile:
 def exact_speed_profile(time: ArrayLike, speed: ArrayLike) -> SpeedProfile:
     """Take a speed without noise (a simulation's, a shaft encoder's) as it is.
 
-    Parameters
-    ----------
-    time : shape (K,)
-        Times [s], rising.
-    speed : shape (K,)
-        Rotor speed [rad/s].
+    Times (K,) [s] rise, with the speed (K,) [rad/s].
     """
     t, omega = _checked(time, speed)
     return _profile(t, omega, noise=0.0, rejected=0)
@@ -84,23 +79,9 @@ def fit_speed_profile(
     much to smooth is found by generalised cross-validation. Values far off the curve are left out and
     counted.
 
-    Parameters
-    ----------
-    time : shape (K,)
-        Times [s], rising.
-    speed : shape (K,)
-        Recorded rotor speed [rad/s].
-    power_off : float, optional
-        When the coast-down starts [s]; the first time if not given.
-    outlier_limit : float
-        Distance, in standard deviations [1], beyond which a value is left out.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the coast-down starts at power-off [s], the
+    first time if not given; the limit of outliers counts in standard deviations [1].
 
-    Returns
-    -------
-    SpeedProfile
-
-    Notes
-    -----
     Source: own method; the error of the speed it leaves is about a tenth of the noise of a speed recorded 20
     times per second.
     """

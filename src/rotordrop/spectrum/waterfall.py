@@ -118,30 +118,10 @@ def waterfalls(
     that moves within the frame less still (see `smear_factor`). Frames are read one at a time, so that a
     file larger than memory can be passed.
 
-    Parameters
-    ----------
-    displacement : shape (N, 2)
-        Displacement (x, y) [m] in one plane.
-    sampling_rate : float
-        Samples per second [Hz].
-    components : sequence of {"x", "y", "full"}
-        One direction, or forward and backward parts of x + jy: a waterfall for each.
-    speed : shape (N,), optional
-        Rotor speed [rad/s] at each sample.
-    settings : WaterfallSettings
-        Frame length and overlap; Hann window.
-    amplitude_kind : {"zero-to-peak", "peak-to-peak"}
-    start_time : float
-        Time of the first sample [s].
-    highest_frequency : float, optional
-        Lines above it [Hz] are left out.
+    The displacement (N, 2) [m] is that of one plane, with the rotor speed (N,) [rad/s] where it is known;
+    each component, one direction or forward and backward parts of x + jy, has a waterfall of its own; lines
+    above the highest frequency [Hz] are left out.
 
-    Returns
-    -------
-    tuple of Waterfall
-
-    Notes
-    -----
     Source: Neisi 2020, section 5.4 (Hann window, 32768 points, 50 % overlap, amplitude times 2).
     Differs from the paper: the full spectrum, and the choice of zero-to-peak or peak-to-peak.
     """
@@ -183,14 +163,8 @@ def waterfalls(
 def smear_factor(rate: float, sampling_rate: float, settings: WaterfallSettings = PAPER_SETTINGS) -> float:
     """Share of its true amplitude that a sweeping tone shows in a frame, at its highest line [1].
 
-    Parameters
-    ----------
-    rate : float
-        How fast the tone's frequency changes [Hz/s], e.g. the order times the change of rotor speed per
-        second.
-    sampling_rate : float
-        Of the signal [Hz].
-    settings : WaterfallSettings
+    The rate is how fast the frequency of the tone changes [Hz/s], e.g. the order times the change of rotor
+    speed per second.
     """
     points = 4096
     duration = settings.points / sampling_rate
