@@ -272,7 +272,7 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
                 drop.problem,
                 drop.forces,
                 b,
-                _loads(drop, judged, b),
+                _loads(drop, judged, b, values.get("preload_N")),
                 measured[:, b],
                 values,
                 judged.widening,
@@ -282,13 +282,13 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
     return tuple(found)
 
 
-def _loads(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
+def _loads(drop: TrackedDrop, judged: _Judgement, b: int, preload: Known | None = None) -> Loads:
     twin = _twin(drop, judged, b)
     if judged.fits or judged.check is None:
         return twin
     if judged.replaced_at[b]:
         return loads_of_cross_check(judged.check, b)
-    return widened_to_cross_check(twin, judged.check, b)
+    return widened_to_cross_check(twin, judged.check, b, preload)
 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
