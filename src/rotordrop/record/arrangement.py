@@ -228,6 +228,8 @@ def pairs_of(
                         left = [c for c in left if c is not first and c is not second]
     order = {id(channel): place for place, channel in enumerate(channels)}
     found.sort(key=lambda entry: min(order[id(channel)] for channel in entry[1]))
+    # an HDF5 file lists its channels by the alphabet, DE first; every format shows the ends in one order
+    found.sort(key=lambda entry: not re.search(r"NDE|NAS", entry[0], re.IGNORECASE))
     return [(name or f"plane {number}", pair) for number, (name, pair) in enumerate(found, start=1)], "names"
 
 

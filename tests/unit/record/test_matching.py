@@ -271,7 +271,7 @@ def test_a_sensor_takes_the_channel_of_its_name_without_counter_and_prefix(machi
     [
         (("A_X", "B_X", "A_Y", "B_Y"), ("A", "B")),
         (("V13", "W13", "V24", "W24"), ("13", "24")),
-        (("DE 45L", "DE 45R", "NDE 45L", "NDE 45R"), ("DE 45", "NDE 45")),
+        (("DE 45L", "DE 45R", "NDE 45L", "NDE 45R"), ("NDE 45", "DE 45")),
         (("Brg 1 Left", "Brg 1 Right", "Status", "Brg 2 Left", "Brg 2 Right"), ("Brg 1", "Brg 2")),
         (("Ch1 X", "Ch2 Y", "Ch3 X", "Ch4 Y"), ("plane 1", "plane 2")),
         (("1MAD10CY011", "1MAD10CY012", "1MAD20CY011", "1MAD20CY012"), ("1MAD10CY01", "1MAD20CY01")),
@@ -317,3 +317,10 @@ def test_what_a_profile_writes_serves_look_with_and_without_the_machine(machine,
     assert record_of(names, machine.sensors, profile=rules).signals.shape == (10, 4)
     arranged = arrangement_of(names, rules)
     assert [sensor.bearing for sensor in arranged.sensors] == ["NDE", "NDE", "DE", "DE"]
+
+
+def test_every_format_shows_the_ends_in_one_order():
+    """An HDF5 file lists its channels by the alphabet."""
+    for names in (("DE_X", "DE_Y", "NDE_X", "NDE_Y"), ("NDE_X", "NDE_Y", "DE_X", "DE_Y")):
+        arranged = arrangement_of(recording(*names), Profile())
+        assert [sensor.bearing for sensor in arranged.sensors] == ["NDE", "NDE", "DE", "DE"]
