@@ -14,6 +14,7 @@ from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
+    from rotordrop.estimate.published import Value
     from rotordrop.restart.next_drop import NextDrop
 
 
@@ -21,8 +22,8 @@ def restart(
     machine: options.Machine,
     estimate: Annotated[Path, Argument(metavar="ESTIMATE", help="Estimate of the drop (.json).")],
     since: Annotated[
-        Path | None,
-        file_option("--since", "Estimate of an earlier drop with these bearings, best the first."),
+        list[Path] | None,
+        file_option("--since", "Estimate of an earlier drop with these bearings, the first before the next."),
     ] = None,
     log: Annotated[str | None, text_option("LOG", "Log of drops: earlier ones count.")] = None,
     bearings: Annotated[str, Option(metavar="NAME", help="Set of touchdown bearings in the log.")] = "1",
@@ -78,9 +79,9 @@ def restart(
     card = restart_card(
         drop,
         assumed,
-        since=None if since is None else read_drop(since),
+        since=[read_drop(one) for one in since or ()],
         checks=_checks(check or ()),
-        earlier=0 if log is None else _earlier(log, drop.machine, bearings, drop.record_sha256),
+        earlier=() if log is None else _earlier(log, drop.machine, bearings, drop.record_sha256),
         next_drops=found,
     )
     deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
@@ -99,11 +100,20 @@ def _checks(written: list[str] | tuple[str, ...]) -> dict[str, str]:
     return found
 
 
-def _earlier(log: str, machine: str, bearings: str, sha256: str) -> int:
-    """Drops of a set of bearings in a log, this one left out."""
+def _earlier(log: str, machine: str, bearings: str, sha256: str) -> list[dict[str, Value]]:
+    """Peak stresses of the drops of a set of bearings in a log, this one left out."""
+    from rotordrop.estimate.published import Value
     from rotordrop.ledger.book import logged_drops
 
-    return sum(
-        one.bearing_set == bearings and (not sha256 or one.sha256 != sha256)
-        for one in logged_drops(log, machine=machine).values()
-    )
+    return [
+        {
+            one.bearing: Value(
+                value=math.sqrt(one.lower * one.upper) if one.value is None else one.value,
+                interval_90=[one.lower, one.upper],
+            )
+            for one in drop.severity
+            if one.quantity == "peak_stress_Pa" and one.lower > 0.0
+        }
+        for drop in logged_drops(log, machine=machine, bearing_set=bearings).values()
+        if not sha256 or drop.sha256 != sha256
+    ]

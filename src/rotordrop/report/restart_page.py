@@ -150,6 +150,7 @@ def _costs(card: RestartCard) -> Table:
         ("running with limits", f"{one.limited_days:g} d, and {one.limited_risk:.0%} of the risk is left"),
         ("risk with sound bearings", f"{one.sound_risk:.2%}"),
         ("another drop until the next planned inspection", f"{one.another_drop:.0%}"),
+        ("damaged bearing allowed in a restart without limits", f"{one.most_doubt:.1%}"),
     )
     columns = (Column("assumption", lambda row: row[0]), Column("value", lambda row: row[1]))
     return table(rows, columns, "Costs and chances", f"Source: {one.source}.")

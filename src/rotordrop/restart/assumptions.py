@@ -30,7 +30,7 @@ class Effect(Document):
     spread: float = Field(gt=0.0)
     """Standard deviation of the logarithm of its size [1]."""
     healthy: float = Field(ge=0.0)
-    """Standard deviation of the change from drop to drop of a sound machine, in the unit of the median."""
+    """Standard deviation of its value at one drop of a sound machine, in the unit of the median."""
 
 
 class Damage(Document):
@@ -87,6 +87,9 @@ class Assumptions(Document):
     """Share of the risk that is left where the machine runs with limits [1]."""
     sound_risk: float = Field(default=0.002, ge=0.0, le=1.0)
     """Chance that a machine with sound bearings is damaged until the next planned inspection [1]."""
+    most_doubt: float = Field(default=0.01, ge=0.0, le=1.0)
+    """Largest chance of a damaged bearing with which it may run without limits, checks included; 1 leaves the
+    answer to the costs alone [1]."""
     another_drop: float = Field(default=0.2, ge=0.0, le=1.0)
     """Chance of another drop until then [1]."""
     brinelling_stress: float = Field(default=5.25e9, gt=0.0)

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.estimate.published import Drop
+from rotordrop.estimate.published import Drop, Value
 from rotordrop.restart.assumptions import Assumptions, Check
 from rotordrop.restart.evidence import (
     Indicator,
@@ -46,7 +46,9 @@ COSTS = {
     "bearing_set_cost": "a set of bearings",
     "machine_cost": "a damaged machine",
     "another_drop": "the chance of another drop",
+    "most_doubt": "the chance of a damaged bearing that is allowed",
 }
+SHARES = ("another_drop", "most_doubt")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +99,8 @@ class RestartCard:
     """Checks that have not been made, the most valuable first."""
     made: dict[str, str]
     """Checks that were made, with their outcome."""
+    doubt: float
+    """Chance of a damaged bearing, checks included [1]."""
     flips: tuple[Flip, ...]
     """Assumptions on which the answer hangs, the nearest first."""
     next_drops: tuple[NextDrop, ...]
@@ -117,9 +121,9 @@ def restart_card(
     drop: Drop,
     assumed: Assumptions,
     *,
-    since: Drop | None = None,
+    since: Sequence[Drop] = (),
     checks: Mapping[str, str] | None = None,
-    earlier: int = 0,
+    earlier: Sequence[Mapping[str, Value]] = (),
     next_drops: Sequence[NextDrop] = (),
 ) -> RestartCard:
     """Judge whether a machine may run again after a drop.
@@ -130,12 +134,14 @@ def restart_card(
         Published estimate of the drop.
     assumed : Assumptions
         Costs, kinds of damage and checks.
-    since : Drop, optional
-        Estimate of an earlier drop with the same bearings, best the first: what changed since is evidence.
+    since : sequence of Drop
+        Estimates of earlier drops with the same bearings in their order, best from the first on: what changed
+        since is evidence.
     checks : mapping of str to "good" or "bad"
         Checks that were made, with their outcome.
-    earlier : int
-        Drops that this set of bearings took before.
+    earlier : sequence of mapping of str to Value
+        Drops that this set of bearings took before, in their order, as the peak stress [Pa] of each bearing;
+        empty where it is not known.
     next_drops : sequence of NextDrop
         What the next drop would be, the first one at the speed of a restart without limits.
 
@@ -147,8 +153,8 @@ def restart_card(
     made = dict(checks or {})
     for name, outcome in made.items():
         require_check(name, outcome, assumed)
-    found = indicators(drop, since, assumed)
-    suspected = suspicions(drop, found, earlier, assumed)
+    found = indicators(drop, since, len(earlier), assumed)
+    suspected = suspicions(drop, found, earlier, assumed, len(since))
     before = _Case.of(suspected, assumed, next_drops)
     case = before.after(made)
     shown = [
@@ -159,7 +165,7 @@ def restart_card(
     answer = case.answer
     right = case.right()
     left = sorted(
-        (case.value_of(name) for name in assumed.checks if name not in made), key=lambda one: -one.value
+        (case.value_of(name, made) for name in assumed.checks if name not in made), key=lambda one: -one.value
     )
     alone = not made and all(abs(math.log(one.ratio)) < SAYS_SOMETHING for one in found)
     card = RestartCard(
@@ -172,6 +178,7 @@ def restart_card(
         indicators=found,
         checks=tuple(left),
         made=made,
+        doubt=case.doubt,
         flips=_flips(suspected, assumed, next_drops, made, answer),
         next_drops=tuple(next_drops),
         prior_alone=alone,
@@ -229,27 +236,52 @@ class _Case:
         return dict(zip(ANSWERS, (self.costs @ self.weights).tolist(), strict=True))
 
     @property
+    def doubt(self) -> float:
+        """Chance that a bearing is damaged [1]."""
+        of_bearings = np.array([not one.of_machine for one in self.assumed.damages.values()])
+        return float(self.weights @ (self.states @ of_bearings > 0.0))
+
+    @property
     def answer(self) -> Answer:
-        """The answer of the least expected cost."""
-        return ANSWERS[int(np.argmin(self.costs @ self.weights))]
+        """The answer of the least expected cost of those that the doubt allows."""
+        costs = self.expected()
+        if self.doubt > self.assumed.most_doubt:
+            costs.pop("restart")
+        return min(costs, key=lambda name: costs[name])
 
     def right(self) -> dict[Answer, float]:
         """Probability of the states in which each answer costs least."""
         best = np.argmin(self.costs, axis=0)
         return {name: float(self.weights[best == k].sum()) for k, name in enumerate(ANSWERS)}
 
-    def value_of(self, name: str) -> CheckValue:
-        """What a check is worth."""
+    def outcomes(self, name: str) -> list[tuple[float, _Case]]:
+        """What a check may say: the chance of each outcome [1], and what is known then."""
+        bad = self._bad(self.assumed.checks[name])
+        shares = (("bad", float(bad @ self.weights)), ("good", float((1.0 - bad) @ self.weights)))
+        return [(share, self.after({name: outcome})) for outcome, share in shares]
+
+    def cost_of(self, name: str) -> float:
+        """What a check costs [unit of the assumptions]."""
+        return self.assumed.checks[name].days * self.assumed.day_cost
+
+    def least(self, checks: Sequence[str]) -> float:
+        """Expected cost of the answer, or of one more of these checks and the answer after it."""
+        ways = [
+            self.cost_of(name)
+            + sum(share * then.expected()[then.answer] for share, then in self.outcomes(name))
+            for name in checks
+        ]
+        return min([self.expected()[self.answer], *ways])
+
+    def value_of(self, name: str, made: Mapping[str, str]) -> CheckValue:
+        """What a check is worth, alone or with the one that pays best after it."""
         check, now = self.assumed.checks[name], self.answer
-        bad = self._bad(check)
-        left, settles = 0.0, 0.0
-        for outcome, chance in (("bad", bad), ("good", 1.0 - bad)):
-            share = float(chance @ self.weights)
-            then = self.after({name: outcome})
-            left += share * min(then.expected().values())
-            settles += share if then.answer != now else 0.0
-        cost = check.days * self.assumed.day_cost
-        value = min(self.expected().values()) - left - cost
+        others = [one for one in self.assumed.checks if one != name and one not in made]
+        outcomes = self.outcomes(name)
+        left = sum(share * then.least(others) for share, then in outcomes)
+        settles = sum(share for share, then in outcomes if then.answer != now)
+        cost = self.cost_of(name)
+        value = self.expected()[now] - left - cost
         return CheckValue(name=name, label=check.label, cost=cost, value=value, settles=settles)
 
 
@@ -304,7 +336,7 @@ def _flips(
 
     def scaled_cost(name: str, factor: float) -> _Case:
         value = getattr(assumed, name) * factor
-        changed = assumed.model_copy(update={name: min(value, 1.0) if name == "another_drop" else value})
+        changed = assumed.model_copy(update={name: min(value, 1.0) if name in SHARES else value})
         return _Case.of(suspected, changed, next_drops).after(made)
 
     def scaled_prior(kind: str, factor: float) -> _Case:
@@ -338,13 +370,13 @@ def _with_prior_odds(one: Suspicion, factor: float) -> Suspicion:
     return replace(one, probability=odds / (1.0 + odds))
 
 
-def _said(card: RestartCard, drop: Drop, since: Drop | None) -> list[str]:
+def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
     """The card in sentences, the answer first."""
     assumed, likeliest = card.assumptions, card.suspicions[0]
     said = []
     if card.prior_alone:
         missing = (
-            "there is no earlier estimate to compare with" if since is None else "no parameter moved clearly"
+            "there is no earlier estimate to compare with" if not since else "no parameter moved clearly"
         )
         said.append(
             f"The assumptions alone decide this: {missing}, and no check was made. Make one before you rely "
@@ -354,11 +386,17 @@ def _said(card: RestartCard, drop: Drop, since: Drop | None) -> list[str]:
         name for name in sorted(card.right, key=lambda name: -card.right[name]) if card.right[name] > RARE
     ]
     said.append(
-        f"{card.answer.capitalize()}: it costs least in expectation, {card.costs[card.answer]:.2g} "
+        f"{card.answer.capitalize()}: it costs least in expectation of what may be done, "
+        f"{card.costs[card.answer]:.2g} "
         f"{assumed.unit}{_beside(card)}. Nothing is damaged with {format_chance(card.sound)}; the largest "
         f"doubt is a {in_words(likeliest, assumed)}. Who knew the state of the bearings would answer "
         f"{', '.join(f'{name} ({format_chance(card.right[name])})' for name in known)}."
     )
+    if card.doubt > assumed.most_doubt:
+        said.append(
+            f"It may not run without limits: a bearing is damaged with {format_chance(card.doubt)}, and at "
+            f"most {format_chance(assumed.most_doubt)} is allowed."
+        )
     best = card.best_check
     if best is not None:
         hours = 24.0 * best.cost / assumed.day_cost

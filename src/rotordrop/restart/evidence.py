@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import changes
@@ -15,6 +16,7 @@ from rotordrop.known import NINETY
 from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
 from rotordrop.units import format_chance
 
+Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 """Gauss's rule for an expectation over a standard normal number."""
@@ -29,8 +31,11 @@ class Indicator:
     """Empty where it belongs to the rotor."""
     what: str
     """In words."""
+    ratios: tuple[float, ...]
+    """Likelihood with the damage over that without it, for damage done between an earlier estimate and the
+    next, in their order, the present one last [1]."""
     ratio: float
-    """Likelihood with the damage over that without it [1]."""
+    """The same on average, every drop as likely [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,22 +65,43 @@ class _Moved:
     """Change and its standard error: of the logarithm, or [m] of a number that is no factor."""
 
 
-def indicators(drop: Drop, since: Drop | None, assumed: Assumptions) -> tuple[Indicator, ...]:
-    """What changed since then, as evidence for or against each kind of damage.
+def indicators(
+    drop: Drop, since: Sequence[Drop], earlier: int, assumed: Assumptions
+) -> tuple[Indicator, ...]:
+    """What changed since the first of the earlier estimates, as evidence for or against each kind of damage.
 
-    Without an earlier estimate nothing is known of a change. A change that the records do not determine says
-    nothing, and neither does an estimate that is not consistent with its record.
+    Without one nothing is known of a change. A change that the records do not determine says nothing, and
+    neither does an estimate that is not consistent with its record.
     """
-    if since is None or not (drop.consistent and since.consistent):
+    if not drop.consistent:
         return ()
-    moved = (*_parameters(since, drop), *_unbalances(since, drop))
-    return tuple(
-        Indicator(kind=kind, bearing=bearing, what=f"{one.what} since then", ratio=_ratio(one, effect))
-        for kind, damage, bearing in places(drop, assumed)
-        for path, effect in damage.moves.items()
-        for one in moved
-        if (one.place, one.path) == (bearing, path)
-    )
+    moved = [(*_parameters(one, drop), *_unbalances(one, drop)) if one.consistent else () for one in since]
+    weights = np.array(_drops_between(len(since), earlier), dtype=float)
+    found = []
+    for kind, damage, bearing in places(drop, assumed):
+        for path, effect in damage.moves.items():
+            seen = {
+                k: one for k, of in enumerate(moved) for one in of if (one.place, one.path) == (bearing, path)
+            }
+            if not seen:
+                continue
+            ratios = _ratios(seen, len(since), effect)
+            found.append(
+                Indicator(
+                    kind=kind,
+                    bearing=bearing,
+                    what=f"{seen[min(seen)].what} since then",
+                    ratios=tuple(ratios.tolist()),
+                    ratio=float(weights @ ratios / weights.sum()),
+                )
+            )
+    return tuple(found)
+
+
+def _drops_between(estimates: int, earlier: int) -> list[int]:
+    """Drops before each estimate after the first, the present one last; those without one came first."""
+    later = max(estimates - 1, 0)
+    return [max(earlier + 1 - later, 1), *[1] * later]
 
 
 def places(drop: Drop, assumed: Assumptions) -> Iterator[tuple[str, Damage, str]]:
@@ -121,46 +147,77 @@ def _logarithm(value: Value) -> tuple[float, float] | None:
     return math.log(value.value), math.log(ends[1] / ends[0]) / (2.0 * NINETY)
 
 
-def _ratio(moved: _Moved, effect: Effect) -> float:
-    """Likelihood of a change, with the damage over that of a sound machine [1].
+def _ratios(seen: Mapping[int, _Moved], estimates: int, effect: Effect) -> Array:
+    """Likelihood of a series of estimates with damage done before each of them, over that of a sound machine.
 
-    The size of the effect is log-normal about its median; a sound machine scatters too.
+    ``seen`` is the change from an estimate to the present one, by the number of that estimate. Every estimate
+    has an error and the scatter of a sound machine of its own; the value of the sound machine is not known
+    (flat prior); the size of the effect is log-normal about its median.
     """
-    width = math.hypot(moved.error, effect.healthy)
+    errors = np.array([one.error for one in seen.values()])
+    values = np.array([*(-one.change for one in seen.values()), 0.0])
+    which = np.array([*seen, estimates])
+    # what two estimates differ by has the errors of both, taken as equal
+    weights = 1.0 / (0.5 * np.append(errors, errors.min()) ** 2 + effect.healthy**2)
+
+    def misfit(shift: Array) -> Array:
+        left = values - shift
+        return np.asarray((left**2) @ weights - (left @ weights) ** 2 / weights.sum())
+
     sizes = effect.median * np.exp(effect.spread * _NODES)
-    sound = -0.5 * (moved.change / width) ** 2
-    damaged = -0.5 * ((moved.change - sizes) / width) ** 2
-    most = float(damaged.max())
-    # held within e^30: beyond that the shape of the tails decides, which nobody knows
-    ratio = most + math.log(float(_WEIGHTS @ np.exp(damaged - most))) - sound
-    return math.exp(min(max(ratio, -30.0), 30.0))
+    sound = 0.5 * misfit(np.zeros((1, len(values))))[0]
+    found = []
+    for begun in range(1, estimates + 1):
+        damaged = -0.5 * misfit(sizes[:, None] * (which >= begun))
+        most = float(damaged.max())
+        # held within e^30: beyond that the shape of the tails decides, which nobody knows
+        ratio = most + math.log(float(_WEIGHTS @ np.exp(damaged - most))) + sound
+        found.append(math.exp(min(max(ratio, -30.0), 30.0)))
+    return np.array(found)
 
 
 def suspicions(
-    drop: Drop, found: tuple[Indicator, ...], earlier: int, assumed: Assumptions
+    drop: Drop,
+    found: Sequence[Indicator],
+    earlier: Sequence[Mapping[str, Value]],
+    assumed: Assumptions,
+    estimates: int = 0,
 ) -> tuple[Suspicion, ...]:
-    """Probability of every kind of damage at every bearing, by prior, peak stress and what changed.
+    """Probability of every kind of damage at every bearing, by prior, peak stresses and what changed.
 
-    Source: Bayes' rule; the indicators of one kind at one place count as independent.
+    ``earlier`` are the peak stresses of earlier drops by bearing, empty where they are not known, and
+    ``estimates`` is how many estimates the indicators were made of.
+    Source: Bayes' rule over when the damage was done; indicators of one kind at one place count as
+    independent.
     """
+    between = _drops_between(estimates, len(earlier))
+    unknown: list[Mapping[str, Value]] = [{}] * (sum(between) - 1 - len(earlier))
     made = []
     for kind, damage, bearing in places(drop, assumed):
-        prior = 1.0 - (1.0 - damage.prior) ** (earlier + 1)
+        kept = np.full(sum(between), 1.0 - damage.prior)
         if kind == BRINELLED:
-            prior = 1.0 - (1.0 - prior) * (1.0 - _dented(drop.bearings[bearing].numbers, assumed))
-        odds = prior / (1.0 - prior)
+            stresses = [*unknown, *earlier, {bearing: drop.bearings[bearing].numbers["peak_stress_Pa"]}]
+            kept *= [1.0 - _dented(one[bearing], assumed) if bearing in one else 1.0 for one in stresses]
+        left = np.cumprod(kept)[np.cumsum(between) - 1]
+        chances = -np.diff(left, prepend=1.0)
+        likelihood = np.ones(len(between))
         for one in found:
-            odds *= one.ratio if (one.kind, one.bearing) == (kind, bearing) else 1.0
-        made.append(Suspicion(kind=kind, bearing=bearing, prior=prior, probability=odds / (1.0 + odds)))
+            if (one.kind, one.bearing) == (kind, bearing):
+                likelihood = likelihood * one.ratios
+        odds = float(chances @ likelihood / left[-1])
+        made.append(
+            Suspicion(
+                kind=kind, bearing=bearing, prior=float(1.0 - left[-1]), probability=odds / (1.0 + odds)
+            )
+        )
     return tuple(made)
 
 
-def _dented(numbers: dict[str, Value], assumed: Assumptions) -> float:
+def _dented(stress: Value, assumed: Assumptions) -> float:
     """Chance that the peak stress dented a race so that it matters [1].
 
     Normal in the logarithm of the stress, whose own interval counts.
     """
-    stress = numbers["peak_stress_Pa"]
     low, high = stress.interval or (stress.value, stress.value)
     error = math.log(high / low) / (2.0 * NINETY) if low > 0.0 else math.inf
     middle = stress.value if stress.interval is None else math.sqrt(low * high)

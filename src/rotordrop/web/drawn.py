@@ -116,11 +116,15 @@ def write_estimate(
 ) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimate.document import estimate_document
+    from rotordrop.estimate.published import drop_of
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_sections import weight_shares
     from rotordrop.report.page import write_page
+    from rotordrop.report.restart_page import restart_page
     from rotordrop.report.rotor_drawing import rotor_outline
+    from rotordrop.restart import restart_card
+    from rotordrop.restart.assumptions import assumptions_of
 
     content = estimate_page(estimate, _origin(job, options), since)
     names, grid, columns = histories_of(estimate)
@@ -147,7 +151,10 @@ def write_estimate(
     ]
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
-    write_json(made / "document.json", estimate_document(estimate), sealed=True)
+    document = estimate_document(estimate)
+    write_json(made / "document.json", document, sealed=True)
+    drop = drop_of(document, estimate.record.name)
+    card = restart_card(drop, assumptions_of({}, "the assumptions"), since=() if since is None else (since,))
     write_json(
         made / "page.json",
         {
@@ -166,6 +173,7 @@ def write_estimate(
             },
             "impacts": sorted(impacts, key=lambda impact: impact["time"]),
             "impact_columns": ["peak force", "impulse"],
+            "restart": content_json(restart_page(card, drop)),
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -28,6 +29,8 @@ from rotordrop.restart.evidence import indicators, suspicions
 from rotordrop.restart.next_drop import NextDrop, next_drops
 
 ASSUMED = assumptions_of({}, "here")
+BY_COST = assumptions_of({"most_doubt": 1.0}, "here")
+"""Nothing but the costs decides."""
 
 
 def drop(stress=2e9, width=0.02, gap=275e-6, stiffness=1e8, unbalance=None, **more):
@@ -74,23 +77,23 @@ def test_a_mild_first_drop_rests_on_the_assumptions_and_says_so():
 
 
 def test_a_gap_that_grew_speaks_of_wear_and_one_that_did_not_against_it():
-    same = restart_card(drop(), ASSUMED, since=drop())
-    grown = restart_card(drop(gap=295e-6), ASSUMED, since=drop())
+    same = restart_card(drop(), ASSUMED, since=[drop()])
+    grown = restart_card(drop(gap=295e-6), ASSUMED, since=[drop()])
     assert chance(same, "worn") < 0.01 < 0.9 < chance(grown, "worn")
     assert not grown.prior_alone
     assert chance(grown, "loose") == pytest.approx(chance(same, "loose"))
 
 
 def test_a_softer_support_is_a_loose_one_and_a_stiffer_one_is_not():
-    soft = restart_card(drop(stiffness=0.7e8), ASSUMED, since=drop())
-    stiff = restart_card(drop(stiffness=1.3e8), ASSUMED, since=drop())
+    soft = restart_card(drop(stiffness=0.7e8), ASSUMED, since=[drop()])
+    stiff = restart_card(drop(stiffness=1.3e8), ASSUMED, since=[drop()])
     assert chance(soft, "loose") > 0.9
     assert chance(stiff, "loose") < 0.01
     assert soft.answer == "inspect first"
 
 
 def test_an_unbalance_that_grew_is_seen_on_the_rotor():
-    card = restart_card(drop(unbalance=5e-5), ASSUMED, since=drop(unbalance=1.5e-5))
+    card = restart_card(drop(unbalance=5e-5), ASSUMED, since=[drop(unbalance=1.5e-5)])
     assert chance(card, "unbalance", "") > 0.9
     assert next(one.what for one in card.indicators if one.kind == "unbalance").startswith(
         "unbalance at node 8 × 3.33"
@@ -98,11 +101,11 @@ def test_an_unbalance_that_grew_is_seen_on_the_rotor():
 
 
 def test_likelihood_ratio_is_the_integral_over_the_sizes_of_the_effect():
-    card = restart_card(drop(gap=281e-6), ASSUMED, since=drop())
+    card = restart_card(drop(gap=281e-6), ASSUMED, since=[drop()])
     effect = ASSUMED.damages["worn"].moves["air_gap"]
     found = next(one for one in card.indicators if (one.kind, one.bearing) == ("worn", "NDE"))
     own = math.sqrt(2.0) / math.sqrt(1e12 - 1 / 22e-6**2)  # the prior is taken out of both
-    width = math.hypot(own, effect.healthy)
+    width = math.hypot(own, math.sqrt(2.0) * effect.healthy)
 
     def normal(x):
         return math.exp(-0.5 * (x / width) ** 2)
@@ -121,7 +124,7 @@ def test_stress_near_the_dent_limit_replaces_and_its_own_width_counts():
 
 
 def test_costs_are_those_of_a_sum_over_all_states():
-    card = restart_card(drop(gap=283e-6), ASSUMED, since=drop(), earlier=3)
+    card = restart_card(drop(gap=283e-6), BY_COST, since=[drop()], earlier=[{}] * 3)
     kinds = list(ASSUMED.damages)
     absent = dict.fromkeys(kinds, 1.0)
     for one in card.suspicions:
@@ -173,18 +176,18 @@ def test_a_check_never_costs_more_than_itself_and_its_outcomes_average_to_what_w
 
 
 def test_a_flip_changes_the_answer_and_a_little_less_does_not():
-    card = restart_card(drop(), ASSUMED)
+    card = restart_card(drop(), BY_COST)
     costs = [one for one in card.flips if one.of == "a damaged machine"]
     assert costs, "half a day decides here"
     for flip in costs:
         beyond, short = flip.factor, flip.factor**0.95
         for factor, same in ((beyond, False), (short, True)):
-            moved = ASSUMED.model_copy(update={"machine_cost": ASSUMED.machine_cost * factor})
+            moved = BY_COST.model_copy(update={"machine_cost": BY_COST.machine_cost * factor})
             assert (restart_card(drop(), moved).answer == card.answer) is same
 
 
 def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
-    assert chance(restart_card(drop(), ASSUMED, earlier=9), "worn") == pytest.approx(1 - 0.98**10)
+    assert chance(restart_card(drop(), ASSUMED, earlier=[{}] * 9), "worn") == pytest.approx(1 - 0.98**10)
     known = {"NDE": (Known(value=3e3), Known(value=4e3))}
     after = [
         NextDrop(speed=s, peak_force=known, peak_stress=known, beyond_limit=Known(value=v))
@@ -197,8 +200,38 @@ def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
         assert more == pytest.approx(ASSUMED.another_drop * share * exchange)
 
 
+def test_damage_that_an_earlier_estimate_would_have_shown_counts_no_more():
+    """Ten drops of which the last but one was still sound: only the last can have done it."""
+    many = [{}] * 9
+    at_once = restart_card(drop(), ASSUMED, since=[drop()], earlier=many)
+    step_by_step = restart_card(drop(), ASSUMED, since=[drop()] * 10, earlier=many)
+    assert chance(step_by_step, "worn") < 0.5 * chance(at_once, "worn")
+    assert chance(step_by_step, "brinelled") == pytest.approx(chance(at_once, "brinelled"))
+    early = restart_card(drop(gap=285e-6), ASSUMED, since=[drop(), *[drop(gap=285e-6)] * 9], earlier=many)
+    late = restart_card(drop(gap=285e-6), ASSUMED, since=[drop(), *[drop()] * 9], earlier=many)
+    assert min(chance(early, "worn"), chance(late, "worn")) > 0.9
+
+
+def test_the_stress_of_earlier_drops_counts():
+    hard = {"NDE": Value(value=5.5e9, interval_90=[5.4e9, 5.6e9])}
+    card = restart_card(drop(), ASSUMED, earlier=[hard])
+    assert chance(card, "brinelled") > 0.5 > 0.05 > chance(card, "brinelled", "DE")
+
+
+def test_it_runs_without_limits_only_where_the_chance_of_a_damaged_bearing_is_small_enough():
+    free, held = (restart_card(drop(), a, since=[drop()]) for a in (BY_COST, ASSUMED))
+    assert free.answer == "restart"
+    assert held.costs == free.costs
+    assert held.doubt > ASSUMED.most_doubt
+    assert held.answer != "restart"
+    assert any(text.startswith("It may not run without limits: a bearing is") for text in held.statements)
+    turned = restart_card(drop(), ASSUMED, since=[drop()], checks={"turning": "good", "borescope": "good"})
+    assert turned.doubt < ASSUMED.most_doubt
+    assert turned.answer == "restart"
+
+
 def test_an_estimate_that_does_not_fit_is_no_evidence():
-    card = restart_card(drop(gap=295e-6, consistent=False), ASSUMED, since=drop())
+    card = restart_card(drop(gap=295e-6, consistent=False), ASSUMED, since=[drop()])
     assert not card.indicators
     assert any("not consistent with this record" in text for text in card.statements)
 
@@ -247,7 +280,7 @@ def test_unknown_checks_and_outcomes_are_named():
 
 def test_page_json_and_terminal_say_the_same(capsys):
     one = drop(gap=295e-6, simulated_record=True)
-    card = restart_card(one, ASSUMED, since=drop(), checks={"turning": "good"})
+    card = restart_card(one, ASSUMED, since=[drop()], checks={"turning": "good"})
     page = restart_page(card, one)
     assert page.title.endswith(card.answer)
     assert "simulated" in page.simulated
@@ -272,10 +305,10 @@ def test_probabilities_are_reliable_where_the_world_is_as_assumed():
     world = ASSUMED.model_copy(update={"damages": {**ASSUMED.damages, "worn": often}})
     for _ in range(400):
         worn = random.random() < 0.3
-        moved = effect.healthy * random.standard_normal() + own * random.standard_normal()
+        moved = math.sqrt(2.0) * effect.healthy * random.standard_normal() + own * random.standard_normal()
         moved += worn * effect.median * math.exp(effect.spread * random.standard_normal())
         one = drop(gap=275e-6 + moved)
-        found = suspicions(one, indicators(one, drop(), world), 0, world)
+        found = suspicions(one, indicators(one, [drop()], 0, world), [], world, 1)
         stated.append(next(s.probability for s in found if (s.kind, s.bearing) == ("worn", "NDE")))
         true.append(worn)
     error = math.sqrt(sum(p * (1 - p) for p in stated))
@@ -312,3 +345,28 @@ def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
     assert f"Restart of {machine.name}" in (tmp_path / "card.html").read_text()
     save_machine(example_machine("lp400"), file)
     assert run(call) == UsageError.exit_code
+
+
+def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimate(tmp_path):
+    machine = example_machine("small")
+    places = {}
+    for name, stress in (("first", 2e9), ("hard", 6e9), ("now", 2e9)):
+        places[name] = tmp_path / f"{name}.json"
+        one = drop(stress=stress, machine=machine.name, record_sha256=name.ljust(64, "0"))
+        write_json(places[name], one.as_json(), sealed=True)
+    file, log, out = (str(tmp_path / name) for name in ("m.toml", "drops.db", "card.json"))
+    save_machine(machine, Path(file))
+    call = ["restart", file, str(places["now"]), "--drops", "0", "--json", out]
+    assert run(call) == 0
+    alone = read_document(out)
+    for name in ("first", "hard"):
+        assert run(["log", "add", log, str(places[name])]) == 0
+        call += ["--since", str(places[name])]
+    assert run([*call, "--log", log]) == 0
+    card = read_document(out)
+    dents = [
+        max(one["probability"] for one in of["suspicions"] if one["kind"] == "brinelled")
+        for of in (alone, card)
+    ]
+    assert dents[0] < 0.05 < 0.8 < dents[1]
+    assert {len(one["ratios"]) for one in card["indicators"]} == {2}

@@ -294,7 +294,7 @@ def test_no_script_in_a_name_is_executed(browser, tmp_path):
             choose(browser, job)
             if "look" in states:
                 browser.until("!document.getElementById('status').innerText.includes('Looking')")
-                for tab in ("Events", "Numbers", "Quality", "All", "Compare", "Origin", "Impacts"):
+                for tab in ("Events", "Numbers", "Quality", "Restart", "All", "Compare", "Origin", "Impacts"):
                     tabs = "[...document.querySelectorAll('[role=tab]')]"
                     browser.evaluate(f"{tabs}.find(t => t.innerText === '{tab}')?.click()")
         assert len(looked) >= 8

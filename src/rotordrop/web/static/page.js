@@ -38,6 +38,12 @@ const TABS = {
     return [cards(page.cards), make("ul", { class: "statements", of: page.verdict.map(sentence) }), ...(state.estimate ? page.summary : []).map(table)];
   },
   Quality: () => [findings(state.estimate?.findings || state.look.findings), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
+  Restart: () => {
+    const card = state.estimate?.restart;
+    if (!card) { return [make("p", { text: "An estimate of this drop is needed to weigh whether the machine may run again." })]; }
+    return [make("ul", { class: "statements", of: card.verdict.map(sentence) }), ...card.summary.map(table), ...card.sections.flatMap((part) => [
+      make("h3", { class: "part", text: part.heading }), ...part.text.map((text) => make("p", { text })), ...part.tables.map(table)])];
+  },
   All: () => (state.estimate || state.look).sections.flatMap((part) => [make("h3", { class: "part", text: part.heading }),
     ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
   Compare: compareTab,
