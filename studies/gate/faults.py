@@ -364,9 +364,10 @@ def second_drop(given: Given, random: Random) -> Given:
     once = record.signals[record.time < 0.35]
     count = int(0.1 * record.sampling_rate)
     ramp = np.linspace(0.0, 1.0, count)[:, None]
-    first = np.mean(record.signals[:100], axis=0)
+    first = record.signals[0]
     lift = once[-1] * (1.0 - ramp) + first * ramp + random.normal(0.0, 0.4e-6, (count, once.shape[1]))
-    signals = np.vstack([once, lift, record.signals])
+    again = record.signals + random.normal(0.0, 0.2e-6, record.signals.shape)
+    signals = np.vstack([once, lift, again])
     assert record.speed_readings is not None
     time = record.time[0] + np.arange(len(signals)) / record.sampling_rate
     read = np.full(len(time[::200]), record.speed_readings[0])
@@ -470,7 +471,7 @@ _ENDS = ("swapped ends", "swapped channels")
 _GAIN = ("wrong gain", "wrong unit factor", "wrong air gap")
 _TURNED = ("turned sensors", "leaning fall", "leaning rest")
 _LATE = ("late channel",)
-_MACHINE = ("wrong machine file", "wrong unit factor", "wrong air gap")
+_MACHINE = ("machine file", "wrong unit factor", "wrong air gap")
 
 FAULTS: dict[str, Fault] = {
     name: Fault(make=make, names=names)

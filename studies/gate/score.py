@@ -2,6 +2,7 @@
 
 Usage: python studies/gate/score.py faults OUT FOLDER FIRST [SUPPLIED [KIND ...]]
        python studies/gate/score.py clean OUT FOLDER FIRST LAST
+       python studies/gate/score.py blocks OUT FOLDER FIRST LAST
        python studies/gate/score.py count OUT [OUT ...]
 
 Every judgement is one line of the file OUT; what is there already is not made again, so a run that was
@@ -22,9 +23,11 @@ import sys
 import time
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from importlib import resources
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +38,9 @@ from records import NAMES, kept, name_of, rotor_of
 from rotordrop import example_machine, read_record
 from rotordrop.errors import RecordError
 from rotordrop.evidence import check_record
+from rotordrop.evidence.quality.channels import check_channels
+from rotordrop.evidence.quality.recorder import check_blocks
+from rotordrop.record.recording import Array
 
 LIGHT, HEAVY = (0, 1, 2, 3, 8), (4, 5, 6, 7, 9)
 """Places of the rotors up to 60 kg and of the heavier ones in `NAMES`."""
@@ -138,6 +144,65 @@ def run_clean(path: Path, folder: Path, seeds: range) -> None:
                 out.flush()
 
 
+def run_blocks(path: Path, folder: Path, seeds: range) -> None:
+    """Exchange or zero blocks anywhere in clean records, and ask the checks of channels and blocks."""
+    done = {(line["block"], line["seed"]) for line in lines_of(path)}
+    with path.open("a") as out:
+        for seed, kind in product(seeds, BLOCKS):
+            if (kind, seed) in done:
+                continue
+            random = np.random.default_rng(zlib.crc32(f"{kind} {seed}".encode()))
+            record = kept(folder, seed)[0]
+            torn = replace(record, signals=BLOCKS[kind](record.signals.copy(), random))
+            said = [
+                {(one.kind, one.channel) for one in check_channels(read) + check_blocks(read)}
+                for read in (record, torn)
+            ]
+            size = float(np.max(np.abs(torn.signals - record.signals)))
+            line = {"block": kind, "seed": seed, "size": size, "seen": bool(said[1] - said[0])}
+            out.write(json.dumps(line) + "\n")
+
+
+def _exchanged(most: int, *, every: bool) -> Callable[[Array, np.random.Generator], Array]:
+    """Exchange two neighbouring blocks of 8 to `most` samples in all channels or one."""
+
+    def change(signals: Array, random: np.random.Generator) -> Array:
+        count = 2 ** int(random.integers(3, 1 + int(np.log2(most))))
+        begin = int(random.integers(1, len(signals) - 2 * count))
+        columns = slice(None) if every else [int(random.integers(signals.shape[1]))]
+        block = signals[begin : begin + 2 * count, columns].copy()
+        signals[begin : begin + 2 * count, columns] = np.roll(block, count, axis=0)
+        return signals
+
+    return change
+
+
+def _zeroed(signals: Array, random: np.random.Generator) -> Array:
+    """Zero a block of 8 to 64 samples in one channel."""
+    count = 2 ** int(random.integers(3, 7))
+    begin = int(random.integers(1, len(signals) - count))
+    signals[begin : begin + count, int(random.integers(signals.shape[1]))] = 0.0
+    return signals
+
+
+BLOCKS = {
+    "rows of 16 bits exchanged": _exchanged(256, every=True),
+    "rows of 64 bits exchanged": _exchanged(64, every=True),
+    "samples of one channel exchanged": _exchanged(256, every=False),
+    "samples of one channel zero": _zeroed,
+}
+"""Blocks that formats without a checksum lose or exchange, by name."""
+
+
+def count_blocks(lines: list[dict[str, Any]]) -> None:
+    """Print what passed, and the largest error in it."""
+    for kind in BLOCKS:
+        mine = [line for line in lines if line["block"] == kind]
+        silent = [1e6 * line["size"] for line in mine if not line["seen"] and line["size"] > 0.0]
+        above = sum(size > 5.0 for size in silent)
+        print(f"{kind:34} silent {wilson(len(silent), len(mine))}, {above} above 5 µm, {sorted(silent)[-3:]}")
+
+
 def wilson(hits: int, count: int) -> str:
     """Share with its 95 % interval after Wilson."""
     if not count:
@@ -146,11 +211,6 @@ def wilson(hits: int, count: int) -> str:
     middle = (p + z * z / (2 * count)) / (1 + z * z / count)
     half = z * np.sqrt(p * (1 - p) / count + z * z / (4 * count**2)) / (1 + z * z / count)
     return f"{hits}/{count} = {p:.1%} ({max(middle - half, 0.0):.1%} to {min(middle + half, 1.0):.1%})"
-
-
-def _print_seconds(lines: list[dict[str, Any]]) -> None:
-    spent = [line["seconds"] for line in lines]
-    print(f"processor time: median {np.median(spent):.2f} s, most {max(spent):.1f} s")
 
 
 def _print_seconds(lines: list[dict[str, Any]]) -> None:
@@ -197,11 +257,12 @@ if __name__ == "__main__":
     what, *rest = sys.argv[1:]
     if what == "count":
         every = [line for name in rest for line in lines_of(Path(name))]
-        for counted, key in ((count_clean, "seed"), (count_faults, "fault")):
+        for counted, key in ((count_clean, "rotor"), (count_faults, "fault"), (count_blocks, "block")):
             if lines := [line for line in every if key in line]:
                 counted(lines)
     elif what == "faults":
         out, folder, first, given, *kinds = [*rest, ""] if len(rest) < 4 else rest
         run_faults(Path(out), Path(folder), int(first), given, tuple(kinds))
     else:
-        run_clean(Path(rest[0]), Path(rest[1]), range(int(rest[2]), int(rest[3])))
+        run = run_clean if what == "clean" else run_blocks
+        run(Path(rest[0]), Path(rest[1]), range(int(rest[2]), int(rest[3])))

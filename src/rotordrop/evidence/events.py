@@ -309,6 +309,18 @@ def nominal_gaps(machine: Machine, record: Record) -> Array:
     return np.array([float(_bearing_at(machine, plane).air_gap) for plane in record.planes])
 
 
+def planes_at_bearings(machine: Machine, record: Record) -> set[int]:
+    """Numbers of the sensor planes nearest to the touchdown bearings; between them the rotor bends more."""
+    position = machine.rotor.node_positions
+    return {
+        min(
+            range(len(record.planes)),
+            key=lambda p: abs(position[bearing.node - 1] - position[record.planes[p].node - 1]),
+        )
+        for bearing in machine.touchdown_bearings
+    }
+
+
 def expected_gap(machine: Machine, plane: Plane) -> tuple[float, float]:
     """Air gap that a machine file expects at a sensor plane, and its standard error [m]."""
     from rotordrop.rotor.unknowns import prior

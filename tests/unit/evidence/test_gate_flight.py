@@ -57,8 +57,8 @@ def test_the_gain_of_one_channel_is_weighed(channel, hopping, machine):
     seen, (found,) = in_flight(record, machine)
     assert (found.kind, found.channel) == ("wrong gain", record.channel_names[channel])
     # a touch that was not seen looks like this in a single flight
-    assert (seen.flights, found.severity) == (1, "note")
-    (twice,) = check_flights(replace(seen, flights=2), record)
+    assert (len(seen.each), found.severity) == (1, "note")
+    (twice,) = check_flights(replace(seen, each=2 * seen.each), record)
     assert twice.severity == "warning"
 
 

@@ -52,9 +52,9 @@ def test_filters_are_found_whatever_the_size_of_the_air_gap(size, whole_drop):
     """A reading at rest of less than 50 µm was not looked at: a machine with a small gap passed."""
     for kind, corner in (("AC coupling", 1.0), ("recorder low-pass", 100.0)):
         signals = size * filtered(whole_drop.signals, 20e3, corner, "high" if corner == 1.0 else "low")
-        found = check_filters(replace(whole_drop, signals=signals), 0.0)
+        found = check_filters(replace(whole_drop, signals=signals), 0.0, bounces=460.0)
         assert [finding.kind for finding in found] == [kind]
-    assert check_filters(replace(whole_drop, signals=size * whole_drop.signals), 0.0) == []
+    assert check_filters(replace(whole_drop, signals=size * whole_drop.signals), 0.0, bounces=460.0) == []
 
 
 @pytest.mark.parametrize("span", [2e-3, 20e-3, 50e-3])
@@ -320,9 +320,9 @@ def test_readings_taken_early_and_late_under_an_even_clock(drop):
 
 def test_a_tail_whose_zero_moved_rests_beside_the_path_of_the_rotor(whole_drop, tail, machine):
     floating = levitated(whole_drop).mean
-    assert check_rest_in_record(tail, whole_drop, machine, floating) == []
+    assert check_rest_in_record(tail, whole_drop, machine, floating, sag=1e-6) == []
     moved = replace(tail, signals=tail.signals + 40e-6 * np.eye(4)[2])
-    (found,) = check_rest_in_record(moved, whole_drop, machine, floating)
+    (found,) = check_rest_in_record(moved, whole_drop, machine, floating, sag=1e-6)
     assert (found.kind, found.severity) == ("tail offset", "warning")
     off = float(re.search(r"rests ([\d.]+) µm higher at node 25", found.message)[1])
     assert off == pytest.approx(40.0 / np.sqrt(2.0), abs=3.0)

@@ -19,7 +19,7 @@ from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels, check_rail
 from rotordrop.evidence.quality.continuity import check_orbit
-from rotordrop.evidence.quality.fall import check_ends, fell_as_described
+from rotordrop.evidence.quality.fall import check_ends, check_exchanged, fell_as_described
 from rotordrop.evidence.quality.finding import Finding, Kind, Severity, ranked, refuse_unusable, stops
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
 from rotordrop.evidence.quality.motion import (
@@ -40,6 +40,7 @@ from rotordrop.evidence.quality.recorder import (
     check_speed_signal,
 )
 from rotordrop.evidence.quality.tail import check_rest_in_record, check_tail
+from rotordrop.units import GRAVITY
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -154,8 +155,15 @@ def _begins(evidence: Evidence) -> list[Finding]:
 def _recorder(evidence: Evidence) -> list[Finding]:
     # a high-pass bends a rest into what looks like a rail; what a filter explains is none
     whole = evidence.record.whole
-    found = [*check_filters(whole, known(evidence.beginning).coarse.instant), *check_again(whole)]
+    instant = known(evidence.beginning).coarse.instant
+    found = check_filters(whole, instant, _bounces(evidence) / (2.0 * np.pi)) + check_again(whole)
     return found or check_rail(whole, first_motion(whole)[0])
+
+
+def _bounces(evidence: Evidence) -> float:
+    """Angular frequency at which the rigid rotor bounces on the supports of the machine file [rad/s]."""
+    stiffness = sum(float(bearing.support.stiffness) for bearing in evidence.machine.touchdown_bearings)
+    return float(np.sqrt(stiffness / evidence.rotor.mass))
 
 
 def _length(evidence: Evidence) -> list[Finding]:
@@ -168,7 +176,11 @@ def _fall(evidence: Evidence) -> list[Finding]:
     near = evidence.record.whole.window(-np.inf, coarse.instant + _NEAR)
     fall = evidence.free_fall
     own = None if isinstance(fall, Missing) else fall
-    return check_ends(near, evidence.machine, evidence.rotor, evidence.floating, coarse, own)
+    machine, floating = evidence.machine, evidence.floating
+    found = check_ends(near, machine, evidence.rotor, floating, coarse, own)
+    if own is None or stops(found):
+        return found
+    return check_exchanged(near, machine, floating, coarse, own) or found
 
 
 def _flights(evidence: Evidence) -> list[Finding]:
@@ -177,14 +189,14 @@ def _flights(evidence: Evidence) -> list[Finding]:
 
 
 def _tail_at_rest(evidence: Evidence) -> list[Finding]:
-    still = evidence.still
+    still, record, floating = evidence.still, evidence.record.whole, evidence.floating
     if isinstance(still, Missing):
-        return [] if evidence.tail is None else check_tail(still, evidence.machine, evidence.floating)
-    found = check_tail(still.whole, evidence.machine, evidence.floating)
+        return [] if evidence.tail is None else check_tail(still, evidence.machine, floating, record)
+    found = check_tail(still.whole, evidence.machine, floating, record)
     if found or evidence.tail is None:
         return found
-    record = evidence.record.whole
-    return check_rest_in_record(still.whole, record, evidence.machine, evidence.floating.mean)
+    sag = GRAVITY / _bounces(evidence) ** 2
+    return check_rest_in_record(still.whole, record, evidence.machine, floating.mean, sag)
 
 
 STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
@@ -228,9 +240,13 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
             every[name] = [one for one in every[name] if one.kind != Kind.COARSE]
     if "fall" in every:
         fall, flights = every["fall"], every["flights"]
-        # Flights weigh the sensors far sharper than the first fall: they refute gains and angles it suspects.
+        # Flights weigh the sensors far sharper than the first fall: they refute gains and angles it suspects,
+        # and a delay or a bend of the channels that they find to have a gain.
         if gains_right:
             fall = [one for one in fall if one.kind not in (Kind.WRONG_GAIN, Kind.TURNED)]
+        named = {one.channel for one in flights if one.severity == "warning"}
+        lagging = (Kind.LATE_CHANNEL, Kind.SATURATION)
+        fall = [one for one in fall if one.kind not in lagging or one.channel not in named]
         flights = [one for one in flights if one.kind not in {other.kind for other in fall}]
         every |= {"fall": fall, "flights": flights}
         # Readings of the drop that are doubted themselves say nothing against the tail.

@@ -74,7 +74,9 @@ def check_channels(record: Record) -> list[Finding]:
             findings.append(_dead(sensor.name, values, float(moves[index]), typical))
             continue
         checks = (zeroed, _stuck, _clipped, _spikes, _coarse, bridged)
-        findings += [found for check in checks if (found := check(record, sensor.name, values)) is not None]
+        own = [found for check in checks if (found := check(record, sensor.name, values)) is not None]
+        # zeros are held readings too: each name once
+        findings += [found for k, found in enumerate(own) if all(found.kind != one.kind for one in own[:k])]
     return findings
 
 
@@ -150,7 +152,15 @@ def _held(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     share = max(float(np.mean(same)), 1.0 / len(same))
     rare = len(same) * share**lengths < _BY_CHANCE
     chosen = np.flatnonzero((lengths + 1 >= _STUCK_SAMPLES) & inside & rare)
-    chosen = np.array([k for k in chosen if _alone(same, int(starts[k]), int(lengths[k]))], dtype=np.intp)
+    chosen = np.array(
+        [
+            k
+            for k in chosen
+            if _alone(same, int(starts[k]), int(lengths[k]))
+            and not _of_steps(values, int(starts[k]), int(lengths[k]))
+        ],
+        dtype=np.intp,
+    )
     chosen = chosen[np.argsort(-lengths[chosen], kind="stable")]
     return starts[chosen], lengths[chosen] + 1
 
@@ -162,6 +172,14 @@ def _alone(same: NDArray[np.bool_], start: int, length: int) -> bool:
     return len(same) * share**length < _BY_CHANCE
 
 
+def _of_steps(values: Array, start: int, length: int) -> bool:
+    """Whether a coarse converter makes a run where the rotor turns back: it goes on by a single step."""
+    step = _step_of(values)
+    beside = (max(start - 1, 0), min(start + length + 1, len(values) - 1))
+    gone = max(abs(float(values[place] - values[start])) for place in beside)
+    return step > COARSE_STEP and gone < 1.5 * step
+
+
 def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
     starts, lengths = _held(values)
     if not len(lengths):
@@ -171,7 +189,7 @@ def _stuck(record: Record, channel: str, values: Array) -> Finding | None:
     lasts = count / record.sampling_rate
     short = float(np.sum(lengths)) / record.sampling_rate <= MOST_HELD
     return Finding(
-        kind=Kind.STUCK_CHANNEL,
+        kind=Kind.STUCK_CHANNEL if values[first] != 0.0 else Kind.ZEROED,
         message=f"{count} samples ({lasts * 1e3:.3g} ms) read exactly {held} from {at:.6g} s on",
         remedy="check the recorder's input; the tracked twin goes on without these samples, for at most "
         f"{MOST_HELD * 1e3:g} ms"

@@ -22,9 +22,13 @@ from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
-_SIDES = (8, 16, 32)
-"""Samples on either side of a place through which a parabola says how the rotor moves: few where it turns
-fast, many where its noise hides what is missing [1]."""
+_FEWEST = 8
+"""Fewest samples on either side of a place through which a parabola says how the rotor moves [1]: five remain
+to tell whether it does. Twice as many, and so on, where noise hides what is missing."""
+
+_AS_PARABOLA = 1.6e-3
+"""Longest such side [s]: of an orbit of 100 Hz a parabola leaves 1 % over that time; whether one describes
+the motion is asked of each by itself."""
 
 _PART = 65536
 
@@ -34,27 +38,36 @@ where they describe the motion [1]: in a contact of less than a millisecond they
 of a jump there."""
 
 _LONGEST = 0.5e-3
-"""Longest side of a jump of a single channel beyond the shortest one [s]: of 80 clean drops of all rotors
-none had more than 6.4 standard deviations, with 0.65 ms 8.6 and with 0.8 ms 9.3; channels that jump together
-agree on a time and may be longer."""
+"""Longest side of a jump of a single channel beyond the shortest one [s]: of 57 clean drops of all rotors
+none had more than 5.4 standard deviations, with 0.65 ms 7.1; channels that jump together agree on a time and
+may be longer."""
 
 _KINK = 0.6
 """Part of a sample by which the kink of a hard impact may lie aside of the middle of two samples [1]: a half,
 and what the parabolas leave open."""
 
-_TORN = 9.0
-"""Jump of a channel in standard deviations from which it is none of noise [1]: 130 clean drops of rotors of
-5, 60 and 140 kg had 7 at most, where the parabolas describe the motion."""
+_TORN = 8.0
+"""Jump of a channel in standard deviations, beyond what the parabolas may leave out, from which it is none of
+noise [1]: of 577 clean drops of all rotors one had more than 7, of 5 kg at 20 kHz."""
 
-_LOST = 7.0
-"""Standard deviations of a time that is missing in all channels, from which it is named [1]: 80 clean drops
-of all rotors had 5.6 at most."""
+_LOST = 6.0
+"""Standard deviations of a time that is missing in all channels, beyond what the parabolas may leave out,
+from which it is named [1]: at 100,000 places looked at, five have one chance in 30; 4.5 at most in 57 clean
+drops of all rotors."""
+
+_LEFT_OUT = 7.0 / 18.0
+"""Square of a jump, in its standard deviations, that a course in the third power of time makes which leaves
+one noise variance to the parabolas on both sides together [1]: its value at their ends squared, 7 over the
+samples, against twice the 9 over the samples of a parabola's."""
+
+_SURELY = 2.0
+"""Standard deviations of that noise by which it may hide what the parabolas leave out [1]."""
 
 _SAME_WAY = 3.0
 """Standard deviations up to which channels agree on the missing time [1]."""
 
-_HALF_A_SAMPLE = 0.5
-"""Least missing time in samples: what is lost is a whole number of them [1]."""
+_WHOLE = 3.0
+"""Standard deviations within which what is missing is a whole number of samples [1]."""
 
 _ORDER = 6
 """Differences that leave no motion of a rotor: at 1 kHz of bending and 20 kHz of sampling 1e-3 of it [1]."""
@@ -73,8 +86,8 @@ _TURNED = 6.0
 """Standard deviations by which the orbit jumps in angle where samples are missing [1]: at a hundred places
 looked at, five have one chance in 10,000."""
 
-_LEAST_TURN = 0.04
-"""Least such jump [rad]: a quarter of a sample's turn at 500 Hz and 20 kHz (chosen)."""
+_LEAST_TURN = 0.5
+"""Least such jump over what the shaft turns in a sample [1]: what is lost is a whole number of them."""
 
 _PARTS = (8, 48)
 """Parts of the levitated motion, half turns or more, in which the angle of its orbit is looked at: at least
@@ -113,6 +126,10 @@ class _Jumps:
     """Velocity on both sides [m per sample]."""
     smooth: NDArray[np.bool_]
     """Whether both parabolas describe the motion."""
+    excess: Array
+    """What both leave of the readings beyond noise, in its variances [1]."""
+    free: int
+    """Samples of one side that remain to tell so [1]."""
     error: Array
     """Standard deviation of a jump by noise [m], shape (S,)."""
 
@@ -120,26 +137,32 @@ class _Jumps:
 def check_continuity(record: Record) -> list[Finding]:
     """Find places where no rotor moves from one sample to the next, or samples that were not taken evenly."""
     signals = record.signals
-    if len(signals) < 4 * max(_SIDES) or not np.isfinite(signals).all():
+    longest = _AS_PARABOLA * record.sampling_rate
+    doubled = range(max(math.floor(math.log2(longest / _FEWEST)), 0) + 1)
+    counts = [_FEWEST << double for double in doubled]
+    if len(signals) < 4 * counts[-1] or not np.isfinite(signals).all():
         return []
     steps = [np.median(np.diff(np.unique(c))) if np.ptp(c) > 0.0 else 0.0 for c in signals.T]
     own = np.array([noise_by_differences(column, 4) for column in signals.T])
     noise = np.maximum(np.hypot(own, np.array(steps) / np.sqrt(12.0)), 1e-12)
+    uneven = _uneven(record, noise)
+    if uneven:
+        return uneven  # readings that are early or late jump by themselves
     torn, lost = _Worst(), _Worst()
-    for sides in map(_Sides.of, _SIDES):
+    for sides in map(_Sides.of, counts):
         reach = 2 * sides.count
         for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
             part = signals[begin : begin + _PART + reach]
             if len(part) > reach:
                 seen = _jumps_of(part, sides, noise)
-                if sides.count == _SIDES[0] or sides.count <= _LONGEST * record.sampling_rate:
+                if sides.count == _FEWEST or sides.count <= _LONGEST * record.sampling_rate:
                     torn.keep(_size_of_jump(seen), seen, begin + sides.count)
                 lost.keep(_size_of_loss(seen), seen, begin + sides.count)
     if lost.size >= _LOST:
         return [_lost(lost, record)]
     if torn.size >= _TORN:
         return [_torn(torn, record)]
-    return _uneven(record, noise)
+    return []
 
 
 def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
@@ -154,11 +177,14 @@ def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
     smooth &= same[count - 1 :] - same[: len(smooth)] < count // 2
     ends, begins = windows @ sides.at_end, windows @ sides.at_end[::-1]
     out, into = windows @ sides.slope, windows @ -sides.slope[::-1]
+    excess = left / noise**2 - free
     return _Jumps(
         jump=begins[count:] - ends[:-count],
         before=out[:-count],
         after=into[count:],
         smooth=smooth[count:] & smooth[:-count],
+        excess=excess[count:] + excess[:-count],
+        free=free,
         error=np.sqrt(2.0) * np.linalg.norm(sides.at_end) * noise,
     )
 
@@ -167,14 +193,17 @@ def _size_of_jump(seen: _Jumps) -> Array:
     """Jump of every channel beyond what a kink explains, in standard deviations, shape (N, S)."""
     # a hard impact turns the velocity between two samples: that kink may lie half a sample aside
     turned = np.abs(seen.after - seen.before)
-    return np.asarray(np.maximum(np.abs(seen.jump) - _KINK * turned, 0.0) * seen.smooth / seen.error)
+    excess = seen.excess + _SURELY * math.sqrt(4.0 * seen.free)
+    beyond = np.abs(seen.jump) - _KINK * turned - np.sqrt(_LEFT_OUT * np.maximum(excess, 0.0)) * seen.error
+    return np.asarray(np.maximum(beyond, 0.0) * seen.smooth / seen.error)
 
 
 def _size_of_loss(seen: _Jumps) -> Array:
     """Missing time over its standard deviation, where channels jump by it times their velocity, shape (N, 1).
 
     Channels that parabolas do not describe on both sides have no voice; more than half must have one.
-    Over a gap the motion goes on with one acceleration: it has the mean velocity of both sides.
+    Over a gap the motion goes on with one acceleration: it has the mean velocity of both sides. What is no
+    parabola within the noise jumps too, by as much as the readings on both sides leave room for.
     """
     jump, mean, turned = (
         part * seen.smooth / seen.error
@@ -184,10 +213,13 @@ def _size_of_loss(seen: _Jumps) -> Array:
     missing = np.sum(jump * mean, axis=1) / np.maximum(weight, 1e-300)
     aside = np.sum((jump - missing[:, None] * mean) ** 2, axis=1)
     seeing = np.sum(seen.smooth, axis=1)
-    fits = (seeing > max(jump.shape[1] // 2, 1)) & (missing > _HALF_A_SAMPLE)
+    whole = np.abs(missing - np.round(missing)) * np.sqrt(weight) < _WHOLE
+    fits = (seeing > max(jump.shape[1] // 2, 1)) & whole & (missing > 0.5)
     fits &= aside < _SAME_WAY**2 * seeing
     kink = _KINK * np.linalg.norm(turned, axis=1)
-    return np.asarray((np.maximum(missing * np.sqrt(weight) - kink, 0.0) * fits)[:, None])
+    excess = np.sum(seen.excess * seen.smooth, axis=1) + _SURELY * np.sqrt(4.0 * seen.free * seeing)
+    bent = np.sqrt(_LEFT_OUT * np.maximum(excess, 0.0))
+    return np.asarray((np.maximum(missing * np.sqrt(weight) - kink - bent, 0.0) * fits)[:, None])
 
 
 class _Worst:
@@ -301,10 +333,13 @@ def check_orbit(levitated: LevitatedModel, record: Record) -> list[Finding]:
         seen = 2.0 * np.mean(left[own] * waves[own].conj()[:, None], axis=0)
         angle.append(float(np.angle(power + np.sum(weight * seen))))
         error.append(float(np.sqrt(2.0 / (power * np.sum(own)))))
-    return _orbit_steps(np.unwrap(angle), np.array(error), levitated, turns)
+    least = _LEAST_TURN * 2.0 * np.pi * levitated.frequency / record.sampling_rate
+    return _orbit_steps(np.unwrap(angle), np.array(error), levitated, turns, least)
 
 
-def _orbit_steps(angle: Array, error: Array, levitated: LevitatedModel, turns: float) -> list[Finding]:
+def _orbit_steps(
+    angle: Array, error: Array, levitated: LevitatedModel, turns: float, least: float
+) -> list[Finding]:
     if len(angle) < _PARTS[0]:
         return []
     places = np.arange(len(angle))
@@ -319,7 +354,7 @@ def _orbit_steps(angle: Array, error: Array, levitated: LevitatedModel, turns: f
         sure = abs(float(found[3])) / (float(np.linalg.norm(inverse[3])) * scatter)
         if sure > best:
             best, at, size = sure, place, float(found[3])
-    if best < _TURNED or abs(size) < _LEAST_TURN:
+    if best < _TURNED or abs(size) < least:
         return []
     when = levitated.start + at * turns / levitated.frequency
     return [

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.evidence.events import planes_at_bearings
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.fall import WRONG_GAIN
 from rotordrop.evidence.quality.finding import Finding, Kind
@@ -64,8 +65,15 @@ _REFUTED = 0.12
 """Error of a gain that flights exclude [1], at which a fall that suspects one is no longer heard."""
 
 _WITNESSES = 2
-"""Channels times flights from which on a fault is a warning: a touch that was not seen looks like a gain of
-one channel in one flight, of 28 % at 5.5 standard deviations in one of 298 clean drops."""
+"""Flights that show a fault of some channels, each by itself, from which on it is a warning [1]: a touch that
+was not seen looks like a gain of one in one flight, of 28 % at 5.5 standard deviations in one of 298 clean
+drops, and only a second one tells; a touch does not look like all channels."""
+
+_BY_ITSELF = 3.0
+"""Standard deviations from which on a flight shows a fault by itself [1]."""
+
+_LARGEST = 1.0
+"""Largest error of a gain, and tangent of a turn, that are sought [1]: what is more shows in every fall."""
 
 _LEVEL = 0.2
 """Sine of the angle below which a sensor looks too level to be weighed by gravity [1]."""
@@ -74,7 +82,7 @@ _SEPARABLE = 1e-9
 """Least singular value over the largest one that still tells unknowns apart [1]."""
 
 SURE = 5.0
-"""Standard deviations from which on a gain is named [1]."""
+"""Standard deviations from which on a gain is named [1], with what the flights differ by in them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +93,12 @@ class Weighed:
     """Reading over true displacement [1]; 1 with right gains, angles and clock, shape (S,)."""
     covariance: Array
     """Its covariance [1], shape (S, S)."""
-    flights: int
-    """Flights it comes from."""
+    each: tuple[tuple[Array, Array], ...]
+    """Share and inverse covariance of every flight by itself."""
+    scatter: float
+    """Mean square by which the flights differ, over what their errors let them [1]."""
+    beside: frozenset[str]
+    """Channels between the touchdown bearings, where the rotor bends more than its model knows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,9 +116,7 @@ def weighed(
     if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
         return None
     count = len(record.sensors)
-    weight: Array = np.zeros((count, count))
-    total: Array = np.zeros(count)
-    flights = 0
+    seen: list[tuple[Array, Array]] = []
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
     fall = _Fall(gravity=float(machine.gravity), time=float(np.sqrt(2.0 * gap / float(machine.gravity))))
     for window in _flights(record, levitated, drop, fall):
@@ -114,14 +124,27 @@ def weighed(
         if found is None:
             continue
         share, covariance = found
-        inverse: Array = np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)
-        weight += inverse
-        total += inverse @ share
-        flights += 1
-    if not flights:
+        seen.append((share, np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)))
+    if not seen:
         return None
-    error: Array = np.linalg.inv(weight).astype(np.float64)
-    return Weighed(share=error @ total, covariance=error, flights=flights)
+    error: Array = np.linalg.inv(np.sum([inverse for _, inverse in seen], axis=0)).astype(np.float64)
+    mean = error @ np.sum([inverse @ share for share, inverse in seen], axis=0)
+    # sensors read alike in every flight; where the flights differ by more than their errors, something
+    # touched the rotor in them, and they know as much less (Birge's ratio)
+    apart = sum(float((share - mean) @ inverse @ (share - mean)) for share, inverse in seen)
+    scatter = apart / max((len(seen) - 1) * count, 1)
+    return Weighed(
+        share=mean,
+        covariance=error * max(scatter, 1.0),
+        each=tuple(seen),
+        scatter=scatter,
+        beside=frozenset(
+            name
+            for number, plane in enumerate(record.planes)
+            if number not in planes_at_bearings(machine, record)
+            for name in plane.names
+        ),
+    )
 
 
 def gains_hold(seen: Weighed) -> bool:
@@ -137,13 +160,23 @@ def check_flights(seen: Weighed, record: Record) -> list[Finding]:
     tried = []
     for kind, channels, shape in _ways(record):
         size = float(shape @ precision @ off) / float(shape @ precision @ shape)
-        tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels))
-    gained, size, kind, channels = max(tried, key=lambda one: one[0])
+        tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels, shape))
+    gained, size, kind, channels, shape = max(tried, key=lambda one: one[0])
     left = float(off @ precision @ off) - gained
-    if gained < SURE**2 or abs(size) < WRONG_GAIN or left > _ONE_FAULT * (len(off) - 1):
+    if gained < SURE**2 or not WRONG_GAIN <= abs(size) <= _LARGEST or left > _ONE_FAULT * (len(off) - 1):
+        return []
+    if seen.scatter > _ONE_FAULT:
         return []
     names = ", ".join(channels)
-    sole = seen.flights * len(channels) < _WITNESSES
+    witnesses = sum(_shown(shape * np.sign(size), *flight) > _BY_ITSELF for flight in seen.each)
+    sole = witnesses < _WITNESSES and len(channels) < len(off)
+    doubt = (
+        "; no second flight shows it by itself, and a touch that was not seen looks alike"
+        if sole
+        else "; between its bearings a rotor that bends otherwise looks alike"
+        if seen.beside.issuperset(channels)
+        else ""
+    )
     error = abs(size) / gained**0.5
     seen_as = (
         f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
@@ -153,16 +186,20 @@ def check_flights(seen: Weighed, record: Record) -> list[Finding]:
     return [
         Finding(
             kind=kind,
-            message=f"in {seen.flights} flight(s) between impacts, where nothing but gravity pulls it, "
-            f"the rotor falls as it would with {seen_as}"
-            + ("; a single flight, and a touch that was not seen looks alike" if sole else ""),
+            message=f"in {len(seen.each)} flight(s) between impacts, where nothing but gravity pulls it, "
+            f"the rotor falls as it would with {seen_as}{doubt}",
             remedy="check the angles of the sensors at that end"
             if kind == Kind.TURNED
             else "check sensitivity, gain and unit of the channels, and the sampling rate",
-            severity="note" if sole else "warning",
+            severity="note" if doubt else "warning",
             channel=names,
         )
     ]
+
+
+def _shown(shape: Array, share: Array, inverse: Array) -> float:
+    """Standard deviations by which one flight shows a fault."""
+    return float(shape @ inverse @ (share - 1.0)) / float(np.sqrt(shape @ inverse @ shape))
 
 
 def _ways(record: Record) -> Iterator[tuple[Kind, tuple[str, ...], Array]]:

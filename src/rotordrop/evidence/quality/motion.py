@@ -33,6 +33,10 @@ _FACTORS = {
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
 
+_MERGED = 0.75
+"""Distance over the resolution by which the peak of a line and of another beside it may lie off the line [1]:
+half of it where both merge, and what the grid of frequencies leaves open."""
+
 _NO_HALF = 1e-3
 """Power at half the strongest line over that at it, below which the half is no line [1]."""
 
@@ -169,7 +173,7 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
         return []
     frequency, resolution, at_half = line
     expected = abs(speed) / (2 * np.pi)
-    near = max(1.5 * resolution, 0.01 * expected)
+    near = max(_MERGED * resolution, 0.01 * expected)
     if abs(frequency - expected) <= near:
         return []
     if abs(frequency - 2.0 * expected) <= near and at_half > _NO_HALF:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.elements.support import PEAK_LOADS
 from rotordrop.errors import RecordError, UnsettledError
-from rotordrop.evidence.events import nominal_gaps
+from rotordrop.evidence.events import nominal_gaps, planes_at_bearings
 from rotordrop.evidence.evidence import Missing
 from rotordrop.evidence.levitated import MAINS, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
@@ -53,7 +54,9 @@ _OFF_PATH = 0.03
 rotors."""
 
 
-def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedModel) -> list[Finding]:
+def check_tail(
+    still: Record | Missing, machine: Machine, levitated: LevitatedModel, record: Record
+) -> list[Finding]:
     """Check where the rotor came to rest and in which direction it swings.
 
     Parameters
@@ -64,6 +67,8 @@ def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedMo
         The machine.
     levitated : LevitatedModel
         The readings before the drop.
+    record : Record
+        The record of the drop.
     """
     if isinstance(still, Missing):
         if not isinstance(still.error, UnsettledError):
@@ -78,7 +83,7 @@ def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedMo
         ]
     path = planar_of(still.along - along_sensors(levitated.mean, still.sensors), still.planes)
     gaps = nominal_gaps(machine, still)
-    if _without_level(still, path, gaps, levitated.noise):
+    if _without_level(still, path, gaps, record.window(levitated.start, levitated.end)):
         return [
             Finding(
                 kind=Kind.AC_COUPLING,
@@ -95,11 +100,13 @@ def check_tail(still: Record | Missing, machine: Machine, levitated: LevitatedMo
     return findings
 
 
-def check_rest_in_record(still: Record, record: Record, machine: Machine, floating: Array) -> list[Finding]:
+def check_rest_in_record(
+    still: Record, record: Record, machine: Machine, floating: Array, sag: float
+) -> list[Finding]:
     """See whether the rotor, while it still turned, passed the place where the tail says that it rests.
 
     A rotor that rolls or slides in its bearing passes the lowest point of the race again and again, pressed
-    against it by little more or less than its weight.
+    against it by its weight and, where it bounces, by up to some weights more.
 
     Parameters
     ----------
@@ -109,6 +116,8 @@ def check_rest_in_record(still: Record, record: Record, machine: Machine, floati
         The machine.
     floating : array, shape (S,)
         Readings of the levitated rotor [m].
+    sag : float
+        By how much the supports give way under the weight [m].
     """
     if still.sensors != record.sensors:
         return []
@@ -116,19 +125,22 @@ def check_rest_in_record(still: Record, record: Record, machine: Machine, floati
     level = along_sensors(floating, record.sensors)
     path, rest = (planar_of(one.along - level, one.planes) for one in (late, still))
     gaps = nominal_gaps(machine, record)
-    off = _off_the_path(path, np.mean(rest, axis=0), gaps)
+    # between the bearings a turning rotor bends, and no race is passed
+    for plane in set(range(len(gaps))) - planes_at_bearings(machine, record):
+        path[:, plane], rest[:, plane] = np.nan, np.nan
+    off, seen = (_off_the_path(path, np.mean(rest, axis=0), gaps, gives) for gives in (sag, 0.0))
     if not np.any(np.abs(off) > _OFF_PATH * gaps):
         return []
     # ends that are exchanged rest too high at one and too low at the other
     for first, second in combinations(np.flatnonzero(np.abs(off) > 0.5 * _OFF_PATH * gaps).tolist(), 2):
         order = list(range(len(gaps)))
         order[first], order[second] = second, first
-        if np.all(np.abs(_off_the_path(path, np.mean(rest, axis=0)[order], gaps)) <= _OFF_PATH * gaps):
+        if np.all(np.abs(_off_the_path(path, np.mean(rest, axis=0)[order], gaps, sag)) <= _OFF_PATH * gaps):
             names = [record.planes[i].names for i in (first, second)]
             return [
                 Finding(
                     kind=Kind.SWAPPED_ENDS,
-                    message=f"tail: the rotor rests {_in_words(off, record)} where it passed in the last "
+                    message=f"tail: the rotor rests {_in_words(seen, record)} where it passed in the last "
                     f"{_LATE:g} s of the record; with {' and '.join(names[0])} exchanged with "
                     f"{' and '.join(names[1])} it passed there",
                     remedy="correct the channel map of the tail",
@@ -140,7 +152,7 @@ def check_rest_in_record(still: Record, record: Record, machine: Machine, floati
     return [
         Finding(
             kind=Kind.TAIL_OFFSET,
-            message=f"tail: the rotor rests {_in_words(off, record)} where it passed in the last "
+            message=f"tail: the rotor rests {_in_words(seen, record)} where it passed in the last "
             f"{_LATE:g} s of the record",
             remedy="check the zeros of the sensors between record and tail; the air gap comes from the tail "
             "and is off by as much",
@@ -161,7 +173,7 @@ def _in_words(off: Array, record: Record) -> str:
     return ", ".join(found)
 
 
-def _off_the_path(path: Array, rest: Array, gaps: Array) -> Array:
+def _off_the_path(path: Array, rest: Array, gaps: Array, sag: float) -> Array:
     """How far the path passes above the rest [m], per plane; 0 where it passes through it or never near."""
     off = np.zeros(len(gaps))
     for plane, gap in enumerate(gaps):
@@ -169,18 +181,20 @@ def _off_the_path(path: Array, rest: Array, gaps: Array) -> Array:
         if int(np.sum(near)) < _PASSED:
             continue
         low, high = np.percentile(path[near, plane, 1] - rest[plane, 1], _BAND)
-        off[plane] = max(low, 0.0) + min(high, 0.0)
+        off[plane] = max(low, 0.0) + min(high + PEAK_LOADS * sag, 0.0)
     return off
 
 
-def _without_level(rest: Record, path: Array, gaps: Array, noise: Array) -> bool:
+def _without_level(rest: Record, path: Array, gaps: Array, floating: Record) -> bool:
     """Whether a tail shows no rest although its readings are no smaller than those of the record.
 
     A unit that is wrong makes the noise as small as the distance, a high-pass takes the distance alone.
     """
     still = np.hypot(*np.mean(path, axis=0).T) < _NO_DEPTH * gaps
-    own = np.array([noise_by_differences(column, 3) for column in rest.signals.T])
-    return bool(np.all(still)) and float(np.nanmedian(own / noise)) > _SAME_NOISE
+    own, noise = (
+        np.array([noise_by_differences(column, 3) for column in one.signals.T]) for one in (rest, floating)
+    )
+    return bool(np.all(still)) and float(np.nanmedian(own)) > _SAME_NOISE * float(np.nanmedian(noise))
 
 
 def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
