@@ -46,7 +46,9 @@ from rotordrop.simulate.result import load_result
 from rotordrop.study.folder import Shard, open_folder, publish, study_of
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import load_results
+from rotordrop.watch.kept import TOLD, Arrived, Kept, told_of
 from rotordrop.web.running import publish as publish_result
+from rotordrop.watch.kept import TOLD, Arrived, Kept, told_of
 from rotordrop.web.running import result_folder, state_of, write_state
 from rotordrop.web.traces import open_traces, write_traces
 from rotordrop.web.workspace import Job, Workspace
@@ -223,6 +225,23 @@ def _looked(path: Path) -> Any:
     return job.read()["name"], state, (folder / "page.json").read_text(), float(np.sum(traces.values))
 
 
+def _watched(folder: Path) -> Path:
+    arrived = Arrived.at(_csv(folder))
+    assert arrived is not None
+    kept = Kept(Workspace(folder / "kept"))
+    kept.prepare()
+    return kept.job(kept.take(arrived)).path / TOLD
+
+
+def _told(path: Path) -> Any:
+    """What a watcher knows of a record that it took."""
+    told = told_of(Job(path.parent))
+    assert told is not None
+    if told["outcome"] == "failed":
+        raise RotordropError(told["why"])
+    return told
+
+
 STUDY, WEB, RUN = "study.folder:", "web.", f"look.{'0' * 16}/"
 WRITTEN = {
     "machine": Written(("machine.saving:save_machine", "cli._output:deliver_text"), _machine, load_machine),
@@ -258,6 +277,7 @@ WRITTEN = {
     "state": Written((f"{WEB}running:write_state",), _job("look.state.json"), _looked, sealed=True),
     "result": Written((f"{WEB}running:publish",), _job("look.result.json"), _looked, sealed=True),
     "trace": Written((f"{WEB}traces:write_traces",), _job(f"{RUN}motion.values.npy"), _looked, sealed=True),
+    "watched record": Written(("watch.kept:take", "watch.kept:tell"), _watched, _told, sealed=True),
     "page": Written(
         (
             *(f"{WEB}drawn:write_{what}" for what in ("look", "estimate", "waterfall")),
@@ -286,6 +306,8 @@ NEVER_READ = {
     "web.workspace:receive": "what was sent; its digest stands in the job",
     "web.running:_begin": "the number of a process; whatever is none is passed over",
     "record.readers.__init__:read_gzip": "a temporary copy",
+    "watch.kept:put": "what arrived; its digest stands in the job",
+    "watch.kept:quarantine": "for people",
 }
 
 

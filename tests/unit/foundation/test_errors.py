@@ -22,6 +22,8 @@ def test_exit_codes_are_those_documented_and_all_different():
         "MachineFileError": 2,
         "RecordError": 3,
         "NoDropError": 3,
+        "NothingFallsError": 3,
+        "UnpairedError": 3,
         "UnsettledError": 3,
         "IdentificationError": 4,
         "SimulationError": 5,
