@@ -48,7 +48,6 @@ from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import load_results
 from rotordrop.watch.kept import TOLD, Arrived, Kept, told_of
 from rotordrop.web.running import publish as publish_result
-from rotordrop.watch.kept import TOLD, Arrived, Kept, told_of
 from rotordrop.web.running import result_folder, state_of, write_state
 from rotordrop.web.traces import open_traces, write_traces
 from rotordrop.web.workspace import Job, Workspace
