@@ -30,7 +30,7 @@ import numpy as np
 
 from rotordrop.machine import load_machine
 from rotordrop.record.record import read_record
-from rotordrop.watch.kept import Kept, told_of
+from rotordrop.watch.kept import Kept, status_of
 from rotordrop.web.workspace import Workspace
 
 PACKAGE = Path(str(resources.files("rotordrop")))
@@ -139,7 +139,7 @@ def done(kept: Kept) -> Counter[str]:
     """Outcomes so far."""
     found: Counter[str] = Counter()
     for number in kept.numbers():
-        told = told_of(kept.job(number))
+        told = status_of(kept.job(number))
         found[told["outcome"] if told and told.get("done") else "under way"] += 1
     return found
 
@@ -265,7 +265,7 @@ def report(place: Path, kept: Kept, made, seconds: float, killing: Killing, size
     """Count and print."""
     outcomes: dict[str, list[tuple[str, str]]] = {}
     for number in kept.numbers():
-        told = told_of(kept.job(number))
+        told = status_of(kept.job(number))
         if told is not None:
             why = kept.path / "quarantine" / number / "why.txt"
             said = why.read_text().strip() if why.exists() else ""

@@ -6,7 +6,6 @@ import json as json_module
 import math
 import sys
 from enum import StrEnum
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -145,14 +144,10 @@ def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
 def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
     """Copy the machine file of an example, its shaft table and recordings; or none when one stands there."""
     from rotordrop.files import atomic_path, make_folder
-    from rotordrop.machine import example_path
+    from rotordrop.record.examples import example_files
 
-    machine = example_path(name)
-    contents = {"machine.toml": machine.read_bytes()}
-    contents |= {table.name: table.read_bytes() for table in machine.parent.glob(f"{name}_*.csv")}
-    records = files("rotordrop") / "examples" / name
-    if records.is_dir():
-        contents |= {record.name: record.read_bytes() for record in records.iterdir()}
+    machine, *others = example_files(name).values()
+    contents = {"machine.toml": machine.read_bytes()} | {one.name: one.read_bytes() for one in others}
     standing = [folder / file for file in contents if (folder / file).exists()]
     if standing and not overwrite:
         raise OutputError(f"{standing[0]} exists already; name another folder or add --force")

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 BallMaterial = Literal["silicon nitride", "steel"]
 
+STEEL_DENSITY = 7800.0
+"""Of bearing steel, rings and balls [kg/m³]."""
+
 _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
     "silicon nitride": {
         "ball_youngs_modulus": (315e9, "Pa"),
@@ -44,12 +47,11 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
     "steel": {
         "ball_youngs_modulus": (208e9, "Pa"),
         "ball_poisson_ratio": (0.3, ""),
-        "ball_density": (7800.0, "kg/m^3"),
+        "ball_density": (STEEL_DENSITY, "kg/m^3"),
     },
 }
 
 _SPRUNG = ("spring_rate", "ring_mass", "ring_travel", "fit_friction")
-_STEEL_DENSITY = 7800.0
 _BALL_HEIGHT = 1.16
 """Ball diameter over half the height of the cross-section [1], 2 · 0.58 of spindle bearings."""
 
@@ -332,7 +334,7 @@ class BallBearing(RaceBearing):
         ball, pitch = whole.ball_diameter.value, whole.pitch_diameter.value
         bore = 0.5 * whole.bore_diameter.value if whole.bore_diameter else 0.5 * pitch - ball / _BALL_HEIGHT
         width = whole.width.value if whole.width else 1.6 * ball
-        mass = _STEEL_DENSITY * math.pi * ((pitch - bore) ** 2 - 0.25 * (pitch + 0.6 * ball) ** 2) * width
+        mass = STEEL_DENSITY * math.pi * ((pitch - bore) ** 2 - 0.25 * (pitch + 0.6 * ball) ** 2) * width
         rows = (
             ("spring_rate", rate, 3.0, "a tenth of the rigidity of the pair, chosen and not measured", "N/m"),
             ("ring_mass", mass, 1.3, "a steel ring from 0.6 ball diameters outside the pitch circle", "kg"),

@@ -22,6 +22,7 @@ from rotordrop.elements.race_bearing import (
     RollingElements,
     Spread,
 )
+from rotordrop.errors import UsageError
 from rotordrop.known import NINETY, Known
 from rotordrop.physics import blocks
 from rotordrop.physics.ball_bearing import (
@@ -93,7 +94,18 @@ class BallNumbers(BearingNumbers):
         return self.constants.radial_play
 
     def element_loads(self, moved: Array, rings: Array) -> Array:
-        """Load of every ball [N]."""
+        """Load of every ball [N].
+
+        Raises
+        ------
+        UsageError
+            With ball_inertia: the load depends on the speed of the race, and differs between the races.
+        """
+        if self.balls.ball_inertia:
+            raise UsageError(
+                "the load of every ball is not known with ball_inertia = true, where it differs between the "
+                "races; max_ball_load and race_stress of the drop hold the largest"
+            )
         return ball_loads(self.constants, moved, rings)
 
     def element_loads_under(self, force: Array) -> Array:

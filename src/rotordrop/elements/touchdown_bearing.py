@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.ball_bearing import STEEL_DENSITY, BallBearing
 from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description, Misfit, Name, Placed
 from rotordrop.elements.friction import Friction
@@ -23,7 +23,6 @@ from rotordrop.elements.values import PositiveLength, Time, default, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
-_STEEL_DENSITY = 7800.0
 RACE_MASS, RACE_FORM = 1.25, 1.3
 """Factors within which mass and form, inertia over mass, of a race lie that are inferred from its size [1].
 
@@ -148,7 +147,7 @@ class TouchdownBearing(Placed):
     def _race_from_size(self, width: float) -> tuple[float, float]:
         inner = self.bore_radius.value
         outer = max(self.bearing.race_radius()[0], 1.05 * inner)
-        mass = _STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width
+        mass = STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width
         return mass, 0.5 * mass * (outer**2 + inner**2)
 
 

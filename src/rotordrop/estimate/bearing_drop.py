@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -222,7 +223,7 @@ class BearingDrop:
         )
         return replace(found, maximum=self.peak_stress.value)
 
-    @property
+    @cached_property
     def touched(self) -> Array:
         """When each impact began, by the rule and the displacement that a look goes by [s], shape (K,)."""
         if self.air_gap is None:

@@ -31,6 +31,22 @@ def example_record_path(name: str) -> Path:
     return paths[name]
 
 
+def example_files(name: str) -> dict[str, Path]:
+    """Files of an example by their names: machine file first, shaft table, recordings where there are any.
+
+    Raises
+    ------
+    UsageError
+        When there is no example machine of this name.
+    """
+    from rotordrop.machine import example_path
+
+    machine = example_path(name)
+    recordings = (Path(str(files("rotordrop"))) / "examples" / name).glob("*")
+    found = (machine, *sorted(machine.parent.glob(f"{name}_*.csv")), *sorted(recordings))
+    return {file.name: file for file in found}
+
+
 @lru_cache(maxsize=1)
 def example_hashes() -> frozenset[str]:
     """SHA-256 of the recordings that come with the package."""

@@ -123,14 +123,15 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     dx, dy = race_deflection(b, y, p)
-    entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
-    F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
     w_x = w_y = 0.0
     if row[L.FAST_SPEED_STEP] > 0.0:
         grid = row[L.FAST : L.FAST_END]
         F_x, F_y, k_xx, k_xy, k_yy, w_x, w_y = ball_table.fast_gradient(
             grid, p.ball_table[b], p.balls[b], dx, dy, y[spin]
         )
+    else:
+        entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
+        F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
     k, c = (k_xx, k_xy, k_yy), (row[L.BEARING_DAMPING], 0.0, row[L.BEARING_DAMPING])
     for i in range(2):
         m_h = row[L.SUPPORT_MASS_X + i]

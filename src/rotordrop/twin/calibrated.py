@@ -106,9 +106,23 @@ def calibrate_machine(
     names: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Fit the parameters of a machine with guesses to several of its recorded drops.
+    """Fit the parameters of a machine to several recorded drops.
 
-    A tail is None where a drop has none; progress is called with a sentence and the fraction done.
+    Parameters
+    ----------
+    machine : Machine
+        The machine with guesses.
+    records, tails : sequence of Record
+        Drops of this machine, and their settled tails (None where there is none).
+    names : sequence of str, optional
+        Names of the drops.
+    progress : callable, optional
+        Called with a sentence and the fraction done.
+
+    Returns
+    -------
+    Calibration
+        The machine with estimates, what the records determine and what not.
     """
     stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
     model = build_drop_model(machine)

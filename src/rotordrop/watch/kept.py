@@ -27,7 +27,7 @@ from rotordrop.files import (
 )
 from rotordrop.web.workspace import Job, Role, Workspace, labelled, stored_as
 
-TOLD = "watch.json"
+STATUS_FILE = "watch.json"
 QUARANTINE = "quarantine"
 PASSED_OVER = ("thumbs.db", "desktop.ini")
 UNFINISHED = (".part", ".tmp", ".temp", ".filepart", ".crdownload", ".swp", ".lock")
@@ -151,7 +151,7 @@ class Kept:
                         "files": entries,
                     }
                 )
-                tell(
+                keep_status(
                     job, {"source": str(one.path), "size": one.size, "mtime_ns": one.mtime_ns, "outcome": ""}
                 )
             return number
@@ -205,16 +205,16 @@ def put(job: Job, files: Mapping[str, Path]) -> dict[str, Any]:
     return entries
 
 
-def told_of(job: Job) -> dict[str, Any] | None:
+def status_of(job: Job) -> dict[str, Any] | None:
     """What is known of a drop that a watcher took; None for one of the page. What is damaged has failed."""
     try:
-        return read_sealed(job.path / TOLD, "remove this drop, and its record is taken again")
+        return read_sealed(job.path / STATUS_FILE, "remove this drop, and its record is taken again")
     except FileNotFoundError:
         return None
     except DamagedFileError as error:
         return {"source": job.number, "outcome": "failed", "why": str(error), "done": True}
 
 
-def tell(job: Job, told: Mapping[str, Any]) -> None:
+def keep_status(job: Job, status: Mapping[str, Any]) -> None:
     """Keep what became of a drop."""
-    write_json(job.path / TOLD, told, sealed=True)
+    write_json(job.path / STATUS_FILE, status, sealed=True)

@@ -16,7 +16,7 @@ from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.units import format_minute
 from rotordrop.watch.fleet import Fleet
-from rotordrop.watch.kept import QUARANTINE, Kept, told_of
+from rotordrop.watch.kept import QUARANTINE, Kept, status_of
 from rotordrop.watch.scalars import KINDS, NO_PEAKS, NOT_KNOWN, PEAKS, VERBS, shown_peak
 from rotordrop.web.running import published_run
 
@@ -66,19 +66,19 @@ def _records(kept: Kept) -> Iterator[dict[str, Any]]:
     """Every record that is done, on a row of its own."""
     for number in kept.numbers():
         job = kept.job(number)
-        told = told_of(job)
-        if told is None or not told.get("done"):
+        status = status_of(job)
+        if status is None or not status.get("done"):
             continue
-        scalars = told.get("scalars") or {"record": number, "machine": "", "needs_person": told["why"]}
-        arrived = datetime.fromtimestamp(told.get("mtime_ns", 0) / 1e9).isoformat(timespec="minutes")
+        scalars = status.get("scalars") or {"record": number, "machine": "", "needs_person": status["why"]}
+        arrived = datetime.fromtimestamp(status.get("mtime_ns", 0) / 1e9).isoformat(timespec="minutes")
         href = ""
-        if told["outcome"] == "quarantined":
+        if status["outcome"] == "quarantined":
             href = f"{QUARANTINE}/{number}/why.txt"
-        elif told["outcome"] == "estimated":
+        elif status["outcome"] == "estimated":
             run = published_run(job, VERBS["estimated"])
             href = "" if run is None else f"jobs/{number}/estimate.{run}/report.html"
         yield {
-            "outcome": told["outcome"],
+            "outcome": status["outcome"],
             "record": scalars["record"],
             "machine": scalars["machine"],
             "needs_person": scalars["needs_person"],

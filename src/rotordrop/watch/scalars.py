@@ -26,16 +26,16 @@ VERBS: dict[str, Verb] = {"estimated": "estimate", "looked": "look"}
 """Computations of the page by what came of them."""
 
 
-def scalars_of(job: Job, told: dict[str, Any], watched: Watched | None) -> dict[str, Any]:
+def scalars_of(job: Job, status: dict[str, Any], watched: Watched | None) -> dict[str, Any]:
     """At most fifteen numbers and texts of a drop, flat, SI, the unit in the key; null where none is known.
 
     ``needs_person`` says why somebody should look, and is empty where nobody needs to.
     """
-    entry, outcome, why = job.read()["files"]["record"], told["outcome"], told.get("why", "")
+    entry, outcome, why = job.read()["files"]["record"], status["outcome"], status.get("why", "")
     found: dict[str, Any] = {
         "sha256": entry["sha256"],
         "record": entry["name"],
-        "machine": told.get("serial", ""),
+        "machine": status.get("serial", ""),
         "recorded": "",
         "outcome": outcome,
         "verdict": why,

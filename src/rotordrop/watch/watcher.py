@@ -23,7 +23,7 @@ from rotordrop.estimate.published import read_drop
 from rotordrop.files import digest_of_file
 from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate
 from rotordrop.watch.fleet import Fleet, read_fleet
-from rotordrop.watch.kept import Arrived, Kept, arrived, put, tell, told_of
+from rotordrop.watch.kept import Arrived, Kept, arrived, keep_status, put, status_of
 from rotordrop.watch.overview import write_overview
 from rotordrop.watch.scalars import line_of, scalars_of
 from rotordrop.web.running import Runner, Verb, result_folder, state_of, take_lock
@@ -151,12 +151,12 @@ class Watcher:
             if number in self._ended or number in self._mine:
                 continue
             job = self.kept.job(number)
-            told = told_of(job)
-            if told is not None and "size" in told:
-                source = Path(told["source"])
-                self._seen.setdefault(source, Arrived(source, told["size"], told["mtime_ns"]))
-            if told is None or (told.get("done") and not self._is_to_be_tried_again(job, told)):
-                self._end(number, told)
+            status = status_of(job)
+            if status is not None and "size" in status:
+                source = Path(status["source"])
+                self._seen.setdefault(source, Arrived(source, status["size"], status["mtime_ns"]))
+            if status is None or (status.get("done") and not self._is_to_be_tried_again(job, status)):
+                self._end(number, status)
             else:
                 self._lock(job)
 
@@ -170,22 +170,22 @@ class Watcher:
 
     def _release(self, number: str) -> None:
         os.close(self._mine.pop(number))
-        self._end(number, told_of(self.kept.job(number)))
+        self._end(number, status_of(self.kept.job(number)))
         self._news = True
 
-    def _end(self, number: str, told: dict[str, Any] | None) -> None:
+    def _end(self, number: str, status: dict[str, Any] | None) -> None:
         self._ended.add(number)
-        if told is not None and told["outcome"] == "quarantined":
+        if status is not None and status["outcome"] == "quarantined":
             self._quarantined.add(number)
 
-    def _is_to_be_tried_again(self, job: Job, told: dict[str, Any]) -> bool:
-        if told["outcome"] == "quarantined":
+    def _is_to_be_tried_again(self, job: Job, status: dict[str, Any]) -> bool:
+        if status["outcome"] == "quarantined":
             return not self.kept.quarantined(job).is_dir()
-        return told["outcome"] == "looked" and self._fleet.of(*self._names(job, told))[0] is not None
+        return status["outcome"] == "looked" and self._fleet.of(*self._names(job, status))[0] is not None
 
-    def _names(self, job: Job, told: dict[str, Any]) -> tuple[Path, Path]:
+    def _names(self, job: Job, status: dict[str, Any]) -> tuple[Path, Path]:
         """A record as it lay under the folder, and where it is kept."""
-        source = Path(told["source"])
+        source = Path(status["source"])
         stored = job.path / "files" / job.read()["files"]["record"]["stored"]
         return source.relative_to(self.folder) if source.is_relative_to(self.folder) else source, stored
 
@@ -209,9 +209,9 @@ class Watcher:
             self._seen[one.path] = one
             self._standing.pop(one.path, None)
             job = self.kept.job(number)
-            told = told_of(job)
-            if told is not None and told["outcome"] == "superseded":  # its content is back
-                tell(job, told | {"outcome": "", "done": False})
+            status = status_of(job)
+            if status is not None and status["outcome"] == "superseded":  # its content is back
+                keep_status(job, status | {"outcome": "", "done": False})
                 self._ended.discard(number)
             if number not in self._ended and number not in self._mine:
                 self._lock(job)
@@ -222,41 +222,41 @@ class Watcher:
     def _tend(self, number: str) -> bool:
         """Do the next step of a drop; whether it was the last."""
         job = self.kept.job(number)
-        told = told_of(job)
-        if told is None:
+        status = status_of(job)
+        if status is None:
             return True  # removed on the page
-        if told.get("done"):
-            if not self._is_to_be_tried_again(job, told):
+        if status.get("done"):
+            if not self._is_to_be_tried_again(job, status):
                 return True
             kept = ("source", "size", "mtime_ns")
-            told = {"outcome": "", **{key: told[key] for key in kept}}
-            tell(job, told)
-        if not told["outcome"]:
-            told = self._computed(job, told)
-        if not told["outcome"]:
+            status = {"outcome": "", **{key: status[key] for key in kept}}
+            keep_status(job, status)
+        if not status["outcome"]:
+            status = self._computed(job, status)
+        if not status["outcome"]:
             return False
-        self._deliver(job, told)
+        self._deliver(job, status)
         return True
 
-    def _computed(self, job: Job, told: dict[str, Any]) -> dict[str, Any]:
+    def _computed(self, job: Job, status: dict[str, Any]) -> dict[str, Any]:
         """What came of the computation of a drop, which is begun where it has not been."""
-        verb: Verb | None = told.get("verb")
+        verb: Verb | None = status.get("verb")
         state = None if verb is None else state_of(job, verb)
-        if verb is None or state is None or state["run"] == told.get("counted"):
-            return self._begun(job, told)
+        if verb is None or state is None or state["run"] == status.get("counted"):
+            return self._begun(job, status)
         if state["state"] in ("waiting", "running"):
             self._runner.ask(job, verb, state["options"])
-            return told
+            return status
         if state["state"] == "done" and (folder := result_folder(job, verb, "document.json")) is not None:
-            told = told | self._judged(job, told, verb, folder)
+            status = status | self._judged(job, status, verb, folder)
         else:
-            told = told | _failed(job, told, state)
-        tell(job, told)
-        return told
+            status = status | _failed(job, status, state)
+        keep_status(job, status)
+        return status
 
-    def _begun(self, job: Job, told: dict[str, Any]) -> dict[str, Any]:
+    def _begun(self, job: Job, status: dict[str, Any]) -> dict[str, Any]:
         """Ask for the estimate of a drop whose machine is known, or for a look at it."""
-        watched, why = self._fleet.of(*self._names(job, told))
+        watched, why = self._fleet.of(*self._names(job, status))
         common = self._fleet.profile
         files = {"profile": common} if common is not None else {}
         content = job.read()
@@ -265,16 +265,16 @@ class Watcher:
         content["files"] |= put(job, files if watched is None else watched.files)
         job.write(content)
         verb: Verb = "look" if watched is None else "estimate"
-        told = told | {"verb": verb, "serial": "" if watched is None else watched.serial, "why": why}
-        tell(job, told)
+        status = status | {"verb": verb, "serial": "" if watched is None else watched.serial, "why": why}
+        keep_status(job, status)
         self._runner.ask(job, verb, {"quick": True} if self.quick and watched is not None else {})
-        return told
+        return status
 
-    def _judged(self, job: Job, told: dict[str, Any], verb: Verb, folder: Path) -> dict[str, Any]:
+    def _judged(self, job: Job, status: dict[str, Any], verb: Verb, folder: Path) -> dict[str, Any]:
         """What a finished computation means: the outcome, with the reason."""
-        source = Path(told["source"])
+        source = Path(status["source"])
         now = Arrived.at(source)
-        changed = now not in (None, Arrived(source, told["size"], told["mtime_ns"]))
+        changed = now not in (None, Arrived(source, status["size"], status["mtime_ns"]))
         if changed and not digest_of_file(source).startswith(job.number):
             why = "it was taken before it was complete; what stands there now is another record"
             return {"outcome": "superseded", "why": why}
@@ -288,23 +288,23 @@ class Watcher:
             return {"outcome": "quarantined", "why": f"{where}{worst['message']}; {worst['remedy']}"}
         return {"outcome": "looked"}
 
-    def _deliver(self, job: Job, told: dict[str, Any]) -> None:
+    def _deliver(self, job: Job, status: dict[str, Any]) -> None:
         """Quarantine, log and report a drop, each once, whatever was done before."""
-        watched = self._fleet.machines.get(told.get("serial", ""))
-        if told["outcome"] == "quarantined":
-            self.kept.quarantine(job, told["why"])
-        if "logged" not in told:
-            told["logged"] = None
-            if told["outcome"] == "estimated":
-                bearings = told["serial"] if watched is None else watched.bearings
-                told["logged"] = self._logged(job, bearings)
-            told["scalars"] = scalars_of(job, told, watched)
-            tell(job, told)
-        if self.hook is not None and told["outcome"] != "superseded" and not told.get("hooked"):
-            run_hook(self.hook, told["scalars"])
-            told["hooked"] = True
-        tell(job, told | {"done": True})
-        self.say(line_of(told["scalars"], told["logged"]))
+        watched = self._fleet.machines.get(status.get("serial", ""))
+        if status["outcome"] == "quarantined":
+            self.kept.quarantine(job, status["why"])
+        if "logged" not in status:
+            status["logged"] = None
+            if status["outcome"] == "estimated":
+                bearings = status["serial"] if watched is None else watched.bearings
+                status["logged"] = self._logged(job, bearings)
+            status["scalars"] = scalars_of(job, status, watched)
+            keep_status(job, status)
+        if self.hook is not None and status["outcome"] != "superseded" and not status.get("hooked"):
+            run_hook(self.hook, status["scalars"])
+            status["hooked"] = True
+        keep_status(job, status | {"done": True})
+        self.say(line_of(status["scalars"], status["logged"]))
 
     def _logged(self, job: Job, bearings: str) -> int:
         folder = result_folder(job, "estimate", "document.json")
@@ -336,16 +336,16 @@ def _standing_in(folder: Path) -> set[Arrived]:
     return set()
 
 
-def _failed(job: Job, told: dict[str, Any], state: dict[str, Any]) -> dict[str, Any]:
+def _failed(job: Job, status: dict[str, Any], state: dict[str, Any]) -> dict[str, Any]:
     """What a computation that failed means: no use, a person, or another try."""
     code, why = state.get("code"), state.get("error", "")
     if state["state"] == "cancelled":
         return {"outcome": "failed", "why": "the computation was cancelled on the page"}
     if code == RecordError.exit_code:
         return {"outcome": "quarantined", "why": why}
-    crashes = told.get("crashes", 0) + (code is None)
+    crashes = status.get("crashes", 0) + (code is None)
     if code in (None, OutputError.exit_code) and crashes < CRASHES:
-        tell(job, told | {"counted": state["run"], "crashes": crashes})
+        keep_status(job, status | {"counted": state["run"], "crashes": crashes})
         raise OutputError(why)
     return {"outcome": "failed", "why": why}
 

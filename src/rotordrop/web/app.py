@@ -28,13 +28,8 @@ from rotordrop.web.workspace import LARGEST, ROLES, Job, Role, TooLargeError, Wo
 ASSETS = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 """What of the folder of the page is sent, by its ending."""
 STATIC = resources.files("rotordrop.web") / "static"
-EXAMPLE = (
-    "machine/examples/lp400.toml",
-    "machine/examples/lp400_shaft.csv",
-    "examples/lp400/drop_060.h5",
-    "examples/lp400/drop_060_tail.csv",
-)
-"""Files of the example, in the package."""
+EXAMPLE = "lp400"
+"""The example to try the page with."""
 BETWEEN_LOOKS_S = 0.25
 """Pause between two looks at what waits and what ended [s]; chosen, not measured."""
 TICKET_S = 120.0
@@ -64,8 +59,9 @@ async def static(desk: Desk, request: Request) -> Response:
 
 async def example(desk: Desk, request: Request) -> Response:
     """A file of the bundled machine or of its simulated drop, to try the page with."""
-    package, name = Path(str(resources.files("rotordrop"))), request.path_params["name"]
-    known = {place.name: place for place in map(package.joinpath, EXAMPLE)}
+    from rotordrop.record.examples import example_files
+
+    name, known = request.path_params["name"], example_files(EXAMPLE)
     if name not in known:
         raise NotThereError(f"there is no such example; there are {', '.join(known)}")
     return Response(known[name].read_bytes(), media_type="application/octet-stream")

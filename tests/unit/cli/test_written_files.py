@@ -46,7 +46,7 @@ from rotordrop.simulate.result import load_result
 from rotordrop.study.folder import Shard, open_folder, publish, study_of
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import load_results
-from rotordrop.watch.kept import TOLD, Arrived, Kept, told_of
+from rotordrop.watch.kept import STATUS_FILE, Arrived, Kept, status_of
 from rotordrop.web.running import publish as publish_result
 from rotordrop.web.running import result_folder, state_of, write_state
 from rotordrop.web.traces import open_traces, write_traces
@@ -229,12 +229,12 @@ def _watched(folder: Path) -> Path:
     assert arrived is not None
     kept = Kept(Workspace(folder / "kept"))
     kept.prepare()
-    return kept.job(kept.take(arrived)).path / TOLD
+    return kept.job(kept.take(arrived)).path / STATUS_FILE
 
 
 def _told(path: Path) -> Any:
     """What a watcher knows of a record that it took."""
-    told = told_of(Job(path.parent))
+    told = status_of(Job(path.parent))
     assert told is not None
     if told["outcome"] == "failed":
         raise RotordropError(told["why"])
@@ -276,7 +276,7 @@ WRITTEN = {
     "state": Written((f"{WEB}running:write_state",), _job("look.state.json"), _looked, sealed=True),
     "result": Written((f"{WEB}running:publish",), _job("look.result.json"), _looked, sealed=True),
     "trace": Written((f"{WEB}traces:write_traces",), _job(f"{RUN}motion.values.npy"), _looked, sealed=True),
-    "watched record": Written(("watch.kept:take", "watch.kept:tell"), _watched, _told, sealed=True),
+    "watched record": Written(("watch.kept:take", "watch.kept:keep_status"), _watched, _told, sealed=True),
     "page": Written(
         (
             *(f"{WEB}drawn:write_{what}" for what in ("look", "estimate", "waterfall")),

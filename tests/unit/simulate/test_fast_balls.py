@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import a_state, both_jacobians
 
-from rotordrop.errors import MachineFileError, RecordError, SimulationError
+from rotordrop.errors import MachineFileError, RecordError, SimulationError, UsageError
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics.ball_table import PLACES, fast_energy, fast_force, fast_loads
@@ -149,3 +149,9 @@ def test_a_record_is_not_estimated_with_them(fast):
 
     with pytest.raises(RecordError, match=r"balls with inertia, with which a record cannot be estimated"):
         insisted(SimpleNamespace(machine=fast.machine))
+
+
+def test_loads_of_every_ball_are_refused_not_those_of_slow_ones(fast):
+    result = simulate_drop(fast.machine, DropCase(speed="60 Hz", duration=2e-3, reduction="quick"))
+    with pytest.raises(UsageError, match="race_stress of the drop"):
+        result.ball_loads(fast.machine, 0)

@@ -21,7 +21,7 @@ from rotordrop.files import write_json
 from rotordrop.ledger import logged_drops
 from rotordrop.watch import Kept, Watcher, read_fleet
 from rotordrop.watch.again import reestimate
-from rotordrop.watch.kept import Arrived, arrived, tell, told_of
+from rotordrop.watch.kept import Arrived, arrived, keep_status, status_of
 from rotordrop.web.running import publish, write_state
 from rotordrop.web.workspace import Workspace
 
@@ -195,15 +195,15 @@ def test_a_record_that_grew_after_it_was_taken_is_taken_as_it_is_now(drops, kept
     found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
     file.write_bytes(b"")
     watcher()[0].run(once=True)
-    outcomes = {told_of(kept.job(name))["outcome"] for name in kept.numbers()}
-    assert told_of(job)["outcome"] == "superseded"
+    outcomes = {status_of(kept.job(name))["outcome"] for name in kept.numbers()}
+    assert status_of(job)["outcome"] == "superseded"
     assert outcomes == {"superseded", "quarantined"}
 
 
 def found(kept: Kept, number: str, verb: str, content: dict, serial: str = "") -> None:
     """What a computation of a drop found, as the child leaves it."""
     job = kept.job(number)
-    tell(job, told_of(job) | {"verb": verb, "serial": serial, "why": ""})
+    keep_status(job, status_of(job) | {"verb": verb, "serial": serial, "why": ""})
     write_state(job, verb, {"state": "done", "run": "abc", "options": {}, "asked": time.time()})
     made = job.path / f"{verb}.part"
     made.mkdir()
@@ -274,10 +274,10 @@ def test_a_machine_file_that_comes_later_is_used(machines, drops, kept, watcher)
     number = kept.take(Arrived.at(drops / "9000.csv"))
     found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
     watcher()[0].run(once=True)
-    assert told_of(kept.job(number))["outcome"] == "looked"
+    assert status_of(kept.job(number))["outcome"] == "looked"
     shutil.copy(machines / "4711.toml", machines / "9000.toml")
     watcher()[0].run(once=True)
-    told = told_of(kept.job(number))
+    told = status_of(kept.job(number))
     assert (told["serial"], told["outcome"]) == ("9000", "quarantined")  # an x is no record
 
 

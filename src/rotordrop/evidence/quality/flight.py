@@ -128,6 +128,7 @@ def weighed(
     if not seen:
         return None
     error: Array = np.linalg.inv(np.sum([inverse for _, inverse in seen], axis=0)).astype(np.float64)
+    near = planes_at_bearings(machine, record)
     mean = error @ np.sum([inverse @ share for share, inverse in seen], axis=0)
     # sensors read alike in every flight; where the flights differ by more than their errors, something
     # touched the rotor in them, and they know as much less (Birge's ratio)
@@ -139,10 +140,7 @@ def weighed(
         each=tuple(seen),
         scatter=scatter,
         beside=frozenset(
-            name
-            for number, plane in enumerate(record.planes)
-            if number not in planes_at_bearings(machine, record)
-            for name in plane.names
+            name for number, plane in enumerate(record.planes) if number not in near for name in plane.names
         ),
     )
 
