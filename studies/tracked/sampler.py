@@ -31,10 +31,10 @@ from rotordrop.elements.table import EXTENSIONS
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted, stage_settings, track
+from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, stage_settings, track
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings, forward
-from rotordrop.twin.problems import COARSE_BASIS, drop_problem, first_contact
+from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.violations import Violations
 
@@ -99,9 +99,8 @@ def study(seed: int, draws: int, window: float, structure: str = "", threads: in
         machine = extension.added_to(machine) if extension.name == structure else machine
     evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail)
     problem = steady(drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, window + 0.01))
-    schedule = shifted(BLIND_SCHEDULE, first_contact(evidence), problem.fall_time)
     last = Stage(until=window, force=0.14, share=0.02, passes=4)
-    fitted = track([problem], (*(s for s in schedule if s.until < window), last)).smoothed[0]
+    fitted = track([problem], (*(s for s in BLIND_SCHEDULE if s.until < window), last)).smoothed[0]
     settings = stage_settings(problem, last)
     samples = len(fitted.means)
     places = np.array(

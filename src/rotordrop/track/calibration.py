@@ -36,6 +36,9 @@ Progress = Callable[[str, float], None]
 class Stage:
     """One stage: window after power-off [s], unknown forces, their share, passes, steps per 50 µs.
 
+    A window that ends before `WHOLE_DROP` is written for a first contact at 7.5 ms and a free fall of 7.1 ms;
+    `window_end` says where it ends for a drop.
+
     ``force`` is the unknown force at each bearing and axis as a part of the weight on a bearing, ``share`` as
     a part of the force of the contact [1]; both are new every `STEP` of a free fall through the gap.
 
@@ -61,7 +64,7 @@ BLIND_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.045, force=0.14, share=0.02, passes=2),
     Stage(until=0.060, force=0.14, share=0.02, passes=2),
 )
-"""From nominal guesses: windows for a first contact at 7.5 ms, for a gap of 0.25 mm; see `shifted`."""
+"""From nominal guesses."""
 
 DAMPED_SCHEDULE: tuple[Stage, ...] = (
     *(replace(stage, damping=3.0 if stage.until < 0.02 else 1.0) for stage in BLIND_SCHEDULE[:-1]),
@@ -119,24 +122,13 @@ class TrackedDrops:
         return [one.means for one in self.smoothed]
 
 
-def shifted(schedule: Sequence[Stage], first_contact: float, fall: float) -> tuple[Stage, ...]:
-    """The schedule with its short windows where the first contacts of a drop are.
-
-    Parameters
-    ----------
-    schedule : sequence of Stage
-        Windows for a first contact at 7.5 ms and a free fall of 7.1 ms.
-    first_contact : float
-        Time of the first contact [s].
-    fall : float
-        Time of a free fall through the air gap [s]: rebounds last longer with it.
+def window_end(stage: Stage, first_contact: float, fall: float) -> float:
+    """End of a window [s] with the first contact [s] of a drop and the time [s] of a free fall through its
+    air gap: rebounds last longer with it.
     """
-    return tuple(
-        replace(stage, until=first_contact + (stage.until - REFERENCE_CONTACT) * fall / REFERENCE_FALL)
-        if stage.until < WHOLE_DROP
-        else stage
-        for stage in schedule
-    )
+    if stage.until >= WHOLE_DROP:
+        return stage.until
+    return first_contact + (stage.until - REFERENCE_CONTACT) * fall / REFERENCE_FALL
 
 
 def track(
@@ -165,26 +157,28 @@ def track(
     trajectories: list[Array | None] = list(references) if references is not None else [None] * len(problems)
     # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
     from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
-    total = sum(stage.until * stage.passes for stage in schedule)
+    contact, fall = max(one.first_contact for one in problems), problems[0].fall_time
+    ends = [window_end(stage, contact, fall) for stage in schedule]
+    total = sum(end * stage.passes for end, stage in zip(ends, schedule, strict=True))
     done = 0.0
     smoothed: list[Smoothed] = []
     storages = [Storage() for _ in problems]
-    for stage in schedule:
+    for end, stage in zip(ends, schedule, strict=True):
         settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
             if progress is not None:
-                progress(f"fitting the first {1e3 * stage.until:.0f} ms", done / total)
+                progress(f"fitting the first {1e3 * end:.0f} ms", done / total)
             smoothed = one_pass(
                 [_eased(*one, stage) for one in zip(problems, trajectories, strict=True)],
                 settings,
                 trajectories,
-                stage.until,
+                end,
                 from_guesses=from_guesses,
                 storages=storages,
             )
             from_guesses = False
             trajectories = [s.means for s in smoothed]
-            done += stage.until
+            done += end
     return TrackedDrops(
         problems=tuple(problems),
         smoothed=tuple(smoothed),

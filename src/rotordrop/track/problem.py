@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,18 +59,8 @@ class RecordedDrop:
     """Measured rotor speed [rad/s], NaN where nobody measured it, shape (N,)."""
     tail_level: Array | None
     """Mean readings of the settled tail in the positive direction of each sensor [m], shape (C,)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fall:
-    """The fall before the first contact: its end [s] and the largest unknown impulse per 50 µs in it [N s].
-
-    Nothing acts on a falling rotor but its weight and what is left of the magnets. Larger impulses would
-    explain a lift that lasts longer than usual.
-    """
-
-    end: float
-    impulse: float
+    first_contact: float
+    """When the rotor first touched a race [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +88,11 @@ class DropProblem:
     """Prior at the first sample."""
     sensor_form: SensorForm
     """What the sensors do beyond gain, offset and runout."""
-    fall: Fall | None = None
-    """The fall, where the lift of the magnets may last longer than usual."""
+    first_contact: float
+    """When the rotor first touched a race [s]; the windows of a schedule lie around it."""
+    impulse_in_fall: float = math.inf
+    """Largest unknown impulse per 50 µs before it [N s], where the lift of the magnets may last longer than
+    usual: larger ones would explain that."""
 
     @property
     def reading_rows(self) -> Array:
@@ -241,6 +235,7 @@ def build_problem(
         start=start_of(mean, model, unknowns),
         covariance=covariance,
         sensor_form=sensor_form(model, unknowns, rows),
+        first_contact=drop.first_contact,
     )
     if drop.tail_level is not None:
         apply_tail(problem, drop.tail_level, problem.start, problem.covariance.copy())

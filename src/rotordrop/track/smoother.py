@@ -15,7 +15,7 @@ from rotordrop.physics import columns as L
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track._covariance import unpack
-from rotordrop.track.problem import DropProblem, Fall, private_copy
+from rotordrop.track.problem import DropProblem, private_copy
 
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
@@ -60,11 +60,13 @@ class PassSettings:
     law near zero speed decides, which no record of positions shows, and must not rewrite what the first
     impacts said."""
 
-    def for_sampling(self, dt: float, fastest: float = 0.0, fall: Fall | None = None) -> P.FilterSettings:
+    def for_sampling(
+        self, dt: float, fastest: float = 0.0, contact: float = 0.0, impulse_in_fall: float = math.inf
+    ) -> P.FilterSettings:
         """Settings of the kernel for a sample distance [s]; noise grows with the square root of time.
 
         ``fastest`` is the highest natural frequency of the model [rad/s]; it sets a least number of steps.
-        ``fall`` limits the unknown impulses before the first contact.
+        Before the first ``contact`` [s] unknown impulses are at most ``impulse_in_fall`` [N s] per 50 µs.
         """
         growth = math.sqrt(dt / REFERENCE_STEP)
         return P.FilterSettings(
@@ -77,8 +79,8 @@ class PassSettings:
             spin_noise=self.spin_noise * growth,
             speed_noise=self.speed_noise * growth,
             learning_end=self.learning_end,
-            fall_end=-math.inf if fall is None else fall.end,
-            fall_impulse=math.inf if fall is None else fall.impulse * growth,
+            fall_end=contact,
+            fall_impulse=impulse_in_fall * growth,
         )
 
 
@@ -315,7 +317,9 @@ def forward(
     dt = float(problem.time[1] - problem.time[0])
     course = _Course(
         problem=problem,
-        settings=settings.for_sampling(dt, fastest_frequency(problem), problem.fall),
+        settings=settings.for_sampling(
+            dt, fastest_frequency(problem), problem.first_contact, problem.impulse_in_fall
+        ),
         mean=np.ascontiguousarray(mean),
         reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
         length=_stretch_length(problem) if smoothing else count,

@@ -12,9 +12,9 @@ from rotordrop.machine import Machine
 from rotordrop.record.axes import sees_both_directions
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction, reduction_for_contact
-from rotordrop.track.calibration import BLIND_SCHEDULE, Stage, shifted
+from rotordrop.track.calibration import BLIND_SCHEDULE, window_end
 from rotordrop.track.prior import fall_time
-from rotordrop.track.problem import DropProblem, Fall, RecordedDrop, build_problem
+from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
 from rotordrop.twin.tracked_parameters import UNSURE_GAP
 
 COARSE_BASIS = Reduction(modes=6, attachment=True)
@@ -40,7 +40,7 @@ def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) ->
     if model.machine.remanence_time_constant is None:
         return problem
     weight = model.machine.rotor.mass * float(model.machine.gravity)
-    return replace(problem, fall=Fall(end=first_contact(evidence), impulse=FALL_SHARE * weight))
+    return replace(problem, impulse_in_fall=FALL_SHARE * weight)
 
 
 def twin_problem(machine: Machine, evidence: Evidence, until: float = WINDOW) -> DropProblem:
@@ -59,6 +59,7 @@ def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
         initial_speed_error=evidence.speed.initial_error,
         speed=evidence.measured_speed(until),
         tail_level=None if isinstance(level, Missing) else level,
+        first_contact=first_contact(evidence),
     )
 
 
@@ -129,11 +130,6 @@ class Drops:
     calibrate_only: bool
     posed: dict[tuple[int, bool], tuple[Machine, tuple[DropProblem, ...]]] = field(default_factory=dict)
 
-    def scaled(self, machine: Machine, schedule: Sequence[Stage]) -> tuple[Stage, ...]:
-        """A schedule with its windows where the first contacts of the drops are."""
-        contact = max(first_contact(item) for item in self.evidence)
-        return shifted(schedule, contact, fall_time(machine))
-
     def fine(self, machine: Machine) -> tuple[DropProblem, ...]:
         """The drops in the basis that force and stress are taken from."""
         return self._problems(machine, fine=True)
@@ -149,7 +145,8 @@ class Drops:
             return known[1]
         until = WINDOW
         if self.calibrate_only:
-            until = self.scaled(machine, BLIND_SCHEDULE[-1:])[0].until + 0.01
+            contact = max(first_contact(item) for item in self.evidence)
+            until = window_end(BLIND_SCHEDULE[-1], contact, fall_time(machine)) + 0.01
         seen = machine if fine else with_end_planes(machine)
         basis = _basis(machine, *((FINE_BASIS, FINE_REACH) if fine else (COARSE_BASIS, COARSE_REACH)))
         model = build_drop_model(seen, basis)

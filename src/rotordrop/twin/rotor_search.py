@@ -17,7 +17,6 @@ from scipy.optimize import minimize
 
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import RotordropError
-from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import build_drop_model
@@ -57,7 +56,7 @@ class _Unknown:
         return math.exp(theta) if self.row.logarithmic else float(theta)
 
 
-def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedDrop]]) -> Machine:
+def with_found_rotor(machine: Machine, drops: Sequence[RecordedDrop]) -> Machine:
     """The machine with the rotor that makes its records likeliest, where a beam stands for it; else itself.
 
     Of the rotor, what has a range is sought; the records have the readings of the time that is looked at.
@@ -70,7 +69,7 @@ def with_found_rotor(machine: Machine, drops: Sequence[tuple[Evidence, RecordedD
         return machine
     model = build_drop_model(machine, BASIS)
     seen: list[tuple[RecordedDrop, Readings]] = []
-    for _, drop in drops:
+    for drop in drops:
         until = float(drop.time[-1])
         seen.append((drop, readings_of(build_problem(model, drop, until=until))))
 

@@ -194,7 +194,7 @@ def track_drops(
     search = Search(drops=drops, progress=progress)
     machine = search.with_rotor(machine)
     if is_calibrated(machine) and not calibrate_only:
-        schedule = drops.scaled(machine, QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE)
+        schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
         calibrated = Candidate(machine=machine, fit=track(drops.fine(machine), schedule, progress=progress))
         if quick or not calibrated.inconsistent:
             return search.not_lost(calibrated)
@@ -373,17 +373,17 @@ class Search:
         if not machine.rotor.sought():
             return machine
         until = ROTOR_SEEN * fall_time(machine)
-        return with_found_rotor(machine, [(item, recorded_drop(item, until)) for item in self.drops.evidence])
+        return with_found_rotor(machine, [recorded_drop(item, until) for item in self.drops.evidence])
 
     def fit_base(self, machine: Machine) -> TrackedDrops:
         """Fit of a machine from its guesses by the coarse basis; where inconsistent, again in short steps."""
         problems, found = self.drops.coarse(machine), None
         with suppress(IdentificationError):
-            found = track(problems, self.drops.scaled(machine, BLIND_SCHEDULE), progress=self.progress)
+            found = track(problems, BLIND_SCHEDULE, progress=self.progress)
             if not is_inconsistent(found):
                 return found
         try:
-            again = track(problems, self.drops.scaled(machine, DAMPED_SCHEDULE), progress=self.progress)
+            again = track(problems, DAMPED_SCHEDULE, progress=self.progress)
             again = self.converge(_checkpoint_of(again))
         except IdentificationError:
             if found is None:
@@ -403,12 +403,11 @@ class Search:
         if before is None and start >= FIRST_OTHER_START:
             problems = tuple(_other_start(problem, start) for problem in problems)
         references = None if before is None else before.trajectories
-        return _checkpoint_of(track(problems, self.drops.scaled(machine, stages), references=references))
+        return _checkpoint_of(track(problems, stages, references=references))
 
     def converge(self, checkpoint: Checkpoint) -> TrackedDrops:
         """The fit over the last window of the coarse basis, repeated while that pays."""
-        last = self.drops.scaled(checkpoint.problems[0].model.machine, BLIND_SCHEDULE[-1:])[0]
-        return converged(checkpoint.problems, last, checkpoint.trajectories)
+        return converged(checkpoint.problems, BLIND_SCHEDULE[-1], checkpoint.trajectories)
 
     def likelihood(self, known: TrackedDrops, machine: Machine) -> float:
         """Negative logarithm of the likelihood with another machine, drop by drop, linearised at a fit."""
@@ -423,15 +422,13 @@ class Search:
     def relinearise(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
         """Passes with another machine over the first window whole, linearised at a fit that is known."""
         problems = self.drops.coarse(machine)
-        last = self.drops.scaled(machine, (replace(BLIND_SCHEDULE[-1], passes=passes),))
-        return track(problems, last, references=_carried(known, problems))
+        last = replace(BLIND_SCHEDULE[-1], passes=passes)
+        return track(problems, (last,), references=_carried(known, problems))
 
     def refine(self, first: Candidate) -> Candidate:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.drops.fine(first.machine)
-        schedule = self.drops.scaled(
-            first.machine, CALIBRATION_SCHEDULE if self.drops.calibrate_only else FINE_SCHEDULE
-        )
+        schedule = CALIBRATION_SCHEDULE if self.drops.calibrate_only else FINE_SCHEDULE
         references = _carried(first.fit, fine)
         if first.accepted:
             # The finer basis may lie in the valley that the coarse one only came near: turned axes of a

@@ -11,7 +11,7 @@ from tests.scaled_machines import scaled_machine
 
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track._filter import is_plausible
-from rotordrop.track.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, shifted, stage_settings
+from rotordrop.track.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, stage_settings, window_end
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings
@@ -56,10 +56,12 @@ def test_noise_gathers_with_time_and_not_with_samples(rate):
 
 
 def test_windows_follow_the_first_contact_and_last_as_long_as_the_rebounds():
-    slow = shifted(BLIND_SCHEDULE, 0.015, 2.0 * math.sqrt(2.0 * 0.25e-3 / 9.81))
-    same = shifted(BLIND_SCHEDULE, 0.0075, math.sqrt(2.0 * 0.25e-3 / 9.81))
-    assert [stage.until for stage in same] == pytest.approx([stage.until for stage in BLIND_SCHEDULE])
-    assert [stage.until for stage in slow] == pytest.approx([2.0 * stage.until for stage in same])
+    fall = math.sqrt(2.0 * 0.25e-3 / 9.81)
+    usual = [stage.until for stage in BLIND_SCHEDULE]
+    assert [window_end(stage, 0.0075, fall) for stage in BLIND_SCHEDULE] == pytest.approx(usual)
+    slow = [window_end(stage, 0.015, 2.0 * fall) for stage in BLIND_SCHEDULE]
+    assert slow == pytest.approx([2.0 * until for until in usual])
+    assert window_end(LAST, 0.015, 2.0 * fall) == LAST.until
 
 
 def test_a_fall_takes_the_time_of_its_gap(flight):

@@ -409,6 +409,7 @@ def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers() -
         initial_speed_error=0.1,
         speed=np.full(len(time), 600.0),
         tail_level=None,
+        first_contact=7e-3,
     )
     expected = r"does not rest on the touchdown bearing NDE \(-\d+ N of .* 584 N\).* expected it between them"
     with pytest.raises(IdentificationError, match=expected):

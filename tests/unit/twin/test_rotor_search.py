@@ -69,7 +69,7 @@ def seen(twelve):
     record = read_record(RECORDS / "drop_060.h5", twelve)
     tail = read_record(RECORDS / "drop_060_tail.csv", twelve)
     evidence = read_evidence(build_drop_model(twelve), record, tail)
-    return [(evidence, recorded_drop(evidence, 0.03))]
+    return [recorded_drop(evidence, 0.03)]
 
 
 @pytest.mark.slow

@@ -348,7 +348,7 @@ def test_an_extension_that_says_nothing_is_taken_off_and_the_rest_refined(
     item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")
     drops = Drops(evidence=(item,), calibrate_only=True)
     search = Search(drops=drops, progress=None)
-    fit = track(drops.fine(machine), drops.scaled(machine, (replace(CALIBRATION_SCHEDULE[0], passes=1),)))
+    fit = track(drops.fine(machine), (replace(CALIBRATION_SCHEDULE[0], passes=1),))
     found = Candidate(machine=machine, fit=fit, accepted=(Accepted(extension=extension, gain=60.0),))
     without = search.without_silent(found, calibrated)
     assert without.accepted == () and without.machine == calibrated
