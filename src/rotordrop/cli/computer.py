@@ -43,7 +43,7 @@ def serve(
     port: Annotated[
         int, Option("--port", min=0, max=65535, help="Where to listen; 0 takes a free port.")
     ] = USUAL_PORT,
-    log: Annotated[str | None, text_option("LOG", "Log of drops that the page compares with.")] = None,
+    log: Annotated[str | None, text_option("LOG", "Log of drops; one in FOLDER by default.")] = None,
     open_page: Annotated[bool, Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Serve a local page: look at drops, estimate, read reports.

@@ -14,8 +14,9 @@ from typing import Any
 
 from rotordrop.errors import DamagedFileError, UsageError
 from rotordrop.estimate.published import Drop
-from rotordrop.ledger._store import Transaction, name_of, transaction
+from rotordrop.ledger._store import Transaction, transaction
 from rotordrop.ledger._store import is_url as is_url
+from rotordrop.ledger._store import name_of as name_of
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",

@@ -21,6 +21,7 @@ from rotordrop.errors import DamagedFileError, OutputError, RotordropError, Usag
 from rotordrop.web import histories
 from rotordrop.web.desk import Desk, NotThereError, Operation, of_file, options_of, order_of, verb_of
 from rotordrop.web.guard import App, Guard, Receive, Scope, Send
+from rotordrop.web.kept_drops import label, row_of_job
 from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
 from rotordrop.web.running import VERBS, Runner, published, state_of
 from rotordrop.web.workspace import LARGEST, ROLES, Job, Role, TooLargeError, Workspace, labelled, receive
@@ -32,6 +33,8 @@ EXAMPLE = "lp400"
 """The example to try the page with."""
 BETWEEN_LOOKS_S = 0.25
 """Pause between two looks at what waits and what ended [s]; chosen, not measured."""
+OWN_LOG = "drops.db"
+"""Log in the folder of the page, where no other is named."""
 TICKET_S = 120.0
 """How long an address of a report waits to be opened [s]; chosen, not measured."""
 LINGER_S = 30.0
@@ -98,11 +101,16 @@ def _told(job: Job) -> dict[str, Any]:
 
 
 async def jobs(desk: Desk, request: Request) -> Response:
-    """All jobs, and what room is left."""
-    told = []
-    for job in desk.space.jobs():
-        with contextlib.suppress(FileNotFoundError):  # one that is removed meanwhile hides no other
-            told.append(_told(job))
+    """All jobs with what is known of each, and what room is left."""
+
+    def listed() -> list[dict[str, Any]]:
+        told = []
+        for job in desk.space.jobs():
+            with contextlib.suppress(FileNotFoundError):  # one that is removed meanwhile hides no other
+                told.append({**_told(job), "row": row_of_job(job)})
+        return told
+
+    told = await asyncio.to_thread(listed)
     return JSONResponse({"jobs": told, "used": desk.space.used(), "quota": desk.space.quota})
 
 
@@ -226,11 +234,32 @@ async def formats(desk: Desk, request: Request) -> Response:
     return JSONResponse({"formats": readers.known_formats(), "largest": LARGEST})
 
 
-async def drops(desk: Desk, request: Request) -> Response:
-    """Drops to compare with: estimates that are here, and entries of the log."""
-    compared = await asyncio.to_thread(import_module, "rotordrop.web.compared")
-    found, problem = await asyncio.to_thread(compared.compared_drops, desk.space, desk.log)
-    return JSONResponse({"drops": found, "log": desk.log is not None, "problem": problem})
+async def label_job(desk: Desk, request: Request) -> Response:
+    """Name a drop, note something of it, tag it, put it away; what was found of it stays."""
+    job = desk.job(request)
+    label(job, await order_of(request))
+    return JSONResponse(_told(job))
+
+
+async def read_log(desk: Desk, request: Request) -> Response:
+    """The log: its drops, what they are allowed, and what rises from drop to drop."""
+    logs = await asyncio.to_thread(import_module, "rotordrop.web.log")
+    return JSONResponse(await asyncio.to_thread(logs.log_told, desk.log, desk.own_log))
+
+
+async def add_to_log(desk: Desk, request: Request) -> Response:
+    """Add the estimate of a drop to the log."""
+    logs = await asyncio.to_thread(import_module, "rotordrop.web.log")
+    return JSONResponse(
+        await asyncio.to_thread(logs.add_to_log, desk.job(request), desk.log), status_code=201
+    )
+
+
+async def take_out_of_log(desk: Desk, request: Request) -> Response:
+    """Take a drop out of the log."""
+    logs = await asyncio.to_thread(import_module, "rotordrop.web.log")
+    await asyncio.to_thread(logs.take_out_of_log, desk.job(request), desk.log)
+    return Response(status_code=204)
 
 
 _RESULT = "/api/jobs/{job}/{verb}"
@@ -248,7 +277,10 @@ OPERATIONS = (
     Operation("GET", "/api/jobs/{job}/files/{role}", sent_file),
     Operation("GET", "/api/formats", formats),
     Operation("GET", "/api/example/{name}", example),
-    Operation("GET", "/api/drops", drops),
+    Operation("POST", "/api/jobs/{job}/label", label_job),
+    Operation("GET", "/api/log", read_log),
+    Operation("POST", "/api/jobs/{job}/log", add_to_log),
+    Operation("DELETE", "/api/jobs/{job}/log", take_out_of_log),
     Operation("GET", "/api/numbers", numbers),
     Operation("POST", "/api/jobs/{job}/numbers", twelve_numbers),
     Operation("POST", _RESULT, ask),
@@ -263,9 +295,12 @@ OPERATIONS = (
 
 
 def make_app(space: Workspace, *, port: int, log: str | None = None) -> App:
-    """Make the application for a folder and a log of drops, guarded for the port it will listen at."""
+    """Make the application for a folder and a log of drops, guarded for the port it will listen at.
+
+    Without a log the folder has one of its own, which is made with the first drop that is added.
+    """
     space.prepare()
-    desk = Desk(space, Runner(space), log)
+    desk = Desk(space, Runner(space), log or str(space.path / OWN_LOG), log is None)
     desk.runner.take_over()
 
     @contextlib.asynccontextmanager

@@ -42,7 +42,9 @@ class Desk:
 
     space: Workspace
     runner: Runner
-    log: str | None = None
+    log: str
+    own_log: bool
+    """The log of drops; whether it is that of the folder, which is made when it is first written."""
     tickets: dict[str, tuple[Path, float]] = field(default_factory=dict)
 
     def job(self, request: Request) -> Job:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +15,10 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.files import write_json
-from rotordrop.report.content import Figure, Statement
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
-from rotordrop.report.quantity import Quantity, System, display_unit
+from rotordrop.report.quantity import Quantity
 from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, waterfall_lines
+from rotordrop.web.rows import content_json, quantity_json, row_of, shown_units
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
@@ -34,10 +33,8 @@ if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 Array = NDArray[np.float64]
-SYSTEMS: tuple[System, ...] = ("SI", "US")
 MOST_PLACES = 200
 """Places of a line that are drawn [1]; chosen, not measured."""
-SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
 
 
 def write_look(
@@ -64,6 +61,15 @@ def write_look(
         {
             **content_json(content),
             **_common("motion", tuple(columns), seen.motion.time),
+            "row": {
+                "machine": "" if machine is None else machine.name,
+                "recorded": seen.record.event_date,
+                "sha256": seen.record.sha256,
+                "simulated": seen.record.is_simulated,
+                "speed": None
+                if seen.speed is None
+                else quantity_json(Quantity(value=seen.speed, kind="speed")),
+            },
             "rotor": None if machine is None else rotor_outline(machine),
             "labels": labels,
             "zero": seen.drops[0].release if seen.drops else float(seen.motion.time[0]),
@@ -117,6 +123,7 @@ def write_estimate(
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimate.document import estimate_document
     from rotordrop.estimate.published import drop_of
+    from rotordrop.ledger.book import drop_of_estimate
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_sections import weight_shares
@@ -160,6 +167,7 @@ def write_estimate(
         {
             **content_json(content),
             **_common("drop", tuple(columns), grid),
+            "row": row_of(drop_of_estimate(drop, "")),
             "rotor": rotor_outline(estimate.machine),
             "labels": {column: _label(estimate, column) for column in columns},
             "timeline": _events(estimate),
@@ -257,7 +265,7 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
     speed = falls[0].speed
     return {
         "version": __version__,
-        "units": _units(),
+        "units": shown_units(),
         "planes": planes,
         "parts": parts,
         "time": falls[0].time.tolist(),
@@ -320,12 +328,8 @@ def _common(name: str, columns: tuple[str, ...], time: Array) -> dict[str, Any]:
     return {
         "version": __version__,
         "traces": {"name": name, "columns": list(columns), "start": float(time[0]), "end": float(time[-1])},
-        "units": _units(),
+        "units": shown_units(),
     }
-
-
-def _units() -> dict[str, Any]:
-    return {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS}
 
 
 def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
@@ -383,26 +387,3 @@ def _panel(panel: Panel) -> dict[str, Any]:
 def _impact(place: str, time: float, azimuth: float, *numbers: Quantity) -> dict[str, Any]:
     shown = [quantity_json(one) for one in numbers]
     return {"place": place, "time": time, "azimuth": azimuth, "numbers": shown}
-
-
-def content_json(part: Any) -> Any:
-    """A report or a part of it without its pictures, its numbers written in both systems of units."""
-    if isinstance(part, Quantity):
-        return quantity_json(part)
-    if isinstance(part, Statement):
-        return {"text": part.sentence, "level": part.level}
-    if isinstance(part, tuple):
-        return [content_json(one) for one in part if not isinstance(one, Figure)]
-    if not is_dataclass(part):
-        return part
-    return {item.name: content_json(getattr(part, item.name)) for item in fields(part)}
-
-
-def quantity_json(quantity: Quantity) -> dict[str, Any]:
-    """A number as it is [SI] and as it is written, with its interval."""
-    finite = math.isfinite(quantity.value) and not quantity.range_only
-    told: dict[str, Any] = {"value": quantity.value if finite else None, "kind": quantity.kind}
-    for system in SYSTEMS:
-        shown = replace(quantity, system=system)
-        told[system] = [shown.text, shown.interval_text]
-    return told

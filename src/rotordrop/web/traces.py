@@ -12,6 +12,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,10 @@ FEWEST_POINTS = 100
 """Samples of a window that are sent at once, at most and at least; chosen, not measured."""
 MOST_COLUMNS = 12
 """Columns that are sent at once, more than a figure shows; chosen, not measured."""
+
+_ONE_HEAD = Lock()
+"""Numpy reads the head of an array file by ``ast.literal_eval``, which fails now and then in CPython 3.11
+where two threads are in it at once (gh-106905)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,10 +154,11 @@ def extremes_of_blocks(values: NDArray[np.float32]) -> NDArray[np.int32]:
 
 def open_traces(folder: Path, name: str, columns: tuple[str, ...]) -> Traces:
     """Open histories that were written, without reading them: what a window needs comes from the disk."""
-    parts = [
-        np.load(folder / f"{name}.{part}.npy", mmap_mode="r", allow_pickle=False)
-        for part in ("time", "values", "levels")
-    ]
+    with _ONE_HEAD:
+        parts = [
+            np.load(folder / f"{name}.{part}.npy", mmap_mode="r", allow_pickle=False)
+            for part in ("time", "values", "levels")
+        ]
     return Traces(columns=columns, time=parts[0], values=parts[1], levels=parts[2])
 
 

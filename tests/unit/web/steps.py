@@ -38,6 +38,13 @@ def look_at(browser: Browser, server: Served, files: Sequence[Path]) -> None:
     browser.until(LOOKED)
 
 
+def open_drop(browser: Browser, name: str) -> None:
+    """Open a drop from the list by a click on its name."""
+    link = f"[...document.querySelectorAll('.dropname')].find(one => one.innerText === {name!r})"
+    browser.until(link)
+    browser.evaluate(f"{link}.click()")
+
+
 def press(browser: Browser, button: str) -> None:
     browser.evaluate(PRESS.format(button))
 

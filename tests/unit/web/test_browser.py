@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
 from tests.unit.web.serving import Served
-from tests.unit.web.steps import LOOKED, look_at, press, quiet, send, serving, words
+from tests.unit.web.steps import LOOKED, look_at, open_drop, press, quiet, send, serving, words
 
 from rotordrop.web.running import publish, result_folder, write_state
 from rotordrop.web.traces import write_traces
@@ -153,6 +153,7 @@ def test_other_drops_are_drawn_on_the_axes_of_this_one(browser, tmp_path, files)
             server.order(f"/api/jobs/{number}/look")
             assert server.settled(number, "look")["state"] == "done"
         browser.open(server.address)
+        open_drop(browser, "second")
         browser.until(LOOKED)
         browser.key("c")
         browser.until("document.getElementById('compare').open")
@@ -177,6 +178,7 @@ def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
         assert server.settled(number, "look")["state"] == "done"
         _with_a_third_plane_and_an_estimate(server.space.job(number))
         browser.open(server.address)
+        open_drop(browser, "drop")
         browser.until("document.querySelectorAll('.panel canvas').length === 4")
         orbits = "[...document.querySelectorAll('#orbits canvas')].map(c => c.ariaLabel.split(' ')[2]).join()"
         assert browser.evaluate(orbits) == "NDE,DE"
@@ -257,9 +259,8 @@ def payloads() -> list[str]:
 
 
 def choose(browser: Browser, job: str) -> None:
-    browser.evaluate(
-        f"s=document.getElementById('jobs');s.value='{job}';s.dispatchEvent(new Event('change'))"
-    )
+    browser.evaluate(f"location.hash = 'drop={job}'")
+    browser.until(f"!document.getElementById('actions').hidden && location.hash.includes('{job}')")
 
 
 def test_no_script_in_a_name_is_executed(browser, tmp_path):

@@ -32,9 +32,8 @@ def test_each_sees_the_own_drop_and_waits_for_the_others(people, tmp_path, files
         for number, browser in enumerate(people):
             own = own_files(files, tmp_path, number)
             (_later if number else look_at)(browser, server, own)
-        chosen = "document.getElementById('jobs').selectedOptions[0].text"
         for number, browser in enumerate(people):
-            assert browser.evaluate(chosen).startswith(f"drop of {number} · ")
+            assert words(browser, "#dropname") == f"drop of {number}"
             press(browser, "estimate")
             browser.until("document.getElementById('cancel')")
         for browser in people[1:]:
@@ -50,10 +49,10 @@ def test_each_sees_the_own_drop_and_waits_for_the_others(people, tmp_path, files
 def _later(browser, server, files) -> None:
     """Whoever comes later finds the drops of the others and adds the own one."""
     browser.open(server.address)
-    browser.until(LOOKED, 120)
+    browser.until("document.querySelector('.dropname')", 120)
     send(browser, files)
-    name = files[0].stem
-    browser.until(f"document.getElementById('jobs').selectedOptions[0].text.startsWith({name!r})", 60)
+    browser.until(f"document.getElementById('dropname').innerText === {files[0].stem!r}", 60)
+    browser.until(LOOKED, 120)
     browser.until("document.getElementById('status').innerText.includes('released')", 120)
 
 
@@ -71,7 +70,7 @@ def test_each_gets_an_estimate_and_its_report(people, tmp_path, files):
             consistent = "The model is consistent with the record."
             browser.until(f"document.getElementById('status').innerText.includes({consistent!r})", 900)
             assert browser.evaluate("document.querySelectorAll('.panel canvas').length") == 4
-            chosen = browser.evaluate("document.getElementById('jobs').value")
+            chosen = browser.evaluate("new URLSearchParams(location.hash.slice(1)).get('drop')")
             document = server.ask("GET", f"/api/jobs/{chosen}/estimate/document").told
             peak = document["bearings"]["NDE"]["peak_force_N"]["value"]
             shown = words(browser, "#status").replace("\u202f", "")

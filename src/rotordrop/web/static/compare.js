@@ -37,15 +37,12 @@ async function opened(drop) {
 }
 
 export async function chooseOthers() {
-  const [{ drops, problem }, { jobs }] = await Promise.all([server.drops(), server.jobs()]);
-  const looked = jobs.filter((one) => one.states.look?.result && !drops.some((drop) => drop.job === one.id))
-    .map((one) => ({ job: one.id, name: one.name, machine: "", numbers: [] }));
-  const found = [...drops, ...looked].filter((drop) => drop.job !== state.job.id), now = state.others.map(keyOf);
+  const { drops, problem } = await everyDrop();
+  const found = drops.filter((drop) => drop.job !== state.job.id), now = state.others.map(keyOf);
   const told = (drop) => [drop.machine, drop.speed && drop.speed[units.chosen()][0], drop.recorded, drop.log ? `log ${drop.log}, numbers only` : drop.numbers.length ? "estimate" : "looked at only"].filter(Boolean).join(" · ");
-  state.drops = drops;
   by("dropsfound").replaceChildren(...(problem ? [make("p", { class: "small", text: problem })] : []), ...(found.length ? found.map((drop, i) => make("label", { class: "choice", of: [
     make("input", { type: "checkbox", value: i, ...(now.includes(keyOf(drop)) ? { checked: "" } : {}) }), make("span", { text: drop.name }), make("span", { class: "small", text: told(drop) })] }))
-    : [make("p", { text: "There is no other drop yet. Drops of this page are found by themselves, those of a log by: rotordrop serve --log LOG." })]));
+    : [make("p", { text: "There is no other drop yet, neither on this page nor in the log." })]));
   const boxes = [...by("dropsfound").querySelectorAll("input")];
   const limit = () => { const many = boxes.filter((box) => box.checked).length >= MOST; boxes.forEach((box) => { box.disabled = many && !box.checked; }); };
   boxes.forEach((box) => box.addEventListener("change", limit));
@@ -130,4 +127,14 @@ export function compareTab() {
     make("ul", { class: "others", of: chosen }), make("button", { text: "Choose drops …", id: "choosedrops", on: { click: () => chooseOthers().catch((error) => say(error.message, "bad")) } }), ...made];
 }
 
-export async function learnDrops() { state.drops = (await server.drops()).drops; }
+// The drops of the page, and those of the log that are not among them.
+async function everyDrop(wanted = []) {
+  const [{ jobs }, log] = await Promise.all([server.jobs(), server.log()]), here = new Set(jobs.map((one) => one.row?.sha256));
+  const kept = jobs.filter((one) => one.row && (!one.label?.archived || wanted.includes(one.id))).map((one) => ({ ...one.row, job: one.id, name: one.name }));
+  state.drops = [...kept, ...log.drops.filter((one) => !here.has(one.sha256))];
+  return { drops: state.drops, problem: log.problem };
+}
+export async function learnDrops(wanted = []) {
+  const { drops } = await everyDrop(wanted), others = drops.filter((drop) => wanted.includes(drop.job));
+  if (others.length) { await setOthers(others.slice(0, MOST)); }
+}

@@ -1,8 +1,11 @@
 // The page: one job, its tabs and its status, and what every button and key does.
 import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
+import * as address from "./address.js";
 import { chooseOthers, compareTab, learnDrops } from "./compare.js";
 import { nextImpact, pan, play, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
+import { addToLog, askAbout, askRemoval, leaveHome, redrawHome, showHome } from "./home.js";
+import { redoLog, redrawLog, showLog } from "./log.js";
 import { drawAll, lines, loadView } from "./panels.js";
 import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
@@ -60,16 +63,17 @@ function showTab(name, focus = false) {
   if (focus) { by("tabs").querySelector('[aria-selected="true"]').focus(); }
   by("tabpanel").setAttribute("aria-label", name);
   by("tabpanel").replaceChildren(...TABS[name]());
+  noted();
 }
 
 function showStatus() {
   const { states } = state.job, { look, estimate, waterfall, channels } = states;
-  for (const id of ["estimate", "report", "document", "waterfall", "channels", "tomachine"]) { by(id).disabled = Boolean(state.job.damaged); }
-  if (state.job.damaged) { say(state.job.damaged, "bad", make("button", { text: "Remove", on: { click: () => by("sure").showModal() } })); return false; }
+  for (const id of ["estimate", "report", "document", "waterfall", "channels", "tomachine", "tothelog", "aboutdrop"]) { by(id).disabled = Boolean(state.job.damaged); }
+  if (state.job.damaged) { say(state.job.damaged, "bad", make("button", { text: "Remove", on: { click: () => askRemoval(state.job) } })); return false; }
   const running = [estimate, waterfall, look, channels].find((one) => one && ["waiting", "running"].includes(one.state));
   by("estimate").disabled = Boolean(running) || !state.job.files.machine || !state.look;
   by("estimate").title = !state.job.files.machine ? "An estimate needs the machine file" : state.look ? "Estimate force and stress" : "An estimate needs a record that could be looked at";
-  by("report").disabled = by("document").disabled = !(estimate && estimate.result);
+  by("report").disabled = by("document").disabled = by("tothelog").disabled = !(estimate && estimate.result);
   by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
   by("tomachine").hidden = Boolean(state.job.files.machine);
   by("simulated").hidden = !simulated();
@@ -104,7 +108,7 @@ function waysOut(error) {
   const missing = error.match(/shaft table '([^']+)'/);
   const again = async () => { state.job = await server.begin(state.job.id, "look", {}); await refresh(); };
   const way = (text, click) => make("button", { text, on: { click: () => Promise.resolve(click()).catch(lost) } });
-  return [...(missing ? [way(`Choose ${missing[1]} …`, openFiles)] : [way("Channels …", () => channels(error))]), way("Look again", again), way("Remove", () => by("sure").showModal())];
+  return [...(missing ? [way(`Choose ${missing[1]} …`, openFiles)] : [way("Channels …", () => channels(error))]), way("Look again", again), way("Remove", () => askRemoval(state.job))];
 }
 
 // ---- jobs
@@ -129,12 +133,11 @@ async function refresh() {
     if (look) {
       units.learn(look.units);
       const columns = look.places.map((place) => place.radius), [first, last] = span();
-      state.view = homeView(); state.cursor = null; state.impact = -1;
+      Object.assign(state, { view: homeView(), cursor: null, impact: -1 });
       const found = await samples("look", columns, first, last, 2400);
       if (state.job.id !== id || shown !== now) { return; }
       state.overview = { time: found.time, data: { time: found.time, curves: columns.map((name) => ({ values: found[name] })) } };
-      showTab(state.tab);
-      await loadView();
+      await asSeen();
     }
   }
   if (!showStatus()) { await askedChannels(); return; }
@@ -147,22 +150,72 @@ function lost(error) {
   if (!(error instanceof server.Refusal)) { setTimeout(() => state.job && refresh().catch(lost), 1500); }
 }
 
-async function listJobs(choose) {
-  const { jobs } = await server.jobs();
-  by("jobs").replaceChildren(...jobs.map((one) => make("option", { value: one.id, text: `${one.name} · ${units.dateText(one.created)}${one.damaged || one.states.look?.state === "failed" ? " · not readable" : one.states.estimate?.result ? " · estimated" : ""}` })));
-  by("empty").hidden = jobs.length > 0;
-  by("actions").hidden = !jobs.length;
-  const wantedJob = choose || localStorage.getItem("rotordrop job");
-  const job = jobs.find((one) => one.id === wantedJob) || jobs[0];
-  if (!job) { state.job = null; by("main").hidden = true; say("No drop yet.", "notice"); return; }
-  if (state.job && state.job.id !== job.id) { leaveFall(); }
-  by("jobs").value = job.id;
-  localStorage.setItem("rotordrop job", job.id);
-  state.job = job;
+// ---- views: the address says which is seen
+
+const part = (name) => (name in TABS ? name : "Impacts");
+async function openDrop(told) {
+  if (state.job?.id !== told.drop) {
+    leaveFall();
+    Object.assign(state, { job: null, look: null, estimate: null, view: null });
+    by("main").hidden = true;
+    state.job = await server.job(told.drop);
+    shown = "";
+  }
+  by("actions").hidden = false;
+  by("dropname").textContent = by("dropname").title = state.job.name;
+  state.asked = told;
+  if (shown && state.look) { await asSeen(); }
   await refresh();
 }
 
-const sent = (id) => { justSent = id; return id ? listJobs(id) : null; };
+// What the address asks for: window, cursor, motion, tab, others, waterfall.
+async function asSeen() {
+  const told = state.asked || {}, number = (name) => (told[name] === undefined ? NaN : Number(told[name]));
+  state.asked = null;
+  state.view = number("to") > number("from") ? { from: number("from"), to: number("to") } : state.view || homeView();
+  state.cursor = Number.isFinite(number("at")) ? number("at") : state.cursor;
+  if ([...by("signal").options].some((one) => one.value === told.show)) { by("signal").value = told.show; }
+  showTab(part(told.tab || state.tab));
+  await loadView();
+  if (told.with) { await learnDrops(told.with.split(",")); }
+  if (told.view === "waterfall") { if (by("fall").hidden) { await waterfall(); } } else { leaveFall(); }
+}
+const seen = () => {
+  const rounded = (value, size) => (value === null ? "" : String(Number(value.toPrecision(size))));
+  return { drop: state.job.id, view: by("fall").hidden ? "" : "waterfall", tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
+    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, with: state.others.map((other) => other.job).filter(Boolean).join(",") };
+};
+const noted = () => address.note(() => (state.job ? seen() : address.read()));
+document.addEventListener("seen", noted);
+
+async function route() {
+  address.settle();
+  const told = address.read(), atDrop = Boolean(told.drop);
+  if (told.token) { location.reload(); return; }
+  by("todrops").toggleAttribute("aria-current", !atDrop && told.view !== "log");
+  by("tolog").toggleAttribute("aria-current", !atDrop && told.view === "log");
+  leaveHome();
+  by("log").hidden = true;
+  if (atDrop) {
+    try { await openDrop(told); } catch (error) {
+      if (error.status !== 404) { throw error; }
+      await home({});
+      say("There is no such drop; it may have been removed.", "bad");
+    }
+    return;
+  }
+  await home(told);
+}
+async function home(told) {
+  leaveFall();
+  play(false);
+  state.job = null;
+  shown = "";
+  by("main").hidden = by("actions").hidden = by("simulated").hidden = true;
+  if (told.view === "log") { await showLog(told); } else { await showHome(told); }
+}
+
+const sent = (id) => { justSent = id; if (id) { shown = ""; address.go({ drop: id }); } };
 const openChosen = (list) => (list.length ? chooseFiles(list, sent).catch((error) => say(error.message, "bad")) : null);
 
 // What the recording holds is read by a process of its own, then asked.
@@ -194,7 +247,8 @@ click("open", openFiles); click("open2", openFiles); click("tryit", async () => 
 by("files").addEventListener("change", () => { const list = [...by("files").files]; by("files").value = ""; openChosen(list); });
 click("channels", () => channels());
 click("tomachine", () => chooseFiles([], sent));
-by("jobs").addEventListener("change", () => listJobs(by("jobs").value).catch(lost));
+click("aboutdrop", () => askAbout(state.job, (job) => { state.job = job; by("dropname").textContent = by("dropname").title = job.name; }));
+click("tothelog", () => addToLog(state.job));
 click("estimate", async () => { state.job = await server.begin(state.job.id, "estimate", { method: by("method").value }); await refresh(); });
 async function openReport(verb) {
   const opened = window.open("about:blank");
@@ -209,6 +263,7 @@ async function showFall() {
   play(false);
   by("main").hidden = true;
   by("fall").hidden = false;
+  noted();
   await openFall(id, page);
   by("fallmap").focus();
 }
@@ -216,6 +271,7 @@ function leaveFall() {
   if (by("fall").hidden) { return; }
   by("fall").hidden = true;
   by("main").hidden = !state.look;
+  if (state.job) { noted(); }
   if (state.panels.length) { drawAll(); }
   by("waterfall").focus();
 }
@@ -232,16 +288,12 @@ click("fallreport", () => openReport("waterfall"));
 by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => showLines(fallFiles.Python()) }));
 by("cutfiles").replaceChildren(files("Cuts", { csv: cutFiles.CSV, svg: cutFiles.SVG, png: cutFiles.PNG, python: () => showLines(cutFiles.Python()) }));
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
-click("remove", () => by("sure").showModal());
-by("sure").addEventListener("close", async () => {
-  if (by("sure").returnValue === "remove") { await server.remove(state.job.id); shown = ""; await listJobs().catch(lost);
-tellFormats().catch(() => {}); }
-});
+click("remove", () => askRemoval(state.job));
 click("whole", () => setWindow(...span())); click("early", () => setView(homeView()));
 click("next", () => goImpact(nextImpact(1))); click("previous", () => goImpact(nextImpact(-1)));
 click("play", () => play(state.playing === null));
 by("signal").addEventListener("change", () => state.view && loadView());
-function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } }
+function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.job && state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } else if (!state.job) { redrawHome(); if (!by("log").hidden) { redoLog(); } } }
 by("units").addEventListener("change", () => chooseUnits(by("units").value));
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function chooseTheme(name) {
@@ -262,7 +314,7 @@ const KEYS = {
 };
 for (const signal of ["y", "x", "r"]) { KEYS[signal] = () => { by("signal").value = signal; loadView(); }; }
 document.addEventListener("keydown", (event) => {
-  const typing = event.target.closest("input, select, textarea, dialog");
+  const typing = event.target.closest("input, select, textarea, dialog, [role=menu]");
   if (event.target.closest("[role=tablist]") && /^Arrow(Left|Right)$/.test(event.key)) {
     const names = Object.keys(TABS), step = event.key === "ArrowRight" ? 1 : names.length - 1;
     showTab(names[(names.indexOf(state.tab) + step) % names.length], true);
@@ -271,22 +323,24 @@ document.addEventListener("keydown", (event) => {
   if (typing || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest("button"))) { return; }
   if (event.key === "?") { by("keys").showModal(); return; }
   if (event.key === "o") { openFiles(); return; }
+  if (event.key === "l") { address.go({ view: "drops" }); return; }
   if (event.key === "w" && !by("waterfall").disabled && !by("actions").hidden) { (by("fall").hidden ? waterfall : leaveFall)(); return; }
   if (event.key === "Escape") { leaveFall(); return; }
-  if (!by("fall").hidden && !"ut".includes(event.key)) { return; }
-  if (state.look && state.view && KEYS[event.key]) { event.preventDefault(); KEYS[event.key](event); }
+  if ("ut".includes(event.key)) { KEYS[event.key](); return; }
+  if (by("fall").hidden && state.job && state.look && state.view && KEYS[event.key]) { event.preventDefault(); KEYS[event.key](event); }
 });
 document.addEventListener("compared", () => showTab("Compare"));
 document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
 document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) { document.body.classList.remove("over"); } });
 document.addEventListener("drop", (event) => { event.preventDefault(); document.body.classList.remove("over"); openChosen(event.dataTransfer.files); });
 const redraw = () => {
-  if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
+  if (!state.job) { redrawLog(); } else if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
 };
 let waiting = 0;
 window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); });
 
 by("units").value = units.chosen();
 chooseTheme(localStorage.getItem("rotordrop theme") || "");
-listJobs().catch(lost);
+window.addEventListener("hashchange", () => route().catch(lost));
+route().catch(lost);
 tellFormats().catch(() => {});

@@ -60,6 +60,7 @@ export async function loadView() {
   state.speed = speed;
   state.panels = asked.map((panel, i) => ({ ...panel, found: found[i], time: found[i].time }));
   drawAll();
+  document.dispatchEvent(new Event("seen"));
 }
 
 function key({ label, colour, lower, bandLabel, dash = [] }) {

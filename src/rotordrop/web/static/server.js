@@ -1,9 +1,10 @@
 // Everything that is asked of the server. The token comes in the fragment of the address and stays in this tab.
 const KEPT = "rotordrop token";
-const given = new URLSearchParams(location.hash.slice(1)).get("token");
+const told = new URLSearchParams(location.hash.slice(1)), given = told.get("token");
 if (given) {
   sessionStorage.setItem(KEPT, given);
-  history.replaceState(null, "", location.pathname);
+  told.delete("token");
+  history.replaceState(null, "", `${location.pathname}${told.size ? `#${told}` : ""}`);
 }
 const token = sessionStorage.getItem(KEPT) || "";
 
@@ -38,7 +39,10 @@ export async function formats() {
   return told.formats;
 }
 export const example = async (name) => new File([await (await ask("GET", `/api/example/${name}`)).blob()], name);
-export const drops = async () => (await ask("GET", "/api/drops")).json();
+export const label = async (id, said) => (await ask("POST", `/api/jobs/${id}/label`, order(said))).json();
+export const log = async () => (await ask("GET", "/api/log")).json();
+export const addToLog = async (id) => (await ask("POST", `/api/jobs/${id}/log`, order())).json();
+export const takeOutOfLog = (id) => ask("DELETE", `/api/jobs/${id}/log`);
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const numbers = async () => (await ask("GET", "/api/numbers")).json();
 export const sendNumbers = (id, values) => ask("POST", `/api/jobs/${id}/numbers`, order(values));

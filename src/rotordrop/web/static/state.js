@@ -1,4 +1,5 @@
 // What the parts of the page share: one job, one window, one cursor.
+import { menu } from "./menu.js";
 import * as server from "./server.js";
 import { make, sentence } from "./tables.js";
 
@@ -35,12 +36,13 @@ export function say(text, level, ...more) {
   by("status").replaceChildren(make("ul", { class: "words", of: [sentence({ text, level })] }), ...more);
 }
 
-export function showLines(text) {
+export function showLines(text, title = "As Python") {
+  by("linestitle").textContent = title;
   by("code").textContent = text;
   by("lines").showModal();
 }
 
-export const files = (title, ways) => make("span", { class: "files", of: Object.entries({ CSV: ways.csv, SVG: ways.svg, PNG: ways.png, Python: ways.python })
-  .map(([text, click]) => make("button", { text, "aria-label": `${title}: ${text === "Python" ? "as Python" : `save as ${text}`}`,
-    on: { click: () => Promise.resolve(click()).catch((error) => say(error.message, "bad")) } })) });
+const WAYS = { csv: "Save as CSV", svg: "Save as SVG", png: "Save as PNG", python: "As Python", command: "As command" };
+// The one menu of a figure: what can be saved of it, and how it is made again.
+export const files = (title, ways) => menu("⋯", `${title}: save, as Python`, Object.entries(WAYS).filter(([way]) => ways[way]).map(([way, text]) => [text, () => Promise.resolve(ways[way]()).catch((error) => say(error.message, "bad")), { "aria-label": `${title}: ${text[0].toLowerCase()}${text.slice(1)}` }]), { class: "menu files" });
 export const fileName = (title) => `${state.job.name} ${title}${simulated() ? " simulated" : ""}`.replace(/[^\w.-]+/g, "_");
