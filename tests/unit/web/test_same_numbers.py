@@ -303,7 +303,8 @@ def in_python(told: Any, seen: set[int]) -> Iterator[float]:
 def derived(document: dict[str, Any]) -> Iterator[float]:
     """What the page says by a difference of two numbers of the document, and the limit it compares with."""
     for bearing in document["bearings"].values():
-        yield from (one["end_s"] - one["start_s"] for one in bearing["impacts"])
+        ended = (one for one in bearing["impacts"] if one["end_s"] is not None)
+        yield from (one["end_s"] - one["start_s"] for one in ended)
     yield from (one["cross_check"] / one["estimate"] - 1.0 for one in document["cross_check"])
     yield STATIC_STRESS
 
