@@ -19,7 +19,7 @@ _BALLS = 8
 _PRESS = 1e-2
 
 
-def rigid_model(values: dict[str, Any], link: float = LINK) -> DropModel:
+def rigid_model(values: dict[str, Any], link: float = LINK, more: str = "") -> DropModel:
     """Drop model of a rigid rotor.
 
     Parameters
@@ -28,6 +28,8 @@ def rigid_model(values: dict[str, Any], link: float = LINK) -> DropModel:
         m, c, K, n, lam, g; ms, Ks, Cs of the support; where they are there: mu, I, r, me and phase from +x.
     link : float
         Stiffness of the balls [N/m].
+    more : str
+        What the file says beside it.
     """
     v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"], "me": 0.0, "phase": 0.0} | values
     half = 0.5 * v["ms"]
@@ -57,6 +59,7 @@ contact = {{ stiffness = "{v["K"]} N/m^{v["n"]:.4f}", exponent = {v["n"]}, dampi
 friction = {{ static = {v["mu"]}, dynamic = {v["mu"]} }}
 race = {{ mass = "{half} kg", inertia = "{v["I"]} kg m^2", drag_coefficient = 0.0 }}
 support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"]} N s/m" }}
+{more}
 """
     )
     model = build_drop_model(machine, Reduction(modes=2, attachment=False))

@@ -2,23 +2,101 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotordrop.elements.description import Misfit, Name, Placed
+from rotordrop.elements.description import Misfit, Name, Placed, Usual
+from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
-from rotordrop.elements.values import PositiveLength
+from rotordrop.elements.values import ContactDamping, NonNegative, PositiveLength, Stiffness
+from rotordrop.known import Known
+from rotordrop.physics import blocks
 from rotordrop.units import format_quantity
+
+_OF_CONTACT: Mapping[str, tuple[float, tuple[float, float], str, str]] = {
+    "friction": (0.2, (0.05, 0.4), "metals that rub dry, chosen and not measured", "1"),
+    "damping": (0.1, (0.0, 0.5), "contact damping of steel at low speed", "s/m"),
+}
+"""What a contact is where the file gives its stiffness alone: value, range, why, unit."""
+
+SMOOTHING_SPEED, STRIBECK_SPEED = 0.02, 1.0
+"""Sliding speed [m/s] below which the friction is smoothed; the other one changes nothing where static and
+dynamic coefficient are one."""
 
 
 class Clearance(Placed):
-    """A radial gap between rotor and housing that no force acts in: a drop is judged by how much it uses."""
+    """A radial gap between rotor and housing: a drop is judged by how much it uses.
+
+    With a stiffness the rotor touches the housing there; without one no force acts.
+    """
 
     name: Name
     """Name of the place, such as "seal"."""
     gap: PositiveLength
     """Radial gap [m]."""
+    stiffness: Stiffness | None = None
+    """Stiffness of the housing where the rotor touches it [N/m]."""
+    friction: NonNegative | None = None
+    """With a stiffness: friction coefficient there [1]; 0.2."""
+    damping: ContactDamping | None = None
+    """With a stiffness: contact damping λ [s/m]; 0.1."""
+    radius: PositiveLength | None = None
+    """With a stiffness: radius of the rotor there [m]; that of the shaft."""
+
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "friction": Usual(
+            least=0.005,
+            most=0.8,
+            kind="dimensionless",
+            look="metals that rub have 0.05 to 0.4; is it in percent?",
+            label="friction",
+        ),
+    }
+
+    def check(self) -> None:
+        """Refuse a contact without a stiffness."""
+        super().check()
+        for key in ("friction", "damping", "radius"):
+            if self.stiffness is None and key in self.model_fields_set:
+                raise Misfit(
+                    f"the clearance {self.name!r} has a {key!r} but no 'stiffness', without which no force "
+                    'acts; give it, such as stiffness = "4e7 N/m", or leave it out',
+                    (key,),
+                )
+
+    def completed(self, rotor: Rotor) -> dict[str, Any]:
+        """What its contact leaves out, on a rotor."""
+        if self.stiffness is None:
+            return {}
+        given = self.model_fields_set
+        values = {
+            key: Known(value=value, status="default", range=bounds, source=why, unit=unit)
+            for key, (value, bounds, why, unit) in _OF_CONTACT.items()
+            if key not in given
+        }
+        if "radius" not in given:
+            beside = rotor.elements[max(self.node - 2, 0) : self.node]
+            most = max(one.layer_diameter or one.outer_diameter for one in beside)
+            why = "the radius of the shaft there"
+            values["radius"] = Known(value=0.5 * most, status="inferred", source=why, unit="m")
+        return values
+
+    def touch(self) -> NDArray[np.float64]:
+        """The numbers of its contact for `rotordrop.physics.touch`."""
+        from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
+
+        assert self.stiffness and self.friction and self.damping and self.radius
+        numbers = np.zeros(blocks.TOUCH_N_ENTRIES)
+        numbers[blocks.TOUCH_AIR_GAP], numbers[blocks.TOUCH_ROTOR_RADIUS] = self.gap.value, self.radius.value
+        numbers[blocks.TOUCH_BORE_RADIUS] = self.radius.value + self.gap.value
+        numbers[[blocks.TOUCH_FRICTION_STATIC, blocks.TOUCH_FRICTION_DYNAMIC]] = self.friction.value
+        numbers[blocks.TOUCH_STRIBECK_SPEED] = STRIBECK_SPEED
+        numbers[blocks.TOUCH_SMOOTHING_SPEED] = SMOOTHING_SPEED
+        numbers[blocks.TOUCH_LAW :] = contact_law(self.stiffness.value, 1.0, self.damping.value)
+        return numbers
 
 
 def check_clearances(

@@ -134,6 +134,7 @@ class Machine(Description):
             return sensor.completed_with({"bearing": nearest.name})
 
         values: dict[str, Any] = {
+            "clearances": tuple(one.completed_with(one.completed(rotor)) for one in self.clearances),
             "ambs": tuple(amb.completed_with(amb.completed(carried)) for amb in self.ambs),
             "sensors": tuple(assigned(sensor) for sensor in self.sensors if not sensor.lost),
         }

@@ -162,8 +162,10 @@ class KernelParameters(NamedTuple):
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
     of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
     (B, ·) or (0, ·) holds what `physics.departure` reads. ``load`` (K, ·), ``load_shape`` (K, m) and
-    ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``memory`` is
-    what is remembered beside the state: a right-hand side reads it, an accepted step alone writes it
+    ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``rub`` (N, · + m) are the contacts of
+    the rotor with its housing, numbers of `physics.touch` and then shape, ``stops`` (S,) the bearings whose
+    mount has a stop; the log has both behind the contacts with races. ``memory`` is what is remembered
+    beside the state: a right-hand side reads it, an accepted step alone writes it
     (`simulate._loop.remember`). No element of today has any; its length is zero.
     """
 
@@ -189,4 +191,6 @@ class KernelParameters(NamedTuple):
     load: Array
     load_shape: Array
     load_points: Array
+    rub: Array
+    stops: Integers
     memory: Array

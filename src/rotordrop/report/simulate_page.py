@@ -17,12 +17,14 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
 CLEARANCES = (
-    Column("clearance", "name"),
+    Column("clearance", lambda use: f"{use.name}, stop of the mount" if use.stop else use.name),
     Column("node", lambda use: str(use.node)),
     Column("gap", "gap", "length"),
     Column("largest travel", "travel", "length"),
     Column("travel over gap", "share", "dimensionless", 3),
     Column("at", "time", "time", 3),
+    Column("contacts", lambda use: "no force acts" if use.count is None else str(use.count)),
+    Column("largest force", "peak_force", "force"),
 )
 
 

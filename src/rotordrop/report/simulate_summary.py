@@ -80,16 +80,10 @@ def _verdict(
     if machine is not None:
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
-        said += [*_stops(result, machine), *_springs(result, machine), *_thrown(result, machine)]
+        said += [*_springs(result, machine), *_thrown(result, machine)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
     said += [static_limit_statement(bearing) for bearing in bearings]
-    for use in uses:
-        travel, gap = shown(use.travel, "length", 3), shown(use.gap, "length", 3)
-        touches = use.share >= 1.0
-        text = f"{use.name}: the rotor travels {travel} of a gap of {gap}" + (
-            ", so it touches there; no force acts in a clearance." if touches else "."
-        )
-        said.append(Statement(text, "bad" if touches else "good"))
+    said += [_used(use) for use in uses]
     if machine is not None and machine.defaults_in_use:
         count = len(machine.defaults_in_use)
         text = (
@@ -99,24 +93,24 @@ def _verdict(
     return tuple(said)
 
 
-def _stops(result: DropResult, machine: Machine) -> list[Statement]:
-    """Whether a mount reached its stop."""
-    said = []
-    for b, bearing in enumerate(machine.touchdown_bearings):
-        if bearing.mount.stop is None:
-            continue
-        travel = np.hypot(*result.support_displacement[:, b].T)
-        gap, largest = float(bearing.mount.stop.gap), float(travel.max())
-        moved, free = shown(largest, "length"), shown(gap, "length")
-        if largest > gap:
-            first = shown(result.time[np.argmax(travel > gap)], "time")
-            text = f"{bearing.name}: the mount reached its stop at {first}; it moved {moved} of {free}."
-            said.append(Statement(text, "warning"))
+def _used(use: ClearanceUse) -> Statement:
+    """What a drop used of a clearance or of the way up to a stop, and the force there."""
+    travel, gap = shown(use.travel, "length", 3), shown(use.gap, "length", 3)
+    share = f"{travel} of {gap} ({100.0 * use.share:.3g} %)"
+    text = f"{use.name}: the mount moves {share}" if use.stop else f"{use.name}: the rotor travels {share}"
+    if use.contacts is None:
+        touches = use.share >= 1.0
+        text += ", so it touches there; no force acts in a clearance without stiffness." if touches else "."
+    else:
+        touches = len(use.contacts) > 0
+        what = "reaches its stop" if use.stop else "touches the housing"
+        if touches:
+            times = "once" if use.count == 1 else f"{use.count} times"
+            first, force = shown(use.contacts.start[0], "time", 3), shown(use.peak_force, "force", 3)
+            text += f" and {what} {times}, first at {first}, with {force} at most."
         else:
-            said.append(
-                Statement(f"{bearing.name}: the mount did not reach its stop; it moved {moved} of {free}.")
-            )
-    return said
+            text += f" and never {what}."
+    return Statement(text, ("warning" if use.stop else "bad") if touches else "good")
 
 
 def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:

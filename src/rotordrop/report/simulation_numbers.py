@@ -36,7 +36,7 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
             "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
             "contact_half_width_m": {"value": half_width},
         }
-    numbers = {
+    numbers: dict[str, Any] = {
         "machine": result.machine_name,
         "method": "simulation",
         "speed_Hz": result.initial_speed / (2 * math.pi),
@@ -47,15 +47,16 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
         "certificate": parts,
         "bearings": bearings,
     }
-    if machine is not None and machine.clearances:
-        numbers["clearances"] = {
-            use.name: {
-                "node": use.node,
-                "gap_m": use.gap,
-                "largest_travel_m": use.travel,
-                "travel_over_gap": use.share,
-                "time_s": use.time,
-            }
-            for use in clearance_uses(machine, result)
+    for use in () if machine is None else clearance_uses(machine, result):
+        entry = {
+            "node": use.node,
+            "gap_m": use.gap,
+            "largest_travel_m": use.travel,
+            "travel_over_gap": use.share,
+            "time_s": use.time,
         }
+        if use.contacts is not None:
+            entry |= {"contacts": len(use.contacts), "peak_force_N": use.peak_force}
+            entry |= {"first_contact_s": float(use.contacts.start[0])} if len(use.contacts) else {}
+        numbers.setdefault("stops" if use.stop else "clearances", {})[use.name] = entry
     return numbers

@@ -20,6 +20,7 @@ from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.spread import ends, percent, study_numbers_of
 from rotordrop.report.style import SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
+from rotordrop.simulate.clearances import share_column, stopped
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
 from rotordrop.study.sensitivity import influences
@@ -116,9 +117,12 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
                 f"{bearing.name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
             )
             said.append(Statement(text, "notice" if over.high < 0.5 else "warning"))
-    for clearance in results.study.machine.clearances:
-        touching = results.exceedance(f"{clearance.name}.travel_over_gap", 1.0)
-        text = f"{clearance.name}: the rotor touches in {percent(touching)} of the drops."
+    machine = results.study.machine
+    places = [(one.name, False, "the rotor touches") for one in machine.clearances]
+    places += [(name, True, "the mount reaches its stop") for name in stopped(machine)]
+    for name, stop, happens in places:
+        touching = results.exceedance(share_column(name, stop), 1.0)
+        text = f"{name}: {happens} in {percent(touching)} of the drops."
         said.append(Statement(text, "notice" if touching.value == 0.0 else "warning"))
     return [*said, Statement(SCOPE)]
 

@@ -14,7 +14,7 @@ from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics import aerodynamics, departure
+from rotordrop.physics import aerodynamics, blocks, departure
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
@@ -163,6 +163,7 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
     uniform = product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))
     return {
         **_loads(machine, basis, uniform),
+        **_rubs(machine, basis),
         "bearing": rows,
         "balls": places_of([numbers_of(bearing) for bearing in bearings]),
         **_of_fast_balls(machine, rows),
@@ -203,6 +204,15 @@ def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Arr
         "load_shape": np.ascontiguousarray(np.array(shapes).reshape(len(shapes), basis.size)),
         "load_points": points,
     }
+
+
+def _rubs(machine: Machine, basis: RotorBasis) -> dict[str, Any]:
+    """Numbers and shapes of the contacts of the rotor with its housing; bearings that have a stop."""
+    rubbing = [one for one in machine.clearances if one.stiffness is not None]
+    stops = [b for b, bearing in enumerate(machine.touchdown_bearings) if bearing.mount.stop is not None]
+    rows = [np.concatenate([one.touch(), basis.node_row(one.node)]) for one in rubbing]
+    rub = np.array(rows).reshape(len(rubbing), blocks.TOUCH_N_ENTRIES + basis.size)
+    return {"rub": rub, "stops": np.array(stops, dtype=np.int64)}
 
 
 def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:

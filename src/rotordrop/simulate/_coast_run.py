@@ -133,8 +133,9 @@ def begin(setup: Setup) -> Run:
     progress = np.zeros(_loop.N_PROGRESS)
     progress[_loop.STEP] = FIRST_STEP
     progress[_loop.PREVIOUS_ERROR] = 1.0
-    running = np.zeros((n_b, _loop.N_RUN_COLUMNS))
-    log = np.zeros((n_b, _loop.N_LOG_COLUMNS))
+    n_watched = _loop.number_watched(setup.parameters)
+    running = np.zeros((n_watched, _loop.N_RUN_COLUMNS))
+    log = np.zeros((n_watched, _loop.N_LOG_COLUMNS))
     progress[_loop.LOGGED] = _loop.start_running(start, 0.0, setup.parameters, running, log)
     whirl = np.zeros((n_b, C.N_WHIRL))
     relative = relative_displacement(setup, start[None, :])[0]
@@ -179,7 +180,7 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     first, window_end = int(status[SAMPLE]), case.window_end(int(status[WINDOW]))
     rows = window_end - first + 1
     states = np.empty((rows, len(run.state)))
-    histories = np.empty((rows, len(run.running), H.N_HISTORIES))
+    histories = np.empty((rows, len(run.whirl), H.N_HISTORIES))
     states[0] = run.state
     H.bearing_histories(
         _grid(first, first + 1, case.output_step), states[:1], setup.parameters, histories[:1]
@@ -247,7 +248,7 @@ def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -
             states[: len(times)],
             log,
             run.running,
-            np.zeros((len(run.running) + 1, N_PLACES)),
+            np.zeros((len(run.whirl) + 1, N_PLACES)),
             run.peaks,
             run.progress,
         )
@@ -295,12 +296,12 @@ def _ended_contacts(run: Run, log: Array, already_open: int) -> tuple[Array, Arr
     """
     count = min(int(run.progress[_loop.LOGGED]), len(log))
     entries = log[:count]
-    n_b = len(run.running)
-    began = np.bincount(entries[already_open:, _loop.LOG_CONTACT].astype(int), minlength=n_b)
+    n_b = len(run.whirl)
+    began = np.bincount(entries[already_open:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
     if not run.windows["window_rows"]:
-        began = np.bincount(entries[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)
+        began = np.bincount(entries[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
     ended = entries if run.status[PHASE] != RUNNING else entries[~np.isnan(entries[:, _loop.LOG_END])]
-    ended = ended.copy()
+    ended = ended[ended[:, _loop.LOG_CONTACT] < n_b]  # of rotor and races; stops and housing are not kept
     for b in range(n_b):
         mine = ended[ended[:, _loop.LOG_CONTACT] == b]
         run.totals[b, 1] += float(np.sum(mine[:, _loop.LOG_DISSIPATED]))
@@ -422,7 +423,7 @@ def _carry_contacts(run: Run, histories: Array, begun: float, step: float, log: 
     """Bring the open contacts and the peaks up to the end of a settled stretch."""
     force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
     values = (histories[..., H.H_DELTA], force, histories[..., H.H_STRESS])
-    for b in range(len(run.running)):
+    for b in range(len(run.whirl)):
         row = log[int(run.running[b, _loop.RUN_IN_CONTACT]) - 1]
         normal, power = histories[:, b, H.H_CONTACT_FORCE], histories[:, b, H.H_CONTACT_POWER]
         row[_loop.LOG_IMPULSE] += step * float(np.sum(normal))

@@ -25,6 +25,7 @@ from rotordrop.simulate._rhs import (
     race_deflection,
     relative_motion,
     ring_travel,
+    rub_values,
     scratch_of,
     support_deflection,
 )
@@ -120,6 +121,17 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @lean_kernel
+def rub_energy(y: Array, p: KernelParameters) -> float:
+    """Energy [J] in the contacts of the rotor with its housing."""
+    energy = 0.0
+    for i in range(p.rub.shape[0]):
+        delta = rub_values(i, y, p)[0]
+        if delta > 0.0:
+            energy += contact_energy(p.rub[i, blocks.TOUCH_LAW : blocks.TOUCH_N_ENTRIES], delta)
+    return energy
+
+
+@lean_kernel
 def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     n_q = p.rotor_at[L.N_COORDINATES]
@@ -157,6 +169,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
+    energy += rub_energy(y, p)
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
     return energy

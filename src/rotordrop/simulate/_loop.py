@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_table, blocks
+from rotordrop.physics import ball_table, blocks, mount
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
@@ -29,7 +29,9 @@ from rotordrop.simulate._rhs import (
     race_deflection,
     relative_motion,
     ring_travel,
+    rub_values,
     scratch_of,
+    support_deflection,
 )
 from rotordrop.simulate._tableau import Tableau
 
@@ -209,6 +211,42 @@ def contact_at(t: float, c: int, y: Array, p: KernelParameters, out: Array) -> N
 
 
 @lean_kernel
+def further_values(
+    c: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
+    """A contact other than of rotor and race: of a support with its stop, or of rotor and housing behind."""
+    if c >= p.stops.shape[0]:
+        return rub_values(c - p.stops.shape[0], y, p)
+    b = p.stops[c]
+    x, z, vx, vz = support_deflection(b, y, p)
+    numbers = p.bearing[b, L.MOUNT : L.MOUNT_END]
+    radius = math.sqrt(x * x + z * z)
+    depth = radius - numbers[blocks.MOUNT_STOP_GAP]
+    if depth <= 0.0:
+        return depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    F_x, F_y, lost = mount.stop_force(numbers, x, z, vx, vz)
+    return depth, math.sqrt(F_x * F_x + F_y * F_y), 0.0, x / radius, z / radius, 0.0, lost
+
+
+@inner_kernel
+def watched(
+    t: float, c: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
+    """One of all contacts that are logged, in the order of `rotordrop.physics.touch.touch`.
+
+    Those of rotor and races come first.
+    """
+    if c < p.contact_at.shape[0]:
+        return contact_values(t, c, p.contact_at[c, L.CONTACT_BEARING], y, p)
+    return further_values(c - p.contact_at.shape[0], y, p)
+
+
+def number_watched(p: KernelParameters) -> int:
+    """Number of contacts that are logged."""
+    return len(p.contact_at) + len(p.stops) + len(p.rub)
+
+
+@lean_kernel
 def crossing_fraction(
     t: float,
     c: int,
@@ -223,15 +261,18 @@ def crossing_fraction(
     """Fraction of a step at which the indentation changes sign, by bisection on the dense output."""
     # Bisection, not Newton: the normal speed may pass zero within the step, and thirty halvings are few
     # against the right-hand sides of a step.
-    b = p.contact_at[c, L.CONTACT_BEARING]
+    b = p.contact_at[c, L.CONTACT_BEARING] if c < p.contact_at.shape[0] else 0
     low = 0.0
     high = 1.0
     for _ in range(30):
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
-        ux, uy, _vx, _vy = relative_motion(c, b, scratch, p)
-        gap = gap_at(t + middle * h, b, scratch, p)
-        if (math.sqrt(ux * ux + uy * uy) > gap) == (delta_0 > 0.0):
+        if c < p.contact_at.shape[0]:  # its motion alone: the forces of thirty halvings cost a step
+            ux, uy, _vx, _vy = relative_motion(c, b, scratch, p)
+            inside = math.sqrt(ux * ux + uy * uy) > gap_at(t + middle * h, b, scratch, p)
+        else:
+            inside = further_values(c - p.contact_at.shape[0], scratch, p)[0] > 0.0
+        if inside == (delta_0 > 0.0):
             low = middle
         else:
             high = middle
@@ -263,9 +304,8 @@ def log_contacts(
 ) -> int:
     """Update the contact log with an accepted step; returns the number of entries opened so far."""
     scratch_time = -math.inf
-    for c in range(p.contact_at.shape[0]):
-        b = p.contact_at[c, L.CONTACT_BEARING]
-        delta, force, _friction, nx, ny, sliding, lost = contact_values(t + h, c, b, y_new, p)
+    for c in range(running.shape[0]):
+        delta, force, _friction, nx, ny, sliding, lost = watched(t + h, c, y_new, p)
         power = sliding + lost
         was = running[c, RUN_IN_CONTACT] > 0.0
         touches = delta > 0.0
@@ -292,9 +332,7 @@ def log_contacts(
             if middle != scratch_time:
                 dense_output((middle - t) / h, h, y, k, tab, scratch)
                 scratch_time = middle
-            _delta, between, _friction, mid_x, mid_y, mid_sliding, mid_lost = contact_values(
-                middle, c, b, scratch, p
-            )
+            _delta, between, _friction, mid_x, mid_y, mid_sliding, mid_lost = watched(middle, c, scratch, p)
             mid_power = mid_sliding + mid_lost
             sixth = (end - begin) / 6.0
             log[row, LOG_IMPULSE] += sixth * (running[c, RUN_FORCE] + 4.0 * between + force)
@@ -317,9 +355,8 @@ def log_contacts(
 def start_running(y: Array, t: float, p: KernelParameters, running: Array, log: Array) -> int:
     """Fill the running contacts from a state that may already touch; returns the number of entries opened."""
     n_log = 0
-    for c in range(p.contact_at.shape[0]):
-        b = p.contact_at[c, L.CONTACT_BEARING]
-        delta, force, _friction, nx, ny, sliding, lost = contact_values(t, c, b, y, p)
+    for c in range(running.shape[0]):
+        delta, force, _friction, nx, ny, sliding, lost = watched(t, c, y, p)
         power = sliding + lost
         running[c, RUN_IN_CONTACT] = 0.0
         running[c, RUN_FORCE] = force
@@ -424,8 +461,8 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         Filled with the states on the grid, as far as they were reached.
     log : ndarray, shape (R, 9)
         Contacts, columns ``LOG_*``; the first entries are those still open.
-    running : ndarray, shape (C, 5)
-        The running contacts, from `start_running`.
+    running : ndarray, shape (W, 5)
+        The running contacts of all that are `watched`, from `start_running`.
     books : ndarray, shape (B + 1, 5)
         Energy lost so far by place [J].
     peaks : ndarray, shape (B, 7) or (0, 7)
@@ -553,7 +590,7 @@ def integrate_drop(
     """
     p = p._replace(memory=p.memory.copy())
     y = np.array(y0, dtype=np.float64)
-    running = np.zeros((p.contact_at.shape[0], N_RUN_COLUMNS))
+    running = np.zeros((number_watched(p), N_RUN_COLUMNS))
     log[:] = 0.0
     progress = np.zeros(N_PROGRESS)
     progress[[TIME, STEP]] = times[0], min(first_step, largest_step)

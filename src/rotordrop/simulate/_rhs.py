@@ -31,7 +31,7 @@ OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 # Places where power is lost: columns of `Scratch.power`, a row for each bearing; the last row is the rotor's.
 SLIDING, IN_CONTACT, BALL_SET, SUPPORT, DRAG = range(5)
 N_PLACES = 5
-BENDING = 0
+BENDING, RUBBING = range(2)
 
 
 class Scratch(NamedTuple):
@@ -362,6 +362,41 @@ def add_contact(
     return F_mu, sliding, lost
 
 
+@lean_kernel
+def rub_values(
+    i: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
+    """One contact of the rotor with its housing, in the order of `rotordrop.physics.touch.touch`."""
+    numbers, shape = p.rub[i, : blocks.TOUCH_N_ENTRIES], p.rub[i, blocks.TOUCH_N_ENTRIES :]
+    qx, qy, sx, sy = modal_parts(y, p)
+    ux, uy, vx, vy = project(shape, qx), project(shape, qy), project(shape, sx), project(shape, sy)
+    gap, law = numbers[blocks.TOUCH_AIR_GAP], numbers[blocks.TOUCH_LAW :]
+    return touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], 0.0)
+
+
+@lean_kernel
+def add_rubs(y: Array, p: KernelParameters, dy: Array, power: Array) -> tuple[float, float]:
+    """Add the contacts of the rotor with its housing, which stands still.
+
+    Returns the friction torque on the rotor [N m] and the power lost [W], which stands in ``power`` too.
+    """
+    _, _, ax, ay = modal_parts(dy, p)
+    torque = 0.0
+    total = 0.0
+    for i in range(p.rub.shape[0]):
+        delta, F_r, F_mu, nx, ny, sliding, lost = rub_values(i, y, p)
+        if delta <= 0.0:
+            continue
+        shape, x, z = p.rub[i, blocks.TOUCH_N_ENTRIES :], F_r * nx - F_mu * ny, F_r * ny + F_mu * nx
+        for k in range(shape.shape[0]):
+            ax[k] -= shape[k] * x
+            ay[k] -= shape[k] * z
+        torque -= F_mu * p.rub[i, blocks.TOUCH_ROTOR_RADIUS]
+        total += sliding + lost
+    power[RUBBING] = total
+    return torque, total
+
+
 @inner_kernel
 def add_race(
     b: int, friction: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
@@ -529,6 +564,8 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
     dy[p.rotor_at[L.WORK_IN]] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
+    if p.rub.shape[0] > 0:  # first, where no value of a bearing is held in a register
+        contact_torque, dissipated = add_rubs(y, p, dy, work.power[p.bearing.shape[0]])
     for b in range(p.bearing.shape[0]):
         torque, lost = bearing_accelerations(t, b, y, p, dy, work)
         contact_torque += torque

@@ -34,7 +34,7 @@ _DIMENSIONS = {
     "magnet": 2,
 }
 _DIMENSIONS |= dict.fromkeys(("bearing_at", "contact_at", "magnet_at", "departure", "load"), 2)
-_DIMENSIONS |= dict.fromkeys(("load_shape", "load_points"), 2)
+_DIMENSIONS |= dict.fromkeys(("load_shape", "load_points", "rub"), 2)
 
 
 def _parameters() -> KernelParameters:

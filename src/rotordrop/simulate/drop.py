@@ -140,6 +140,8 @@ def _result(
     H.bearing_histories(times, states, parameters, histories)
     displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
+    of_races = log[:, _loop.LOG_CONTACT] < n_b
+    contacts, further = _contact_log(log[of_races], 0), _further_names(model)
     return DropResult(
         time=times,
         displacement=displacement,
@@ -156,7 +158,9 @@ def _result(
         speed=states[:, layout.rotor_speed],
         race_speed=states[:, layout.race_spin],
         state=states,
-        contacts=_contact_log(parameters, log),
+        contacts=contacts,
+        further_contacts=_contact_log(log[~of_races], n_b) if further else None,
+        further_names=further,
         bearing_names=model.bearing_names,
         state_names=layout.names(model.bearing_names),
         shapes=model.basis.shapes,
@@ -166,7 +170,7 @@ def _result(
         reduction=model.basis.description,
         steps=int(counters[0]),
         rejected_steps=int(counters[1]),
-        outcome=_sentence(outcome, case, counters, len(log), n_b),
+        outcome=_sentence(outcome, case, counters, len(contacts), n_b),
         finished=outcome == _loop.FINISHED,
         certificate=_energy_certificate(model, parameters, times, states, force),
     )
@@ -179,9 +183,14 @@ def _race_stress(parameters: KernelParameters, histories: Array) -> Array | None
     return histories[..., [H.H_INNER_STRESS, H.H_OUTER_STRESS]]
 
 
-def _contact_log(parameters: KernelParameters, log: Array) -> ContactLog:
+def _further_names(model: DropModel) -> tuple[str, ...]:
+    stops = [f"{model.bearing_names[b]}.mount.stop" for b in model.parameters.stops]
+    return (*stops, *(one.name for one in model.machine.clearances if one.stiffness is not None))
+
+
+def _contact_log(log: Array, first: int) -> ContactLog:
     return ContactLog(
-        bearing=parameters.contact_at[log[:, _loop.LOG_CONTACT].astype(np.int64), L.CONTACT_BEARING],
+        bearing=log[:, _loop.LOG_CONTACT].astype(np.int64) - first,
         start=log[:, _loop.LOG_START].copy(),
         end=log[:, _loop.LOG_END].copy(),
         peak_force=log[:, _loop.LOG_PEAK_FORCE].copy(),

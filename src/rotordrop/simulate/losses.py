@@ -35,12 +35,14 @@ class Losses:
     own: the drag is counted above, the rest is still in the race."""
     bending: float
     """Damping of the rotor's modes."""
+    rubbing: float
+    """Contacts of the rotor with its housing."""
 
     @property
     def total(self) -> float:
         """Sum of all that is lost; the book of the time loop."""
         parts = (self.sliding, self.contact, self.ball_set, self.support, self.drag)
-        return float(sum(part.sum() for part in parts)) + self.bending
+        return float(sum(part.sum() for part in parts)) + self.bending + self.rubbing
 
 
 def losses(model: DropModel, result: DropResult) -> Losses:
@@ -68,4 +70,5 @@ def losses(model: DropModel, result: DropResult) -> Losses:
         drag=lost[:, R.DRAG],
         spin_up=gained + lost[:, R.DRAG],
         bending=float(result.lost[-1, R.BENDING]),
+        rubbing=float(result.lost[-1, R.RUBBING]),
     )

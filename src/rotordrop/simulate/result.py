@@ -32,7 +32,7 @@ class ContactLog:
     Attributes
     ----------
     bearing : ndarray of int
-        Index of the bearing.
+        Index of the bearing, of further contacts that of their name.
     start, end, duration : ndarray
         Times [s]; ``end`` is NaN when the contact still lasts.
     peak_force, peak_time, azimuth : ndarray
@@ -118,6 +118,10 @@ class DropResult:
     race_stress: Array | None = field(default=None, repr=False)
     """Largest Hertz stress on inner and outer race [Pa], shape (T, B, 2), of a machine with ball_inertia; a
     bearing of it without has zero on its outer race. None where the inner race governs everywhere."""
+    further_names: tuple[str, ...] = ()
+    further_contacts: ContactLog | None = field(default=None, repr=False)
+    """Contacts of supports with their stops, such as "DE.mount.stop", and of the rotor with its housing, by
+    the name of the clearance."""
 
     def index_of(self, bearing: int | str) -> int:
         """Place of a bearing, given by name or by number from 0.
@@ -147,6 +151,12 @@ class DropResult:
         if name not in self.state_names:
             return np.zeros(len(self.time))
         return self.state[:, self.state_names.index(name)]
+
+    def contacts_at(self, name: str) -> ContactLog | None:
+        """The contacts at a stop or a clearance; None where no force acts."""
+        if self.further_contacts is None or name not in self.further_names:
+            return None
+        return self.further_contacts.of_bearing(self.further_names.index(name))
 
     def __repr__(self) -> str:
         """Machine, speed, length, peaks and outcome."""
@@ -245,16 +255,15 @@ def _write(result: DropResult, file: Any) -> None:
     _scale(file, "bearing", np.array(result.bearing_names, dtype=text))
     _scale(file, "axis", np.array(["x", "y"], dtype=text))
     _scale(file, "state_name", np.array(result.state_names, dtype=text))
-    _scale(file, "contact", np.arange(len(result.contacts), dtype=np.int64))
     _scale(file, "coordinate", np.arange(result.shapes.shape[0], dtype=np.int64))
     _scale(file, "mode", np.arange(result.shapes.shape[1], dtype=np.int64))
     for name, axes, unit, words in HISTORIES:
         _dataset(file, name, getattr(result, name), axes, unit, words)
     _dataset(file, "shapes", result.shapes, ("coordinate", "mode"), "1", "mode shapes of a plane")
-    for item in fields(ContactLog):
-        _dataset(
-            file, f"contact_{item.name}", getattr(result.contacts, item.name), ("contact",), "", item.name
-        )
+    _write_log(file, "contact", result.contacts)
+    if result.further_contacts is not None:
+        _write_log(file, "further_contact", result.further_contacts)
+        _scale(file, "further_name", np.array(result.further_names, dtype=text))
     for item in fields(LineContact):
         values = np.array([getattr(line, item.name) for line in result.line_contacts])
         _dataset(file, f"line_contact_{item.name}", values, ("bearing",), "", f"rotor on race: {item.name}")
@@ -271,6 +280,12 @@ def _write(result: DropResult, file: Any) -> None:
         value = getattr(result.certificate, item.name)
         if value is not None:
             file.attrs[f"certificate_{item.name}"] = value
+
+
+def _write_log(file: Any, prefix: str, log: ContactLog) -> None:
+    _scale(file, prefix, np.arange(len(log), dtype=np.int64))
+    for item in fields(ContactLog):
+        _dataset(file, f"{prefix}_{item.name}", getattr(log, item.name), (prefix,), "", item.name)
 
 
 def _dataset(file: Any, name: str, values: Any, axes: tuple[str, ...], unit: str, words: str) -> None:
@@ -313,13 +328,10 @@ def _read(file: Any) -> DropResult:
     values["steps"] = int(file.attrs["steps"])
     values["rejected_steps"] = int(file.attrs["rejected_steps"])
     values["finished"] = bool(file.attrs["finished"])
-    unknown = np.full(len(file["contact"]), np.nan)  # files of before the split of the contact's loss
-    values["contacts"] = ContactLog(
-        **{
-            f.name: file[name][()] if (name := f"contact_{f.name}") in file else unknown
-            for f in fields(ContactLog)
-        }
-    )
+    values["contacts"] = _read_log(file, "contact")
+    if "further_name" in file:
+        values["further_names"] = tuple(file["further_name"].asstr()[()])
+        values["further_contacts"] = _read_log(file, "further_contact")
     lines = {f.name: file[f"line_contact_{f.name}"][()].tolist() for f in fields(LineContact)}
     values["line_contacts"] = tuple(
         LineContact(**dict(zip(lines, numbers, strict=True))) for numbers in zip(*lines.values(), strict=True)
@@ -333,3 +345,13 @@ def _read(file: Any) -> DropResult:
     for name in ("lost", "race_stress"):
         values[name] = file[name][()] if name in file else None
     return DropResult(**values)
+
+
+def _read_log(file: Any, prefix: str) -> ContactLog:
+    unknown = np.full(len(file[prefix]), np.nan)  # files of before the split of the contact's loss
+    return ContactLog(
+        **{
+            f.name: file[name][()] if (name := f"{prefix}_{f.name}") in file else unknown
+            for f in fields(ContactLog)
+        }
+    )

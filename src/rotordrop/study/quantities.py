@@ -13,7 +13,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.simulate.clearances import clearance_uses
+from rotordrop.simulate.clearances import clearance_uses, share_column, stopped
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
@@ -90,8 +90,11 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
     of_parts = [(f"{b}.{q.name}", q.kind, f"{b}: {q.meaning}") for b in names for q in BEARING_QUANTITIES]
     of_parts += [(f"{a.name}.largest_displacement", "length", rubs.format(a.name)) for a in machine.ambs]
     used = "largest displacement over the gap of the clearance {}: touches there from one on"
-    names = [clearance.name for clearance in machine.clearances]
-    of_parts += [(f"{name}.travel_over_gap", "dimensionless", used.format(name)) for name in names]
+    of_parts += [
+        (share_column(one.name, False), "dimensionless", used.format(one.name)) for one in machine.clearances
+    ]
+    way = "largest deflection of the support over the gap of the stop of {}: stopped from one on"
+    of_parts += [(share_column(b, True), "dimensionless", way.format(b)) for b in stopped(machine)]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 

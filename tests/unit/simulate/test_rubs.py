@@ -1,0 +1,166 @@
+"""Drops in which the rotor touches its housing, and mounts their stops: forces, energy, log, what is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import MachineFileError, RecordError
+from rotordrop.evidence.evidence import read_evidence
+from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop.machine.saving import machine_text
+from rotordrop.record import example_record_path, read_record
+from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.clearances import clearance_uses
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.losses import losses
+from rotordrop.simulate.result import load_result
+
+TEXT = example_path("small").read_text(encoding="utf-8")
+HEAD = '[[touchdown_bearings]]\nname = "DE"'
+SPEED = 2.0 * np.pi * 200.0
+CASE = DropCase(speed=SPEED, duration=0.03, reduction="quick")
+RUB = 'stiffness = "4e7 N/m"'
+
+
+def sealed(*lines, gap=None, text=TEXT):
+    """The small machine with a seal in the middle, by default 5 µm wider than the air gap."""
+    machine = loads_machine(text)
+    node = (machine.touchdown_bearings[0].node + machine.touchdown_bearings[1].node) // 2
+    widest = max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+    of = (
+        f'\n[[clearances]]\nname = "seal"\nnode = {node}\ngap = "{widest + 5e-6 if gap is None else gap} m"\n'
+    )
+    return loads_machine(text + of + "\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def rubbed():
+    return sealed(RUB)
+
+
+@pytest.fixture(scope="module")
+def drop(rubbed):
+    return simulate_drop(build_drop_model(rubbed, "quick"), CASE)
+
+
+def test_energy_closes_by_place(rubbed, drop):
+    assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
+    found = losses(build_drop_model(rubbed, "quick"), drop)
+    assert found.total == pytest.approx(
+        drop.state[-1, drop.state_names.index("dissipated energy")], rel=1e-12
+    )
+    logged = float(np.sum(drop.contacts_at("seal").dissipated_energy))
+    assert 0.0 < found.rubbing == pytest.approx(logged, rel=1e-3)
+
+
+def test_the_log_is_that_of_the_motion(rubbed, drop):
+    (use,) = clearance_uses(rubbed, drop)
+    radius = np.linalg.norm(drop.at_nodes([use.node])[:, 0], axis=-1)
+    log = use.contacts
+    assert len(log) > 1
+    assert use.peak_force == pytest.approx(4e7 * (use.travel - use.gap), rel=0.05)
+    inside = np.zeros(len(drop.time), dtype=bool)
+    for start, end in zip(log.start, log.end, strict=True):
+        inside |= (drop.time > start) & ~(drop.time >= end)
+    assert np.array_equal(inside, radius > use.gap)
+
+
+def test_a_housing_out_of_reach_changes_nothing():
+    plain = simulate_drop(loads_machine(TEXT), CASE)
+    far = simulate_drop(sealed(RUB, gap=5e-3), CASE)
+    assert np.array_equal(plain.displacement, far.displacement)
+    assert np.array_equal(plain.contacts.impulse, far.contacts.impulse)
+    assert len(far.contacts_at("seal")) == 0
+
+
+def test_friction_brakes_the_rotor_and_a_mirrored_drop_is_the_mirror(rubbed):
+    found = []
+    for side in (1.0, -1.0):
+        place = np.array([[side * 40e-6, -20e-6], [side * 70e-6, 10e-6]])
+        start = PlacedStart(displacement=place, velocity=np.zeros((2, 2)))
+        case = DropCase(speed=side * SPEED, duration=0.012, reduction="quick", start=start)
+        found.append(simulate_drop(rubbed.with_values({"unbalance.0.amount": 0.0}), case))
+    one, other = found
+    assert one.contacts_at("seal").peak_force == pytest.approx(other.contacts_at("seal").peak_force, rel=1e-4)
+    assert one.speed == pytest.approx(-other.speed, rel=1e-9)
+    smooth = rubbed.with_values({"unbalance.0.amount": 0.0, "clearances.seal.friction": 0.0})
+    assert abs(one.speed[-1]) < simulate_drop(smooth, case).speed[-1] * -1.0
+
+
+def test_page_and_document_say_what_happens(rubbed, drop):
+    (said,) = [one for one in simulate_summary(drop, rubbed).verdict if one.text.startswith("seal")]
+    assert said.level == "bad"
+    assert "touches the housing" in said.text and " N at most" in said.text
+    entry = simulation_numbers(drop, rubbed)["clearances"]["seal"]
+    assert entry["contacts"] == len(drop.contacts_at("seal"))
+    assert entry["peak_force_N"] == np.max(drop.contacts_at("seal").peak_force)
+    assert entry["first_contact_s"] == drop.contacts_at("seal").start[0]
+
+
+def test_a_stop_is_logged_and_told_with_its_force():
+    def stopped(gap):
+        mount = f'mount = [{{ kind = "stop", gap = "{gap} um" }}]'
+        machine = loads_machine(TEXT.replace(HEAD, f"{HEAD}\n{mount}"))
+        drop = simulate_drop(machine, CASE)
+        (use,) = clearance_uses(machine, drop)
+        (said,) = [one for one in simulate_summary(drop, machine).verdict if "the mount moves" in one.text]
+        return drop, use, said, simulation_numbers(drop, machine)["stops"]["DE"]
+
+    drop, use, said, entry = stopped(8)
+    moved = np.hypot(*drop.support_displacement[:, 1].T)
+    assert use.travel == moved.max() > use.gap
+    assert use.peak_force == pytest.approx(5e8 * (use.travel - use.gap), rel=0.15)
+    assert drop.time[np.argmax(moved > use.gap)] == pytest.approx(use.contacts.start[0], abs=2e-5)
+    assert said.level == "warning" and "reaches its stop" in said.text
+    assert entry["contacts"] == len(use.contacts) and entry["travel_over_gap"] == use.share
+    assert len(drop.contacts) == len(drop.contacts.of_bearing(0)) + len(drop.contacts.of_bearing(1))
+    _, use, said, entry = stopped(500)
+    assert said.level == "good" and "never reaches its stop" in said.text
+    assert entry["contacts"] == 0 and entry["peak_force_N"] == 0.0
+
+
+def test_further_contacts_are_saved(drop, tmp_path):
+    drop.save(tmp_path / "drop.h5")
+    again = load_result(tmp_path / "drop.h5")
+    assert again.further_names == ("seal",)
+    assert np.array_equal(again.contacts_at("seal").impulse, drop.contacts_at("seal").impulse)
+    assert np.array_equal(again.contacts.impulse, drop.contacts.impulse)
+
+
+def test_the_contact_is_written_and_varied_by_name(rubbed):
+    assert loads_machine(machine_text(rubbed)) == rubbed
+    other = rubbed.with_values({"clearances.seal.friction": 0.1})
+    assert build_drop_model(other, "quick").parameters.rub[0, 3] == 0.1
+    assert float(rubbed.clearances[0].friction) == 0.2
+    assert float(rubbed.clearances[0].radius) > 1e-3
+
+
+def test_an_estimate_of_such_a_machine_is_refused():
+    text = f'[[clearances]]\nname = "seal"\nnode = 9\ngap = "1 mm"\n{RUB}\n'
+    machine = loads_machine(machine_text(example_machine("lp400")) + text)
+    record = read_record(example_record_path("lp400_drop_060"), machine)
+    with pytest.raises(RecordError, match=r"clearance 'seal' of the machine .* has a 'stiffness'.* Leave it"):
+        read_evidence(build_drop_model(machine, "quick"), record)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("friction = 0.2", r"'friction' but no 'stiffness'"),
+        ('radius = "20 mm"', r"'radius' but no 'stiffness'"),
+        ('stiffness = "0 N/m"', r"must be positive"),
+        (f"{RUB}\nfriction = -0.1", r"must not be negative"),
+    ],
+)
+def test_contacts_that_cannot_be_are_refused(line, message):
+    with pytest.raises(MachineFileError, match=message):
+        sealed(line)
+
+
+def test_a_seal_below_the_air_gap_is_refused():
+    with pytest.raises(MachineFileError, match=r"'seal' .* is used up before the rotor reaches"):
+        sealed(RUB, gap=50e-6)
