@@ -289,6 +289,7 @@ OPERATIONS = (
     Operation("GET", f"{_RESULT}/document", found_document),
     Operation("GET", f"{_RESULT}/window", histories.window, _WINDOW),
     Operation("GET", f"{_RESULT}/field", histories.field, ("plane", "part")),
+    Operation("GET", f"{_RESULT}/between", histories.between, _WINDOW[:3]),
     Operation("GET", f"{_RESULT}/csv", histories.csv, _WINDOW[:3]),
     Operation("POST", f"{_RESULT}/report", ticket),
 )

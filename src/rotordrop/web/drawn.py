@@ -108,6 +108,7 @@ def write_look(
                 "radial velocity before",
             ],
             "findings": _findings(seen.findings),
+            "command": _command(job, options, "look"),
             "python": look_lines(job.read()["files"], options, len(seen.motion.paths)),
         },
     )
@@ -182,6 +183,7 @@ def write_estimate(
             "impacts": sorted(impacts, key=lambda impact: impact["time"]),
             "impact_columns": ["peak force", "impulse"],
             "restart": content_json(restart_page(card, drop)),
+            "command": _command(job, options, "estimate"),
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
         },
     )
@@ -298,26 +300,39 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
             }
             for line in found.lines
         ],
+        "command": _command(job, options, "waterfall"),
         "python": waterfall_lines(job.read()["files"], options, planes, parts),
     }
+
+
+def _command(job: Job, options: Mapping[str, Any], verb: str) -> str:
+    """The command that does the same as the page with the files of a job."""
+    told = job.read()["files"]
+    order = ("record", "machine") if verb == "look" else ("machine", "record")
+    words = [verb, *(told[role]["name"] for role in order if role in told)]
+    words += ["--tail", told["tail"]["name"]] if "tail" in told and verb == "estimate" else []
+    words += ["--profile", told["profile"]["name"]] if "profile" in told else []
+    if verb == "look":
+        for name in ("gap", "speed"):
+            words += [f"--{name}", options[name]] if options.get(name) else []
+        for plane in filter(None, map(str.strip, options.get("planes", "").split(";"))):
+            words += ["--map", plane]
+    if verb == "estimate":
+        words += ["--method", "replay"] if options.get("method") == "replay" else []
+        words += ["--quick"] if options.get("quick") else []
+    return command_line(words)
 
 
 def _origin(job: Job, options: Mapping[str, Any], verb: str = "estimate") -> Origin:
     from rotordrop.simulate.fingerprint import fingerprint
 
-    told = job.read()["files"]
     named = {"machine": "machine file"}
-    command = [verb, told["machine"]["name"], told["record"]["name"]]
-    command += ["--tail", told["tail"]["name"]] if "tail" in told and verb == "estimate" else []
-    command += ["--profile", told["profile"]["name"]] if "profile" in told else []
-    command += ["--method", "replay"] if options.get("method") == "replay" else []
-    command += ["--quick"] if options.get("quick") else []
     return Origin(
-        command=command_line(command),
+        command=_command(job, options, verb),
         operator=str(options.get("operator", "")),
         files=tuple(
             UsedFile(role=named.get(role, role.split(" ")[0]), name=file["name"], sha256=file["sha256"])
-            for role, file in told.items()
+            for role, file in job.read()["files"].items()
         ),
         made=now(),
         fingerprint=fingerprint(),

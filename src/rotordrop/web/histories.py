@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from rotordrop.errors import UsageError
 from rotordrop.web.desk import Desk, NotThereError, number, of_file
@@ -57,14 +57,31 @@ async def window(desk: Desk, request: Request) -> Response:
     return Response(await asyncio.to_thread(shown), media_type="application/octet-stream")
 
 
-def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], float, float]:
+async def between(desk: Desk, request: Request) -> Response:
+    """Mean, smallest and largest of histories between two instants, from every sample.
+
+    A column ``"x 0|y 0"`` is the radius of two.
+    """
+    folder = await desk.found(request)
+
+    def counted() -> list[dict[str, float | None]]:
+        asked = [column.split("|")[:2] for column in request.query_params.getlist("column")]
+        traces, _, start, end = _asked_window(folder, request, [name for pair in asked for name in pair])
+        return [traces.between(traces.chosen(tuple(pair)), start, end) for pair in asked]
+
+    return JSONResponse(await asyncio.to_thread(counted))
+
+
+def _asked_window(
+    folder: Path, request: Request, columns: Sequence[str] | None = None
+) -> tuple[Traces, list[int], float, float]:
     from rotordrop.web.traces import open_traces
 
     told = _page_of(folder).get("traces")
     if told is None:
         raise NotThereError("this result has no histories")
     traces = open_traces(folder, told["name"], tuple(told["columns"]))
-    rows = traces.chosen(tuple(request.query_params.getlist("column")))
+    rows = traces.chosen(tuple(request.query_params.getlist("column") if columns is None else columns))
     start, end = number(request, "start", told["start"]), number(request, "end", told["end"])
     if not start < end:
         raise UsageError(

@@ -82,6 +82,25 @@ class Traces:
             found = [self._from_level(row, first, last, size, offset, stretches) for row in rows]
         return np.unique(np.concatenate([[first, last - 1], *(places.ravel() for places in found)]))
 
+    def between(self, rows: list[int], start: float, end: float) -> dict[str, float | None]:
+        """Mean over time, smallest and largest of every sample between two instants [s].
+
+        One row is a history, two are the x and y of a radius.
+        """
+        first = int(np.searchsorted(self.time, start))
+        last = int(np.searchsorted(self.time, end, side="right"))
+        read = [self._read(row, slice(first, last)) for row in rows]
+        values = np.hypot(*read) if len(read) > 1 else read[0]
+        time = np.asarray(self.time[first:last])
+        known = np.isfinite(values)
+        time, values = time[known], values[known]
+        if not len(values):
+            return {"mean": None, "least": None, "largest": None}
+        lasted = float(time[-1] - time[0])
+        area = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(time))
+        mean = area / lasted if lasted > 0.0 else values[0]
+        return {"mean": float(mean), "least": float(values.min()), "largest": float(values.max())}
+
     def _from_level(self, row: int, first: int, last: int, size: int, offset: int, stretches: int) -> Indices:
         """Extremes of the stretches by the blocks inside the window; its ragged ends sample by sample.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,6 +143,61 @@ def test_the_empty_page_offers_a_simulated_drop_to_try(browser, tmp_path):
         (job,) = server.ask("GET", "/api/jobs").told["jobs"]
         assert {"machine", "record", "tail"} < set(job["files"])
         assert browser.evaluate("!document.getElementById('simulated').hidden")
+        quiet(browser)
+
+
+def test_two_cursors_notes_and_chosen_traces_and_their_address(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        look_at(browser, server, list(files.values()))
+        browser.key("n")
+        browser.until("document.querySelector('tr.here')")
+        browser.until("Math.abs(to.value - from.value - 18) < 0.01")  # that of an impact is drawn
+        browser.key("b")
+        for _ in range(40):
+            browser.key("ArrowRight")
+        browser.until("document.getElementById('between').rows.length > 2")
+        caption = words(browser, "#between caption")
+        apart, rate = (float(one) for one in re.findall(r"([0-9.]+) (?:ms|Hz)", caption))
+        assert apart == pytest.approx(2.0, abs=0.05)  # forty samples at 20 kHz, from between two of them
+        assert apart * rate == pytest.approx(1e3, rel=1e-3)
+        browser.until("![...document.querySelectorAll('#between td')].some(one => one.innerText === '…')")
+        numbers = (
+            "[...document.querySelectorAll('#between tbody tr')].map(r => [...r.cells].map(c => c.innerText))"
+        )
+        for _, at, then, change, mean, least, largest in browser.evaluate(numbers):
+            at, then, change, mean, least, largest = (
+                float(one.replace("\u2212", "-")) for one in (at, then, change, mean, least, largest)
+            )
+            assert change == pytest.approx(then - at, abs=0.2)
+            assert least <= mean <= largest
+            assert least <= min(at, then) + 0.1 and largest >= max(at, then) - 0.1
+        browser.key("i")
+        browser.until("document.getElementById('instant').open")
+        browser.evaluate("instanttext.value = 'here'; document.querySelector('#instant .main').click()")
+        browser.until("fetch && document.getElementById('tabs') && !document.getElementById('instant').open")
+        browser.key("f")
+        browser.until("document.getElementById('figuresdialog').open")
+        browser.evaluate("document.querySelector('#figurechoices input').click()")
+        for column in ("x0", "x1"):
+            browser.evaluate(
+                f"document.querySelector('#tracechoices input[value=\"look {column}\"]').click()"
+            )
+        assert browser.evaluate("document.querySelector('input[value=\"look speed\"]').disabled")
+        browser.evaluate("document.querySelector('#figuresdialog .main').click()")
+        titles = "[...document.querySelectorAll('.panel h2')].map(one => one.innerText).join()"
+        browser.until(f"{titles} === 'DE, sensor plane,Shaft speed,Chosen traces'")
+        browser.until("location.hash.includes('mark=') && location.hash.includes('traces=look+x0')")
+        browser.call("Page.reload")
+        browser.until(f"{titles} === 'DE, sensor plane,Shaft speed,Chosen traces'")
+        browser.until("!document.getElementById('between').hidden")
+        assert words(browser, "#between caption") == caption
+        (job,) = server.ask("GET", "/api/jobs").told["jobs"]
+        (note,) = job["label"]["notes"]
+        assert note["text"] == "here" and f"at={note['time']:.6g}"[:8] in browser.evaluate("location.hash")
+        browser.evaluate(
+            "[...document.querySelectorAll('[role=tab]')].find(t => t.innerText === 'Events').click()"
+        )
+        assert "here" in words(browser, "#tabpanel")
         quiet(browser)
 
 

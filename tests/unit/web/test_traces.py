@@ -112,3 +112,26 @@ def test_columns_that_are_not_there_are_named(tmp_path):
         shown.chosen(("c7",))
     with pytest.raises(UsageError, match=r"0 columns asked for; 1 to 12"):
         shown.chosen(())
+
+
+def test_between_two_instants_every_sample_counts(tmp_path):
+    count = 100_000
+    clock = np.arange(count) / RATE
+    ramp, spike = 2.0 * clock, np.zeros(count)
+    spike[40_001] = 7.0
+    some = traces(tmp_path, ramp, spike, 3.0 * np.cos(clock), 3.0 * np.sin(clock))
+    told = some.between([0], 1.0, 3.0)
+    assert told["mean"] == pytest.approx(4.0, rel=1e-6)  # of a ramp the middle
+    assert (told["least"], told["largest"]) == pytest.approx((2.0, 6.0), rel=1e-6)
+    assert some.between([1], 2.0, 2.1)["largest"] == 7.0  # one sample of 2000
+    assert some.between([2, 3], 0.5, 4.5)["mean"] == pytest.approx(3.0, rel=1e-6)
+    assert some.between([0], 1.00001, 1.00002) == {"mean": None, "least": None, "largest": None}
+
+
+def test_between_is_weighted_by_time_and_leaves_gaps_out(tmp_path):
+    clock = np.array([0.0, 1.0, 1.1, 1.2, 4.0])
+    write_traces(tmp_path, "some", clock, {"v": np.array([0.0, 1.0, 9.0, np.nan, 1.0])})
+    told = open_traces(tmp_path, "some", ("v",)).between([0], 0.0, 4.0)
+    areas = 0.5 * 1.0 + 5.0 * 0.1 + 5.0 * 2.9
+    assert told["mean"] == pytest.approx(areas / 4.0, rel=1e-6)
+    assert (told["least"], told["largest"]) == (0.0, 9.0)

@@ -2,16 +2,17 @@
 import { canvasPen, keepPng, keepSvg } from "./figures.js";
 import { dashOf } from "./compare.js";
 import { drawOrbit, nearest, orbitPicture } from "./orbit.js";
-import { csv, drawStrip, lines, loadView } from "./panels.js";
+import { csv, drawAll, drawStrip, lines, loadView } from "./panels.js";
 import { follow } from "./plots.js";
-import { by, fileName, files, impacts, showLines, span, state, zero } from "./state.js";
+import * as server from "./server.js";
+import { by, fileName, files, impacts, shift, showLines, span, state, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
-const motions = () => state.panels.filter((panel) => panel.id.startsWith("motion "));
+const motions = () => state.orbits;
 
 function orbitOf(index) {
-  const panel = state.panels[index], place = state[panel.verb].places[index], forcePanel = state.panels.find((one) => one.id === "force");
+  const panel = state.orbits[index], place = state[panel.verb].places[index], forcePanel = state.loaded.find((one) => one.id === "force");
   const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
   const others = panel.found.others.map(({ found, columns: [x, y], k }) => ({ x: found[x], y: found[y], k, dash: dashOf(k) }));
   let force = null;
@@ -31,8 +32,8 @@ export function makeOrbits() {
     box.replaceChildren(...names.map((name, i) => {
       const title = `Orbit ${name}`;
       return make("figure", { class: "orbit", of: [make("canvas", { role: "img" }), make("header", { of: [files(title, {
-        csv: () => csv({ ...state.panels[i], title }), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(title)),
-        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.panels[i].verb, `orbit ${i}`))
+        csv: () => csv({ ...state.orbits[i], title }), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(title)),
+        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.orbits[i].verb, `orbit ${i}`))
       })] })] });
     }));
   }
@@ -77,7 +78,7 @@ function cellsOf({ verb, found }, place, at) {
     Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–",
     Number.isFinite(order) ? `${units.fixed(order, 2)}X` : "–"];
   for (const [id, name, kind] of state.estimate ? [["force", "force", "force"], ["stress", "stress", "pressure"]] : []) {
-    const panel = state.panels.find((one) => one.id === id), names = verb === "estimate" ? place[name] : [];
+    const panel = state.loaded.find((one) => one.id === id), names = verb === "estimate" ? place[name] : [];
     const [now, low, high] = names.map((column) => (at !== null ? value(panel.found, column) / units.factor(kind) : NaN));
     cells.push(Number.isFinite(now) ? [units.written(now, 4), names[1] ? `${units.written(low, 3)} to ${units.written(high, 3)}` : ""] : "–");
   }
@@ -98,6 +99,48 @@ function readout() {
   const meant = { angle: "Angle on the ring, from +x", order: "Turns of the shaft centre per turn of the shaft, over half a turn of the shaft about the cursor; forward positive" };
   by("readhead").replaceChildren(make("tr", { of: columns.map((text, i) => make("th", { scope: "col", text, title: meant[text] || null, class: i ? "number" : null })) }));
   by("readout").replaceChildren(...rows);
+  tellBetween();
+}
+
+// ---- two cursors: what lies between the mark and the cursor, of every sample
+
+let asking = 0;
+export function setMark(t) {
+  state.mark = t;
+  state.between = null;
+  drawAll();
+  drawOrbits();
+  document.dispatchEvent(new Event("seen"));
+}
+const both = () => (state.mark === null || state.cursor === null || state.mark === state.cursor ? null : [Math.min(state.mark, state.cursor), Math.max(state.mark, state.cursor)]);
+
+async function askBetween() {
+  const ends = both(), { id } = state.job;
+  if (!ends) { return; }
+  const found = await Promise.all(state.panels.map(({ verb, measured }) => {
+    const columns = measured.map((one) => one.column), own = verb === "look" ? zero() : shift("estimate");
+    return columns.every(Boolean) ? server.between(id, verb, columns, ends[0] + own, ends[1] + own).catch(() => null) : null;
+  }));
+  const now = both();
+  if (state.job?.id === id && now && now[0] === ends[0] && now[1] === ends[1]) { state.between = { ends, found }; tellBetween(); }
+}
+
+function tellBetween() {
+  const ends = both(), box = by("between");
+  by("unmark").hidden = state.mark === null;
+  box.hidden = !ends;
+  if (!ends) { return; }
+  const apart = ends[1] - ends[0], speed = speedAt(ends[0]), known = state.between && state.between.ends[0] === ends[0] && state.between.ends[1] === ends[1] ? state.between.found : null;
+  if (!known) { clearTimeout(asking); asking = setTimeout(() => askBetween().catch(() => {}), 200); }
+  const order = speed > 0 ? ` = ${units.fixed((2 * Math.PI) / apart / speed, 2)}X` : "", turns = speed > 0 ? `, ${units.fixed((apart * speed) / (2 * Math.PI), 2)} turns` : "";
+  const rows = state.panels.flatMap((panel, i) => panel.measured.map(({ label, value }, k) => {
+    const drawn = value(panel.found), f = units.factor(panel.kind), at = (t) => drawn[nearest(panel.time, t)] / f, told = known?.[i]?.[k];
+    const cell = (v) => make("td", { class: "number", text: units.written(v, 4) });
+    return make("tr", { of: [make("th", { scope: "row", text: `${label} [${units.unit(panel.kind)}]` }), cell(at(state.mark)), cell(at(state.cursor)), cell(at(state.cursor) - at(state.mark)),
+      ...["mean", "least", "largest"].map((name) => (told && told[name] !== null ? cell(told[name] / f) : make("td", { class: "number", text: known ? "–" : "…" })))] });
+  }));
+  box.replaceChildren(make("caption", { text: `Mark to cursor: Δt ${units.timeText(apart, apart)}${turns}; 1/Δt ${units.written(1 / apart, 4)} Hz${order}` }),
+    make("thead", { of: [make("tr", { of: ["", "mark", "cursor", "Δ", "mean", "least", "largest"].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) })] }), make("tbody", { of: rows }));
 }
 
 // ---- where window and cursor are
@@ -117,7 +160,7 @@ export function zoom(share, about) {
 export const pan = (direction) => { const by4 = ((state.view.to - state.view.from) / 4) * direction; setView({ from: state.view.from + by4, to: state.view.to + by4 }); };
 export function setCursor(t) { state.cursor = t; drawOrbits(); follow(t); if (state.playing === null) { document.dispatchEvent(new Event("seen")); } }
 export function stepCursor(direction) {
-  const { time } = state.panels[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
+  const { time } = state.loaded[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
   setCursor(time[Math.min(Math.max(here + direction, 0), time.length - 1)]);
 }
 export const nextImpact = (direction) => {

@@ -115,7 +115,7 @@ export function ticks(low, high, about = 5) {
 }
 
 // A time trace as a picture of its own, with all labels: for SVG and PNG.
-export function tracePicture(pen, { title, x, y, curves, bands, levels }) {
+export function tracePicture(pen, { title, x, y, curves, bands, levels, uprights = [] }) {
   const tone = colours(), box = { left: 70, right: pen.width - 16, top: 44, bottom: pen.height - 46 };
   const px = (v) => box.left + ((v - x.low) / (x.high - x.low)) * (box.right - box.left);
   const py = (v) => box.bottom - ((v - y.low) / (y.high - y.low)) * (box.bottom - box.top);
@@ -141,6 +141,10 @@ export function tracePicture(pen, { title, x, y, curves, bands, levels }) {
   }
   for (const { time, values, colour, width = 1.3, dash = [] } of curves) {
     pen.line(Array.from(time, (t, i) => [px(t), py(clip(values[i]))]), colour, width, dash);
+  }
+  for (const { at, text, mark } of uprights.filter((one) => one.at >= x.low && one.at <= x.high)) {
+    pen.line([[px(at), box.top], [px(at), box.bottom]], mark ? tone.accent : tone.residual, 1.2, mark ? [] : [3, 3]);
+    pen.text(text, px(at) + 3, box.top + 11, mark ? tone.accent : tone.residual, { size: 10 });
   }
   pen.line([[box.left, box.top], [box.right, box.top], [box.right, box.bottom], [box.left, box.bottom], [box.left, box.top]],
     tone.muted);

@@ -2,14 +2,14 @@
 import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
 import * as address from "./address.js";
 import { chooseOthers, compareTab, learnDrops } from "./compare.js";
-import { nextImpact, pan, play, setView, setWindow, stepCursor, zoom } from "./cursor.js";
+import { nextImpact, pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
 import { addToLog, askAbout, askRemoval, leaveHome, redrawHome, showHome } from "./home.js";
 import { redoLog, redrawLog, showLog } from "./log.js";
-import { drawAll, lines, loadView } from "./panels.js";
+import { drawAll, FIGURES, isShown, lines, loadView, traces } from "./panels.js";
 import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
-import { by, events, files, homeView, impacts, samples, say, showLines, simulated, span, state, zero } from "./state.js";
+import { by, events, files, homeView, impacts, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
 import { cutFiles, drawFall, fallFiles, openFall } from "./waterfall.js";
 import * as units from "./units.js";
@@ -35,7 +35,10 @@ const TABS = {
     return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact)] : [make("p", { text: "No impacts." })]),
       make("span", { class: "files", of: [make("button", { text: "as Python", on: { click: () => showLines(lines(source === state.look ? "look" : "estimate", "impacts")) } })] })];
   },
-  Events: () => [timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
+  Events: () => [...(notes().length ? [make("h3", { class: "part", text: "Notes" }), make("ol", { class: "timeline", of: notes().map((note) => make("li", { of: [
+      make("button", { class: "link", text: units.eventText(note.time), on: { click: () => { state.cursor = note.time; setView({ from: note.time - 0.05, to: note.time + 0.1 }); } } }), make("span", { text: note.text }),
+      make("button", { class: "link", text: "✕", "aria-label": `Remove the note ${note.text}`, on: { click: () => keepNotes(notes().filter((one) => one !== note)).catch(lost) } })] })) }), make("h3", { class: "part", text: "Events" })] : []),
+    timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
   Numbers: () => {
     const page = state.estimate || state.look;
     return [cards(page.cards), make("ul", { class: "statements", of: page.verdict.map(sentence) }), ...(state.estimate ? page.summary : []).map(table)];
@@ -150,6 +153,45 @@ function lost(error) {
   if (!(error instanceof server.Refusal)) { setTimeout(() => state.job && refresh().catch(lost), 1500); }
 }
 
+// ---- notes at an instant, and which figures are drawn
+
+async function keepNotes(list) {
+  state.job = await server.label(state.job.id, { notes: list });
+  if (state.tab === "Events") { showTab("Events"); }
+  drawAll();
+}
+function askNote() {
+  if (!state.job || state.cursor === null) { say("Point at a trace first: a note stands at the cursor.", "notice"); return; }
+  const time = state.cursor;
+  by("instantwhen").textContent = `At ${units.eventText(time)} from power-off`;
+  by("instanttext").value = "";
+  by("instant").showModal();
+  by("instanttext").focus();
+  by("instant").onclose = () => { if (by("instant").returnValue === "keep") { keepNotes([...notes(), { time, text: by("instanttext").value }]).catch(lost); } };
+}
+function chooseTraces() {
+  const box = (value, text, checked) => make("label", { class: "choice", of: [make("input", { type: "checkbox", value, ...(checked ? { checked: "" } : {}) }), make("span", { text })] });
+  const list = traces(), chosen = (id) => [...by(id).querySelectorAll("input")].filter((one) => one.checked).map((one) => one.value);
+  by("figurechoices").replaceChildren(...FIGURES().map(([id, text]) => box(id, text, isShown(id))));
+  by("tracechoices").replaceChildren(...list.map((one) => box(one.key, one.label, state.own.includes(one.key))));
+  const limit = () => {
+    const first = list.find((one) => one.key === chosen("tracechoices")[0]), many = chosen("tracechoices").length >= 8;
+    [...by("tracechoices").querySelectorAll("input")].forEach((input, i) => { input.disabled = Boolean(first) && (list[i].kind !== first.kind || list[i].verb !== first.verb || (many && !input.checked)); });
+  };
+  by("tracechoices").onchange = limit;
+  limit();
+  by("figuresdialog").showModal();
+  by("figuresdialog").onclose = () => {
+    const { returnValue } = by("figuresdialog");
+    if (returnValue === "usual") { Object.assign(state, { figures: null, own: [] }); }
+    if (returnValue === "choose") {
+      const shownNow = chosen("figurechoices"), own = chosen("tracechoices");
+      Object.assign(state, { figures: shownNow.length || own.length ? shownNow : null, own });
+    }
+    if (returnValue !== "cancel") { loadView(); }
+  };
+}
+
 // ---- views: the address says which is seen
 
 const part = (name) => (name in TABS ? name : "Impacts");
@@ -174,6 +216,9 @@ async function asSeen() {
   state.asked = null;
   state.view = number("to") > number("from") ? { from: number("from"), to: number("to") } : state.view || homeView();
   state.cursor = Number.isFinite(number("at")) ? number("at") : state.cursor;
+  state.mark = Number.isFinite(number("mark")) ? number("mark") : null;
+  state.figures = told.figures ? told.figures.split(",") : null;
+  state.own = told.traces ? told.traces.split(",") : [];
   if ([...by("signal").options].some((one) => one.value === told.show)) { by("signal").value = told.show; }
   showTab(part(told.tab || state.tab));
   await loadView();
@@ -183,7 +228,8 @@ async function asSeen() {
 const seen = () => {
   const rounded = (value, size) => (value === null ? "" : String(Number(value.toPrecision(size))));
   return { drop: state.job.id, view: by("fall").hidden ? "" : "waterfall", tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
-    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, with: state.others.map((other) => other.job).filter(Boolean).join(",") };
+    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, mark: rounded(state.mark, 9),
+    figures: (state.figures || []).join(","), traces: state.own.join(","), with: state.others.map((other) => other.job).filter(Boolean).join(",") };
 };
 const noted = () => address.note(() => (state.job ? seen() : address.read()));
 document.addEventListener("seen", noted);
@@ -291,6 +337,8 @@ click("document", async () => keep(new Blob([await server.documentText(state.job
 click("remove", () => askRemoval(state.job));
 click("whole", () => setWindow(...span())); click("early", () => setView(homeView()));
 click("next", () => goImpact(nextImpact(1))); click("previous", () => goImpact(nextImpact(-1)));
+click("setmark", () => (state.cursor === null ? say("Point at a trace first: the mark is set at the cursor.", "notice") : setMark(state.cursor)));
+click("unmark", () => setMark(null)); click("noteat", askNote); click("choosetraces", chooseTraces);
 click("play", () => play(state.playing === null));
 by("signal").addEventListener("change", () => state.view && loadView());
 function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.job && state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } else if (!state.job) { redrawHome(); if (!by("log").hidden) { redoLog(); } } }
@@ -308,6 +356,7 @@ dark.addEventListener("change", () => chooseTheme(by("theme").value));
 const KEYS = {
   n: () => goImpact(nextImpact(1)), p: () => goImpact(nextImpact(-1)), " ": () => play(state.playing === null),
   "+": () => zoom(0.6), "=": () => zoom(0.6), "-": () => zoom(1.7), 0: () => setWindow(...span()), d: () => setView(homeView()),
+  b: () => by("setmark").click(), i: askNote, f: chooseTraces,
   c: () => chooseOthers().catch((error) => say(error.message, "bad")), m: () => channels(),
   u: () => chooseUnits(units.chosen() === "SI" ? "US" : "SI"), t: () => chooseTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"),
   ArrowLeft: (event) => (event.shiftKey ? pan(-1) : stepCursor(-1)), ArrowRight: (event) => (event.shiftKey ? pan(1) : stepCursor(1))

@@ -1,10 +1,10 @@
 // The figures over time: what they show, how they are drawn, saved, and made again in Python.
 import { curvesOfOthers, dashOf, othersOf } from "./compare.js";
-import { makeOrbits, setCursor, setView, setWindow, zoom } from "./cursor.js";
+import { makeOrbits, setCursor, setMark, setView, setWindow, zoom } from "./cursor.js";
 import { colours, faint, keep, keepPng, keepSvg, placeColour, svgPen, tracePicture } from "./figures.js";
 import { clearPlots, drawOverview, drawPanel, follow, stripOn } from "./plots.js";
 import * as server from "./server.js";
-import { by, events, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, usesEstimate, zero } from "./state.js";
+import { by, events, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, uprights, usesEstimate, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -22,6 +22,7 @@ function motionPanel(index) {
   return {
     id: `motion ${index}`, verb, columns: residual ? [...columns, ...place.residual] : columns, kind: "length", fromZero: signal === "r",
     title: `${place.name}, ${verb === "estimate" ? "at the bearing" : "sensor plane"}`, others: residual ? [] : othersOf("motion", index, place.name),
+    measured: pairs.map(([role, [x, y]]) => ({ label: `${place.name} ${role}`, column: residual ? null : { y, x, r: `${x}|${y}` }[signal] || y, value: (found) => component(found, [x, y], signal) })),
     axis: { y: "y", x: "x", r: "radius", residual: residual ? "measured − estimated" : "y" }[signal],
     levels: (place.gap && !residual) ? gapLevels(place.gap, signal) : [],
     ofOther: (found, names) => component(found, names, signal),
@@ -37,6 +38,7 @@ function loadPanel(kind) {
     id: kind, verb: "estimate", columns: places.flatMap((place) => place[kind]), kind: kind === "force" ? "force" : "pressure",
     title: kind === "force" ? "Bearing force" : "Maximum Hertz stress", axis: kind, fromZero: kind === "force",
     levels: panels[kind].flatMap((panel, i) => panel.levels.map(({ name, value }) => ({ name: `${panel.title}: ${name}`, value, place: i }))),
+    measured: places.map((place) => ({ label: `${place.name} ${kind}`, column: place[kind][0], value: (found) => found[place[kind][0]] })),
     others: places.flatMap((place, i) => othersOf(kind, i, place.name)), ofOther: (found, [name]) => found[name],
     curves: (found, tone) => places.map((place, i) => ({
       label: `${place.name}, ${panels[kind][i].origin}`, colour: placeColour(tone, i), values: found[place[kind][0]],
@@ -45,8 +47,33 @@ function loadPanel(kind) {
   };
 }
 
+// One figure of traces that somebody chose, of one quantity.
+const KIND_OF = { m: "length", N: "force", Pa: "pressure", "rad/s": "speed" };
+export function traces() {
+  return ["look", "estimate"].filter((verb) => state[verb]).flatMap((verb) => Object.entries(state[verb].labels || {}).map(([column, label]) => {
+    const [, name, unit] = label.match(/^(.*?)(?: \[(.*)\])?$/);
+    return { key: `${verb} ${column}`, verb, column, kind: KIND_OF[unit], label: `${name}${column === "speed" ? ", as recorded" : verb === "look" ? ", sensor plane" : ", at the bearing"}` };
+  })).filter((one) => one.kind);
+}
+function chosenPanel(title, id, list) {
+  const [{ verb, kind }] = list;
+  return { id, verb, kind, title, axis: { length: "motion", speed: "speed" }[kind] || kind, columns: list.map((one) => one.column), levels: [], others: [], fromZero: kind === "speed" && id === "speed",
+    measured: list.map(({ label, column }) => ({ label: label.replace(/, .*/, ""), column, value: (found) => found[column] })), ofOther: (found, [name]) => found[name],
+    curves: (found, tone) => list.map(({ label, column }, i) => ({ label, colour: placeColour(tone, i), values: found[column], dash: i > 3 ? [6, 3] : [] })) };
+}
+const speedPanel = () => chosenPanel("Shaft speed", "speed", [{ verb: "look", kind: "speed", column: "speed", label: "speed, as recorded" }]);
+
 // A look has one motion for every sensor plane, an estimate one for every bearing: their numbers may differ.
-const wanted = () => [...state[usesEstimate() ? "estimate" : "look"].places.map((_, i) => motionPanel(i)), ...(state.estimate ? ["force", "stress"].map(loadPanel) : [])];
+export const FIGURES = () => [...state[usesEstimate() ? "estimate" : "look"].places.map((place, i) => [`motion ${i}`, `Motion ${place.name}`]),
+  ...(state.estimate ? [["force", "Bearing force"], ["stress", "Maximum Hertz stress"]] : []), ...(state.look.traces.columns.includes("speed") ? [["speed", "Shaft speed"]] : [])];
+const usual = (id) => id !== "speed" || !state.estimate;
+export const isShown = (id) => (state.figures ? state.figures.includes(id) : usual(id));
+// What is loaded: motion, force and stress always, for orbits and numbers at the cursor need them; of these and the rest, what is drawn.
+function wanted() {
+  const own = traces().filter((one) => state.own.includes(one.key)), same = own.filter((one) => one.kind === own[0].kind && one.verb === own[0].verb);
+  const made = FIGURES().filter(([id]) => id !== "speed" || isShown(id)).map(([id]) => (id.startsWith("motion") ? motionPanel(Number(id.slice(7))) : id === "speed" ? speedPanel() : loadPanel(id)));
+  return [...made, ...(same.length ? [chosenPanel("Chosen traces", "own", same)] : [])];
+}
 
 export async function loadView() {
   const serial = ++state.serial, asked = wanted(), { from, to } = state.view;
@@ -58,7 +85,9 @@ export async function loadView() {
   } catch (error) { if (serial === state.serial) { say(error.message, "bad"); } return; }
   if (serial !== state.serial) { return; }
   state.speed = speed;
-  state.panels = asked.map((panel, i) => ({ ...panel, found: found[i], time: found[i].time }));
+  state.loaded = asked.map((panel, i) => ({ ...panel, found: found[i], time: found[i].time }));
+  state.orbits = state.loaded.filter((panel) => panel.id.startsWith("motion "));
+  state.panels = state.loaded.filter(({ id }) => id === "own" || isShown(id));
   drawAll();
   document.dispatchEvent(new Event("seen"));
 }
@@ -82,7 +111,7 @@ function panelFrame(panel, tone) {
   }))];
   return make("section", { class: "panel", "aria-label": panel.title, of: [
     make("header", { of: [make("h2", { text: panel.title }), make("span", { class: "keys-of", of: panel.drawn.map(key) }), files(panel.title, {
-      csv: () => csv(panel), svg: () => keepSvg(picture(panel), fileName(panel.title)), png: () => keepPng(picture(panel), fileName(panel.title)), python: () => showLines(lines(panel.verb, panel.id))
+      csv: () => csv(panel), svg: () => keepSvg(picture(panel), fileName(panel.title)), png: () => keepPng(picture(panel), fileName(panel.title)), python: lines(panel.verb, panel.id) && (() => showLines(lines(panel.verb, panel.id))), command: state[panel.verb].command && (() => showLines(state[panel.verb].command, "As command"))
     })] }), panel.element] });
 }
 
@@ -97,7 +126,7 @@ function picture(panel) {
   }
   const room = 0.06 * (high - low || 1);
   tracePicture(pen, { title: `${state.job.name}: ${panel.title}`, curves, bands, levels: panel.levels.map((level) => ({ ...level, value: level.value / f })),
-    x: { low: state.view.from / scale, high: state.view.to / scale, label: `time from power-off [${name}]` },
+    uprights: uprights().map((one) => ({ ...one, at: one.time / scale })), x: { low: state.view.from / scale, high: state.view.to / scale, label: `time from power-off [${name}]` },
     y: { low: panel.fromZero ? 0 : low - room, high: high + room, label: `${panel.axis} [${units.unit(panel.kind)}]` } });
   return pen;
 }
@@ -124,8 +153,9 @@ export function drawAll() {
   const tone = colours();
   clearPlots();
   by("panels").replaceChildren(...state.panels.map((panel) => panelFrame(panel, tone)));
+  by("panels").style.setProperty("--count", state.panels.length);
   for (const panel of state.panels) {
-    drawPanel({ ...panel, curves: panel.drawn, lowest: panel === state.panels.at(-1) }, state.view, { window: setWindow, cursor: setCursor, zoom, home: () => setView(homeView()) });
+    drawPanel({ ...panel, curves: panel.drawn, lowest: panel === state.panels.at(-1) }, state.view, { window: setWindow, cursor: setCursor, mark: setMark, uprights: uprights().map((one) => (panel === state.panels[0] ? one : { ...one, text: "" })), zoom, home: () => setView(homeView()) });
   }
   const [scale, name] = units.timeScale(state.view.to - state.view.from);
   by("from").value = Number((state.view.from / scale).toPrecision(6));
@@ -137,7 +167,7 @@ export function drawAll() {
 }
 
 const strip = () => ({ ...state.overview, view: state.view, span: span(), impacts: impacts().map((one) => one.time),
-  events: events() });
+  events: events(), uprights: uprights() });
 export function drawStrip() { if (state.overview) { drawOverview(by("overview"), strip()); } }
 const stripPicture = () => {
   const pen = svgPen(1200, 180, colours().back, `${state.job.name}: whole record`);

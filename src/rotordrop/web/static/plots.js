@@ -25,6 +25,23 @@ function levelsOn(u, levels) {
   c.restore();
 }
 
+// The mark of the second cursor and notes at an instant, over every trace.
+function uprightsOn(u, uprights, scale) {
+  const c = u.ctx, ratio = window.devicePixelRatio || 1, tone = colours();
+  c.save();
+  c.beginPath(); c.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height); c.clip();
+  c.font = `${10 * ratio}px system-ui, sans-serif`; c.textAlign = "left"; c.textBaseline = "alphabetic"; c.lineJoin = "round";
+  for (const { time, text, mark } of uprights) {
+    const x = u.valToPos(time / scale, "x", true);
+    c.strokeStyle = c.fillStyle = mark ? tone.accent : tone.residual; c.lineWidth = ratio * (mark ? 1.5 : 1); c.setLineDash(mark ? [] : [3 * ratio, 3 * ratio]);
+    c.beginPath(); c.moveTo(x, u.bbox.top); c.lineTo(x, u.bbox.top + u.bbox.height); c.stroke();
+    c.setLineDash([]); c.lineWidth = 4 * ratio; c.strokeStyle = tone.back;
+    c.strokeText(text.length > 28 ? `${text.slice(0, 27)}…` : text, x + 3 * ratio, u.bbox.top + 10 * ratio);
+    c.fillText(text.length > 28 ? `${text.slice(0, 27)}…` : text, x + 3 * ratio, u.bbox.top + 10 * ratio);
+  }
+  c.restore();
+}
+
 // A panel: {element, kind, axis, curves: [{label, colour, values, lower, upper}], levels, time, fromZero}
 export function drawPanel(panel, view, on) {
   const tone = colours(), [scale, timeName] = timeScale(view.to - view.from), f = factor(panel.kind);
@@ -61,7 +78,7 @@ export function drawPanel(panel, view, on) {
       { ...axis, size: 54, values: values(8), label: `${panel.axis} [${unit(panel.kind)}]`, labelSize: 16, labelGap: 0, gap: 3 }],
     series, bands,
     hooks: {
-      draw: [(u) => levelsOn(u, levels)],
+      draw: [(u) => levelsOn(u, levels), (u) => uprightsOn(u, on.uprights, scale)],
       setSelect: [(u) => {
         if (u.select.width > 3) {
           on.window(scale * u.posToVal(u.select.left, "x"), scale * u.posToVal(u.select.left + u.select.width, "x"));
@@ -74,6 +91,7 @@ export function drawPanel(panel, view, on) {
   panel.element.replaceChildren();
   const made = new uPlot(options, data, panel.element);
   made.over.addEventListener("dblclick", on.home);
+  made.over.addEventListener("click", (event) => { if (event.shiftKey) { on.mark(scale * made.posToVal(event.offsetX, "x")); } });
   made.over.addEventListener("wheel", (event) => {
     event.preventDefault();
     on.zoom(event.deltaY > 0 ? 1.25 : 0.8, scale * made.posToVal(event.offsetX, "x"));
@@ -101,7 +119,7 @@ export function follow(cursor) {
 // data: {time, curves: [{values}]}; events: [{time, words}]
 export const drawOverview = (canvas, told) => stripOn(canvasPen(canvas), told);
 
-export function stripOn(pen, { data, events, impacts, view, span }) {
+export function stripOn(pen, { data, events, impacts, view, span, uprights }) {
   const tone = colours(), top = 4, bottom = pen.height - 16;
   const px = (t) => ((t - span[0]) / (span[1] - span[0])) * pen.width;
   let high = 0;
@@ -114,6 +132,7 @@ export function stripOn(pen, { data, events, impacts, view, span }) {
   });
   for (const t of impacts) { pen.line([[px(t), bottom], [px(t), bottom - 5]], tone.limit, 1); }
   for (const { time } of events) { pen.line([[px(time), top], [px(time), bottom]], tone.muted, 1, [2, 3]); }
+  for (const { time, mark } of uprights) { pen.line([[px(time), top], [px(time), bottom]], mark ? tone.accent : tone.residual, 1.5); }
   pen.line([[left, top], [left, bottom]], tone.accent, 1);
   pen.line([[right, top], [right, bottom]], tone.accent, 1);
   const [scale, name] = timeScale(span[1] - span[0]);

@@ -74,5 +74,9 @@ export async function samples(id, verb, columns, start, end, points) {
   return found;
 }
 
+// Mean, smallest and largest of every sample between two instants; "x 0|y 0" is a radius.
+export const between = async (id, verb, columns, start, end) =>
+  (await ask("GET", `${result(id, verb, "between")}?${question(columns, start, end)}`)).json();
+
 export const table = async (id, verb, columns, start, end) =>
   (await ask("GET", `${result(id, verb, "csv")}?${question(columns, start, end)}`)).blob();

@@ -4,8 +4,8 @@ import * as server from "./server.js";
 import { make, sentence } from "./tables.js";
 
 export const by = (id) => document.getElementById(id);
-export const state = { job: null, look: null, estimate: null, view: null, cursor: null, impact: -1, tab: "Impacts", panels: [], overview: null, playing: null, serial: 0,
-  speed: null, others: [], drops: [] };
+export const state = { job: null, look: null, estimate: null, view: null, cursor: null, impact: -1, tab: "Impacts", panels: [], loaded: [], orbits: [], overview: null, playing: null, serial: 0,
+  speed: null, others: [], drops: [], mark: null, between: null, figures: null, own: [] };
 export const zero = () => (state.estimate || state.look).zero;
 export const simulated = () => (state.estimate || state.look)?.simulated || "";
 export const shift = (verb) => state[verb].zero - zero();
@@ -31,6 +31,11 @@ export async function samples(verb, columns, from, to, points) {
   found.time = found.time.map((t) => t - own);
   return found;
 }
+
+// What is said of instants, times from power-off.
+export const notes = () => state.job?.label?.notes || [];
+// Vertical lines of every figure over time: the mark of the second cursor, and notes.
+export const uprights = () => [...(state.mark === null ? [] : [{ time: state.mark, text: "mark", mark: true }]), ...notes()];
 
 export function say(text, level, ...more) {
   by("status").replaceChildren(make("ul", { class: "words", of: [sentence({ text, level })] }), ...more);
