@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,9 +48,11 @@ from rotordrop.rotor.campbell import (
     separations,
 )
 from rotordrop.rotor.critical_speeds import CriticalSpeedMap
+from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.rotor.suspension import EquivalentStiffness
 
 Array = NDArray[np.float64]
 
@@ -128,7 +130,7 @@ def _verdict(
         f"natural frequencies of {massless} Hz; with the mass of the supports {massive} Hz. The paper's map "
         "leaves that mass out."
     )
-    said = [Statement(text)]
+    said = [Statement(text), *_followed(found)]
     top = float(machine.speed.nominal)
     for name, diagram in diagrams.items():
         forward = [c for c in diagram.crossings if c.direction != "backward" and c.speed <= top]
@@ -140,6 +142,26 @@ def _verdict(
     if not any(one.level == "bad" for one in said):
         said.append(Statement(CLEAR, "good"))
     return tuple(sorted(said, key=lambda one: _WORST_FIRST.index(one.level)))
+
+
+def _followed(found: CriticalSpeedMap) -> Iterator[Statement]:
+    """What mounts that relax make of the lines."""
+    if not found.followed:
+        return
+    lines = [hertz for hertz in found.at_lines["with support mass"][:2] if np.isfinite(hertz)]
+    for part in found.lines:
+        if part.branches:
+            at = [
+                f"{format_quantity(stiffness.real, 'stiffness')} (loss factor "
+                f"{stiffness.imag / stiffness.real:.2g}) at {hertz:.1f} Hz"
+                for hertz in lines
+                for stiffness in [part.dynamic(hertz)]
+            ]
+            yield Statement(
+                f"{part.bearing}: the mount relaxes, so its stiffness goes with the frequency: "
+                f"{format_quantity(part.support, 'stiffness')} at rest, {', '.join(at)}. Every line of the "
+                "machine is taken at the stiffness of its own frequency, and so are the damped modes."
+            )
 
 
 def _too_near(name: str, one: Separation, nominal: float) -> Statement:
@@ -458,9 +480,20 @@ def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
                 "equivalent_tangent_N_m": part.equivalent("tangent"),
                 "equivalent_simple_N_m": part.equivalent("simple"),
             }
+            | (_relaxing_json(found, part) if part.branches else {})
             for part in found.lines
         },
         "at_the_machine_Hz": {name: _lists(values) for name, values in found.at_lines.items()},
+    }
+
+
+def _relaxing_json(found: CriticalSpeedMap, part: EquivalentStiffness) -> dict[str, Any]:
+    """Stiffness and loss factor of a support at the lines with the mass of the supports."""
+    lines = found.at_lines["with support mass"]
+    dynamic = [part.dynamic(float(hertz)) for hertz in lines if np.isfinite(hertz)]
+    return {
+        "support_at_lines_N_m": [stiffness.real for stiffness in dynamic],
+        "loss_factor_at_lines": [stiffness.imag / stiffness.real for stiffness in dynamic],
     }
 
 

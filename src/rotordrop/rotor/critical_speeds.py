@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,9 @@ Array = NDArray[np.float64]
 WHIRLS = {"standstill": 0, "forward": 1, "backward": -1}
 DEFAULT_STIFFNESS = (1e5, 1e10)
 _SUPPORT_RIGID = 0.999
+MOST_ITERATIONS, CONVERGED = 200, 1e-9
+"""How often a line is followed to the stiffness of its own frequency, and how far [1]."""
+Held = Callable[[Sequence[EquivalentStiffness]], list[Support]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,10 +50,16 @@ class CriticalSpeedMap:
     """Frequencies with the masses of the supports, and the bearings' tangent stiffness fixed [Hz]; NaN where
     the stiffness exceeds what a bearing on a rigid support would have, shape (S, K)."""
     lines: tuple[EquivalentStiffness, ...]
-    """The machine's own stiffness per bearing: the vertical lines of the map."""
+    """The machine's own stiffness per bearing, of mounts that relax at rest: the vertical lines."""
     at_lines: Mapping[str, Array]
     """Frequencies [Hz], shape (K,), with every bearing at its own equivalent stiffness: ``"tangent"``,
-    ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``."""
+    ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``. A mount that relaxes has in every
+    line the storage stiffness of its frequency."""
+
+    @property
+    def followed(self) -> bool:
+        """Whether some mount is stiffer the faster it moves."""
+        return any(part.branches for part in self.lines)
 
 
 def critical_speed_map(
@@ -155,15 +165,36 @@ def _with_mass(
 def _at_lines(
     fe: RotorFE, parts: Sequence[EquivalentStiffness], masses: list[float], whirl: str, count: int
 ) -> dict[str, Array]:
-    found = {
-        formula: _on(fe, [spring(p.node, p.equivalent(formula)) for p in parts], whirl, count)
-        for formula in FORMULAS
+    def sprung(stiffness: Callable[[EquivalentStiffness], float]) -> Held:
+        return lambda held: [spring(p.node, stiffness(p)) for p in held]
+
+    def massive(held: Sequence[EquivalentStiffness]) -> list[Support]:
+        return [
+            Support(node=p.node, links=(link(p.tangent), link(p.support)), masses=(mass,))
+            for p, mass in zip(held, masses, strict=True)
+        ]
+
+    ways: dict[str, Held] = {
+        formula: sprung(partial(EquivalentStiffness.equivalent, formula=formula)) for formula in FORMULAS
     }
-    held = [spring(p.node, p.equivalent(contact=True)) for p in parts]
-    found["with contact"] = _on(fe, held, whirl, count)
-    massive = [
-        Support(node=p.node, links=(link(p.tangent), link(p.support)), masses=(mass,))
-        for p, mass in zip(parts, masses, strict=True)
-    ]
-    found["with support mass"] = _on(fe, massive, whirl, count)
+    ways["with contact"] = sprung(partial(EquivalentStiffness.equivalent, contact=True))
+    ways["with support mass"] = massive
+    return {name: _followed(fe, parts, held, whirl, count) for name, held in ways.items()}
+
+
+def _followed(fe: RotorFE, parts: Sequence[EquivalentStiffness], held: Held, whirl: str, count: int) -> Array:
+    """Frequencies [Hz], shape (K,), of a rotor whose supports depend on the frequency of each line.
+
+    From the stiffness at rest, so that a line rises to its lowest fixed point: supports that relax are the
+    stiffer the faster, and so are all lines.
+    """
+    found = _on(fe, held(parts), whirl, count)
+    if not any(part.branches for part in parts):
+        return found
+    for k in np.flatnonzero(np.isfinite(found)):
+        for _ in range(MOST_ITERATIONS):
+            before = float(found[k])
+            found[k] = _on(fe, held([part.at(before) for part in parts]), whirl, count)[k]
+            if abs(found[k] - before) <= CONVERGED * before:
+                break
     return found

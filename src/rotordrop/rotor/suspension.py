@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.statics import bearing_load_shares
 
@@ -18,6 +21,20 @@ Array = NDArray[np.float64]
 
 SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
 FORMULAS = ("tangent", "simple")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relaxing:
+    """A spring in series with a damper, in both directions alike."""
+
+    stiffness: float
+    """Stiffness of its spring [N/m]."""
+    time: float
+    """Time in which its force relaxes [s]."""
+
+    def stiffness_at(self, s: complex) -> complex:
+        """Complex stiffness [N/m] of motion that goes with ``e^(st)``."""
+        return self.stiffness * s * self.time / (1.0 + s * self.time)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,9 +52,20 @@ class EquivalentStiffness:
     """Radial stiffness of the bearing at that load [N/m]: slope of its forces with any preload, and the
     simple engineering formula, which knows no preload."""
     support: float
-    """Stiffness of the support [N/m]."""
+    """Stiffness of the support [N/m]: its spring, a ribbon that sticks, a stop that the load presses shut."""
     contact: float
     """Slope of the contact law between rotor and race at that load [N/m]."""
+    branches: tuple[Relaxing, ...] = ()
+    """Branches of the mount that relax: nothing at rest, stiffer the faster the rotor moves."""
+
+    def at(self, frequency: float) -> EquivalentStiffness:
+        """The same where the support moves at a frequency [Hz]: its storage stiffness."""
+        return replace(self, support=self.dynamic(frequency).real, branches=())
+
+    def dynamic(self, frequency: float) -> complex:
+        """Complex stiffness of the support at a frequency [Hz], [N/m]."""
+        s = 2j * math.pi * frequency
+        return complex(self.support + sum(branch.stiffness_at(s) for branch in self.branches))
 
     def equivalent(self, formula: str = "tangent", *, contact: bool = False) -> float:
         """Bearing and support in series [N/m], with the contact if asked (Neisi 2020, section 5.4)."""
@@ -62,16 +90,36 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
             f"touchdown bearing {bearing.name!r} carries {load:.3g} N of the rotor's weight and is not "
             "loaded; its stiffness is not defined"
         )
-    numbers = numbers_of(bearing)
+    numbers, mount = numbers_of(bearing), bearing.mount
     return EquivalentStiffness(
         bearing=bearing.name,
         node=bearing.node,
         load=load,
         tangent=numbers.tangent_stiffness(load),
         simple=numbers.simple_stiffness(load),
-        support=float(bearing.support.stiffness),
+        support=float(bearing.support.stiffness) + _held_by(bearing, load)[1],
         contact=contact_tangent(bearing.contact.law, load),
+        branches=tuple(Relaxing(stiffness=float(b.stiffness), time=float(b.time)) for b in mount.maxwell),
     )
+
+
+def _held_by(bearing: TouchdownBearing, load: float) -> tuple[float, float]:
+    """Stiffness [N/m], horizontal and vertical, that a mount adds to its spring in small motion about a load
+    [N].
+
+    A ribbon sticks, and a stop holds where the load presses it shut; branches are apart.
+    """
+    ribbon, stop = bearing.mount.ribbon, bearing.mount.stop
+    stuck = 0.0 if ribbon is None else float(ribbon.friction_stiffness)
+    if stop is None:
+        return stuck, stuck
+    row = np.zeros(L.N_BEARING_COLUMNS)
+    bearing.mount.fill(row)
+    bearing.support.fill(row)
+    sag = support_sag(row, load)
+    depth = max(sag - float(stop.gap), 0.0)
+    pressed = float(stop.stiffness) if depth > 0.0 else 0.0
+    return stuck + pressed * depth / max(sag, 1e-300), stuck + pressed
 
 
 def suspension_of(machine: Machine, name: str) -> tuple[Support, ...]:
@@ -110,12 +158,14 @@ def touchdown_supports(
     for bearing, parts in zip(machine.touchdown_bearings, equivalent_stiffness(machine, loads), strict=True):
         ground = bearing.support
         race = parts.tangent if formula == "tangent" else parts.simple
+        beside, below = _held_by(bearing, parts.load)
         links = (
             link(parts.contact),
             link(race, float(bearing.damping_time) * parts.tangent),
             link(
-                (float(ground.stiffness_horizontal), float(ground.stiffness)),
+                (float(ground.stiffness_horizontal) + beside, float(ground.stiffness) + below),
                 (float(ground.damping_horizontal), float(ground.damping)),
+                parts.branches,
             ),
         )
         masses = (float(bearing.race.mass), float(ground.mass))
@@ -131,6 +181,8 @@ class Link:
     """Force in (x, y) against displacement in (x, y) [N/m], shape (2, 2)."""
     damping: Array
     """Force in (x, y) against velocity in (x, y) [N s/m], shape (2, 2)."""
+    branches: tuple[Relaxing, ...] = ()
+    """What relaxes beside spring and damper."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,9 +209,9 @@ class Support:
             )
 
 
-def link(stiffness: ArrayLike, damping: ArrayLike = 0.0) -> Link:
+def link(stiffness: ArrayLike, damping: ArrayLike = 0.0, branches: tuple[Relaxing, ...] = ()) -> Link:
     """Link from numbers: one for both directions, two for (x, y), or a 2 × 2 matrix [N/m], [N s/m]."""
-    return Link(stiffness=_planar(stiffness), damping=_planar(damping))
+    return Link(stiffness=_planar(stiffness), damping=_planar(damping), branches=branches)
 
 
 def spring(node: int, stiffness: ArrayLike, damping: ArrayLike = 0.0) -> Support:
@@ -197,6 +249,15 @@ class PlanarMatrices:
     """M, K, C and G; G is skew, shape (2n, 2n)."""
     rotor_size: int
     """Coordinates of the rotor per plane."""
+    relaxing: tuple[tuple[Array, Relaxing], ...] = ()
+    """What relaxes, with the rows of its stretch in x and y, shape (2, 2n)."""
+
+    def stiffness_at(self, s: complex) -> NDArray[np.complex128]:
+        """Stiffness of motion that goes with ``e^(st)``, with what relaxes, shape (2n, 2n)."""
+        total = self.stiffness.astype(np.complex128)
+        for rows, branch in self.relaxing:
+            total += branch.stiffness_at(s) * (rows.T @ rows)
+        return total
 
     @property
     def plane_size(self) -> int:
@@ -222,7 +283,7 @@ def planar_matrices(
         C[plane, plane] = damping
     G[:m, n : n + m] = polar
     G[n : n + m, :m] = -polar
-    body = m
+    body, relaxing = m, []
     for row, support in zip(node_rows, supports, strict=True):
         inner = np.zeros((2, 2 * n))
         inner[0, :m] = inner[1, n : n + m] = row
@@ -235,5 +296,8 @@ def planar_matrices(
             stretch = inner - outer
             K += stretch.T @ part.stiffness @ stretch
             C += stretch.T @ part.damping @ stretch
+            relaxing += [(stretch, branch) for branch in part.branches]
             inner = outer
-    return PlanarMatrices(mass=M, stiffness=K, damping=C, gyroscopic=G, rotor_size=m)
+    return PlanarMatrices(
+        mass=M, stiffness=K, damping=C, gyroscopic=G, rotor_size=m, relaxing=tuple(relaxing)
+    )

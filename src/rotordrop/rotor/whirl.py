@@ -128,7 +128,8 @@ def _turning_force(
 
 def _steady(system: PlanarMatrices, force: ComplexArray, omega: float) -> ComplexArray:
     coupling = system.damping + omega * system.gyroscopic
-    dynamic = system.stiffness - omega**2 * system.mass + 1j * omega * coupling
+    stiffness = system.stiffness_at(1j * omega) if system.relaxing else system.stiffness
+    dynamic = stiffness - omega**2 * system.mass + 1j * omega * coupling
     return np.asarray(np.linalg.solve(dynamic, omega**2 * force))
 
 
@@ -161,7 +162,9 @@ def unbalance_run_up(
     A[:size, size:-1] = np.eye(size)
     for omega in 0.5 * (speeds[:-1] + speeds[1:]):
         coupling = system.damping + omega * system.gyroscopic
-        held = system.stiffness + rise * system.gyroscopic + (1j * rise - omega**2) * system.mass
+        # what relaxes is taken at the speed of the step, as if that stayed
+        stiffness = system.stiffness_at(1j * omega) if system.relaxing else system.stiffness
+        held = stiffness + rise * system.gyroscopic + (1j * rise - omega**2) * system.mass
         A[size:-1, :size] = -inverse @ (held + 1j * omega * coupling)
         A[size:-1, size:-1] = -inverse @ coupling - 2j * omega * np.eye(size)
         A[size:-1, -1] = (omega**2 - 1j * rise) * (inverse @ force)
@@ -183,6 +186,15 @@ def _eigenpairs(system: PlanarMatrices, speed: float) -> tuple[ComplexArray, Com
     stiffness = inverse @ system.stiffness @ inverse.T
     coupling = inverse @ (system.damping + speed * system.gyroscopic) @ inverse.T
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -coupling]])
+    if system.relaxing:
+        # the stretch of what relaxes is a state of its own: exact, where a complex stiffness at the frequency
+        # of a mode would have to be iterated for each
+        rows = np.vstack([rows for rows, _ in system.relaxing]) @ inverse.T
+        springs = np.repeat([branch.stiffness for _, branch in system.relaxing], 2)
+        rates = np.repeat([1.0 / branch.time for _, branch in system.relaxing], 2)
+        none = np.zeros((n, len(rows)))
+        above = np.hstack([state, np.vstack([none, -rows.T * springs])])
+        state = np.vstack([above, np.hstack([none.T, rows, -np.diag(rates)])])
     values, vectors = np.linalg.eig(state)
     return values.astype(np.complex128), (inverse.T @ vectors[:n]).astype(np.complex128)
 

@@ -23,7 +23,10 @@ AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 def said(hertz, direction="forward", nominal=550.0):
     crossing = SimpleNamespace(speed=2.0 * math.pi * hertz, direction=direction, damping_ratio=0.025)
     machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * nominal))
-    found, diagrams = SimpleNamespace(at_lines=AT_LINES), {"AMBs": SimpleNamespace(crossings=(crossing,))}
+    found, diagrams = (
+        SimpleNamespace(at_lines=AT_LINES, followed=False),
+        {"AMBs": SimpleNamespace(crossings=(crossing,))},
+    )
     return [statement.text for statement in _verdict(machine, found, diagrams) if statement.level == "bad"]
 
 
@@ -45,7 +48,10 @@ def test_a_mode_further_off_or_against_the_spin_is_none():
 def test_the_verdict_stands_first_and_says_that_nothing_is_too_near():
     crossing = SimpleNamespace(speed=2.0 * math.pi * 455.0, direction="forward", damping_ratio=0.025)
     machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * 550.0))
-    found, diagrams = SimpleNamespace(at_lines=AT_LINES), {"AMBs": SimpleNamespace(crossings=(crossing,))}
+    found, diagrams = (
+        SimpleNamespace(at_lines=AT_LINES, followed=False),
+        {"AMBs": SimpleNamespace(crossings=(crossing,))},
+    )
     first, *others = _verdict(machine, found, diagrams)
     assert first.level == "good" and "No critical speed of the held rotor is nearer" in first.text
     assert {one.level for one in others} == {"notice"}
