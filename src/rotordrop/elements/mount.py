@@ -204,6 +204,7 @@ STATED: tuple[Parameter, ...] = (
         path="mount.stop.gap",
         label="travel up to the stop of the mount",
         kind="length",
+        way_of="support",
         measured_by="a push of the bearing in its housing at {owner} until it stops",
         guess_sigma=0.2,
         given_sigma=1e-4,

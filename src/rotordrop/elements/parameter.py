@@ -192,6 +192,8 @@ class Parameter:
     """What a sensor reads per unit of it."""
     lag: bool = False
     """Whether it is the time by which a sensor lags behind."""
+    way_of: Literal["", "support"] = ""
+    """What moves up to it, of a way to a stop: one never used up is larger than the largest motion seen."""
 
     def __post_init__(self) -> None:
         if math.isnan(self.given_sigma):

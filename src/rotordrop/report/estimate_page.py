@@ -233,7 +233,12 @@ def _parameters(estimate: Estimate) -> Section:
     for one in estimate.parameters:
         kind = one.row.display_kind
         found = Quantity.of(one.estimate, kind, range_only=uncertain)
-        row = ParameterRow(spoken(one), Quantity.of(one.prior, kind), found, one.estimate.status)
+        verdict: str = one.estimate.status
+        if one.row.way_of and one.estimate.lower is not None:
+            verdict = (
+                f"larger than {shown(one.estimate.lower, kind)}, the most that the {one.row.way_of} moved"
+            )
+        row = ParameterRow(spoken(one), Quantity.of(one.prior, kind), found, verdict)
         rows[one.scope].append(row)
     tables = [parameter_table(rows["machine"], caption="Parameters of the machine", note=PRIOR_NOTE)]
     if rows["drop"]:

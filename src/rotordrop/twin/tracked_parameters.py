@@ -13,6 +13,7 @@ from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
+from rotordrop.physics import columns as L
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.problem import DropProblem
@@ -98,10 +99,31 @@ def parameters(
     found = []
     for unknown, value in zip(problem.unknowns, values, strict=True):
         prior = identified(unknown, unknown.mean, unknown.sigma)
+        value = never_used_up(problem, smoothed.means, unknown, value)
         if not fits:
             value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior), allowance_90=None)
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)
+
+
+def never_used_up(problem: DropProblem, means: Array, unknown: Unknown, value: Known) -> Known:
+    """A way up to a stop that the motion of the drop (N, n) did not use up: larger than the largest travel.
+
+    Any other value, and a way that was used up, as it is.
+    """
+    if unknown.parameter.way_of != "support":
+        return value
+    layout, b = problem.model.layout, unknown.targets[0].row
+    places = layout.bearing_at()[b]
+    moved = means[:, places[L.SUPPORT] : places[L.SUPPORT] + 2]
+    if places[L.BEARING_OWN] >= 0:
+        moved = moved - means[:, places[L.BEARING_OWN] : places[L.BEARING_OWN] + 2]
+    travel = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
+    if travel >= value.value:
+        return value
+    low, high = value.interval_90 or (value.value, value.value)
+    ends = max(low, travel), max(high, travel)
+    return replace(value, status=UNDETERMINED, lower=travel, interval_90=ends)
 
 
 def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> list[Known]:

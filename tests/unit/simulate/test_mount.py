@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
 
 from rotordrop.errors import MachineFileError
+from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
@@ -14,6 +17,7 @@ from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
+from rotordrop.twin.tracked_parameters import never_used_up
 
 STOP = '{ kind = "stop", gap = "8 um", stiffness = "5e8 N/m" }'
 RIBBON = '{ kind = "ribbon", friction_stiffness = "6e7 N/m", slip_force = "1.5 kN" }'
@@ -84,6 +88,29 @@ def test_a_guess_makes_an_unknown_and_a_given_value_none():
     (gap,) = [one for one in structure_unknowns(build_drop_model(machine, "quick")) if "gap" in one.path]
     assert gap.path == "DE.mount.stop.gap"
     assert np.exp(gap.mean + 1.645 * gap.sigma) == pytest.approx(40e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize("foundation", [False, True])
+def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
+    machine = mounted('{ kind = "stop", gap = { guess = "20 um", range = ["10 um", "40 um"] } }')
+    if foundation:
+        values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
+        machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+    model = build_drop_model(machine, "quick")
+    unknowns = {one.path: one for one in structure_unknowns(model)}
+    gap, means = unknowns["DE.mount.stop.gap"], np.zeros((5, model.layout.size))
+    means[2, model.layout.support] = 90e-6, 0.0, 9e-6, -12e-6
+    if foundation:
+        means[2, model.layout.further_at(L.BEARING_OWN)] = 3e-6, -4e-6, 0.0, 0.0
+    fitted = Known(value=19e-6, status="determined", interval_90=(8e-6, 35e-6), unit="m")
+    found = never_used_up(SimpleNamespace(model=model), means, gap, fitted)
+    assert found.status == "the record does not determine it"
+    assert found.lower == pytest.approx(10e-6 if foundation else 15e-6, rel=1e-12)
+    assert found.interval_90 == (found.lower, 35e-6) and found.value == 19e-6
+    means[2] *= 2.0
+    assert never_used_up(SimpleNamespace(model=model), means, gap, fitted) is fitted
+    other = unknowns["DE.mount.stop.stiffness"]
+    assert never_used_up(SimpleNamespace(model=model), means, other, fitted) is fitted
 
 
 @pytest.mark.parametrize(
