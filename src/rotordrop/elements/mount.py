@@ -6,7 +6,7 @@ Spring and damper themselves are those of the support, `rotordrop.elements.suppo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,6 +37,11 @@ _OF_SUPPORT: Mapping[str, tuple[str, ...]] = {
     "stop": (),
 }
 """Kinds of elements, and what each says of the spring and damper of the support."""
+
+
+def _branch_at(k: int) -> int:
+    """First entry of a branch in the numbers of a mount."""
+    return blocks.MOUNT_BRANCHES + k * blocks.MOUNT_BRANCH_ENTRIES
 
 
 class Stop(Description):
@@ -150,7 +155,7 @@ class Mount(Description):
             numbers[blocks.MOUNT_RIBBON_SLIP] = float(self.ribbon.slip_force)
             numbers[blocks.MOUNT_RIBBON_SHARPNESS] = float(self.ribbon.sharpness)
         for k, branch in enumerate(self.maxwell):
-            at = blocks.MOUNT_BRANCHES + k * blocks.MOUNT_BRANCH_ENTRIES
+            at = _branch_at(k)
             numbers[at], numbers[at + 1] = float(branch.stiffness), float(branch.time)
 
 
@@ -234,5 +239,27 @@ STATED: tuple[Parameter, ...] = (
         given_sigma=1e-4,
         entries=bearing_entries(L.MOUNT + blocks.MOUNT_RIBBON_SLIP),
     ),
+    *chain.from_iterable(
+        (
+            Parameter(
+                path=f"mount.maxwell.{k}.stiffness",
+                label=f"stiffness of branch {k + 1} of the mount",
+                kind="stiffness",
+                guess_sigma=0.5,
+                given_sigma=1e-4,
+                entries=bearing_entries(L.MOUNT + _branch_at(k)),
+            ),
+            Parameter(
+                path=f"mount.maxwell.{k}.time",
+                label=f"relaxation time of branch {k + 1} of the mount",
+                kind="time",
+                shown_as="short_time",
+                guess_sigma=0.7,
+                given_sigma=1e-4,
+                entries=bearing_entries(L.MOUNT + _branch_at(k) + 1),
+            ),
+        )
+        for k in range(blocks.MOUNT_MOST_BRANCHES)
+    ),
 )
-"""Unknowns of a mount, of a bearing that has it; branches that relax are taken as they are given."""
+"""Unknowns of a mount, of a bearing that has it."""

@@ -264,8 +264,11 @@ class Parameter:
 
 def _at(part: Any, path: str) -> Any:
     for name in path.split("."):
-        # another kind of bearing or support need not have the field at all
-        part = getattr(part, name, None)
+        if name.isdecimal():  # one of several parts of a kind, of which there may be fewer
+            part = part[int(name)] if part is not None and int(name) < len(part) else None
+        else:
+            # another kind of bearing or support need not have the field at all
+            part = getattr(part, name, None)
     return part
 
 

@@ -301,7 +301,8 @@ def _resolved(machine: Machine, path: str) -> tuple[Any, ...]:
     keys: tuple[Any, ...] = (head, *rest)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     if head in bearings:
-        keys = ("touchdown_bearings", bearings.index(head), *keys_of(rest))
+        below = [int(key) if key.isdecimal() else key for key in keys_of(rest)]
+        keys = ("touchdown_bearings", bearings.index(head), *below)
     elif head in ("unbalance", "loads"):
         what, value = ("unbalances", "amount") if head == "unbalance" else ("loads", "force")
         if rest and not rest[0].removeprefix("-").isdecimal():

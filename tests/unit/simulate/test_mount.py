@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
 
-from rotordrop.errors import MachineFileError
+from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine, loads_machine
 from rotordrop.machine.saving import machine_text
@@ -88,6 +88,19 @@ def test_a_guess_makes_an_unknown_and_a_given_value_none():
     (gap,) = [one for one in structure_unknowns(build_drop_model(machine, "quick")) if "gap" in one.path]
     assert gap.path == "DE.mount.stop.gap"
     assert np.exp(gap.mean + 1.645 * gap.sigma) == pytest.approx(40e-6, rel=1e-3)
+
+
+def test_a_branch_is_varied_and_estimated_by_its_number():
+    machine = mounted(O_RING.replace('"3 ms"', '{ guess = "3 ms", range = ["2 ms", "4 ms"] }'))
+    model = build_drop_model(machine, "quick")
+    paths = {one.path: one for one in structure_unknowns(model) if "maxwell" in one.path}
+    assert sorted(paths) == [f"DE.mount.maxwell.{k}.{name}" for k in (0, 1) for name in ("stiffness", "time")]
+    assert paths["DE.mount.maxwell.0.time"].sigma > 100.0 * paths["DE.mount.maxwell.1.time"].sigma
+    other = model.with_values({"DE.mount.maxwell.1.stiffness": 5e7})
+    changed = np.flatnonzero(other.parameters.bearing[1] != model.parameters.bearing[1])
+    assert changed == paths["DE.mount.maxwell.1.stiffness"].targets[0].entry.column
+    with pytest.raises(UsageError, match="counted from 0"):
+        machine.with_values({"DE.mount.maxwell.2.time": 1e-3})
 
 
 @pytest.mark.parametrize("foundation", [False, True])
