@@ -18,7 +18,7 @@ import numpy as np
 
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
-from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench import SensorChain, SyntheticDrop, hidden_machine, synthesize_drop
 from rotordrop_bench.drops import SPEEDS
 from rotordrop_bench.rotors import ROTORS, bench_rotor
 
@@ -58,8 +58,8 @@ def rotor_of(seed: int) -> Machine:
     return rotor_named(name_of(seed))
 
 
-def made(seed: int, *, long: bool) -> tuple[Record, Record]:
-    """Record and settled tail of a seed."""
+def made(seed: int, *, long: bool) -> SyntheticDrop:
+    """Record, settled tail and truth of a seed."""
     random = np.random.default_rng((seed, 26))
     machine, name = rotor_of(seed), name_of(seed)
     speeds = SPEEDS[THREE_PLANES.get(name, name)]
@@ -71,7 +71,7 @@ def made(seed: int, *, long: bool) -> tuple[Record, Record]:
         runout_2x=float(random.uniform(0.0, 0.5e-6)),
         bits=int(random.choice([14, 16, 16, 24])),
     )
-    drop = synthesize_drop(
+    return synthesize_drop(
         hidden_machine(machine, seed),
         speed,
         seed,
@@ -80,8 +80,6 @@ def made(seed: int, *, long: bool) -> tuple[Record, Record]:
         before=float(random.choice([0.15, 0.25])),
         tolerance=1e-6,
     )
-    assert drop.tail is not None
-    return drop.record, drop.tail
 
 
 def kept(folder: Path, seed: int, *, long: bool = False) -> tuple[Record, Record]:
@@ -90,7 +88,9 @@ def kept(folder: Path, seed: int, *, long: bool = False) -> tuple[Record, Record
     path = folder / f"{seed}{'_long' if long else ''}.npz"
     if not path.is_file():
         folder.mkdir(parents=True, exist_ok=True)
-        record, tail = made(seed, long=long)
+        drop = made(seed, long=long)
+        record, tail = drop.record, drop.tail
+        assert tail is not None
         part = path.with_name(f"{path.stem}.part.npz")
         np.savez_compressed(
             part,

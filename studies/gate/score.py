@@ -3,6 +3,7 @@
 Usage: python studies/gate/score.py faults OUT FOLDER FIRST [SUPPLIED [KIND ...]]
        python studies/gate/score.py clean OUT FOLDER FIRST LAST
        python studies/gate/score.py blocks OUT FOLDER FIRST LAST
+       python studies/gate/score.py ranges OUT FOLDER FIRST SUPPLIED FAULTS
        python studies/gate/score.py count OUT [OUT ...]
 
 Every judgement is one line of the file OUT; what is there already is not made again, so a run that was
@@ -10,6 +11,10 @@ stopped goes on. FOLDER keeps the clean records (`records.py`); FIRST, a multipl
 twenty seeds that are spoiled. SUPPLIED is a folder with drops of the bundled example (`drop_060.csv`,
 `drop_060_tail.csv` and so on); the bundled drop stands for them where there is none. Every kind of fault hits
 three records: a supplied one, one of a rotor up to 60 kg and one of a heavier one.
+
+`ranges` estimates the records whose fault was not caught in FAULTS, the OUT of the faults before, and asks
+whether the ranges of the peak forces hold the truth, bearing by bearing. A supplied drop without a truth file
+(`truth/`) has the values that are estimated of it without the fault in place of a truth.
 
 A fault counts as caught by a finding that the record as it was does not have: a refusal, a warning or a note.
 A clean record counts as a false alarm by any warning or refusal. Clean records whose levitated orbit is wider
@@ -33,10 +38,11 @@ from typing import Any
 
 import numpy as np
 from faults import FAULTS, Given
-from records import NAMES, kept, name_of, rotor_of
+from records import NAMES, kept, made, name_of, rotor_of
 
 from rotordrop import example_machine, read_record
-from rotordrop.errors import RecordError
+from rotordrop.errors import RecordError, RotordropError
+from rotordrop.estimation import estimate_drop
 from rotordrop.evidence import check_record
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.recorder import check_blocks
@@ -163,6 +169,71 @@ def run_blocks(path: Path, folder: Path, seeds: range) -> None:
             out.write(json.dumps(line) + "\n")
 
 
+def new_findings(lines: list[dict[str, Any]]) -> dict[tuple[str, str], list[list[str]]]:
+    """Findings of every spoiled record that it does not have without the fault, by fault and record."""
+    was = {one["record"]: {tuple(f[:3]) for f in one["findings"]} for one in lines if not one["fault"]}
+    return {
+        (line["fault"], line["record"]): [
+            f for f in line["findings"] if tuple(f[:3]) not in was[line["record"]]
+        ]
+        for line in lines
+        if line["fault"]
+    }
+
+
+def run_ranges(path: Path, folder: Path, first: int, given: str, faults: Path) -> None:
+    """Estimate what the gate let pass, and ask whether the ranges of the peak forces hold the truth."""
+    done = {(line["fault"], line["record"]) for line in lines_of(path)}
+    missed = {case for case, found in new_findings(lines_of(faults)).items() if not found} - done
+    with path.open("a") as out:
+        for kind, name, one in spoiled_records(folder, first, given):
+            if (kind, name) in missed:
+                line = {"fault": kind, "record": name, **peaks_of(spoilt(kind, name, one))}
+                line["true"] = true_peaks(name, given) or [peak[0] for peak in peaks_of(one)["peaks"]]
+                out.write(json.dumps(line, ensure_ascii=False) + "\n")
+                out.flush()
+
+
+def peaks_of(given: Given) -> dict[str, Any]:
+    """Peak force of every bearing with the ends of its range [N], and what the estimate says of itself."""
+    begun = time.process_time()
+    try:
+        estimate = estimate_drop(given.machine, given.record, given.tail)
+    except RotordropError as error:
+        return {"peaks": [], "verdict": f"refused: {error}", "seconds": round(time.process_time() - begun, 1)}
+    known = [bearing.peak_force.known for bearing in estimate.bearings]
+    return {
+        "peaks": [[one.value, *(one.interval_90 or (one.value, one.value))] for one in known],
+        "verdict": estimate.verdict.name,
+        "seconds": round(time.process_time() - begun, 1),
+    }
+
+
+def true_peaks(name: str, given: str) -> list[float]:
+    """Peak forces of a record [N] in the order of the bearings; none where no truth is known."""
+    if name.isdecimal():
+        return list(made(int(name), long=True).truth["peak_force_N"].values())
+    path = Path(given) / "truth" / f"{Path(name).stem}.json"
+    return list(json.loads(path.read_text())["peak_force_N"].values()) if path.is_file() else []
+
+
+def count_ranges(lines: list[dict[str, Any]]) -> None:
+    """Print which ranges hold the truth: of all bearings of a record, or some."""
+    covered = refused = 0
+    for line in lines:
+        held = [
+            low <= true <= high for (_, low, high), true in zip(line["peaks"], line["true"], strict=False)
+        ]
+        covered += bool(held) and all(held)
+        refused += not held
+        off = [
+            f"{peak[0] / true - 1.0:+.1%}" for peak, true in zip(line["peaks"], line["true"], strict=False)
+        ]
+        print(f"{line['fault']:34} {line['record']:18} {line['verdict'][:60]:12} {held} {off}")
+    print(f"all ranges hold the truth {wilson(covered, len(lines))}; refused by the estimate {refused}")
+    _print_seconds(lines)
+
+
 def _exchanged(most: int, *, every: bool) -> Callable[[Array, np.random.Generator], Array]:
     """Exchange two neighbouring blocks of 8 to `most` samples in all channels or one."""
 
@@ -232,37 +303,48 @@ def count_clean(lines: list[dict[str, Any]]) -> None:
 
 def count_faults(lines: list[dict[str, Any]]) -> None:
     """Print what was caught, and what under its right name."""
-    was = {one["record"]: {tuple(f[:3]) for f in one["findings"]} for one in lines if not one["fault"]}
-    made = [line for line in lines if line["fault"]]
+    found_of = new_findings(lines)
+    spoiled = [line for line in lines if line["fault"]]
     total = Counter[str]()
     for fault, one in FAULTS.items():
-        mine = [line for line in made if line["fault"] == fault]
-        new = [[f for f in line["findings"] if tuple(f[:3]) not in was[line["record"]]] for line in mine]
+        mine = [line["record"] for line in spoiled if line["fault"] == fault]
+        new = [found_of[fault, record] for record in mine]
         caught = [found for found in new if found]
         right = [found for found in caught if found[0][0] in one.names]
         notes = sum(found[0][1] == "note" for found in caught)
         other = dict(Counter(found[0][0] for found in caught if found not in right))
         total.update(made=len(mine), caught=len(caught), right=len(right), notes=notes)
-        missed = [line["record"] for line, found in zip(mine, new, strict=True) if not found]
+        missed = [record for record, found in zip(mine, new, strict=True) if not found]
         if mine:
             named = f"right {len(right)}, notes {notes} {other or ''} {missed or ''}"
             print(f"{fault:38} caught {len(caught)}/{len(mine)}, {named}")
     print(f"caught {wilson(total['caught'], total['made'])}, {total['notes']} of them by a note alone")
     right_of = [wilson(total["right"], total[of]) for of in ("made", "caught")]
     print(f"right name {right_of[0]} of all; {right_of[1]} of caught")
-    _print_seconds(made)
+    _print_seconds(spoiled)
 
 
 if __name__ == "__main__":
     what, *rest = sys.argv[1:]
     if what == "count":
         every = [line for name in rest for line in lines_of(Path(name))]
-        for counted, key in ((count_clean, "rotor"), (count_faults, "fault"), (count_blocks, "block")):
-            if lines := [line for line in every if key in line]:
+        counts = {
+            "rotor": count_clean,
+            "findings": count_faults,
+            "block": count_blocks,
+            "peaks": count_ranges,
+        }
+        for line in every:
+            line["key"] = next(key for key in counts if key in line)
+        for key, counted in counts.items():
+            if lines := [line for line in every if line["key"] == key]:
                 counted(lines)
     elif what == "faults":
         out, folder, first, given, *kinds = [*rest, ""] if len(rest) < 4 else rest
         run_faults(Path(out), Path(folder), int(first), given, tuple(kinds))
+    elif what == "ranges":
+        out, folder, first, given, faults = rest
+        run_ranges(Path(out), Path(folder), int(first), given, Path(faults))
     else:
         run = run_clean if what == "clean" else run_blocks
         run(Path(rest[0]), Path(rest[1]), range(int(rest[2]), int(rest[3])))

@@ -54,6 +54,14 @@ has begun."""
 _STARTS = (0.0, -0.7, 0.6, -1.4, 1.2)
 """Where the search for the release begins, from the first guess [ms]; the later ones only when needed."""
 
+_OTHERS = (-0.7, 0.6)
+"""Where the search begins anew once the whole fall is explained [ms]: of ten clean drops that were doubted
+three had the lowest minimum elsewhere, 0.7 to 1.2 ms later; the second of these leads there in all three."""
+
+_LOWER = 1.0
+"""Half a chi square by which another minimum has to be lower to be taken [1]: searches that end in the same
+one differ by less."""
+
 _LEAD = 5e-3
 """Levitated samples kept before the earliest release [s] (chosen)."""
 
@@ -280,6 +288,11 @@ def fit_fall(
         if grown is None or found.rank > grown.rank:
             grown = found
         if grown.is_whole(latest):
+            # a wrong one may explain all of it at noise level too, with forces that no magnet has
+            starts = (np.array([other, np.log(REMANENT_TIME[0])]) for other in _OTHERS)
+            better = min((grown.problem.searched(start) for start in starts), key=lambda one: one[1])
+            if better[1] < grown.best[1] - _LOWER:
+                grown = _grown(grown.problem, better, until, latest)
             break
     assert grown is not None
     search, _, jacobian = grown.best

@@ -9,7 +9,7 @@ from rotordrop.evidence import check_record
 from rotordrop.evidence.events import coarse_drop
 from rotordrop.evidence.free_rotor import GRID, Responses, free_rotor
 from rotordrop.evidence.levitated import fit_levitated
-from rotordrop.evidence.quality.flight import check_flights, weighed
+from rotordrop.evidence.quality.flight import Weighed, check_flights, weighed
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -80,3 +80,40 @@ def test_a_fading_force_is_answered_as_by_stepping(hopping, machine):
         since = np.arange(len(stepped)) * GRID
         closed = Responses.of(rotor, 600.0, 0.02).fading(decay, since)
         np.testing.assert_allclose(closed, stepped, rtol=0.0, atol=1e-9 * np.max(np.abs(stepped)))
+
+
+@pytest.mark.parametrize(("by_chance", "severity"), [(0.2, "warning"), (1e-3, "note")])
+@pytest.mark.parametrize("channels", [[1], [0, 1, 2, 3]])
+def test_flights_that_contradict_each_other_ask_and_do_not_warn(by_chance, severity, channels, hopping):
+    share, precision = np.ones(4), np.eye(4) / 0.02**2
+    share[channels] = 0.8
+    seen = Weighed(
+        share=share,
+        covariance=0.5 * 0.02**2 * np.eye(4),
+        each=((share, precision), (share, precision)),
+        scatter=3.0,
+        by_chance=by_chance,
+        beside=frozenset(),
+    )
+    (found,) = check_flights(seen, hopping[0])
+    assert (found.kind, found.severity) == ("wrong gain", severity)
+    assert ("contradict each other" in found.message) == (severity == "note")
+
+
+def test_only_a_fault_of_all_channels_outweighs_what_a_touch_left(hopping):
+    """A touch looks like a gain of one channel, not of all."""
+    precision = np.eye(4) / 0.02**2
+    for share, kinds in (
+        (np.array([0.8, 0.78, 0.86, 0.74]), ["wrong gain"]),
+        (np.array([1.1, 0.6, 1.2, 1.0]), []),
+    ):
+        seen = Weighed(
+            share=share,
+            covariance=0.02**2 * np.eye(4),
+            each=((share, precision),),
+            scatter=1.0,
+            by_chance=1.0,
+            beside=frozenset(),
+        )
+        found = check_flights(seen, hopping[0])
+        assert [(one.kind, one.severity) for one in found] == [(kind, "note") for kind in kinds]

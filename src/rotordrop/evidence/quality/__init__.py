@@ -156,7 +156,8 @@ def _recorder(evidence: Evidence) -> list[Finding]:
     # a high-pass bends a rest into what looks like a rail; what a filter explains is none
     whole = evidence.record.whole
     instant = known(evidence.beginning).coarse.instant
-    found = check_filters(whole, instant, _bounces(evidence) / (2.0 * np.pi)) + check_again(whole)
+    bounces = _bounces(evidence) / (2.0 * np.pi)
+    found = check_filters(whole, evidence.floating, instant, bounces) + check_again(whole)
     return found or check_rail(whole, first_motion(whole)[0])
 
 

@@ -193,8 +193,9 @@ def _size_of_jump(seen: _Jumps) -> Array:
     """Jump of every channel beyond what a kink explains, in standard deviations, shape (N, S)."""
     # a hard impact turns the velocity between two samples: that kink may lie half a sample aside
     turned = np.abs(seen.after - seen.before)
-    excess = seen.excess + _SURELY * math.sqrt(4.0 * seen.free)
-    beyond = np.abs(seen.jump) - _KINK * turned - np.sqrt(_LEFT_OUT * np.maximum(excess, 0.0)) * seen.error
+    # noise that happens to be small hides no less
+    excess = np.maximum(seen.excess, 0.0) + _SURELY * math.sqrt(4.0 * seen.free)
+    beyond = np.abs(seen.jump) - _KINK * turned - np.sqrt(_LEFT_OUT * excess) * seen.error
     return np.asarray(np.maximum(beyond, 0.0) * seen.smooth / seen.error)
 
 
@@ -217,8 +218,8 @@ def _size_of_loss(seen: _Jumps) -> Array:
     fits = (seeing > max(jump.shape[1] // 2, 1)) & whole & (missing > 0.5)
     fits &= aside < _SAME_WAY**2 * seeing
     kink = _KINK * np.linalg.norm(turned, axis=1)
-    excess = np.sum(seen.excess * seen.smooth, axis=1) + _SURELY * np.sqrt(4.0 * seen.free * seeing)
-    bent = np.sqrt(_LEFT_OUT * np.maximum(excess, 0.0))
+    excess = np.maximum(np.sum(seen.excess * seen.smooth, axis=1), 0.0)
+    bent = np.sqrt(_LEFT_OUT * (excess + _SURELY * np.sqrt(4.0 * seen.free * seeing)))
     return np.asarray((np.maximum(missing * np.sqrt(weight) - kink - bent, 0.0) * fits)[:, None])
 
 

@@ -321,8 +321,8 @@ SUSPECT = 20.0
 falls. With 14 two of 577 clean falls were named."""
 
 _WITHIN_TOLERANCE = 0.05
-"""Error of a gain that calibrated sensors may have [1]: that of the scale factor by API 670; and tangent of
-the angle by which they may be mounted otherwise (chosen)."""
+"""Error of a gain that calibrated sensors may have [1]: that of the scale factor by API 670, at the largest
+reading too; and tangent of the angle by which they may be mounted otherwise (chosen)."""
 
 _USUAL_DELAY = 5e-5
 """Delay that sensors may have [s]: that of a driver with a bandwidth of 3 kHz."""
@@ -332,6 +332,9 @@ _MODEL_ERROR = 3e-4
 
 _EXPLAINED = 0.5
 """Share of the chi square beyond noise that a fault has to take away where the fall is not at noise level."""
+
+_BY_CHANCE = 3.0
+"""Standard deviations up to which a chi square is that of a fall at noise level [1]."""
 
 _LONG = (7e-4, 1.5e-3, 2.5e-3)
 """Delays that are no longer small against the fall, each tried with its own shape [s]."""
@@ -370,10 +373,17 @@ def read_otherwise(fall: Fall) -> list[Finding]:
     )
     gained, size, best = found[0]
     beyond = float(residual @ residual) - len(residual)
+    everywhere = best.kind == Kind.WRONG_GAIN and len(best.channels) == len(levitated.noise)
+    if everywhere and beyond < _BY_CHANCE * (2.0 * len(residual)) ** 0.5:
+        beyond = 0.0  # what the model leaves out seldom looks like all channels
     trusted = _trust(levitated, fall)
     if trusted * gained < max(SUSPECT, _EXPLAINED * trusted * beyond):
         return []
-    small = {Kind.TURNED: _WITHIN_TOLERANCE, Kind.LATE_CHANNEL: _USUAL_DELAY}.get(best.kind, 0.0)
+    small = {
+        Kind.TURNED: _WITHIN_TOLERANCE,
+        Kind.LATE_CHANNEL: _USUAL_DELAY,
+        Kind.SATURATION: 3.0 * _WITHIN_TOLERANCE,  # a third of it is missing in the largest reading
+    }.get(best.kind, 0.0)
     if abs(size) < small and not best.long:
         return []
     alike = [one for one in found if one[0] > gained - 0.5 * SUSPECT]

@@ -56,7 +56,12 @@ _MODEL = 0.02
 """What the rotor of the file leaves out of a flight, as an error of gravity [1]."""
 
 _ONE_FAULT = 4.0
-"""Chi square per degree of freedom that one fault may leave; a touch that was not seen leaves more [1]."""
+"""Chi square per degree of freedom that one fault may leave; a touch that was not seen leaves more [1], and
+what is left then only speaks of all channels."""
+
+_CONTRADICT = 0.01
+"""Probability by chance below which flights contradict each other [1] (chosen): then something touched the
+rotor in one of them at least."""
 
 _OF_REACH = 80.0
 """Percentile of the distance from the levitated place that stands for the race [%]: few rotors fly long."""
@@ -97,6 +102,8 @@ class Weighed:
     """Share and inverse covariance of every flight by itself."""
     scatter: float
     """Mean square by which the flights differ, over what their errors let them [1]."""
+    by_chance: float
+    """Probability that flights which nothing touched differ as much [1]."""
     beside: frozenset[str]
     """Channels between the touchdown bearings, where the rotor bends more than its model knows."""
 
@@ -127,18 +134,22 @@ def weighed(
         seen.append((share, np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)))
     if not seen:
         return None
+    from scipy.special import gammaincc
+
     error: Array = np.linalg.inv(np.sum([inverse for _, inverse in seen], axis=0)).astype(np.float64)
     near = planes_at_bearings(machine, record)
     mean = error @ np.sum([inverse @ share for share, inverse in seen], axis=0)
     # sensors read alike in every flight; where the flights differ by more than their errors, something
     # touched the rotor in them, and they know as much less (Birge's ratio)
     apart = sum(float((share - mean) @ inverse @ (share - mean)) for share, inverse in seen)
-    scatter = apart / max((len(seen) - 1) * count, 1)
+    free = (len(seen) - 1) * count
+    scatter = apart / max(free, 1)
     return Weighed(
         share=mean,
         covariance=error * max(scatter, 1.0),
         each=tuple(seen),
         scatter=scatter,
+        by_chance=float(gammaincc(0.5 * free, 0.5 * apart)) if free else 1.0,
         beside=frozenset(
             name for number, plane in enumerate(record.planes) if number not in near for name in plane.names
         ),
@@ -160,17 +171,20 @@ def check_flights(seen: Weighed, record: Record) -> list[Finding]:
         size = float(shape @ precision @ off) / float(shape @ precision @ shape)
         tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels, shape))
     gained, size, kind, channels, shape = max(tried, key=lambda one: one[0])
-    left = float(off @ precision @ off) - gained
-    if gained < SURE**2 or not WRONG_GAIN <= abs(size) <= _LARGEST or left > _ONE_FAULT * (len(off) - 1):
+    left = (float(off @ precision @ off) - gained) / (len(off) - 1)
+    gained /= max(left, 1.0)
+    if gained < SURE**2 or not WRONG_GAIN <= abs(size) <= _LARGEST:
         return []
-    if seen.scatter > _ONE_FAULT:
+    common, odd = len(channels) == len(off), max(left, seen.scatter) > _ONE_FAULT
+    if odd and not common:
         return []
     names = ", ".join(channels)
     witnesses = sum(_shown(shape * np.sign(size), *flight) > _BY_ITSELF for flight in seen.each)
-    sole = witnesses < _WITNESSES and len(channels) < len(off)
     doubt = (
         "; no second flight shows it by itself, and a touch that was not seen looks alike"
-        if sole
+        if witnesses < _WITNESSES and not common
+        else "; but the flights contradict each other, and something touched the rotor in one at least"
+        if odd or seen.by_chance < _CONTRADICT
         else "; between its bearings a rotor that bends otherwise looks alike"
         if seen.beside.issuperset(channels)
         else ""

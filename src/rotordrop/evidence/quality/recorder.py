@@ -18,6 +18,7 @@ from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
+    from rotordrop.evidence.levitated import LevitatedModel
     from rotordrop.record.record import Record
 
 SLOWEST = 2000.0
@@ -256,9 +257,9 @@ have a power that falls with the fourth power of the frequency over that of the 
 of 1.6 and 6 t, of 127 and 82 Hz, have 0.022 and 0.0067 at least, behind a low-pass of 100 Hz 2e-5."""
 
 _COLOURED = 0.05
-"""Power of the levitated readings from 500 Hz to 2 kHz over that from 100 to 250 Hz, lines left out, below
-which a filter has taken their noise too [1]; 0.25 to 1.5 in 235 simulated records, at most 0.005 behind a
-low-pass of up to 300 Hz."""
+"""Power of the levitated readings, without orbit and hum, from 500 Hz to 2 kHz over that from 100 to 250 Hz,
+below which a filter has taken their noise too [1]; 0.25 to 1.5 in 235 simulated records, at most 0.005 behind
+a low-pass of up to 300 Hz."""
 
 _BEFORE = (100.0, 250.0)
 _HIGH, _LOW = (500.0, 2000.0), (30.0, 150.0)
@@ -301,20 +302,23 @@ def bridged(record: Record, channel: str, values: Array) -> Finding | None:
     )
 
 
-def check_filters(record: Record, drop: float, bounces: float) -> list[Finding]:
+def check_filters(record: Record, levitated: LevitatedModel, drop: float, bounces: float) -> list[Finding]:
     """See whether impacts and rest of a dropped rotor are as sharp and as lasting as they must be.
 
     `bounces` is the frequency of the rigid rotor on its supports [Hz].
     """
-    return [*_low_pass(record, drop, bounces), *_coupling(record, drop)]
+    return [*_low_pass(record, levitated, drop, bounces), *_coupling(record, drop)]
 
 
-def _low_pass(record: Record, drop: float, bounces: float) -> list[Finding]:
+def _low_pass(record: Record, levitated: LevitatedModel, drop: float, bounces: float) -> list[Finding]:
     inside = (record.time > drop) & (record.time < drop + 0.2)
     if record.sampling_rate < 2.2 * _HIGH[1] or int(inside.sum()) < 0.1 * record.sampling_rate:
         return []
     ratio = _bands(np.diff(record.signals[inside], 2, axis=0), record.sampling_rate, _LOW)
-    noise = _bands(record.signals[record.time < drop - 8e-3], record.sampling_rate, _BEFORE)
+    # in a short window the orbit is no line among others: what is left beside it is noise
+    floating = (record.time >= levitated.start) & (record.time <= levitated.end)
+    left = record.signals[floating] - levitated.readings(record.time[floating])
+    noise = _bands(left, record.sampling_rate, _BEFORE)
     smoothest = _FAR_TOO_SMOOTH * min(bounces / _BOUNCES, 1.0) ** 4
     if ratio >= (_DOUBTFUL if noise < _COLOURED else smoothest):
         return []
