@@ -7,7 +7,7 @@ No air gap need be known: a magnet turns the rotor back as gently as it came, a 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -45,6 +45,11 @@ _LEAST_TURN = 1.0
 
 _ABOVE_USUAL = 4.0
 """A contact turns the rotor this many times more sharply than its orbit does around [1] (chosen)."""
+
+_ABOVE_CALM, _CALM, _CALM_SPAN = 1.5, 99.8, 2.0
+"""A first contact turns the rotor this many times more sharply than all but the sharpest 0.2 % of turns in
+the nearest two seconds in which it is nowhere near a race: a scratch under a sensor is as sharp there, at
+like speed [1, %, s] (set on seeds 0, 1, 3 and 5 of `studies/look/levitated.py`)."""
 
 _TURN = 4e-3
 """The turn lasts up to this long on either side of the furthest point [s] (chosen)."""
@@ -155,9 +160,10 @@ def held_contacts(
     Notes
     -----
     A contact is a turn far outside of the usual orbit that is at least three times as sharp as any on the way
-    to it, four times as sharp as the orbit around, and above the acceleration of gravity; further turns at
-    the same distance are contacts too. A scratch under a sensor rises nearly as sharply as it turns, and so
-    does a swing on the magnets. Not validated on measured contacts.
+    to it, four times as sharp as the orbit around, sharper than any while nothing is near a race, and above
+    the acceleration of gravity; further turns at the same distance are contacts too. A scratch under a sensor
+    rises nearly as sharply as it turns, and is as sharp wherever the rotor is; a swing on the magnets turns
+    as it rises. Not validated on measured contacts.
     """
     usual = np.median(position, axis=0)
     away = position - usual
@@ -175,7 +181,18 @@ def held_contacts(
     doubt = noise * rate * math.sqrt(12.0 / window**3)  # of a velocity by a straight line
     turn, back, around = (max(round(span * rate), 2) for span in (_TURN, _APPROACH, _AROUND))
 
-    def contacts(floor: float, sharper: float, returned: float) -> Iterator[HeldContact]:
+    far = np.cumsum(np.pad(distance >= floor, turn + 1))
+    calm = np.flatnonzero(far[2 * turn + 1 : -1] == far[: len(distance)])
+    beside = round(0.5 * _CALM_SPAN * rate)
+
+    def scratch(at: int) -> float:
+        near = int(np.searchsorted(calm, at))
+        turns = usual_turn[calm[max(near - beside, 0) : near + beside]]
+        return _ABOVE_CALM * float(np.percentile(turns, _CALM)) if len(turns) else 0.0
+
+    def contacts(
+        floor: float, sharper: float, returned: float, marred: Callable[[int], float]
+    ) -> Iterator[HeldContact]:
         for at in peaks(distance, floor, max(0.1 * floor, 6.0 * noise)):
             outward, begin = away[at] / distance[at], max(at - back, 0)
             speed, here = velocity[begin : at + turn + 1] @ outward, at - begin
@@ -187,7 +204,7 @@ def held_contacts(
             turned = float(-np.min(outwards[fastest : leaves + 1]))
             came = float(np.max(outwards[: fastest + 1]))
             usually = float(np.median(usual_turn[max(at - around, 0) : at + around]))
-            gentle = turned <= max(sharper * came, _ABOVE_USUAL * usually, _LEAST_TURN * GRAVITY)
+            gentle = turned <= max(sharper * came, _ABOVE_USUAL * usually, _LEAST_TURN * GRAVITY, marred(at))
             least, most = sorted((approach, departure))
             if gentle or least <= max(returned * most, 0.0) or most + least <= 10.0 * doubt:
                 continue
@@ -205,11 +222,11 @@ def held_contacts(
                 impulse=None if masses is None else (masses[0] * change[0], masses[1] * change[1]),
             )
 
-    sure = tuple(contacts(floor, _SHARPER, _RETURNED))
+    sure = tuple(contacts(floor, _SHARPER, _RETURNED, scratch))
     if not sure:
         return ()
     race = min(one.distance for one in sure)
-    return tuple(contacts(_BACK_AT_RACE * race, _SHARPER_AGAIN, 0.0))
+    return tuple(contacts(_BACK_AT_RACE * race, _SHARPER_AGAIN, 0.0, lambda _: 0.0))
 
 
 def masses_at(machine: Machine, node: int) -> tuple[float, float]:

@@ -297,6 +297,18 @@ def test_a_scratch_and_a_swing_on_the_magnets_are_no_contacts():
             assert held_contacts("A", time, path + noise, rate, gap=gap) == ()
 
 
+@pytest.mark.parametrize(("width", "load"), [(0.05, 36e-6), (0.07, 26e-6), (0.09, 36e-6)])
+def test_a_scratch_is_no_contact_where_a_load_moves_it_far_out(width, load):
+    rate = 5000.0
+    time = np.arange(0.0, 12.0, 1.0 / rate)
+    angle = 2 * np.pi * 14.3 * time
+    scratch = 15e-6 * np.exp(-np.square(np.angle(np.exp(1j * angle)) / width))
+    moved = load * (time > 11.2)
+    noise = (0.6e-6 if width > 0.08 else 1e-6) * np.random.default_rng(0).standard_normal((len(time), 2))
+    path = np.column_stack([scratch + moved - 1e-6 * np.cos(2 * angle), moved]) + noise
+    assert held_contacts("A", time, path, rate) == ()
+
+
 def test_a_single_channel_shows_its_level(tmp_path, capsys):
     time = np.arange(0.0, 2.0, 2e-4)
     file = tmp_path / "one.csv"
