@@ -23,7 +23,7 @@ from rotordrop.web.desk import Desk, NotThereError, Operation, of_file, options_
 from rotordrop.web.guard import App, Guard, Receive, Scope, Send
 from rotordrop.web.kept_drops import label, row_of_job
 from rotordrop.web.numbers import machine_of_numbers, schema_of_numbers
-from rotordrop.web.running import VERBS, Runner, published, state_of
+from rotordrop.web.running import OF_MACHINE, VERBS, Runner, published, state_of
 from rotordrop.web.workspace import LARGEST, ROLES, Job, Role, TooLargeError, Workspace, labelled, receive
 
 ASSETS = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
@@ -42,6 +42,7 @@ LINGER_S = 30.0
 REPORT_HEADERS = {
     "content-security-policy": "sandbox allow-scripts allow-downloads allow-modals",
     "cross-origin-opener-policy": "unsafe-none",  # a sandboxed page must not claim an opener policy
+    "x-frame-options": "SAMEORIGIN",  # the tabs of a machine show it in a frame
 }
 
 
@@ -167,7 +168,9 @@ async def ask(desk: Desk, request: Request) -> Response:
     """Ask for a computation."""
     job, verb = desk.job(request), verb_of(request)
     options = {**job.read()["options"], **options_of(await order_of(request))}
-    if "record" not in job.read()["files"]:
+    if verb in OF_MACHINE and "machine" not in job.read()["files"]:
+        raise UsageError("no machine file was sent; drop one on the page")
+    if verb not in OF_MACHINE and "record" not in job.read()["files"]:
         raise UsageError("no record was sent; drop one on the page")
     await asyncio.to_thread(desk.runner.ask, job, verb, options)
     return JSONResponse(_told(job), status_code=202)

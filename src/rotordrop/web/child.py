@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +26,7 @@ from rotordrop.errors import (
     UsageError,
 )
 from rotordrop.files import write_json
-from rotordrop.web.running import Verb, clear, publish, result_folder, state_of, write_state
+from rotordrop.web.running import OF_MACHINE, Verb, clear, publish, result_folder, state_of, write_state
 from rotordrop.web.workspace import Job, Workspace, beside, is_path
 
 if TYPE_CHECKING:
@@ -40,10 +41,12 @@ MEMORY: dict[str, int] = {
     "look": 2 * 2**30,
     "estimate": 8 * 2**30,
     "waterfall": 8 * 2**30,
+    **dict.fromkeys(OF_MACHINE, 8 * 2**30),
 }
 MEMORY_PER_BYTE = 40
 """Memory a computation may take beside that, for each byte of its files [1]; chosen, not measured."""
 CPU_S: dict[str, int] = {"channels": 300, "look": 300, "estimate": 4 * 3600, "waterfall": 4 * 3600}
+CPU_S |= dict.fromkeys(OF_MACHINE, 4 * 3600)
 TRACE_POINTS = 80
 """Points of the small trace of a channel; chosen, not measured."""
 BETWEEN_WORDS_S = 0.3
@@ -309,4 +312,11 @@ def _waterfall(job: Job, made: Path, told: dict[str, Any]) -> None:
     write_waterfall(found, machine, record, job, made, told["options"])
 
 
+def _of_machine(verb: Verb, job: Job, made: Path, told: dict[str, Any]) -> None:
+    from rotordrop.web.machine_pages import write_machine_page
+
+    write_machine_page(job, verb, made, told, MEMORY[verb], CPU_S[verb])
+
+
 _WORK = {"channels": _channels, "look": _look, "estimate": _estimate, "waterfall": _waterfall}
+_WORK |= {verb: partial(_of_machine, verb) for verb in OF_MACHINE}

@@ -20,7 +20,17 @@ from rotordrop.web.workspace import LONGEST_OPTION, Job, TooLargeError, Workspac
 
 LARGEST_ORDER = 16 * 2**10
 """Bytes of an order; chosen, not measured: options are short texts."""
-OPTIONS = {"gap": str, "speed": str, "planes": str, "operator": str, "method": str, "quick": bool}
+OPTIONS = {
+    "gap": str,
+    "speed": str,
+    "planes": str,
+    "operator": str,
+    "method": str,
+    "quick": bool,
+    "plan": str,
+}
+LONGEST_PLAN = 8000
+"""Characters of the plan of a study or a design; chosen, not measured."""
 METHODS = ("tracked", "replay")
 
 Handler = Callable[["Desk", Request], Awaitable[Response]]
@@ -122,7 +132,8 @@ def options_of(given: Any) -> dict[str, Any]:
     for name, value in given.items():
         if name not in OPTIONS:
             raise UsageError(f"there is no option {labelled(name)!r}; there are {', '.join(OPTIONS)}")
-        if type(value) is not OPTIONS[name] or (isinstance(value, str) and len(value) > LONGEST_OPTION):
+        most = LONGEST_PLAN if name == "plan" else LONGEST_OPTION
+        if type(value) is not OPTIONS[name] or (isinstance(value, str) and len(value) > most):
             raise UsageError(
                 f"the option {name} is {labelled(str(value))!r}; expected {OPTIONS[name].__name__}"
             )

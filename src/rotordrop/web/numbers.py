@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from functools import lru_cache
 from threading import BoundedSemaphore
 from typing import Any
 
 from rotordrop.errors import UsageError
+from rotordrop.web.commands import said_by_command
 from rotordrop.web.workspace import LONGEST_OPTION, labelled
 
 PATIENCE_S = 60.0
@@ -18,11 +16,6 @@ PATIENCE_S = 60.0
 MEMORY = 2 * 2**30
 """Memory of one of them [byte]; chosen, not measured."""
 _AT_ONCE = BoundedSemaphore(2)
-_PROGRAM = (
-    "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
-    "from rotordrop.web.child import limit; limit(order['memory'], order['seconds']); "
-    "sys.argv[:] = ['rotordrop', *order['arguments']]; from rotordrop.__main__ import main; main()"
-)
 
 
 @lru_cache(maxsize=1)
@@ -50,26 +43,11 @@ def machine_of_numbers(given: dict[str, Any]) -> str:
 
 
 def _said_by(arguments: list[str]) -> str:
-    limits = {"memory": MEMORY, "seconds": int(PATIENCE_S)}
-    order = {"sys_path": [entry for entry in sys.path if entry], "arguments": arguments, **limits}
     if not _AT_ONCE.acquire(timeout=PATIENCE_S):
         raise UsageError("others make machines at this moment; try again in a minute")
     try:
-        order_text = json.dumps(order)
-        done = subprocess.run(
-            [sys.executable, "-I", "-c", _PROGRAM, order_text],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=PATIENCE_S,
-            env=os.environ | {"NO_COLOR": "1", "COLUMNS": "1000", "PYTHONIOENCODING": "utf-8"},
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise UsageError(f"these numbers gave no machine within {PATIENCE_S:g} s") from None
+        return said_by_command(arguments, memory=MEMORY, seconds=int(PATIENCE_S))
     except (ValueError, UnicodeError):
         raise UsageError("these numbers cannot be read; give texts with units") from None
     finally:
         _AT_ONCE.release()
-    if done.returncode != 0:
-        raise UsageError(done.stderr.decode("utf-8", "replace").strip() or "these numbers make no machine")
-    return done.stdout.decode("utf-8")

@@ -18,20 +18,25 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 from rotordrop.errors import DamagedFileError
 from rotordrop.files import digest_at, read_sealed, write_json
 from rotordrop.web.workspace import Job, Workspace, digests_in
 
-Verb: TypeAlias = Literal["channels", "look", "estimate", "waterfall"]
+Verb: TypeAlias = Literal[
+    "channels", "look", "estimate", "waterfall", "check", "speeds", "unbalance", "study", "design"
+]
 Key: TypeAlias = tuple[str, Verb]
-VERBS: tuple[Verb, ...] = ("channels", "look", "estimate", "waterfall")
+VERBS: tuple[Verb, ...] = get_args(Verb)
+OF_MACHINE: tuple[Verb, ...] = ("check", "speeds", "unbalance", "study", "design")
+"""What is computed of a machine alone, without a record."""
 AT_ONCE: dict[Verb, int] = {
     "channels": 2,
     "look": 2,
     "estimate": max(1, (os.cpu_count() or 2) // 2),
     "waterfall": 1,
+    **dict.fromkeys(OF_MACHINE, 1),
 }
 """Computations of one verb that run beside each other; others wait."""
 

@@ -154,8 +154,8 @@ async function load(logToo = false) {
   clearTimeout(home.waiting);
   const asked = performance.now();
   const [{ jobs, used, quota }, log] = await Promise.all([server.jobs(), logToo || !home.log ? server.log() : home.log]);
-  const told = JSON.stringify([jobs, log]);
-  Object.assign(home, { jobs, log });
+  const told = JSON.stringify([jobs, log, units.chosen()]);
+  Object.assign(home, { jobs: jobs.filter((job) => job.damaged || job.files.record || !job.files.machine), log }); // a machine alone is no drop
   if (!home.open) { return; }
   if (told !== home.told && !isOpen() && !document.querySelector("dialog[open]")) { home.told = told; draw(); }
   const running = jobs.filter((job) => stateOf(job)[1] === "notice").length;

@@ -5,6 +5,7 @@ import { chooseOthers, compareTab, learnDrops } from "./compare.js";
 import { nextImpact, pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
 import { addToLog, askAbout, askRemoval, leaveHome, redrawHome, showHome } from "./home.js";
+import { leaveMachines, showMachines } from "./machines.js";
 import { redoLog, redrawLog, showLog } from "./log.js";
 import { drawAll, FIGURES, isShown, lines, loadView, traces } from "./panels.js";
 import { rotorTab } from "./rotor.js";
@@ -238,9 +239,10 @@ async function route() {
   address.settle();
   const told = address.read(), atDrop = Boolean(told.drop);
   if (told.token) { location.reload(); return; }
-  by("todrops").toggleAttribute("aria-current", !atDrop && told.view !== "log");
-  by("tolog").toggleAttribute("aria-current", !atDrop && told.view === "log");
+  const place = atDrop ? "" : { log: "tolog", machines: "tomachines", machine: "tomachines" }[told.view] || "todrops";
+  for (const id of ["todrops", "tomachines", "tolog"]) { if (id === place) { by(id).setAttribute("aria-current", "page"); } else { by(id).removeAttribute("aria-current"); } }
   leaveHome();
+  leaveMachines();
   by("log").hidden = true;
   if (atDrop) {
     try { await openDrop(told); } catch (error) {
@@ -258,10 +260,14 @@ async function home(told) {
   state.job = null;
   shown = "";
   by("main").hidden = by("actions").hidden = by("simulated").hidden = true;
-  if (told.view === "log") { await showLog(told); } else { await showHome(told); }
+  if (told.view === "log") { await showLog(told); } else if (["machines", "machine"].includes(told.view)) { await showMachines(told); } else { await showHome(told); }
 }
 
-const sent = (id) => { justSent = id; if (id) { shown = ""; address.go({ drop: id }); } };
+const sent = (id, kind = "drop") => {
+  if (kind === "machine") { address.go({ view: "machines" }); return; }
+  justSent = id;
+  if (id) { shown = ""; address.go({ drop: id }); }
+};
 const openChosen = (list) => (list.length ? chooseFiles(list, sent).catch((error) => say(error.message, "bad")) : null);
 
 // What the recording holds is read by a process of its own, then asked.
