@@ -305,7 +305,9 @@ def waterfall(
     ] = None,
     amplitude: Annotated[Amplitude, Option(help="Amplitudes of the waterfalls.")] = Amplitude.zero_to_peak,
     against: Annotated[Against, Option(help="What goes upwards.")] = Against.time,
-    points: Annotated[int, Option(min=16, help="Samples per frame; the paper's by default.")] = 32768,
+    points: Annotated[
+        int | None, Option(min=16, help="Samples per frame; the paper's 32768, less in a short record.")
+    ] = None,
     overlap: Annotated[float, Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
     highest: Annotated[
         float | None,
@@ -331,17 +333,18 @@ def waterfall(
     from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
     from rotordrop.spectrum.findings_file import write_findings
     from rotordrop.spectrum.machine_candidates import machine_candidates
-    from rotordrop.spectrum.waterfall import WaterfallSettings
+    from rotordrop.spectrum.waterfall import WaterfallSettings, settings_for
 
     described = load_machine(machine)
     signal, simulated = _signal(described, record, mapping or (), profile)
     if against is Against.speed and signal.profile is None:
         raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
+    samples = next(iter(signal.planes.values())).shape[0]
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
         highest_frequency=highest or WaterfallChoice().highest_frequency,
-        settings=WaterfallSettings(points=points, overlap=overlap),
+        settings=WaterfallSettings(points=points or settings_for(samples).points, overlap=overlap),
     )
     planes = {name: name for name in signal.planes}
     candidates = machine_candidates(with_found_air_gaps(described, signal), planes)

@@ -34,12 +34,12 @@ from rotordrop.spectrum.orders import OrderTrack, track_orders
 from rotordrop.spectrum.resonances import PassedResonance, find_resonances
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import (
-    PAPER_SETTINGS,
     AmplitudeKind,
     Component,
     PlanarSignal,
     Waterfall,
     WaterfallSettings,
+    settings_for,
     waterfalls,
 )
 
@@ -107,8 +107,8 @@ class WaterfallChoice:
     """Said in every label."""
     highest_frequency: float = 600.0
     """[Hz]."""
-    settings: WaterfallSettings = PAPER_SETTINGS
-    """Those of the paper by default."""
+    settings: WaterfallSettings | None = None
+    """Those of the paper when left out, in shorter frames for a short signal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,7 +264,8 @@ def _plane(
 def _waterfalls(
     signal: CoastDownSignal, moved: PlanarSignal, choice: WaterfallChoice
 ) -> tuple[Waterfall, ...]:
-    if choice.settings.frame_count(moved.shape[0]) == 0:
+    settings = choice.settings or settings_for(moved.shape[0])
+    if settings.frame_count(moved.shape[0]) == 0:
         return ()
     speed = None
     if signal.profile is not None:
@@ -274,7 +275,7 @@ def _waterfalls(
         signal.sampling_rate,
         components=choice.components,
         speed=speed,
-        settings=choice.settings,
+        settings=settings,
         amplitude_kind=choice.amplitude_kind,
         start_time=signal.start_time,
         highest_frequency=choice.highest_frequency,

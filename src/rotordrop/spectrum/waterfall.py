@@ -63,6 +63,17 @@ class WaterfallSettings:
 
 PAPER_SETTINGS = WaterfallSettings()
 
+_FEWEST_FRAMES, _SHORTEST_FRAME = 12, 1024
+"""A map with fewer frames shows bars and no change, one of shorter frames no lines [1] (chosen)."""
+
+
+def settings_for(samples: int) -> WaterfallSettings:
+    """Settings of the paper, with frames halved until a short signal has a dozen of them."""
+    points = PAPER_SETTINGS.points
+    while points > _SHORTEST_FRAME and WaterfallSettings(points=points).frame_count(samples) < _FEWEST_FRAMES:
+        points //= 2
+    return WaterfallSettings(points=points)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Waterfall:

@@ -88,7 +88,8 @@ def _told(job: Job) -> dict[str, Any]:
         if state is not None:
             spent = (state.get("ended") or time.time()) - state.get("started", time.time())
             states[verb] = {
-                key: state.get(key) for key in ("state", "stage", "fraction", "error", "options", "run")
+                key: state.get(key)
+                for key in ("state", "stage", "fraction", "left", "error", "options", "run")
             }
             states[verb] |= {"spent": max(spent, 0.0), "result": None}
             try:

@@ -234,15 +234,41 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
     write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options, machine)
 
 
+class Pace:
+    """How long a computation still takes by what it has done since its first step, which loads and compiles.
+
+    The time left falls or stays. A fit that begins again has a pace anew.
+    """
+
+    def __init__(self) -> None:
+        self._steps: list[tuple[float, float]] = []
+        self._left: float | None = None
+
+    def left(self, spent: float, fraction: float) -> float | None:
+        """Time left [s] after so much time with such a fraction done; None before two steps are done."""
+        if self._steps and fraction < self._steps[-1][1]:
+            self._steps, self._left = [], None
+        if not self._steps or fraction > self._steps[-1][1]:
+            self._steps.append((spent, fraction))
+            if len(self._steps) >= 3:
+                began, first = self._steps[1]
+                expected = (spent - began) * (1.0 - fraction) / (fraction - first)
+                self._left = expected if self._left is None else min(expected, self._left)
+        return self._left
+
+
 def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str, float], None]:
-    """A function that keeps stage and share in the state file, now and then."""
-    running, last = state_of(job, verb) or told, [0.0]
+    """A function that keeps stage, share and time left in the state file, now and then."""
+    running, last = state_of(job, verb) or told, 0.0
+    pace = Pace()
 
     def progress(stage: str, fraction: float) -> None:
-        now = time.monotonic()
-        if now - last[0] >= BETWEEN_WORDS_S:
-            last[0] = now
-            write_state(job, verb, {**running, "stage": stage, "fraction": round(fraction, 4)})
+        nonlocal last
+        now = time.time()
+        left = pace.left(now, fraction)
+        if now - last >= BETWEEN_WORDS_S:
+            last = now
+            write_state(job, verb, {**running, "stage": stage, "fraction": round(fraction, 4), "left": left})
 
     return progress
 

@@ -8,7 +8,13 @@ from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.spectrum.waterfall import PAPER_SETTINGS, WaterfallSettings, smear_factor, waterfalls
+from rotordrop.spectrum.waterfall import (
+    PAPER_SETTINGS,
+    WaterfallSettings,
+    settings_for,
+    smear_factor,
+    waterfalls,
+)
 
 FS = 20000.0
 SMALL = WaterfallSettings(points=2048)
@@ -114,3 +120,11 @@ def test_wrong_calls_are_refused():
         RecordError, match=r"speed has shape \(5,\), expected one value per sample, \(4096,\)"
     ):
         waterfalls(np.zeros((4096, 2)), FS, settings=SMALL, speed=np.zeros(5))
+
+
+@pytest.mark.parametrize(
+    ("samples", "points"),
+    [(1_140_000, 32768), (212_992, 32768), (212_991, 16384), (45_000, 4096), (3000, 1024)],
+)
+def test_a_short_signal_has_a_dozen_frames_as_long_as_that_allows(samples, points):
+    assert settings_for(samples).points == points

@@ -62,6 +62,7 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_pa
                 break
         browser.key("ArrowRight")
         browser.until("document.querySelector('[aria-selected=true]').innerText === 'Events'")
+        assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert "released" in words(browser, "#tabpanel")
         browser.call("Page.reload")
         browser.until(LOOKED)

@@ -19,6 +19,7 @@ from rotordrop import load_machine, look
 from rotordrop.cli.app import run
 from rotordrop.files import digest_of_file, without_digest
 from rotordrop.web import running
+from rotordrop.web.child import Pace
 from rotordrop.web.running import Runner, published_run, result_folder, state_of
 from rotordrop.web.workspace import Job, Workspace
 
@@ -144,6 +145,19 @@ def test_an_estimate_is_cancelled_with_all_it_began(served, files):
     with pytest.raises(ProcessLookupError):
         os.killpg(process, 0)
     assert [entry.name for entry in folder.iterdir() if entry.is_dir()] == ["files"]
+
+
+def test_the_time_left_falls_steadily_and_forgets_the_loading_before_the_first_step():
+    pace, dice = Pace(), np.random.default_rng(0)
+    assert pace.left(0.0, 0.0) is None
+    spent, said = 30.0, []  # loading and compiling took half a minute
+    for step in range(1, 40):
+        spent += float(dice.uniform(0.5, 1.5))
+        said.append(pace.left(spent, step / 40))
+    known = [one for one in said if one is not None]
+    assert len(known) == 38 and known == sorted(known, reverse=True)
+    assert known[0] < 60.0 and known[18] == pytest.approx(20.0, abs=6.0) and known[-1] < 2.0
+    assert pace.left(spent, 0.1) is None  # another fit begins
 
 
 def test_what_waits_is_cancelled_too(tmp_path, monkeypatch):

@@ -9,6 +9,9 @@ export function colours() {
 }
 
 export const levelColour = (tone, place) => (place === undefined ? tone.limit : placeColour(tone, place));
+// The names of the levels for the head of a figure; those of several places share one.
+export const levelKeys = (levels, tone) => [...new Map(levels.map((level) => [level.name, level])).values()].map(({ name, place }) => (
+  { label: name, colour: place === undefined ? tone.limit : tone.muted, dash: [5, 4] }));
 export const placeColour = (tone, index) => tone[`place${index % 4}`];
 export const faint = (colour, share) => {
   const number = parseInt(colour.slice(1), 16);
@@ -133,11 +136,8 @@ export function tracePicture(pen, { title, x, y, curves, bands, levels, uprights
     const down = Array.from(time, (t, i) => [px(t), py(clip(lower[i]))]).reverse();
     pen.area([...up, ...down].filter((point) => point.every(Number.isFinite)), colour);
   }
-  for (const { value, name, place } of levels) {
-    const colour = levelColour(tone, place);
-    if (value < y.low || value > y.high) { continue; }
-    pen.line([[box.left, py(value)], [box.right, py(value)]], colour, 1, [5, 4]);
-    pen.text(name, box.right - 4 - 150 * (place || 0), py(value) - 4, colour, { align: "right", size: 10 });
+  for (const { value, place } of levels.filter((one) => one.value >= y.low && one.value <= y.high)) {
+    pen.line([[box.left, py(value)], [box.right, py(value)]], levelColour(tone, place), 1, [5, 4]);
   }
   for (const { time, values, colour, width = 1.3, dash = [] } of curves) {
     pen.line(Array.from(time, (t, i) => [px(t), py(clip(values[i]))]), colour, width, dash);
@@ -150,7 +150,7 @@ export function tracePicture(pen, { title, x, y, curves, bands, levels, uprights
     tone.muted);
   pen.text(title, box.left, 18, tone.ink, { size: 13, weight: "600" });
   let at = box.left;
-  for (const { label, colour, dash = [] } of curves) {
+  for (const { label, colour, dash = [] } of [...curves, ...levelKeys(levels, tone)]) {
     pen.line([[at, 33], [at + 26, 33]], colour, 2, dash);
     pen.text(label, at + 31, 37, tone.ink);
     at += 46 + 6.2 * label.length;

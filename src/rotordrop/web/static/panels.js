@@ -1,7 +1,7 @@
 // The figures over time: what they show, how they are drawn, saved, and made again in Python.
 import { curvesOfOthers, dashOf, othersOf } from "./compare.js";
 import { makeOrbits, setCursor, setMark, setView, setWindow, zoom } from "./cursor.js";
-import { colours, faint, keep, keepPng, keepSvg, placeColour, svgPen, tracePicture } from "./figures.js";
+import { colours, faint, keep, keepPng, keepSvg, levelKeys, placeColour, svgPen, tracePicture } from "./figures.js";
 import { clearPlots, drawOverview, drawPanel, follow, stripOn } from "./plots.js";
 import * as server from "./server.js";
 import { by, events, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, uprights, usesEstimate, zero } from "./state.js";
@@ -11,7 +11,7 @@ import * as units from "./units.js";
 const component = (found, [x, y], signal) => (signal === "x" ? found[x] : signal === "r" ? found[x].map((v, i) => Math.hypot(v, found[y][i])) : found[y]);
 const gapLevels = ([low, high], signal) => {
   const sides = signal === "r" ? [1] : signal === "x" ? [-1, 1] : [-1];
-  return sides.flatMap((side) => (high - low > 1e-6 ? [[side * low, ""], [side * high, "air gap"]] : [[side * high, "air gap"]])).map(([value, name]) => ({ value, name }));
+  return sides.flatMap((side) => (high - low > 1e-6 ? [side * low, side * high] : [side * high])).map((value) => ({ value, name: "air gap" }));
 };
 
 function motionPanel(index) {
@@ -37,7 +37,7 @@ function loadPanel(kind) {
   return {
     id: kind, verb: "estimate", columns: places.flatMap((place) => place[kind]), kind: kind === "force" ? "force" : "pressure",
     title: kind === "force" ? "Bearing force" : "Maximum Hertz stress", axis: kind, fromZero: kind === "force",
-    levels: panels[kind].flatMap((panel, i) => panel.levels.map(({ name, value }) => ({ name: `${panel.title}: ${name}`, value, place: i }))),
+    levels: panels[kind].flatMap((panel, i) => panel.levels.map(({ name, value }) => ({ name, value, place: i }))),
     measured: places.map((place) => ({ label: `${place.name} ${kind}`, column: place[kind][0], value: (found) => found[place[kind][0]] })),
     others: places.flatMap((place, i) => othersOf(kind, i, place.name)), ofOther: (found, [name]) => found[name],
     curves: (found, tone) => places.map((place, i) => ({
@@ -110,7 +110,7 @@ function panelFrame(panel, tone) {
     label, dash: dashOf(k), width: 1.4, time: found.time, values: panel.ofOther(found, columns), colour: placeColour(tone, panel.kind === "length" ? k + 1 : place)
   }))];
   return make("section", { class: "panel", "aria-label": panel.title, of: [
-    make("header", { of: [make("h2", { text: panel.title }), make("span", { class: "keys-of", of: panel.drawn.map(key) }), files(panel.title, {
+    make("header", { of: [make("h2", { text: panel.title }), make("span", { class: "keys-of", of: [...panel.drawn, ...levelKeys(panel.levels, tone)].map(key) }), files(panel.title, {
       csv: () => csv(panel), svg: () => keepSvg(picture(panel), fileName(panel.title)), png: () => keepPng(picture(panel), fileName(panel.title)), python: lines(panel.verb, panel.id) && (() => showLines(lines(panel.verb, panel.id))), command: state[panel.verb].command && (() => showLines(state[panel.verb].command, "As command"))
     })] }), panel.element] });
 }

@@ -11,16 +11,11 @@ function levelsOn(u, levels) {
   const c = u.ctx, ratio = window.devicePixelRatio || 1, tone = colours();
   c.save();
   c.beginPath(); c.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height); c.clip();
-  c.font = `${10 * ratio}px system-ui, sans-serif`; c.textAlign = "right";
-  for (const { value, name, place } of levels) {
-    const y = u.valToPos(value, "y", true), right = u.bbox.left + u.bbox.width, colour = levelColour(tone, place);
-    const at = right - (4 + 150 * (place || 0)) * ratio;
-    c.strokeStyle = colour; c.lineWidth = ratio; c.setLineDash([5 * ratio, 4 * ratio]);
-    c.beginPath(); c.moveTo(u.bbox.left, y); c.lineTo(right, y); c.stroke();
-    if (name) {
-      c.setLineDash([]); c.lineWidth = 4 * ratio; c.lineJoin = "round"; c.strokeStyle = tone.back; c.fillStyle = colour;
-      c.strokeText(name, at, y - 4 * ratio); c.fillText(name, at, y - 4 * ratio);
-    }
+  c.lineWidth = ratio; c.setLineDash([5 * ratio, 4 * ratio]);
+  for (const { value, place } of levels) {
+    const y = u.valToPos(value, "y", true);
+    c.strokeStyle = levelColour(tone, place);
+    c.beginPath(); c.moveTo(u.bbox.left, y); c.lineTo(u.bbox.left + u.bbox.width, y); c.stroke();
   }
   c.restore();
 }
@@ -74,7 +69,7 @@ export function drawPanel(panel, view, on) {
     cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, y: false, points: { show: false } },
     scales: { x: { time: false, range: () => [view.from / scale, view.to / scale] }, y: { range } },
     padding: [8, 16, panel.lowest ? 0 : 4, 0],
-    axes: [{ ...axis, size: panel.lowest ? 22 : 3, values: panel.lowest ? values(8) : () => [], gap: 2, ...(panel.lowest ? { label: `time from power-off [${timeName}]`, labelSize: 14, labelGap: 0 } : {}) },
+    axes: [{ ...axis, size: panel.lowest ? 26 : 3, values: panel.lowest ? values(8) : () => [], gap: 2, ...(panel.lowest ? { label: `time from power-off [${timeName}]`, labelSize: 16, labelGap: 0 } : {}) },
       { ...axis, size: 54, values: values(8), label: `${panel.axis} [${unit(panel.kind)}]`, labelSize: 16, labelGap: 0, gap: 3 }],
     series, bands,
     hooks: {
