@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -17,6 +18,9 @@ from rotordrop.json_schema import DIALECT
 
 ABSENT: Any = None
 """Default of a field that may be left out. It is then not written, and null is refused in its place."""
+
+DEEPEST = 40
+"""Brackets or parts of a key inside one another that a file can need (chosen)."""
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -92,6 +96,34 @@ def first_fault(error: ValidationError) -> str:
     return f"{where}{found}: {fault['msg']}"
 
 
+class NestedTomlError(ValueError):
+    """TOML with more levels inside one another than a file of ours can have."""
+
+    def __init__(self, depth: int, line: int) -> None:
+        super().__init__(f"{depth} levels inside one another")
+        self.line = line
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Table in a text of TOML; every reader of TOML comes here.
+
+    Raises
+    ------
+    ValueError
+        If it is no TOML, or nested as only a damaged or hostile file is: the parser needs memory with the
+        square of the parts of a key, and no end of its stack.
+    """
+    for number, line in enumerate(text.splitlines(), start=1):
+        key = re.match(r"[\s\[]*([\w\s.-]*)", line)
+        depth = max(line.count("[") - line.count("]"), line.count("{"), key.group(1).count(".") if key else 0)
+        if depth > DEEPEST:
+            raise NestedTomlError(depth, number)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("brackets inside one another without an end") from None
+
+
 def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     """The table that a file of the user holds (TOML); ``what`` names its kind in messages.
 
@@ -101,10 +133,10 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         If it cannot be read, or is no TOML.
     """
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+        return parse_toml(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UsageError(f"{path}: cannot read the {what} file: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:  # not UTF-8, or no TOML
+    except ValueError as error:  # not UTF-8, or no TOML
         raise UsageError(f"{path}: not valid TOML: {error}") from error
 
 

@@ -115,3 +115,10 @@ def _skeleton(folder: Path) -> None:
     (bench / "__init__.py").write_text("")
     for name in ("ball_bearing", "ball_bearing_response"):
         (root / "physics" / f"{name}.py").write_text("")
+
+
+def test_toml_is_parsed_in_one_place():
+    """`parse_toml` refuses what is nested without end; each reader by itself forgot it."""
+    package = ROOT / "src" / "rotordrop"
+    using = [path.name for path in package.rglob("*.py") if "tomllib.load" in path.read_text("utf-8")]
+    assert using == ["document.py"]

@@ -128,15 +128,14 @@ def _read_beside(file: Path) -> list[Path]:
         return [file.with_suffix(suffix) for suffix in (".dat", ".DAT")]
     if file.suffix.lower() != ".toml" or not file.is_file():
         return []
-    import tomllib
-
+    from rotordrop.document import parse_toml
     from rotordrop.elements.description import LARGEST_FILE
 
     try:
         with file.open(encoding="utf-8-sig") as stream:
-            rotor = tomllib.loads(stream.read(LARGEST_FILE)).get("rotor")
+            rotor = parse_toml(stream.read(LARGEST_FILE)).get("rotor")
         return [file.parent / str(rotor["shaft_table"])] if isinstance(rotor, dict) else []
-    except (OSError, ValueError, RecursionError, KeyError):
+    except (OSError, ValueError, KeyError):
         return []  # whoever reads the file says what is wrong with it
 
 

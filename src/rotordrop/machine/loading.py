@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from rotordrop.document import NestedTomlError, parse_toml
 from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import LARGEST_FILE, Description, Misfit, UnknownKey
 from rotordrop.errors import MachineFileError, UsageError
@@ -29,9 +30,6 @@ _EXPECTED = {
     "too_short": "at least one entry is needed",
     "missing_argument": "expected two entries",
 }
-_DEEPEST = 40
-"""Brackets or parts of a key inside one another that a machine file can need."""
-
 _UNQUOTED = re.compile(r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$")
 _SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
@@ -103,18 +101,13 @@ def _loaded(text: str, file: Path | None, folder: Path) -> Machine:
 
 def _parsed(text: str, file: Path | None) -> dict[str, Any]:
     lines = text.splitlines()
-    for number, line in enumerate(lines, start=1):
-        # Only a damaged or hostile file has keys and lists nested deeply.
-        key = re.match(r"[\s\[]*([\w\s.-]*)", line)
-        depth = max(line.count("[") - line.count("]"), line.count("{"), key.group(1).count(".") if key else 0)
-        if depth > _DEEPEST:
-            told = f"{depth} levels inside one another; a machine file has a handful"
-            raise MachineFileError(told, file=file, line=number)
     try:
-        return tomllib.loads(text)
+        return parse_toml(text)
+    except NestedTomlError as error:
+        raise MachineFileError(f"{error}; a machine file has a handful", file=file, line=error.line) from None
     except tomllib.TOMLDecodeError as error:
         raise _syntax_error(lines or [""], str(error), file) from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         told = f"this cannot be a value of a machine: {str(error).partition(';')[0]}"
         longest = lines.index(max(lines, key=len))
         raise MachineFileError(told, file=file, line=longest + 1, column=1) from None

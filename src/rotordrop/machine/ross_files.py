@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.document import parse_toml
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.files import write_text
@@ -120,8 +120,8 @@ def read_ross(path: str | Path) -> ImportedRotor:
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
-        content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+        content = json.loads(text) if path.suffix.lower() == ".json" else parse_toml(text)
+    except (OSError, ValueError, RecursionError) as error:
         raise MachineFileError(f"cannot read it as a file of ROSS: {error}", file=path) from error
     if not isinstance(content, dict):
         raise MachineFileError("it is no file of ROSS: a table of elements is expected", file=path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from rotordrop.document import parse_toml
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.files import write_text
 from rotordrop.record.recording import Array, Channel, spelled
@@ -122,10 +122,10 @@ def load_profile(path: str | Path) -> Profile:
     """
     path = Path(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = parse_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordError(f"cannot read the profile {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise RecordError(f"{path} is not a TOML file: {error}") from error
     return profile_of(content, str(path))
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotordrop.document import parse_toml
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import UsageError
 from rotordrop.files import digest_of_file, require_place, write_text
@@ -136,7 +136,7 @@ def nameless(machine: Machine, sensors: Mapping[str, str], shared: Sequence[str]
 
     The new names of its sensors come by their old ones.
     """
-    raw = _untold(tomllib.loads(machine_text(machine)))
+    raw = _untold(parse_toml(machine_text(machine)))
     raw["name"] = "shared machine"
     bearings = {one["name"]: f"B{k}" for k, one in enumerate(raw["touchdown_bearings"], start=1)}
     for one in raw["touchdown_bearings"]:

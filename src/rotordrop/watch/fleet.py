@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import gzip
 import re
-import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from rotordrop.document import read_toml
+from rotordrop.document import parse_toml, read_toml
 from rotordrop.errors import UsageError
 from rotordrop.machine import load_machine
 from rotordrop.record.profile import load_profile
@@ -125,7 +124,7 @@ def _watched(serial: str, file: Path, profile: Path | None, limits: Path | None)
     if profile is not None:
         load_profile(profile)
         read["profile"] = profile
-    rotor = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("rotor")
+    rotor = parse_toml(file.read_text(encoding="utf-8-sig")).get("rotor")
     if isinstance(rotor, dict) and "shaft_table" in rotor:
         read[f"beside {rotor['shaft_table']}"] = file.parent / rotor["shaft_table"]
     stated = {} if limits is None else dict(read_toml(limits, "limits"))

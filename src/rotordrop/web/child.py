@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import sys
 import time
-import tomllib
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -17,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotordrop.document import parse_toml
 from rotordrop.errors import (
     DamagedFileError,
     MachineFileError,
@@ -118,10 +118,8 @@ def machine_of(job: Job) -> Machine | None:
         return None
     for role in beside(job):
         job.file(role)  # refuses what has changed on the disk
-    with suppress(
-        ValueError, RecursionError, OSError
-    ):  # whoever reads it properly says what is wrong with it
-        rotor = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("rotor")
+    with suppress(ValueError, OSError):  # whoever reads it properly says what is wrong with it
+        rotor = parse_toml(file.read_text(encoding="utf-8-sig")).get("rotor")
         table = rotor.get("shaft_table") if isinstance(rotor, dict) else None
         if isinstance(table, str) and (is_path(table) or not (file.parent / table).is_file()):
             raise MachineFileError(

@@ -119,7 +119,7 @@ class Workspace:
         if mark.exists():
             return
         for file in self.jobs_folder.glob("*/*.json"):
-            with suppress(ValueError):
+            with suppress(ValueError, RecursionError):
                 told = json.loads(file.read_bytes())
                 if isinstance(told, dict) and DIGEST not in told:
                     verb = file.name.removesuffix(".result.json")

@@ -5,8 +5,11 @@ import re
 
 import pytest
 
-from rotordrop.errors import MachineFileError
+from rotordrop.document import read_toml
+from rotordrop.errors import MachineFileError, RotordropError
 from rotordrop.machine import load_machine, loads_machine
+from rotordrop.machine.ross_files import read_ross
+from rotordrop.record.profile import load_profile
 
 GAP = 'air_gap = "250 um"'
 
@@ -343,3 +346,23 @@ def test_a_shaft_table_that_is_no_file_is_refused_with_the_line(tmp_path, small_
 def test_an_endless_machine_file_is_refused(tmp_path):
     with pytest.raises(MachineFileError, match=r"more than 16777216 bytes are no machine file"):
         load_machine("/dev/zero")
+
+
+NESTED = {
+    "lists": "a = " + 5000 * "[",
+    "lists, one in a line": "a = " + 5000 * "[\n",
+    "tables": "a = " + 3000 * "{a=",
+    "parts of a key": 20_000 * "a." + "a = 1",
+}
+
+
+@pytest.mark.parametrize("content", NESTED.values(), ids=NESTED)
+@pytest.mark.parametrize(
+    "read", [load_machine, load_profile, read_ross, lambda file: read_toml(file, "study")]
+)
+def test_a_file_of_any_kind_that_is_nested_without_end_is_refused_at_once(tmp_path, read, content):
+    """Brackets ended in a traceback of profiles and files of ROSS, a key of 40 kB needed 1.6 GB."""
+    file = tmp_path / "file.toml"
+    file.write_text(content)
+    with pytest.raises(RotordropError, match="inside one another"):
+        read(file)
