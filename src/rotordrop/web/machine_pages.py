@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import tomllib
 from pathlib import Path
 from typing import Any
 
+from rotordrop.document import parse_toml
 from rotordrop.errors import UsageError
 from rotordrop.files import write_json, write_text
 from rotordrop.report.origin import command_line
@@ -82,8 +82,8 @@ def write_machine_page(
 def _plan(text: str) -> str:
     """A plan without the machine it names: it is that of the job."""
     try:
-        tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        parse_toml(text)
+    except ValueError as error:
         raise UsageError(f"the plan cannot be read as TOML: {error}") from None
     kept = [line for line in text.splitlines() if not re.match(r"\s*machine\s*=", line)]
     return "\n".join([*kept, ""])
