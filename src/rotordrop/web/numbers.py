@@ -47,7 +47,9 @@ def _said_by(arguments: list[str]) -> str:
         raise UsageError("others make machines at this moment; try again in a minute")
     try:
         return said_by_command(arguments, memory=MEMORY, seconds=int(PATIENCE_S))
-    except (ValueError, UnicodeError):
+    except UsageError:
+        raise
+    except ValueError:  # signs that no command takes
         raise UsageError("these numbers cannot be read; give texts with units") from None
     finally:
         _AT_ONCE.release()
