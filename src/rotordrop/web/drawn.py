@@ -17,7 +17,7 @@ from rotordrop._version import __version__
 from rotordrop.files import write_json
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
-from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, waterfall_lines
+from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, vector_lines, waterfall_lines
 from rotordrop.web.rows import content_json, quantity_json, row_of, shown_units
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
@@ -31,10 +31,17 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
     from rotordrop.report.time_panels import Panel
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
+    from rotordrop.spectrum.orders import OrderTrack
 
 Array = NDArray[np.float64]
 MOST_PLACES = 200
-"""Places of a line that are drawn [1]; chosen, not measured."""
+"""Places of a line, and of the centre of the shaft, that are drawn [1]; chosen, not measured."""
+MOST_ROWS, MOST_MARKS = 1500, 20_000
+"""Vectors of an order, and passages of a mark, that are sent [1]; chosen, not measured."""
+VECTORS = (1.0, 2.0)
+"""Orders that are drawn as vectors: unbalance and bow, misalignment and stiffness that turns."""
+TURN_OF_UNKNOWN_S = 0.02
+"""Length of a turn where no speed is known [s]; chosen, not measured."""
 
 
 def write_look(
@@ -70,6 +77,8 @@ def write_look(
                 if seen.speed is None
                 else quantity_json(Quantity(value=seen.speed, kind="speed")),
             },
+            "centreline": _centreline(seen),
+            "marks": [] if seen.record.marks is None else seen.record.marks[:MOST_MARKS].tolist(),
             "rotor": None if machine is None else rotor_outline(machine),
             "labels": labels,
             "zero": seen.drops[0].release if seen.drops else float(seen.motion.time[0]),
@@ -301,7 +310,62 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
             for line in found.lines
         ],
         "command": _command(job, options, "waterfall"),
+        "orders_tracked": {
+            name: vectors_of(plane.track) | {"python": vector_lines(name)}
+            for name, plane in found.planes.items()
+            if plane.track
+        },
         "python": waterfall_lines(job.read()["files"], options, planes, parts),
+    }
+
+
+def vectors_of(track: OrderTrack) -> dict[str, Any]:
+    """Vectors of 1X and 2X over the speed: real and imaginary parts in x and y with their standard error [m].
+
+    Where a steady line lies too close to an order the vector would hold both: it is left out.
+    """
+    every = slice(None, None, max(len(track.time) // MOST_ROWS, 1))
+    told: dict[str, Any] = {
+        "time": track.time[every].tolist(),
+        "speed": track.speed[every].tolist(),
+        "orders": {},
+    }
+    for order in VECTORS:
+        column = track.of(order)
+        vector = np.where(track.separable[:, column, None], track.amplitude[:, column], np.nan)[every]
+        error = track.standard_error[every, column]
+        parts = np.stack([vector.real, vector.imag], axis=-1)
+        told["orders"][f"{order:g}"] = {
+            axis: [
+                [None if math.isnan(v) else float(f"{v:.6g}") for v in (*parts[row, k], error[row, k])]
+                for row in range(len(parts))
+            ]
+            for k, axis in enumerate("xy")
+        }
+    return told
+
+
+def _centreline(seen: Look) -> dict[str, Any]:
+    """Where the shaft centre is on average: means of stretches of at least a turn, in every plane [m]."""
+    time, speed = seen.motion.time, seen.record.speed
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    slowest = TURN_OF_UNKNOWN_S if not seen.speed else 2.0 * math.pi / seen.speed
+    size = max(round(slowest * rate), len(time) // MOST_PLACES, 1)
+    starts = np.arange(0, len(time) - size + 1, size)
+
+    def means(values: Array) -> list[float | None]:
+        sums = [
+            float(np.nanmean(values[a : a + size])) if np.isfinite(values[a : a + size]).any() else None
+            for a in starts
+        ]
+        return [None if one is None else float(f"{one:.6g}") for one in sums]
+
+    return {
+        "time": means(time),
+        "speed": None if speed is None else means(speed),
+        "planes": [
+            {"x": means(path.position[:, 0]), "y": means(path.position[:, 1])} for path in seen.motion.paths
+        ],
     }
 
 

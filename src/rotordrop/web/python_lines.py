@@ -38,6 +38,14 @@ course = [amplitude[row, near].max() if np.isfinite(f) else np.nan \
 for row, (near, f) in enumerate(zip(bins, path))]  # [m]
 """
 
+_VECTORS = """import numpy as np
+track = found.planes[{plane!r}].track
+vectors = {{order: track.amplitude[:, track.of(order)] for order in (1.0, 2.0)}}  # (x, y) [m], complex
+speed = track.speed  # [rad/s]
+slow = 0.0  # speed of the vector that is taken off [rad/s]
+slow_roll = {{order: vectors[order][np.nanargmin(abs(speed - slow))] for order in vectors}}  # of a speed
+"""
+
 
 def _rules(files: Files, options: Mapping[str, Any]) -> list[str]:
     """Lines that make the reading rules; none where the recording speaks for itself."""
@@ -129,6 +137,11 @@ def waterfall_lines(
         for number, name in enumerate(planes)
         for part in parts
     }
+
+
+def vector_lines(plane: str) -> str:
+    """Lines that give the vectors of 1X and 2X over the speed, after those of the waterfall."""
+    return _VECTORS.format(plane=plane)
 
 
 def course_lines(label: str) -> str:

@@ -14,6 +14,8 @@ const motions = () => state.orbits;
 function orbitOf(index) {
   const panel = state.orbits[index], place = state[panel.verb].places[index], forcePanel = state.loaded.find((one) => one.id === "force");
   const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
+  const turn = by("orbitof").value === "window" ? null : turnBefore();
+  if (turn) { return { name: place.name, gap: place.gap, paths: paths.map((one) => ofTurn(one, turn, by("orbitof").value === "1X")), others: [], cursor: state.cursor, force: null, impacts: [], angle: null, turn }; }
   const others = panel.found.others.map(({ found, columns: [x, y], k }) => ({ x: found[x], y: found[y], k, dash: dashOf(k) }));
   let force = null;
   if (forcePanel && panel.verb === "estimate" && state.cursor !== null) {
@@ -23,6 +25,25 @@ function orbitOf(index) {
   return { name: place.name, gap: place.gap, paths, others, cursor: state.cursor, force,
     impacts: impacts().filter((one) => one.place === place.name && one.time >= state.view.from && one.time <= state.view.to).map((one) => one.azimuth),
     angle: turning && state.cursor !== null && state.view.to - state.view.from < 2 ? turning * state.cursor : null };
+}
+
+// The turn of the shaft that ends at the cursor: from the passage of the mark before it where there is one, else by the speed.
+function turnBefore() {
+  const at = state.cursor ?? state.view.from, speed = speedAt(at), marks = (state.look.marks || []).map((time) => time - zero());
+  const last = marks.findLastIndex((time) => time <= at);
+  if (last > 0 && marks[last] - marks[last - 1] < 3) { return { from: marks[last - 1], to: marks[last], seen: true }; }
+  return speed > 0 ? { from: at - (2 * Math.PI) / speed, to: at, seen: false } : null;
+}
+// Samples of one turn; for 1X what is left of them at once per turn about their mean, by least squares.
+function ofTurn(path, { from, to, seen }, filtered) {
+  const first = Math.max(nearest(path.time, from), 0), last = nearest(path.time, to), time = path.time.slice(first, last + 1), part = { ...path, time, x: path.x.slice(first, last + 1), y: path.y.slice(first, last + 1), seen };
+  return filtered ? { ...part, x: once(time, part.x, from, to), y: once(time, part.y, from, to) } : part;
+}
+export function once(time, values, from, to) {
+  const rows = Array.from(time, (t) => { const angle = (2 * Math.PI * (t - from)) / (to - from); return [1, Math.cos(angle), Math.sin(angle)]; }), m = [0, 1, 2].map((i) => [0, 1, 2, 3].map((j) => rows.reduce((sum, row, k) => sum + row[i] * (j < 3 ? row[j] : values[k]), 0)));
+  for (let i = 0; i < 3; i += 1) { for (let k = 0; k < 3; k += 1) { if (k !== i) { const share = m[k][i] / m[i][i]; for (let j = i; j < 4; j += 1) { m[k][j] -= share * m[i][j]; } } } }
+  const c = m.map((row, i) => row[3] / row[i]);
+  return rows.map(([, a, b]) => c[0] + c[1] * a + c[2] * b);
 }
 
 export function makeOrbits() {
@@ -45,7 +66,7 @@ function drawOrbits() {
     if (!motions()[i]) { return; }
     const told = orbitOf(i);
     drawOrbit(canvasPen(canvas), told);
-    canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
+    canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle${told.turn ? `, one turn from ${units.eventText(told.turn.from)}` : ""}, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
   });
   readout();
 }

@@ -12,7 +12,7 @@ export const nearest = (time, t) => {
 };
 
 // paths: [{role, time, x, y}]; force: {value, largest} or null; impacts: azimuths; angle of the shaft or null
-export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, impacts, angle }) {
+export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, impacts, angle, turn }) {
   const tone = colours(), size = Math.min(pen.width, pen.height);
   const cx = pen.width / 2, cy = pen.height / 2 + 4, radius = 0.5 * size - 26;
   let reach = gap ? gap[1] : 0;
@@ -37,7 +37,7 @@ export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, i
     pen.line(Array.from(x, (v, i) => at(v, y[i])), role === "estimated" ? faint(tone.estimated, 0.6) : tone[role], role === "measured" ? 0.9 : 2.4);
   }
   for (const { role, time, x, y } of paths) {
-    if (cursor === null || !time.length) { continue; }
+    if (cursor === null || turn || !time.length) { continue; }
     const here = nearest(time, cursor), [px, py] = at(x[here], y[here]);
     if (!Number.isFinite(px)) { continue; }
     if (role === "estimated" && force && force.value > 0) {
@@ -50,6 +50,14 @@ export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, i
       pen.circle(px + 9 * Math.cos(angle), py - 9 * Math.sin(angle), 2, null, 0, tone.ink);
     }
   }
+  for (const { role, x, y, time } of turn && turn.to > turn.from ? paths.filter((one) => one.time.length) : []) { // the mark: a dot behind a gap, as an oscilloscope blanks it
+    const colour = role === "measured" ? tone.measured : tone.estimated, [px, py] = at(x[0], y[0]);
+    pen.circle(px, py, 6, null, 0, tone.back);
+    pen.circle(px, py, 3.5, null, 0, colour);
+    const middle = Math.floor(time.length / 8), [ax, ay] = at(x[middle], y[middle]), [bx, by] = at(x[middle + 1] ?? x[middle], y[middle + 1] ?? y[middle]);
+    if (Math.hypot(bx - ax, by - ay) > 0) { arrow(pen, [ax, ay], [ax + (9 * (bx - ax)) / Math.hypot(bx - ax, by - ay), ay + (9 * (by - ay)) / Math.hypot(bx - ax, by - ay)], colour, 1.5); }
+  }
+  if (turn) { pen.text(turn.seen ? "● mark passes" : "● turn begins, no mark in the record", pen.width - 6, 28, tone.muted, { align: "right", size: 10 }); }
   pen.text(name, 6, 14, tone.ink, { size: 12.5, weight: "600" });
   if (gap) {
     const words = gap[1] - gap[0] > 1e-6 ? `${written(gap[0] / factor("length"))} to ` : "";

@@ -1,8 +1,9 @@
 // The page: one job, its tabs and its status, and what every button and key does.
 import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
 import * as address from "./address.js";
+import { centrelineTab } from "./centreline.js";
 import { chooseOthers, compareTab, learnDrops } from "./compare.js";
-import { nextImpact, pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
+import { makeOrbits, nextImpact, pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
 import { addToLog, askAbout, askRemoval, leaveHome, redrawHome, showHome } from "./home.js";
 import { leaveMachines, showMachines } from "./machines.js";
@@ -12,7 +13,7 @@ import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
 import { by, events, files, homeView, impacts, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
-import { cutFiles, drawFall, fallFiles, openFall } from "./waterfall.js";
+import { cutFiles, drawFall, fallFiles, fallSeen, fallWanted, openFall } from "./waterfall.js";
 import * as units from "./units.js";
 
 const timeOf = (verb) => (t) => units.eventText(verb === "look" ? t - zero() : t);
@@ -53,6 +54,7 @@ const TABS = {
   },
   All: () => (state.estimate || state.look).sections.flatMap((part) => [make("h3", { class: "part", text: part.heading }),
     ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
+  Centre: centrelineTab,
   Compare: compareTab,
   Rotor: rotorTab,
   Origin: () => [facts((state.estimate || state.look).facts), facts(Object.entries(state.job.files).map(([role, file]) => [role, `${file.name}, ${file.bytes} bytes, SHA-256 ${file.sha256}`])),
@@ -217,6 +219,7 @@ async function asSeen() {
   state.asked = null;
   state.view = number("to") > number("from") ? { from: number("from"), to: number("to") } : state.view || homeView();
   state.cursor = Number.isFinite(number("at")) ? number("at") : state.cursor;
+  by("orbitof").value = ["turn", "1X"].includes(told.orbit) ? told.orbit : "window";
   state.mark = Number.isFinite(number("mark")) ? number("mark") : null;
   state.figures = told.figures ? told.figures.split(",") : null;
   state.own = told.traces ? told.traces.split(",") : [];
@@ -224,12 +227,13 @@ async function asSeen() {
   showTab(part(told.tab || state.tab));
   await loadView();
   if (told.with) { await learnDrops(told.with.split(",")); }
+  if (told.view === "waterfall") { fallWanted(told); }
   if (told.view === "waterfall") { if (by("fall").hidden) { await waterfall(); } } else { leaveFall(); }
 }
 const seen = () => {
   const rounded = (value, size) => (value === null ? "" : String(Number(value.toPrecision(size))));
-  return { drop: state.job.id, view: by("fall").hidden ? "" : "waterfall", tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
-    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, mark: rounded(state.mark, 9),
+  return { drop: state.job.id, ...(by("fall").hidden ? {} : { view: "waterfall", ...fallSeen() }), tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
+    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, mark: rounded(state.mark, 9), orbit: by("orbitof").value === "window" ? "" : by("orbitof").value,
     figures: (state.figures || []).join(","), traces: state.own.join(","), with: state.others.map((other) => other.job).filter(Boolean).join(",") };
 };
 const noted = () => address.note(() => (state.job ? seen() : address.read()));
@@ -346,6 +350,7 @@ click("next", () => goImpact(nextImpact(1))); click("previous", () => goImpact(n
 click("setmark", () => (state.cursor === null ? say("Point at a trace first: the mark is set at the cursor.", "notice") : setMark(state.cursor)));
 click("unmark", () => setMark(null)); click("noteat", askNote); click("choosetraces", chooseTraces);
 click("play", () => play(state.playing === null));
+by("orbitof").addEventListener("change", () => state.view && makeOrbits());
 by("signal").addEventListener("change", () => state.view && loadView());
 function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.job && state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } else if (!state.job) { redrawHome(); if (!by("log").hidden) { redoLog(); } } }
 by("units").addEventListener("change", () => chooseUnits(by("units").value));
@@ -389,7 +394,7 @@ document.addEventListener("dragover", (event) => { event.preventDefault(); docum
 document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) { document.body.classList.remove("over"); } });
 document.addEventListener("drop", (event) => { event.preventDefault(); document.body.classList.remove("over"); openChosen(event.dataTransfer.files); });
 const redraw = () => {
-  if (!state.job) { redrawLog(); } else if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
+  if (!state.job) { redrawLog(); } else if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Centre", "Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
 };
 let waiting = 0;
 window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); });

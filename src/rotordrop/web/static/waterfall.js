@@ -3,6 +3,7 @@ import { canvasPen, colours, keep, keepPng, keepSvg, svgPen, ticks } from "./fig
 import { make } from "./tables.js";
 import * as server from "./server.js";
 import * as units from "./units.js";
+import { drawBode, drawPolar, takenWords, vectors, vectorsCsv } from "./vectors.js";
 
 const by = (id) => document.getElementById(id);
 const VIRIDIS = [[68, 1, 84], [71, 44, 122], [59, 81, 139], [44, 113, 142], [33, 144, 141], [39, 173, 129], [92, 200, 99], [170, 220, 50], [253, 231, 37]];
@@ -98,7 +99,24 @@ function colourBar(pen, { box }, tone) {
   pen.text(units.unit("length"), left, box.top - 8, tone.ink, { size: 11 });
 }
 
+// Spectra one above the other, as many as can be told apart, each before those that came later.
+const MOST_SPECTRA = 60;
+function drawCascade(pen, withCursor) {
+  const tone = colours(), frame = frameBox(pen), { box, px, py } = frame, { time } = fall.page, [low, high] = span(), first = binOf(low), last = binOf(high);
+  const each = Math.max(1, Math.ceil(time.length / MOST_SPECTRA)), tall = Math.max(40, (3 * (box.bottom - box.top) * each) / time.length), top = heat().top;
+  for (let row = Math.floor((time.length - 1) / each) * each; row >= 0; row -= each) {
+    const points = [], base = py(time[row]);
+    for (let bin = first; bin <= last; bin += 1) { points.push([px(frequencies()[bin]), Math.max(base - (tall * value(row, bin)) / top, 4)]); }
+    pen.area([[points[0][0], base], ...points, [points.at(-1)[0], base]], tone.back);
+    pen.line(points, tone.estimated, 0.8);
+  }
+  if (withCursor && fall.at) { pen.line([[px(fall.at.f), box.top], [px(fall.at.f), box.bottom]], tone.limit, 1); pen.line([[box.left, py(fall.at.t)], [box.right, py(fall.at.t)]], tone.limit, 1); }
+  axes(pen, frame, tone);
+  pen.text(`${units.shown(top, "length", 2)} is ${Math.round((100 * tall) / (box.bottom - box.top))} % of the height`, box.right, box.top - 8, tone.muted, { align: "right", size: 10 });
+}
+
 function drawMap(pen, withCursor) {
+  if (by("fallas").value === "cascade") { drawCascade(pen, withCursor); return; }
   const tone = colours(), frame = frameBox(pen), { box, px, py } = frame, { time, speed, orders } = fall.page;
   pen.image(heat().canvas, box.left, box.top, box.right - box.left, box.bottom - box.top);
   const inside = (f) => (f >= span()[0] && f <= span()[1] ? px(f) : NaN);
@@ -155,7 +173,15 @@ function drawCut(pen, box, { x, y, title, label, mark }) {
 }
 
 const cutFrame = () => (fall.at ? frameOf(fall.at.t) : 0);
+const tracked = () => fall.page.orders_tracked?.[fall.page.planes[fall.plane]];
+const shows = () => (tracked() && by("fallshow").value !== "cuts" ? by("fallshow").value.split(" ") : null);
+const slowRoll = () => Number(by("slowroll").value.replace(",", "."));
 function drawCuts(pen) {
+  if (shows()) {
+    const [kind, order] = shows(), at = fall.at && fall.page.speed ? fall.page.speed[frameOf(fall.at.t)] : NaN;
+    if (kind === "bode") { drawBode(pen, tracked(), order, slowRoll(), at); } else { drawPolar(pen, tracked(), order, slowRoll()); }
+    return;
+  }
   const [low, high] = span(), first = binOf(low), last = binOf(high), frame = cutFrame(), middle = pen.height / 2;
   const x = frequencies().slice(first, last + 1), where = { left: 46, right: pen.width - 10 };
   drawCut(pen, { ...where, top: 20, bottom: middle - 36 }, { x, y: x.map((_, i) => value(frame, first + i)), mark: fall.at ? fall.at.f : NaN,
@@ -170,6 +196,7 @@ function readFall() {
   if (!fall.at) { by("fallclock").textContent = "point at the map, or choose a line"; return; }
   const frame = frameOf(fall.at.t), speed = fall.page.speed && fall.page.speed[frame];
   const order = speed > 0.5 ? `, ${units.fixed(fall.at.f / speed, 3)} X at ${units.shown(2 * Math.PI * speed, "speed")}` : "";
+  if (document.activeElement !== by("sliceat")) { by("sliceat").value = speed > 0 ? units.fixed(speed, 2) : ""; }
   by("fallclock").textContent = `${units.fixed(fall.at.f, 2)} Hz, ${units.fixed(fall.page.time[frame], 2)} s: ${units.shown(value(frame, binOf(fall.at.f)), "length", 3)}${order}`;
 }
 
@@ -197,6 +224,10 @@ export function drawFall() {
   drawMap(canvasPen(by("fallmap")), true);
   drawCuts(canvasPen(by("fallcut")));
   by("fallmap").setAttribute("aria-label", `Waterfall of ${fall.page.planes[fall.plane]}, ${PARTS[fall.part]}, to ${Math.round(fall.to)} Hz; arrow keys move the cursor`);
+  by("fallcut").setAttribute("aria-label", shows() ? `${shows()[0] === "bode" ? "Bode" : "Polar"} plot of ${shows()[1]}X at ${fall.page.planes[fall.plane]}` : "Spectrum at the cursor and the chosen line over time");
+  by("slowwords").textContent = shows() && slowRoll() > 0 ? `taken off: ${takenWords(vectors(tracked(), shows()[1], slowRoll())) || "nothing, no speed is near"}` : "";
+  for (const option of by("fallshow").options) { option.disabled = option.value !== "cuts" && !tracked(); }
+  by("slowlabel").hidden = !shows();
   readFall();
   lineList();
 }
@@ -229,13 +260,14 @@ export const fallFiles = {
 // The spectrum at the cursor and, where a line is chosen, its course: one table under the other.
 const cutTitle = () => `${title()}_${fall.page.time[cutFrame()].toFixed(2)}_s`;
 function cutCsv() {
+  if (shows()) { keep(new Blob([vectorsCsv(tracked(), shows()[1], slowRoll())], { type: "text/csv" }), `${title()}_${shows().join("_")}X.csv`); return; }
   const frame = cutFrame(), rows = [`frequency [Hz],amplitude at ${fall.page.time[frame]} s [m]`, ...Array.from(frequencies(), (f, k) => `${f},${value(frame, k).toPrecision(7)}`)];
   if (fall.line) { rows.push("", `time [s],${JSON.stringify(fall.line.label)} [m]`, ...courseOf(fall.line).map((v, i) => `${fall.page.time[i]},${Number.isFinite(v) ? v.toPrecision(7) : ""}`)); }
   keep(new Blob([[...rows, ""].join("\n")], { type: "text/csv" }), `${cutTitle()}.csv`);
 }
 export const cutFiles = {
   CSV: cutCsv, SVG: () => keepSvg(picture(drawCuts, cutTitle()), cutTitle()), PNG: () => keepPng(picture(drawCuts, cutTitle()), cutTitle()),
-  Python: () => `${fallFiles.Python()}spectrum = amplitude[abs(time - ${fall.page.time[cutFrame()]}).argmin()]  # [m]\n${fall.line ? `\n${fall.line.python}` : ""}`
+  Python: () => (shows() ? `${fallFiles.Python()}${tracked().python.replace("slow = 0.0", `slow = ${2 * Math.PI * (slowRoll() || 0)}`)}` : `${fallFiles.Python()}spectrum = amplitude[abs(time - ${fall.page.time[cutFrame()]}).argmin()]  # [m]\n${fall.line ? `\n${fall.line.python}` : ""}`)
 };
 
 const placeOf = (event) => {
@@ -264,3 +296,19 @@ by("fallplane").addEventListener("change", () => { fall.plane = Number(by("fallp
 by("fallpart").addEventListener("change", () => { fall.part = by("fallpart").value; load(); });
 by("fallto").addEventListener("change", () => { setTo(Number(by("fallto").value.replace(",", "."))); drawFall(); });
 by("fallorders").addEventListener("change", drawFall);
+for (const id of ["fallas", "fallshow", "slowroll"]) { by(id).addEventListener("change", () => { drawFall(); document.dispatchEvent(new Event("seen")); }); }
+// A slice at a speed: the frame in which the shaft turned nearest to it.
+by("sliceat").addEventListener("change", () => {
+  const speed = Number(by("sliceat").value.replace(",", ".")), { speed: all, time } = fall.page;
+  if (!(speed > 0) || !all) { return; }
+  const row = all.reduce((best, one, i) => (Math.abs(one - speed) < Math.abs(all[best] - speed) ? i : best), 0);
+  fall.at = { t: time[row], f: fall.at ? fall.at.f : speed };
+  drawFall();
+});
+// What of the waterfall stands in the address, and how it comes back from there.
+export const fallSeen = () => ({ plane: fall.plane || "", part: by("fallpart").value, as: by("fallas").value === "map" ? "" : by("fallas").value, cut: by("fallshow").value === "cuts" ? "" : by("fallshow").value, slow: by("slowroll").value });
+export function fallWanted(told) {
+  by("fallas").value = told.as === "cascade" ? "cascade" : "map";
+  by("fallshow").value = [...by("fallshow").options].some((one) => one.value === told.cut) ? told.cut : "cuts";
+  by("slowroll").value = told.slow || "";
+}
