@@ -880,7 +880,7 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     from rotordrop.track.calibration import stage_settings
     from rotordrop.track.smoother import forward, smooth
     from rotordrop.twin.problems import WINDOW, twin_problem
-    from rotordrop.twin.search import FINE_SCHEDULE
+    from rotordrop.twin.search import WHOLE_STAGE
 
     paper = example_machine("paper")
     quick, accurate = build_drop_model(paper, "quick"), build_drop_model(paper, "accurate")
@@ -889,7 +889,7 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
     record = read_record(example_record_path("lp400_drop_060"), machine)
     tail = read_record(example_record_path("lp400_drop_060_tail"), machine)
     problem = twin_problem(machine, read_evidence(build_drop_model(machine), record, tail))
-    settings = stage_settings(problem, FINE_SCHEDULE[-1])
+    settings = stage_settings(problem, WHOLE_STAGE)
     samples = sum(1 for t in problem.time if t <= WINDOW)
     passed = forward(problem, settings, samples=samples)
     return {

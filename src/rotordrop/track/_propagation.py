@@ -69,6 +69,7 @@ class ParameterTargets(NamedTuple):
 class FilterSettings(NamedTuple):
     """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
+    ``substeps`` is a multiple of ``frozen``, the number of steps over which the Jacobian is held.
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
@@ -77,6 +78,7 @@ class FilterSettings(NamedTuple):
 
     dt: float
     substeps: int
+    frozen: int
     impulse: float
     share: float
     spin_noise: float
@@ -373,19 +375,25 @@ def propagate(
     g = np.zeros((p.contact_at.shape[0], 3, 6))
     touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
-    h = settings.dt / settings.substeps
+    middle = y.copy()
+    step = settings.dt / settings.substeps
+    h = step * settings.frozen
     F[:, :] = 0.0
     for i in range(s):
         F[i, i] = 1.0
     impulses[:] = 0.0
-    for step in range(settings.substeps):
-        now = t + step * h
-        rk4_step(now, h, y, p, k, trial, work)
-        # The Jacobian of the middle serves the whole substep to second order, though it changes within it.
-        middle = k[4].copy()
+    for stretch in range(settings.substeps // settings.frozen):
+        now = t + stretch * h
+        # The Jacobian of the middle serves the whole stretch to second order, though it changes within it.
+        for part in range(settings.frozen):
+            rk4_step(now + part * step, step, y, p, k, trial, work)
+            if 2 * part + 1 == settings.frozen:
+                middle = k[4].copy()
+            elif 2 * (part + 1) == settings.frozen:
+                middle = y.copy()
         drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
         gather_entries(J, entries, places, starts)
-        # at every substep: position and gap must see the same contact, or the gap looks too well known
+        # at every stretch: position and gap must see the same contact, or the gap looks too well known
         if columns > s:
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.

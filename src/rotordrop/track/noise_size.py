@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 from rotordrop.track.calibration import (
     THREADS,
     Stage,
     TrackedDrops,
     handed_on,
-    one_pass,
     stage_settings,
 )
 from rotordrop.track.smoother import Forward, forward
@@ -73,23 +71,6 @@ def forward_passes(fit: TrackedDrops, stage: Stage, factor: float) -> list[Forwa
             )
         )
     return passes
-
-
-def with_noise(fit: TrackedDrops, stage: Stage, factor: float) -> TrackedDrops:
-    """The drops smoothed with unknown impulses of that size [1], linearised at a fit."""
-    drops = zip(fit.problems, fit.smoothed, strict=True)
-    again = one_pass(
-        fit.problems,
-        stage_settings(fit.problems[0], stage, factor),
-        fit.trajectories,
-        max(float(problem.time[len(drop.means) - 1]) for problem, drop in drops),
-    )
-    return replace(
-        fit,
-        smoothed=tuple(again),
-        nis=tuple(one.filtered.nis for one in again),
-        diverged=tuple(one.filtered.done < len(one.filtered.means) for one in again),
-    )
 
 
 def _lowest(function: Callable[[int], float]) -> float:

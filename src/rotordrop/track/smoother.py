@@ -39,6 +39,12 @@ basis less than half of the last windows.
 """
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
+FROZEN, FROZEN_PHASE = 2, 1.2
+"""Integration steps over which a Jacobian is held, and the largest phase [rad] of the fastest mode in them:
+where it is larger each step has its own. A step of third order turns that mode by 9 % too little then.
+
+Source: at 1.15 the errors of the peaks of seven drops of DropBench moved by 0.1 % in the median.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,11 +75,13 @@ class PassSettings:
         Before the first ``contact`` [s] unknown impulses are at most ``impulse_in_fall`` [N s] per 50 µs.
         """
         growth = math.sqrt(dt / REFERENCE_STEP)
+        phase = fastest * dt
+        substeps = max(1, round(self.substeps * dt / REFERENCE_STEP), math.ceil(phase / LARGEST_PHASE))
+        frozen = FROZEN if substeps % FROZEN == 0 and FROZEN * phase <= FROZEN_PHASE * substeps else 1
         return P.FilterSettings(
             dt=dt,
-            substeps=max(
-                1, round(self.substeps * dt / REFERENCE_STEP), math.ceil(fastest * dt / LARGEST_PHASE)
-            ),
+            substeps=substeps,
+            frozen=frozen,
             impulse=self.impulse * growth,
             share=self.share / growth,
             spin_noise=self.spin_noise * growth,

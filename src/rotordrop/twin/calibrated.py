@@ -22,12 +22,13 @@ from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import weight_per_magnet
+from rotordrop.track.calibration import converged
 from rotordrop.track.consistency import Check, consistency_checks, judged_by
-from rotordrop.track.noise_size import likeliest_noise, with_noise
+from rotordrop.track.noise_size import likeliest_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.joint_covariance import joint_covariance
-from rotordrop.twin.search import CALIBRATION_SCHEDULE, track_drops
+from rotordrop.twin.search import CALIBRATION_STAGE, track_drops
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
 
@@ -129,8 +130,9 @@ def calibrate_machine(
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
     machine, base = found.machine, found.fit
-    factor = likeliest_noise(base, CALIBRATION_SCHEDULE[-1])
-    tracked = with_noise(base, CALIBRATION_SCHEDULE[-1], factor)
+    factor = likeliest_noise(base, CALIBRATION_STAGE)
+    tracked = converged(base.problems, CALIBRATION_STAGE, base.trajectories, noise_factor=factor)
+    factor *= max(tracked.noise_factors)
     checks = {
         name: consistency_checks(
             problem,

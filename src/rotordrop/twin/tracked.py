@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
+from rotordrop.track.calibration import converged
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
-from rotordrop.track.noise_size import likeliest_noise, with_noise
+from rotordrop.track.noise_size import likeliest_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
-from rotordrop.twin.search import FINE_SCHEDULE, Accepted, Progress, track_drops
+from rotordrop.twin.search import WHOLE_STAGE, Accepted, Progress, track_drops
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
 
 
@@ -105,8 +106,9 @@ def followed_drops(
         # The estimate without contact law takes nothing from these passes, which leave a core to it.
         with ThreadPoolExecutor(max_workers=1) as pool:
             cross_check = checks_begun(pool, fit)
-            factor = likeliest_noise(fit, FINE_SCHEDULE[-1])
-            fit = with_noise(fit, FINE_SCHEDULE[-1], factor)
+            factor = likeliest_noise(fit, WHOLE_STAGE)
+            fit = converged(fit.problems, WHOLE_STAGE, fit.trajectories, noise_factor=factor)
+            factor *= max(fit.noise_factors)
     waiting = list(zip(evidence, fit.problems, fit.smoothed, base, cross_check, strict=True))
     del fit, found, base, cross_check
     while waiting:

@@ -45,9 +45,7 @@ def shortened() -> Iterator[None]:
         module = "rotordrop.twin.search"
         for room in (module, "rotordrop.twin.problems"):
             patch.setattr(f"{room}.BLIND_SCHEDULE", BLIND_SCHEDULE[:4])
-        patch.setattr(
-            f"{module}.CALIBRATION_SCHEDULE", (Stage(until=SHORT, force=0.07, share=0.01, passes=1),)
-        )
+        patch.setattr(f"{module}.CALIBRATION_STAGE", Stage(until=SHORT, force=0.07, share=0.01, passes=1))
         patch.setattr("rotordrop.twin.problems.WINDOW", SHORT)
         yield
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from rotordrop.track.calibration import Stage, track
+from rotordrop.track import calibration
+from rotordrop.track.calibration import MOST_REPEATS, Stage, converged, track
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import parameter_sample
 
@@ -30,3 +34,27 @@ def test_damping_holds_the_parameters_to_the_pass_before(impacts: DropProblem) -
     assert constant.sum() > 5 and free.max() > 0.3
     assert held.max() < 1e-3
     assert between[np.argmax(free)] < free.max()
+
+
+@pytest.mark.parametrize(
+    ("scores", "passes"),
+    [
+        ([-100.0, -120.0, -121.0], 3),  # it has come to rest
+        ([-100.0, -60.0, -150.0, -154.0], 4),  # a fall is no rest
+        ([10.0 * (-1.0) ** k for k in range(9)], MOST_REPEATS),  # it swings for ever
+    ],
+)
+def test_passes_go_on_while_the_likelihood_changes(
+    monkeypatch: pytest.MonkeyPatch, scores: list[float], passes: int
+) -> None:
+    """Each begins where the one before has ended, with the same noise."""
+    seen: list[Any] = []
+
+    def one_pass(_problems: Any, _stages: Any, *, references: Any, noise_factor: float, **_: Any) -> Any:
+        seen.append((references, noise_factor))
+        return SimpleNamespace(negative_log_likelihood=scores[len(seen) - 1], trajectories=len(seen))
+
+    monkeypatch.setattr(calibration, "track", one_pass)
+    stage = Stage(until=0.2, force=0.07, share=0.01, passes=2)
+    converged([], stage, 0, noise_factor=0.5)  # type: ignore[arg-type]
+    assert seen == [(k, 0.5) for k in range(passes)]

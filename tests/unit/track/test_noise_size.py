@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rotordrop.track import noise_size
-from rotordrop.track.calibration import Stage, TrackedDrops, track
-from rotordrop.track.noise_size import LARGEST, SMALLEST, likeliest_noise, with_noise
+from rotordrop.track.calibration import Stage, track
+from rotordrop.track.noise_size import LARGEST, SMALLEST, likeliest_noise
 
 STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
 
@@ -60,23 +60,6 @@ def test_no_size_is_smaller_than_the_one_that_followed_the_drop(monkeypatch: pyt
     assert likeliest_noise(fit_that_needs(8.0), STAGE) == 8.0
 
 
-def test_the_last_pass_goes_to_the_end_of_the_longest_drop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where the record of the first one ends before."""
-    ends: list[float] = []
-
-    def one_pass(_problems: Any, _settings: Any, _references: Any, until: float, **_: Any) -> list[Any]:
-        ends.append(until)
-        return []
-
-    monkeypatch.setattr(noise_size, "one_pass", one_pass)
-    monkeypatch.setattr(noise_size, "stage_settings", lambda *_: None)
-    drops = [SimpleNamespace(means=np.zeros((count, 1)), filtered=None) for count in (50, 200)]
-    problems = [SimpleNamespace(time=1e-3 * np.arange(count)) for count in (50, 400)]
-    fit: Any = TrackedDrops(problems=tuple(problems), smoothed=tuple(drops), nis=())  # type: ignore[arg-type]
-    with_noise(fit, STAGE, 1.0)
-    assert ends == [pytest.approx(0.199)]
-
-
 def test_a_size_that_loses_a_drop_is_not_the_likeliest(monkeypatch: pytest.MonkeyPatch) -> None:
     def passes(_fit: Any, _stage: Stage, factor: float) -> list[Any]:
         return [SimpleNamespace(done=10 if factor >= 1.0 else 9, negative_log_likelihood=factor)]
@@ -96,7 +79,7 @@ def test_larger_impulses_make_the_readings_say_less(impacts: Any) -> None:
     means = fit.smoothed[0].means.copy()
     spread = {}
     for factor in (found, 16.0 * found):
-        again = with_noise(fit, STAGE, factor)
+        again = track([impacts], (STAGE,), references=fit.trajectories, noise_factor=factor)
         spread[factor] = again.smoothed[0].watched[:, 0, 0].copy()
         assert again.smoothed[0].means.shape == means.shape
         assert not any(again.diverged)

@@ -22,8 +22,8 @@ ANGLES = np.array([-1.3, -1.8])
 """Direction of the contact at both bearings [rad]."""
 
 
-def settings(substeps: int) -> P.FilterSettings:
-    return PassSettings().for_sampling(DT)._replace(substeps=substeps)
+def settings(substeps: int, frozen: int = 1) -> P.FilterSettings:
+    return PassSettings().for_sampling(DT)._replace(substeps=substeps, frozen=frozen)
 
 
 def theta_of(problem: DropProblem) -> np.ndarray:
@@ -54,14 +54,14 @@ def start_of(model: DropModel, indentation: float) -> np.ndarray:
     return y
 
 
-def advanced(problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int):
+def advanced(problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int, frozen: int = 1):
     """State after one sample, with sensitivity and contact impulses."""
     s, n_p = problem.n_dynamic, len(problem.unknowns)
     after, F = y.copy(), np.zeros((s, s + n_p))
     impulses = np.zeros(problem.model.layout.n_bearings)
     p = private_copy(problem.model.parameters)
     P.apply_parameters(theta.copy(), problem.targets, p)
-    P.propagate(2e-4, after, theta.copy(), problem.targets, p, settings(substeps), F, impulses)
+    P.propagate(2e-4, after, theta.copy(), problem.targets, p, settings(substeps, frozen), F, impulses)
     return after, F, impulses
 
 
@@ -115,6 +115,26 @@ def test_the_sensitivity_is_that_of_finite_differences(flight, indentation, touc
     errors = relative_errors(flight, F, finite_differences(flight, y, theta, 64))
     assert errors[: flight.n_dynamic].max() < 3e-4
     assert errors.max() < 5e-3
+
+
+@pytest.mark.parametrize("frozen", [2, 3])
+def test_a_jacobian_held_for_some_steps_is_that_of_their_middle(flight, frozen):
+    """The state is the same to its last digit, and the error of the sensitivity falls with the square."""
+    y, theta = start_of(flight.model, 4e-6), theta_of(flight)
+    exact, errors = advanced(flight, y, theta, 192)[1], []
+    for substeps in (8 * frozen, 16 * frozen):
+        after, _, impulses = advanced(flight, y, theta, substeps)
+        held_after, held, held_impulses = advanced(flight, y, theta, substeps, frozen)
+        np.testing.assert_array_equal(held_after, after)
+        np.testing.assert_allclose(held_impulses, impulses, rtol=1e-2)
+        errors.append(np.median(relative_errors(flight, held, exact)))
+    assert errors[1] < 0.35 * errors[0] < 0.35 * 2e-3
+
+
+def test_a_jacobian_is_held_while_the_fastest_mode_turns_by_less_than_a_step_of_third_order_bears():
+    usual = PassSettings(substeps=4)
+    assert [usual.for_sampling(DT, phase / DT).frozen for phase in (0.0, 2.3, 2.5, 4.1)] == [2, 2, 1, 1]
+    assert PassSettings(substeps=3).for_sampling(DT).frozen == 1
 
 
 @pytest.mark.parametrize("indentation", [-60e-6, 4e-6])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -24,11 +23,12 @@ from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.track.calibration import track
+from rotordrop.track.calibration import Stage, TrackedDrops, track
+from rotordrop.twin import search as search_module
 from rotordrop.twin.calibrated import _with_unbalance
 from rotordrop.twin.problems import Drops
 from rotordrop.twin.search import (
-    CALIBRATION_SCHEDULE,
+    CALIBRATION_STAGE,
     CONSISTENT_RISE,
     FIRST_OTHER_START,
     LEAST_RISE,
@@ -338,6 +338,47 @@ def test_values_that_hold_the_neutral_one_say_nothing(lp400, name):
     assert not extension.says_nothing(machine, telling)
 
 
+def moved_fit(score: float, way: float) -> Any:
+    """A fit of one drop with two parameters of standard deviation 0.1, the second one moved by a way."""
+    problem = SimpleNamespace(parameter_slice=slice(1, 3))
+    smoothed = SimpleNamespace(
+        means=np.array([[5.0, 1.0, 2.0 + way]]),
+        covariance=lambda _: np.diag([9.0, 0.01, 0.01]),
+        filtered=SimpleNamespace(parameter_sample=0, negative_log_likelihood=score),
+    )
+    return TrackedDrops(
+        problems=(problem,),  # type: ignore[arg-type]
+        smoothed=(smoothed,),  # type: ignore[arg-type]
+        nis=(1.0,),
+        diverged=(False,),
+        noise_factors=(1.0,),
+    )
+
+
+@pytest.mark.parametrize(
+    ("way", "other", "windows", "best"),
+    [(0.2, 900.0, 2, 1000.0), (0.3, 900.0, 4, 900.0), (-0.3, 1100.0, 4, 1000.0)],
+)
+def test_a_whole_drop_that_moves_a_parameter_beyond_the_first_impacts_is_fitted_from_another_window_too(
+    lp400, monkeypatch, way, other, windows, best
+):
+    """Two standard deviations are no reason, three are; the likelier fit is taken."""
+    stages: list[Stage] = []
+
+    def converged(_problems: Any, stage: Stage, _references: Any, **_: Any) -> Any:
+        stages.append(stage)
+        return moved_fit(1000.0 if len(stages) <= 2 else other, way)
+
+    monkeypatch.setattr(search_module, "converged", converged)
+    monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
+    drops = SimpleNamespace(calibrate_only=False, fine=lambda _: (None,))
+    search = Search(drops=drops, progress=None)  # type: ignore[arg-type]
+    first = Candidate(machine=lp400, fit=moved_fit(2000.0, 0.0))
+    assert search.refine(first).score[2] == best
+    assert len(stages) == windows
+    assert stages[-2].until < stages[0].until or windows == 2
+
+
 @pytest.mark.slow
 def test_an_extension_that_says_nothing_is_taken_off_and_the_rest_refined(
     calibrated: Machine, synthetic: SyntheticDrop
@@ -348,7 +389,7 @@ def test_an_extension_that_says_nothing_is_taken_off_and_the_rest_refined(
     item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")
     drops = Drops(evidence=(item,), calibrate_only=True)
     search = Search(drops=drops, progress=None)
-    fit = track(drops.fine(machine), (replace(CALIBRATION_SCHEDULE[0], passes=1),))
+    fit = track(drops.fine(machine), (CALIBRATION_STAGE,))
     found = Candidate(machine=machine, fit=fit, accepted=(Accepted(extension=extension, gain=60.0),))
     without = search.without_silent(found, calibrated)
     assert without.accepted == () and without.machine == calibrated
