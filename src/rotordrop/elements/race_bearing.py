@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ class RaceBearing(Description):
 
     designation: Text | None = None
     """What its maker calls it."""
+
+    has_race: ClassVar[bool] = True
+    """Whether a race spins between rotor and support."""
 
     @abstractmethod
     def numbers(self) -> BearingNumbers:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, ValidationInfo, WrapValidator
 
 from rotordrop.elements.ball_bearing import STEEL_DENSITY, BallBearing
 from rotordrop.elements.contact import Contact
@@ -18,6 +18,7 @@ from rotordrop.elements.friction import Friction
 from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
 from rotordrop.elements.race import Race
+from rotordrop.elements.sleeve import Sleeve
 from rotordrop.elements.support import Support
 from rotordrop.elements.values import PositiveLength, Time, default, scaled
 from rotordrop.known import Known
@@ -35,19 +36,31 @@ _MOUNTING = frozenset(
 )
 
 
+def _of_its_kind(raw: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+    """Read a table 'bearing' as the kind of touchdown bearing says."""
+    if info.data.get("kind") != "sleeve":
+        return handler(raw)
+    return raw if isinstance(raw, Sleeve) else Sleeve.model_validate(raw)
+
+
 class TouchdownBearing(Placed):
     """One touchdown bearing with its clearance and all that the rotor meets when it drops."""
 
     name: Name
     """Name, such as "NDE" or "DE"."""
+    kind: Literal["ball bearing", "sleeve"] = Field(
+        default="ball bearing",
+        description='a ball bearing; say "sleeve" where the rotor lands in a plain ring',
+    )
+    """What catches the rotor."""
     air_gap: PositiveLength
     """Radial clearance between rotor and inner race [m]."""
     bore_radius: PositiveLength
     """Radius of the bore of the inner race [m]; the rotor's radius is smaller by the air gap."""
     damping_time: Time = default(1e-5, "within (0.25–2.5)·10⁻⁵ s of Neisi 2020", (0.25e-5, 2.5e-5))
     """Bearing damping over tangent stiffness, C_b/K_b [s]."""
-    bearing: BallBearing
-    """The rolling bearing that carries the race."""
+    bearing: Annotated[BallBearing, WrapValidator(_of_its_kind)]
+    """The rolling bearing that carries the race, or the sleeve."""
     contact: Contact = Field(default_factory=Contact)
     """Contact between rotor and inner race."""
     friction: Friction = Field(default_factory=Friction)
@@ -60,7 +73,6 @@ class TouchdownBearing(Placed):
     """What lies in parallel to spring and damper of the support: ribbon, branches that relax, stop."""
 
     reserved: ClassVar[Mapping[str, str]] = {
-        "kind": "another kind of touchdown bearing than a ball bearing (sleeve, planetary)",
         "thermal": "the heat of the bearing",
     }
 
@@ -81,8 +93,13 @@ class TouchdownBearing(Placed):
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
-        """Read a mount as a list of elements in parallel."""
-        return mounted(raw)
+        """Read a mount as a list of elements in parallel, and a sleeve that says nothing of itself."""
+        if raw.get("kind") == "planetary":
+            told = (
+                'kind = "planetary" is reserved for bearings of several rollers, which are not yet supported'
+            )
+            raise Misfit(f'{told}; there are "ball bearing" and "sleeve"', ("kind",))
+        return mounted({"bearing": {}} | raw if raw.get("kind") == "sleeve" else raw)
 
     def check(self) -> None:
         """Refuse a clearance that leaves no rotor and a bore outside the balls."""
@@ -94,6 +111,12 @@ class TouchdownBearing(Placed):
                 ("air_gap",),
             )
         self.bearing.check_bore(bore)
+        if not self.bearing.has_race and self.race.model_fields_set:
+            raise Misfit(
+                "a sleeve has no race; leave out the table 'race': the length of the sleeve stands under "
+                "'bearing', its mass belongs to the support",
+                ("race",),
+            )
 
     def with_designation(self, designation: str) -> TouchdownBearing:
         """Give the same touchdown bearing around another rolling bearing, with its catalogue values.
@@ -102,6 +125,8 @@ class TouchdownBearing(Placed):
         and lengths of the bearing before it do not. Mass and inertia of the race change as those of steel
         rings of both sizes do.
         """
+        if not self.bearing.has_race:
+            raise ValueError('it is a sleeve; give the file kind = "ball bearing" and a bearing')
         kept = self.bearing.model_fields_set & _MOUNTING
         mounted = {name: getattr(self.bearing, name) for name in kept}
         inside = BallBearing.model_validate({"designation": designation} | mounted)
@@ -118,9 +143,16 @@ class TouchdownBearing(Placed):
         """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
         given = self.race.model_fields_set
         width = self.race.width if "width" in given else self._race_width()
+        if not self.bearing.has_race:
+            none = Known(value=0.0, status="default", source="a sleeve does not spin", unit="kg")
+            values = {"width": width, "mass": none, "inertia": replace(none, unit="kg m^2")}
+            return {
+                "race": self.race.completed_with(values),
+                "mount": self.mount.beside(self.support.stiffness),
+            }
         mass, inertia = self._race_from_size(width.value)
         why = self.bearing.race_radius()[1]
-        values: dict[str, Known] = {"width": width}
+        values = {"width": width}
         spread = RACE_FORM
         if "mass" not in given:
             bounds = (mass / RACE_MASS, mass * RACE_MASS)

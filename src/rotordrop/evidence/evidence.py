@@ -450,6 +450,11 @@ def insisted(evidence: Evidence) -> Evidence:
             "record cannot be estimated yet: the housing would pass for something else. "
             "Leave it out where the rotor did not touch there; 'rotordrop simulate' and 'study' know it"
         )
+    if sleeves := [one.name for one in machine.touchdown_bearings if not one.bearing.has_race]:
+        raise RecordError(
+            f"the touchdown bearing {sleeves[0]!r} of the machine {machine.name!r} is a sleeve, with which "
+            "a record cannot be estimated yet; 'rotordrop simulate', 'coast-down' and 'study' know it"
+        )
     if any(bearing.bearing.ball_inertia for bearing in machine.touchdown_bearings):
         raise RecordError(
             f"the machine {machine.name!r} has balls with inertia, with which a record cannot be estimated "

@@ -187,16 +187,10 @@ def _of_the_rotor(machine: Machine) -> Iterator[Doubt]:
 def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator[Doubt]:
     """Race, support and contact of a bearing against the weight of the rotor and the size of the bearing."""
     name, mass, gap = bearing.name, machine.rotor.mass, bearing.air_gap.value
-    radius, race, support, contact = bearing.bore_radius.value, bearing.race, bearing.support, bearing.contact
-    reach = math.sqrt(race.inertia.value / race.mass.value)
-    if not 0.5 * radius <= reach <= 4.0 * radius:
-        text = (
-            f"inertia over mass of the race puts its mass at a radius of {_length(reach)}, and its bore has "
-            f"{_length(radius)}; check both"
-        )
-        yield _doubt("race inertia", name, reach, radius, text)
+    support, contact = bearing.support, bearing.contact
+    if bearing.bearing.has_race:
+        yield from _of_the_race(bearing, mass)
     look = f"the rotor weighs {mass:.3g} kg"
-    yield from _outside("race mass", name, race.mass.value, 1e-5 * mass, mass, "mass", look)
     weight = mass * GRAVITY / len(machine.touchdown_bearings)
     sag = weight / support.stiffness.value
     text = (
@@ -215,6 +209,20 @@ def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator
         f"of the weight, in an air gap of {_length(gap)}; check the unit N/m^n and the exponent"
     )
     yield from _beyond("contact stiffness", name, pressed, 1e-6 * gap, 0.5 * gap, text)
+
+
+def _of_the_race(bearing: TouchdownBearing, mass: float) -> Iterator[Doubt]:
+    """Inertia and mass of a race against its bore and the mass of the rotor [kg]."""
+    name, radius, race = bearing.name, bearing.bore_radius.value, bearing.race
+    reach = math.sqrt(race.inertia.value / race.mass.value)
+    if not 0.5 * radius <= reach <= 4.0 * radius:
+        text = (
+            f"inertia over mass of the race puts its mass at a radius of {_length(reach)}, and its bore has "
+            f"{_length(radius)}; check both"
+        )
+        yield _doubt("race inertia", name, reach, radius, text)
+    look = f"the rotor weighs {mass:.3g} kg"
+    yield from _outside("race mass", name, race.mass.value, 1e-5 * mass, mass, "mass", look)
 
 
 def _outside(

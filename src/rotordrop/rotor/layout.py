@@ -32,6 +32,8 @@ class StateLayout:
     these."""
     departing: tuple[int, ...] = ()
     """Kinds of the states of what departs at each bearing, behind the books; empty where nothing does."""
+    raceless: tuple[bool, ...] = ()
+    """Whether each bearing has no race, where one has none; the states of what is not there stay zero."""
     modal_x: slice = field(init=False)
     modal_y: slice = field(init=False)
     """Modal amplitudes [sqrt(kg) m]."""
@@ -96,6 +98,9 @@ class StateLayout:
             n_modes=n_modes,
             n_bearings=len(bearings),
             further=tuple((place, tuple(one.get(place, ()) for one in asked)) for place in places),
+            raceless=()
+            if all(one.bearing.has_race for one in bearings)
+            else tuple(not one.bearing.has_race for one in bearings),
             sensor_own=sum(len(sensor.further_states) for sensor in machine.sensors),
         )
 
@@ -152,6 +157,7 @@ class StateLayout:
         for place, each in self.further:
             counts = tuple(map(len, each))
             places[:, place] = _first_of(counts, self.further_at(place).start, self.n_bearings)
+        places[np.array(self.raceless, dtype=bool).nonzero(), L.RACE] = -1
         places[:, L.CONTACTS], places[:, L.CONTACTS_END] = count, count + 1
         of_one = len(self.departing)
         if of_one:
@@ -159,8 +165,10 @@ class StateLayout:
         return places
 
     def contact_at(self) -> Integers:
-        """Bodies of each contact, shape (C, 3), see ``CONTACT_BODY``: the rotor touches each race."""
+        """Bodies of each contact, shape (C, 3), see ``CONTACT_BODY``: the rotor touches a race or sleeve."""
         bodies = self.bearing_at()[:, [L.RACE, L.RACE_SPIN]]
+        for b in np.flatnonzero(bodies[:, 0] < 0):  # a sleeve: the rotor touches the support, which stands
+            bodies[b] = self.support.start + 2 * b, -1
         # C order, as all arrays of the kernels: another order of one compiles every kernel once more.
         return np.column_stack([np.arange(self.n_bearings), bodies]).astype(np.int64, order="C")
 
@@ -191,6 +199,14 @@ class StateLayout:
                 at = first - self.race_spin.stop
                 names[at : at + 2] = ring_state(name), f"{ring_state(name)} velocity"
         return tuple(names)
+
+    def bore(self, states: Array) -> Array:
+        """Displacement [m] of what the rotor meets in states (T, n): race, or support where none is."""
+        race: Array = states[:, self.race].reshape(len(states), -1, 2)
+        if not self.raceless:
+            return race
+        support = states[:, self.support].reshape(len(states), -1, 2)
+        return np.where(np.array(self.raceless)[:, None], support, race)
 
     def zeros(self) -> Array:
         """State with everything at zero."""

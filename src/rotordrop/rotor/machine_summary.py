@@ -14,6 +14,7 @@ from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.machine.plausibility import doubts
+from rotordrop.physics.contact import contact_tangent
 from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
@@ -94,6 +95,8 @@ def summarise_machine(machine: Machine) -> MachineSummary:
 def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> BearingSummary:
     numbers = numbers_of(bearing)
     deflection, tangent = numbers.deflection(abs(load))
+    if not bearing.bearing.has_race:
+        tangent = contact_tangent(bearing.contact.law, abs(load))
     support = bearing.support
     return BearingSummary(
         name=bearing.name,
@@ -174,6 +177,8 @@ def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[Machin
 
 def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
     race, radius, numbers = bearing.race, float(bearing.bore_radius), numbers_of(bearing)
+    if not bearing.bearing.has_race:
+        return
     sliding, rolling = friction_heat(
         F_r=max(rest.load, 0.0),
         mu=float(bearing.friction.dynamic),

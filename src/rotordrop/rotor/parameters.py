@@ -140,9 +140,13 @@ def _kernel_parameters(
 
 def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:
     """The kernel arrays that change with the values of a machine whose rotor stays."""
+    from rotordrop.rotor.machine_summary import rotor_on_race  # which builds on this module
+
     bearings = machine.touchdown_bearings
     rows = np.array([bearing_row(bearing, load) for bearing, load in zip(bearings, shares, strict=True)])
     for row, bearing in zip(rows, bearings, strict=True):
+        if not bearing.bearing.has_race:  # what stresses a sleeve is the rotor in it
+            row[L.STRESS_COEFFICIENT] = float(rotor_on_race(machine, bearing).maximum_pressure(1.0))
         # A held race gives way to its own weight by nanometres; a loose one falls.
         if not numbers_of(bearing).held:
             row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(machine.gravity)
@@ -224,7 +228,8 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.RING : L.RING_END] = numbers.rings()
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
-    row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
+    if bearing.bearing.has_race:
+        row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
     bearing.fill(row)
     return row
 

@@ -91,14 +91,18 @@ def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
             "loaded; its stiffness is not defined"
         )
     numbers, mount = numbers_of(bearing), bearing.mount
+    contact = contact_tangent(bearing.contact.law, load)
+    tangent, simple = contact, contact  # of a sleeve the contact is all that lies on the support
+    if bearing.bearing.has_race:
+        tangent, simple = numbers.tangent_stiffness(load), numbers.simple_stiffness(load)
     return EquivalentStiffness(
         bearing=bearing.name,
         node=bearing.node,
         load=load,
-        tangent=numbers.tangent_stiffness(load),
-        simple=numbers.simple_stiffness(load),
+        tangent=tangent,
+        simple=simple,
         support=float(bearing.support.stiffness) + _held_by(bearing, load)[1],
-        contact=contact_tangent(bearing.contact.law, load),
+        contact=contact if bearing.bearing.has_race else math.inf,
         branches=tuple(Relaxing(stiffness=float(b.stiffness), time=float(b.time)) for b in mount.maxwell),
     )
 
@@ -160,15 +164,16 @@ def touchdown_supports(
         race = parts.tangent if formula == "tangent" else parts.simple
         beside, below = _held_by(bearing, parts.load)
         links = (
-            link(parts.contact),
-            link(race, float(bearing.damping_time) * parts.tangent),
+            *((link(parts.contact),) if bearing.bearing.has_race else ()),
+            link(race, float(bearing.damping_time) * parts.tangent if bearing.bearing.has_race else 0.0),
             link(
                 (float(ground.stiffness_horizontal) + beside, float(ground.stiffness) + below),
                 (float(ground.damping_horizontal), float(ground.damping)),
                 parts.branches,
             ),
         )
-        masses = (float(bearing.race.mass), float(ground.mass))
+        masses = (float(bearing.race.mass),) if bearing.bearing.has_race else ()
+        masses = (*masses, float(ground.mass))
         supports.append(Support(node=bearing.node, links=links, masses=masses))
     return tuple(supports)
 

@@ -106,7 +106,11 @@ def _settled_parts(model: DropModel, output_step: float) -> int:
     for bearing, parts in zip(
         model.machine.touchdown_bearings, equivalent_stiffness(model.machine), strict=True
     ):
-        fastest = max(fastest, math.sqrt((parts.contact + parts.tangent) / float(bearing.race.mass)))
+        if bearing.bearing.has_race:
+            square = (parts.contact + parts.tangent) / float(bearing.race.mass)
+        else:
+            square = (parts.tangent + parts.support) / float(bearing.support.mass)
+        fastest = max(fastest, math.sqrt(square))
     return max(1, math.ceil(output_step * fastest / SETTLED_STEP))
 
 
@@ -165,9 +169,8 @@ def stored_energy_of(setup: Setup, time: float, state: Array) -> float:
 
 def relative_displacement(setup: Setup, states: Array) -> Array:
     """Displacement of the rotor relative to the races, shape (T, B, 2) [m]."""
-    return displacement_at(setup, states, setup.parameters.bearing_shape) - states[
-        :, setup.model.layout.race
-    ].reshape(len(states), -1, 2)
+    moved = displacement_at(setup, states, setup.parameters.bearing_shape)
+    return moved - setup.model.layout.bore(states)
 
 
 def displacement_at(setup: Setup, states: Array, rows: Array) -> Array:
@@ -338,7 +341,7 @@ def samples_of(setup: Setup, states: Array, histories: Array) -> dict[str, NDArr
     layout = setup.model.layout
     columns = {
         "displacement": displacement_at(setup, states, setup.parameters.bearing_shape),
-        "race_displacement": states[:, layout.race].reshape(len(states), -1, 2),
+        "race_displacement": layout.bore(states),
         "sensor_displacement": displacement_at(setup, states, setup.sensor_rows),
         "indentation": histories[..., H.H_DELTA],
         "contact_force": histories[..., H.H_CONTACT_FORCE],

@@ -52,6 +52,17 @@ N_HISTORIES = 12
 def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Scratch, out: Array) -> None:
     """Fill ``out`` (12,) with what one bearing does in a state."""
     contact_at(t, p.bearing_at[b, L.CONTACTS], y, p, out)
+    if p.bearing_at[b, L.RACE] < 0:  # without a race the contact itself is what the bearing bears
+        out[H_BEARING_FORCE_X] = (
+            out[H_FRICTION_FORCE] * out[H_NORMAL_Y] - out[H_CONTACT_FORCE] * out[H_NORMAL_X]
+        )
+        out[H_BEARING_FORCE_Y] = (
+            -out[H_FRICTION_FORCE] * out[H_NORMAL_X] - out[H_CONTACT_FORCE] * out[H_NORMAL_Y]
+        )
+        out[H_BALL_LOAD] = out[H_OUTER_STRESS] = 0.0
+        out[H_STRESS] = p.bearing[b, L.STRESS_COEFFICIENT] * math.sqrt(out[H_CONTACT_FORCE])
+        out[H_INNER_STRESS] = out[H_STRESS]
+        return
     F_x, F_y, _exchanged = ball_force(b, y, p, work)
     out[H_BEARING_FORCE_X] = -F_x
     out[H_BEARING_FORCE_Y] = -F_y
@@ -151,9 +162,10 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
                 energy += departure.energy_in_contact(p.departure[b], law, delta)
             elif delta > 0.0:
                 energy += contact_energy(law, delta)
-        energy += ball_energy(b, y, p)
-        energy += row[L.RACE_WEIGHT] * y[r + 1]
-        energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
+        if r >= 0:
+            energy += ball_energy(b, y, p)
+            energy += row[L.RACE_WEIGHT] * y[r + 1]
+            energy += 0.5 * row[L.RACE_MASS] * (y[n_q + r] ** 2 + y[n_q + r + 1] ** 2)
         energy += (
             0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
         )

@@ -402,6 +402,17 @@ def force_and_stress(b: int, y: Array, p: KernelParameters, work: Scratch) -> tu
     return math.sqrt(F_x * F_x + F_y * F_y), stress
 
 
+@inner_kernel
+def note_largest(t: float, force: float, stress: float, entry: Array) -> None:
+    """Keep the largest force [N] and stress [Pa] of a bearing with their times."""
+    if force > entry[PEAK_FORCE]:
+        entry[PEAK_FORCE] = force
+        entry[PEAK_FORCE + 1] = t
+    if stress > entry[PEAK_STRESS]:
+        entry[PEAK_STRESS] = stress
+        entry[PEAK_STRESS + 1] = t
+
+
 @lean_kernel
 def update_peaks(
     t: float, y: Array, p: KernelParameters, running: Array, peaks: Array, work: Scratch
@@ -418,6 +429,10 @@ def update_peaks(
                 peaks[b, PEAK_INDENTATION] = running[c, RUN_DELTA]
                 peaks[b, PEAK_INDENTATION + 1] = t
         if p.bearing_at[b, L.RACE] < 0:
+            c = p.bearing_at[b, L.CONTACTS]
+            _delta, normal, friction, _nx, _ny, _sliding, _lost = contact_values(t, c, b, y, p)
+            force = math.sqrt(normal * normal + friction * friction)
+            note_largest(t, force, p.bearing[b, L.STRESS_COEFFICIENT] * math.sqrt(normal), peaks[b])
             continue
         dx, dy = race_deflection(b, y, p)
         travel = dx * dx + dy * dy
@@ -427,12 +442,7 @@ def update_peaks(
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
         force, stress = force_and_stress(b, y, p, work)
-        if force > peaks[b, PEAK_FORCE]:
-            peaks[b, PEAK_FORCE] = force
-            peaks[b, PEAK_FORCE + 1] = t
-        if stress > peaks[b, PEAK_STRESS]:
-            peaks[b, PEAK_STRESS] = stress
-            peaks[b, PEAK_STRESS + 1] = t
+        note_largest(t, force, stress, peaks[b])
 
 
 @kernel

@@ -513,6 +513,8 @@ def bearing_accelerations(
     by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
+    else:
+        dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
     by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls) if sprung else 0.0
     sx = y[n_q + h]

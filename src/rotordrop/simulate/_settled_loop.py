@@ -25,6 +25,8 @@ def race_damping_rates(p: KernelParameters, n: int) -> Array:
     """Damping over mass [1/s] of the race velocities, shape (n,); zero for every other state."""
     rates = np.zeros(n)
     for b in range(p.bearing.shape[0]):
+        if p.bearing_at[b, L.RACE] < 0:
+            continue
         rate = p.bearing[b, L.BEARING_DAMPING] / p.bearing[b, L.RACE_MASS]
         race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
         rates[race] = rate
@@ -59,6 +61,8 @@ def damp_races(
     """Take the ball-set damping of the races implicitly: explicitly it would bound the step."""
     half = 0.5 * h
     for b in range(p.bearing.shape[0]):
+        if p.bearing_at[b, L.RACE] < 0:
+            continue
         race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
         for i in range(race, race + 2):
             # The right-hand side has taken the damping at the velocity assumed; found is the velocity at

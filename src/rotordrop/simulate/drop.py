@@ -145,7 +145,7 @@ def _result(
     return DropResult(
         time=times,
         displacement=displacement,
-        race_displacement=states[:, layout.race].reshape(reached, n_b, 2),
+        race_displacement=layout.bore(states),
         support_displacement=states[:, layout.support].reshape(reached, n_b, 2),
         indentation=histories[..., H.H_DELTA],
         contact_force=histories[..., H.H_CONTACT_FORCE],

@@ -85,7 +85,10 @@ def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[fl
     stiffness, name = rest.tangent_stiffness, bearing.name
     damping = stiffness * float(bearing.damping_time)
     race, support, friction = bearing.race, bearing.support, bearing.friction
-    for mass, what in ((float(race.mass), "race"), (float(support.mass), "support")):
+    bodies = [(float(support.mass), "support")]
+    if bearing.bearing.has_race:
+        bodies.insert(0, (float(race.mass), "race"))
+    for mass, what in bodies:
         own = stiffness + (float(support.stiffness) if what == "support" else 0.0)
         yield math.sqrt(own / mass), f"the mass of {name}'s {what} ({mass:.3g} kg) on its springs"
         yield damping / mass, f"the bearing damping of {name} on the mass of its {what} ({mass:.3g} kg)"
@@ -93,6 +96,8 @@ def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[fl
         float(support.damping) / float(support.mass),
         f"the support damping of {name} on its mass ({float(support.mass):.3g} kg)",
     )
+    if not bearing.bearing.has_race:
+        return
     grip = float(friction.static) * abs(rest.load) * float(bearing.bore_radius) ** 2
     yield (
         grip / (float(friction.smoothing_speed) * float(race.inertia)),

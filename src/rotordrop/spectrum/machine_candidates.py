@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +94,8 @@ def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float,
     lower, upper = gap.range or (gap.lower or float(gap), gap.upper or float(gap))
     lengths = [effective_length(value, *sags) for value in (float(gap), lower, upper)]
     bore, rotor = float(bearing.bore_radius), float(bearing.bore_radius) - float(gap)
-    turning = spin_participation(rotor, bore, inertia, float(bearing.race.inertia))
+    spun = float(bearing.race.inertia) if bearing.bearing.has_race else math.inf  # a sleeve does not turn
+    turning = spin_participation(rotor, bore, inertia, spun)
     ratio = 1.0 + turning * g / part.load
     slowest = float(small_frequency(lengths[2], g, ratio)) / float(period_ratio(LARGEST_SWING))
     return SwingRange(

@@ -30,8 +30,8 @@ BAD = [
     (GAP, 'airgap = "250 um"', "unknown key 'airgap'; did you mean 'air_gap'", "airgap"),
     (
         GAP,
-        GAP + '\nkind = "sleeve"',
-        "'kind' is reserved for another kind of touchdown bearing .* not yet",
+        GAP + '\nkind = "planetary"',
+        "is reserved for bearings of several rollers, which are not yet supported; there are .*sleeve",
         "kind",
     ),
     (

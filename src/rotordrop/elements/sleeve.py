@@ -1,0 +1,99 @@
+"""A sleeve: a plain ring in which the rotor lands and slides, without rolling elements and without a race."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotordrop.elements.race_bearing import BearingFigure, BearingNumbers, Excess, RaceBearing
+from rotordrop.elements.values import PoissonRatio, PositiveLength, Pressure, default
+from rotordrop.physics import blocks
+
+Array = NDArray[np.float64]
+
+
+class Sleeve(RaceBearing):
+    """A sleeve that stands still: the rotor meets its support through one contact."""
+
+    length: PositiveLength = default(0.04, "usual of rotors of some tens of kilograms, chosen", (0.01, 0.1))
+    """Length over which the rotor lies in it [m]; the pressure between them follows from it."""
+    youngs_modulus: Pressure = default(110e9, "bronze", (3e9, 210e9))
+    """Young's modulus [Pa]."""
+    poisson_ratio: PoissonRatio = default(0.34, "bronze", (0.27, 0.4))
+    """Poisson's ratio [1]."""
+
+    has_race: ClassVar[bool] = False
+    ball_inertia: ClassVar[bool] = False
+    ring_travel: ClassVar[None] = None
+
+    def numbers(self) -> SleeveNumbers:
+        """Give the numbers that follow from it."""
+        return SleeveNumbers(self)
+
+    def check_bore(self, radius: float) -> None:
+        """Take any bore: nothing lies around it."""
+
+    def usual_race_width(self) -> tuple[float, str]:
+        """Its length."""
+        return self.length.value, "the length of the sleeve"
+
+    def race_radius(self) -> tuple[float, str]:
+        """Nothing spins with it."""
+        return 0.0, "a sleeve does not spin"
+
+
+@dataclass(frozen=True)
+class SleeveNumbers(BearingNumbers):
+    """The numbers of a sleeve: rigid, held, without rolling elements."""
+
+    sleeve: Sleeve
+
+    held: ClassVar[bool] = True
+    play: ClassVar[float] = 0.0
+    drag_diameter: ClassVar[float] = 0.0
+
+    @property
+    def ring_material(self) -> tuple[float, float]:
+        """Young's modulus [Pa] and Poisson's ratio [1] of the sleeve."""
+        return self.sleeve.youngs_modulus.value, self.sleeve.poisson_ratio.value
+
+    def entries(self) -> Array:
+        """No ball set."""
+        return np.zeros(blocks.BALLS_N_ENTRIES)
+
+    def places(self, least: int = 0) -> Array:
+        """No places but padding, which bears nothing."""
+        return np.zeros((3, least))
+
+    def deflection(self, load: float) -> tuple[float, float]:
+        """Nothing gives way between rotor and support but the contact."""
+        return 0.0, math.inf
+
+    def seat(self, load: float) -> tuple[float, float]:
+        """It stays in the middle."""
+        return 0.0, 0.0
+
+    def simple_stiffness(self, load: float) -> float:
+        """Rigid."""
+        return math.inf
+
+    def figures(self, load: float) -> tuple[BearingFigure, ...]:
+        """Nothing holds it but its support."""
+        return ()
+
+    def excesses(self, omega: float, load: float) -> Iterator[Excess]:
+        """Nothing turns."""
+        yield from ()
+
+    def room_to_grow(self) -> tuple[float, str]:
+        """Nothing is compared: heat of a sleeve is not reckoned."""
+        return math.inf, "nothing"
+
+    def truth(self) -> dict[str, float]:
+        """None of a ball bearing."""
+        return {}
