@@ -73,7 +73,8 @@ def _of_the_bearing(machine: Machine, bearing: TouchdownBearing) -> Iterator[Dou
     beside = machine.rotor.elements[max(0, bearing.node - 2) : bearing.node]
     outer = [0.5 * (e.layer_diameter or e.outer_diameter) for e in beside]
     nearest = min(outer, key=lambda value: abs(value - radius))
-    if abs(nearest - radius) > RADIUS_DISTANCE:
+    # a beam that stands for a rotor has one diameter, and none of the rotor's seats
+    if abs(nearest - radius) > RADIUS_DISTANCE and not machine.rotor.is_beam:
         text = (
             f"bore radius less air gap make a rotor radius of {_length(radius)}, but the shaft there has "
             f"{_length(nearest)}; a sleeve may explain it, else check 'bore_radius' and the node"

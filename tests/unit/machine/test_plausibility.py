@@ -4,11 +4,19 @@ import pytest
 
 from rotordrop.machine import example_machine, example_names
 from rotordrop.machine.plausibility import doubts
+from rotordrop.machine.simple import SimpleMachine, simple_machine
 
 
 @pytest.mark.parametrize("name", example_names())
 def test_the_examples_look_normal(name):
     assert doubts(example_machine(name)) == ()
+
+
+def test_a_beam_that_stands_for_a_rotor_has_no_seats_to_compare():
+    told = {"mass": "59.5 kg", "length": "1.117 m", "centre": "621 mm", "bearings": ("70 mm", "857 mm")}
+    told |= {"sensors": ("100 mm", "827 mm"), "sensor_angle": "135 deg", "designation": "XCB71914-E"}
+    told |= {"gap": "0.25 mm", "speed": "33000 rpm", "grade": "G 1", "support": "1e8 N/m"}
+    assert doubts(simple_machine(SimpleMachine(**told))) == ()
 
 
 ODD = [
