@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from rotordrop._version import __version__
 from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.estimate.document import published_drop
 from rotordrop.estimate.estimate import CrossCheck, Estimate, FittedParameter
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Drop
@@ -39,6 +40,9 @@ from rotordrop.report.replay_sections import (
     friction_section,
     speed_section,
 )
+from rotordrop.report.restart_page import restart_section
+from rotordrop.restart import RestartCard, restart_card
+from rotordrop.restart.assumptions import assumptions_of
 from rotordrop.severity.numbers import NOTE, SEVERITY
 from rotordrop.units import format_second
 
@@ -66,14 +70,25 @@ AGREES = "The independent cross-check agrees within its known accuracy."
 
 
 def estimate_page(
-    estimate: Estimate, origin: Origin | None = None, since: Drop | None = None
+    estimate: Estimate,
+    origin: Origin | None = None,
+    since: Drop | None = None,
+    card: RestartCard | None = None,
 ) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
     Everything it says of the drop comes from the estimate; the origin says how it was made, and an earlier
-    estimate of the machine, as published, is compared with this one.
+    estimate of the machine, as published, is compared with this one. Without a restart card it has one by the
+    assumptions of the package.
     """
-    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since), lead=1)
+    weighed = card or assumed_card(estimate, since)
+    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since, weighed), lead=1)
+
+
+def assumed_card(estimate: Estimate, since: Drop | None = None) -> RestartCard:
+    """The restart card of a drop by the assumptions of the package, and by an earlier drop."""
+    earlier = () if since is None else (since,)
+    return restart_card(published_drop(estimate), assumptions_of({}, "the assumptions"), since=earlier)
 
 
 def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
@@ -174,7 +189,7 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
     return tuple((name, text) for name, text in facts.items() if text)
 
 
-def _sections(estimate: Estimate, since: Drop | None) -> tuple[Section, ...]:
+def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tuple[Section, ...]:
     names = [bearing.name for bearing in estimate.bearings]
     steps = estimate.replay
     tables = () if steps is None else (first_contact_table(names, steps.contacts),)
@@ -189,6 +204,7 @@ def _sections(estimate: Estimate, since: Drop | None) -> tuple[Section, ...]:
         *drop_sections(estimate.bearings, origin, estimate.speed, shares, contact_tables=tables),
         _severity(estimate),
         changed_section(estimate, since),
+        restart_section(card),
         *(() if estimate.agreement is None else (agreement_section(estimate.agreement, names),)),
         _parameters(estimate),
         *(() if steps is None or steps.friction is None else (friction_section(steps.friction),)),

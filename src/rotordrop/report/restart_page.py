@@ -41,20 +41,17 @@ SCOPE = (
     "A decision by expected cost. Damage is never measured here: its chances are assumptions, moved by what "
     "the estimate and the checks show."
 )
+RESTART = "Restart"
 NO_DROPS = "Name the machine file, and a limit with --limit, to see the next drop."
 
 
 def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
     """Build the page of a restart card."""
-    first, *rest = card.statements
-    lead: list[Statement] = []
-    if card.prior_alone:
-        lead, (first, *rest) = [Statement(first, "warning")], rest
     return ReportContent(
         title=f"Restart of {drop.machine}: {card.answer}",
         subtitle=f"after the drop {drop.record} at {format_quantity(2.0 * math.pi * drop.speed_Hz, 'speed')}",
         simulated=SIMULATED_RECORD if drop.simulated_record else "",
-        verdict=(*lead, Statement(first, _LEVELS[card.answer]), *map(Statement, rest), Statement(SCOPE)),
+        verdict=_said(card),
         cards=tuple(_bearing(card, drop, name) for name in drop.bearings),
         summary=(_answers(card), _checks(card)),
         facts=(("assumptions", card.assumptions.source), ("estimate", drop.verdict)),
@@ -64,6 +61,20 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
             _next(card.next_drops),
         ),
     )
+
+
+def restart_section(card: RestartCard) -> Section:
+    """The card as a part of the report on its drop: answer, costs, checks, what may be damaged."""
+    tables = (_answers(card), _checks(card), _suspected(card), _evidence(card))
+    return Section(RESTART, statements=_said(card), tables=tables)
+
+
+def _said(card: RestartCard) -> tuple[Statement, ...]:
+    first, *rest = card.statements
+    lead: list[Statement] = []
+    if card.prior_alone:
+        lead, (first, *rest) = [Statement(first, "warning")], rest
+    return (*lead, Statement(first, _LEVELS[card.answer]), *map(Statement, rest), Statement(SCOPE))
 
 
 def _bearing(card: RestartCard, drop: Drop, name: str) -> Card:

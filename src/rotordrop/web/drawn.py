@@ -135,15 +135,14 @@ def write_estimate(
     from rotordrop.estimate.published import drop_of
     from rotordrop.ledger.book import drop_of_estimate
     from rotordrop.report.drop_sections import force_panel, stress_panel
-    from rotordrop.report.estimate_page import estimate_page
+    from rotordrop.report.estimate_page import assumed_card, estimate_page
     from rotordrop.report.machine_sections import weight_shares
     from rotordrop.report.page import write_page
     from rotordrop.report.restart_page import restart_page
     from rotordrop.report.rotor_drawing import rotor_outline
-    from rotordrop.restart import restart_card
-    from rotordrop.restart.assumptions import assumptions_of
 
-    content = estimate_page(estimate, _origin(job, options), since)
+    card = assumed_card(estimate, since)
+    content = estimate_page(estimate, _origin(job, options), since, card)
     names, grid, columns = histories_of(estimate)
     loads = weight_shares(estimate.machine)
     places = []
@@ -171,7 +170,6 @@ def write_estimate(
     document = estimate_document(estimate)
     write_json(made / "document.json", document, sealed=True)
     drop = drop_of(document, estimate.record.name)
-    card = restart_card(drop, assumptions_of({}, "the assumptions"), since=() if since is None else (since,))
     write_json(
         made / "page.json",
         {

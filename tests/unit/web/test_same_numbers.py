@@ -19,7 +19,10 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.table import LOADS, published
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
+from rotordrop.report.estimate_page import assumed_card
 from rotordrop.report.quantity import IN_OTHER_UNITS, display_unit
+from rotordrop.report.restart_page import restart_numbers
+from rotordrop.restart import RestartCard
 from rotordrop.web.drawn import write_estimate, write_look
 from rotordrop.web.python_lines import estimate_lines, look_lines
 from rotordrop.web.traces import open_traces
@@ -309,11 +312,20 @@ def derived(document: dict[str, Any]) -> Iterator[float]:
     yield STATIC_STRESS
 
 
+def missing_chances(card: RestartCard) -> Iterator[float]:
+    """What the page says of a bearing by the chances of its damages: that there is one at all."""
+    for name in {one.bearing for one in card.suspicions}:
+        yield 1.0 - np.prod([1.0 - one.probability for one in card.suspicions if one.bearing == name])
+
+
 def test_no_number_of_the_page_is_missing_in_the_document_or_in_python(
     estimate: Estimate, page: dict[str, Any], document: dict[str, Any]
 ) -> None:
     written, seen = {*in_json(document), *derived(document)}, set[int]()
     known = {*in_python(estimate, seen), *derived(document)}
+    card = assumed_card(estimate)  # as 'rotordrop restart' computes it from the document
+    written |= {*in_json(restart_numbers(card)), *missing_chances(card)}
+    known |= {*in_python(card, seen), *missing_chances(card)}
     for bearing in estimate.bearings:
         known |= {*in_python([*severity_values(estimate, bearing).values()], set())}
         known |= {
