@@ -9,10 +9,10 @@ sent is a sample.
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ FEWEST_POINTS = 100
 MOST_COLUMNS = 12
 """Columns that are sent at once, more than a figure shows; chosen, not measured."""
 
-_ONE_HEAD = Lock()
+_ONE_HEAD = threading.Lock()
 """Numpy reads the head of an array file by ``ast.literal_eval``, which fails now and then in CPython 3.11
 where two threads are in it at once (gh-106905)."""
 
