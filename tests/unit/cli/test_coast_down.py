@@ -333,6 +333,9 @@ def test_a_record_too_short_for_a_frame_or_a_law_says_so(tmp_path, capsys):
     told = " ".join(capsys.readouterr().out.split())
     assert "too short for a speed law" in told
     assert "Force and stress are not in a record of displacement" in told
+    assert "shorter than one frame; there is no waterfall" not in page.read_text()
+    short = str(recorded(tmp_path / "s.csv", seconds=0.9))
+    assert run(["waterfall", LP400, short, "--report", str(page)]) == 0
     assert "shorter than one frame; there is no waterfall" in page.read_text()
     assert run(["coast-down", LP400, "--speed", "60 Hz", "--drag-from", record]) == 3
     assert re.search(r"recorded for 1\.\d+ s after power-off; at least 4 s", capsys.readouterr().err)

@@ -282,6 +282,7 @@ WRITTEN = {
             *(f"{WEB}drawn:write_{what}" for what in ("look", "estimate", "waterfall")),
             f"{WEB}drawn:_falls",
             f"{WEB}child:_channels",
+            f"{WEB}machine_pages:write_machine_page",
         ),
         _job(f"{RUN}page.json"),
         _looked,

@@ -16,7 +16,7 @@ import pytest
 from tests.unit.web.serving import Served
 
 from rotordrop.files import DIGEST
-from rotordrop.web import numbers, running
+from rotordrop.web import commands, numbers, running
 from rotordrop.web.running import Runner, result_folder
 from rotordrop.web.workspace import Job, Workspace
 
@@ -80,7 +80,7 @@ def test_a_damaged_job_is_shown_as_damaged_and_can_be_removed(served, files, con
         served.ask("PUT", f"/api/jobs/{job}/files/tail?name=a.csv", b"x"),
     ):
         assert (answer.status, "remove the drop, and send its files again" in answer.text) == (409, True)
-    assert served.ask("GET", "/api/drops").status == 200
+    assert served.ask("GET", "/api/log").status == 200
     again = Served(Workspace(served.space.path))
     assert job in [one["id"] for one in again.ask("GET", "/api/jobs").told["jobs"]]
     again.stop()
@@ -138,7 +138,7 @@ def test_a_folder_of_an_earlier_version_is_given_digests_once(served, looked, tm
 def test_a_log_that_is_damaged_hides_no_estimate(tmp_path):
     (tmp_path / "drops.db").write_text("no data base " * 100)
     server = Served(Workspace(tmp_path / "served"), log=str(tmp_path / "drops.db"))
-    answer = server.ask("GET", "/api/drops").told
+    answer = server.ask("GET", "/api/log").told
     server.stop()
     assert (answer["drops"], "is not a log of drops" in answer["problem"]) == ([], True)
 
@@ -169,7 +169,7 @@ def test_few_machines_are_made_at_once(monkeypatch):
             running[0] -= 1
         return subprocess.CompletedProcess([], 0, b"{}", b"")
 
-    monkeypatch.setattr(numbers.subprocess, "run", slow)
+    monkeypatch.setattr(commands.subprocess, "run", slow)
     threads = [threading.Thread(target=numbers._said_by, args=([],)) for _ in range(8)]
     for thread in threads:
         thread.start()
