@@ -95,6 +95,9 @@ class Line:
 EVEN = 1.0 / math.sqrt(12.0)
 """Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
 
+FEWEST_SAMPLES = 16
+"""Samples in which a line may be looked for [1]: those of the shortest frame."""
+
 SWING_ERROR = 0.05
 """How well the frequency of a wandering swing is known at any time [Hz]."""
 
@@ -131,6 +134,8 @@ def find_lines(
     def lines_of(displacement: PlanarSignal) -> list[FoundLine]:
         thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
         first = round(skip * rate)
+        if len(thin) - first < FEWEST_SAMPLES:  # the record ends while the rotor bounces
+            return []
         search = LineSearch(
             thin[first:],
             rate,
