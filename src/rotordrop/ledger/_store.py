@@ -61,6 +61,14 @@ class Transaction:
         self._cursor.execute(statement.replace("?", self._mark), tuple(values))
         return [] if self._cursor.description is None else [tuple(row) for row in self._cursor.fetchall()]
 
+    def refuse_damaged(self, where: str | Path) -> None:
+        """Refuse a SQLite file whose indexes are not those of its rows: a drop may be counted twice there."""
+        if self._mark == "?" and (found := self.run("PRAGMA integrity_check(1)")[0][0]) != "ok":
+            raise DamagedFileError(
+                f"{where} is damaged: {found}. Its drops are whole; take a copy of it, and make its indexes "
+                "anew: sqlite3 LOG REINDEX"
+            )
+
     def seal(self, what: str, digest: str | None) -> None:
         """Keep the digest of a drop or an allowance, or forget it."""
         self.run("DELETE FROM seals WHERE sealed = ?", (what,))

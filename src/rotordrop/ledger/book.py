@@ -201,6 +201,7 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
     kept = replace(drop, sha256=drop.sha256 or f"{_NO_SHA256}{secrets.token_hex(8)}")
     values = [getattr(kept, name) for name in COLUMNS]
     with transaction(where, writing=True) as log:
+        log.refuse_damaged(where)
         key = (kept.machine, kept.bearing_set, kept.sha256)
         there = log.run("SELECT id FROM drops WHERE machine = ? AND bearing_set = ? AND sha256 = ?", key)
         if there:
@@ -250,16 +251,17 @@ def read_log(where: str | Path) -> Log:
     """Everything in a log, compared with its digests; what is damaged or gone is named."""
     with transaction(where, writing=False) as log:
         found, seals = _read(log), log.seals
-    there = _digests(found)
-    wrong = [
-        f"{what} is not what was logged" for what in there if seals.get(what, there[what]) != there[what]
-    ]
-    wrong += [f"{what} is gone" for what in seals.keys() - there]
-    if wrong:
-        raise DamagedFileError(
-            f"{name_of(where)} is damaged: {', '.join(sorted(wrong))}. Take a damaged drop out with "
-            "'rotordrop log remove' and add its estimate again; state a damaged allowance again"
-        )
+        there = _digests(found)
+        wrong = [
+            f"{what} is not what was logged" for what in there if seals.get(what, there[what]) != there[what]
+        ]
+        wrong += [f"{what} is gone" for what in seals.keys() - there]
+        if wrong:
+            raise DamagedFileError(
+                f"{name_of(where)} is damaged: {', '.join(sorted(wrong))}. Take a damaged drop out with "
+                "'rotordrop log remove' and add its estimate again; state a damaged allowance again"
+            )
+        log.refuse_damaged(where)
     return replace(found, unsealed=tuple(what for what in there if what not in seals))
 
 

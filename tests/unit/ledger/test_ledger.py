@@ -207,6 +207,26 @@ def test_what_has_changed_in_a_log_is_named_and_can_be_taken_out(log, change, na
         assert len(logged_drops(log)) == 2
 
 
+def test_an_index_that_is_damaged_lets_no_drop_in_twice(log):
+    """One bit in an index page: the drops are whole, and the one that is looked for is not found."""
+    add_drop(log, DROP)
+    whole = log.read_bytes()
+    digest = str(DROP.sha256).encode()
+    places = [at for at in range(len(whole)) if whole.startswith(digest, at)]
+    assert len(places) == 2  # the row, and the index of what counts once
+    named = []
+    for at in places:
+        raw = bytearray(whole)
+        raw[at + 5] ^= 1
+        log.write_bytes(raw)
+        with pytest.raises(DamagedFileError, match="is damaged") as refusal:
+            read_log(log)
+        named.append("REINDEX" in str(refusal.value))
+        with pytest.raises(DamagedFileError, match="make its indexes anew"):
+            add_drop(log, DROP)
+    assert named == [False, True] or named == [True, False]
+
+
 def test_a_log_of_an_older_version_is_read_and_given_digests(log):
     add_drop(log, DROP)
     with closing(sqlite3.connect(log)) as connection, connection:

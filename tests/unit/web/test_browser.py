@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
@@ -176,7 +177,11 @@ def test_two_cursors_notes_and_chosen_traces_and_their_address(browser, tmp_path
         browser.until("document.getElementById('instant').open")
         browser.evaluate("instanttext.value = 'here'; document.querySelector('#instant .main').click()")
         browser.until("fetch && document.getElementById('tabs') && !document.getElementById('instant').open")
-        browser.key("f")
+        for _ in range(40):  # the drop is asked for again, and takes no key until it is there
+            browser.key("f")
+            if browser.evaluate("document.getElementById('figuresdialog').open"):
+                break
+            time.sleep(0.1)
         browser.until("document.getElementById('figuresdialog').open")
         browser.evaluate("document.querySelector('#figurechoices input').click()")
         for column in ("x0", "x1"):
