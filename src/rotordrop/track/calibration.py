@@ -217,10 +217,17 @@ def converged(
         As for `track`.
     """
     once = (replace(stage, passes=1),)
-    fit = track(problems, once, references=references, noise_factor=noise_factor, progress=progress)
-    for _ in range(passes - 1):
-        before = fit.negative_log_likelihood
-        fit = track(problems, once, references=fit.trajectories, noise_factor=noise_factor, progress=progress)
+
+    def passed(number: int, references: Sequence[Array]) -> TrackedDrops:
+        def told(words: str, share: float) -> None:
+            if progress is not None:
+                progress(words, (number + share) / passes)
+
+        return track(problems, once, references=references, noise_factor=noise_factor, progress=told)
+
+    fit = passed(0, references)
+    for number in range(1, passes):
+        before, fit = fit.negative_log_likelihood, passed(number, fit.trajectories)
         if abs(fit.negative_log_likelihood - before) < SMALL_CHANGE:
             break
     return fit

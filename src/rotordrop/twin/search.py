@@ -508,14 +508,21 @@ def _fits(found: Candidate) -> bool:
 
 
 def largest_move(before: TrackedDrops, after: TrackedDrops) -> float:
-    """Largest move of a parameter between two fits, over its standard deviation in the first [1]."""
+    """Largest move of a parameter between two fits, over its standard deviation in the first [1].
+
+    What the first does not have, such as unknowns of a sensor plane that it leaves out, has not moved.
+    """
     moves = [0.0]
     drops = zip(before.problems, before.smoothed, after.problems, after.smoothed, strict=True)
     for problem, smoothed, fine, found in drops:
         at, chosen = parameter_sample(smoothed), problem.parameter_slice
-        sigma = np.sqrt(np.diag(smoothed.covariance(at))[chosen])
-        way = found.means[parameter_sample(found)][fine.parameter_slice] - smoothed.means[at][chosen]
-        moves.append(float(np.max(np.abs(way) / sigma)))
+        mean, variance = smoothed.means[at][chosen], np.diag(smoothed.covariance(at))[chosen]
+        known = {one.path: pair for one, *pair in zip(problem.unknowns, mean, variance, strict=True)}
+        values = found.means[parameter_sample(found)][fine.parameter_slice]
+        for unknown, value in zip(fine.unknowns, values, strict=True):
+            if unknown.path in known:
+                middle, spread = known[unknown.path]
+                moves.append(abs(float(value - middle)) / math.sqrt(spread))
     return max(moves)
 
 

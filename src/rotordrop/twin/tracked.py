@@ -107,7 +107,9 @@ def followed_drops(
         with ThreadPoolExecutor(max_workers=1) as pool:
             cross_check = checks_begun(pool, fit)
             factor = likeliest_noise(fit, WHOLE_STAGE)
-            fit = converged(fit.problems, WHOLE_STAGE, fit.trajectories, noise_factor=factor)
+            fit = converged(
+                fit.problems, WHOLE_STAGE, fit.trajectories, noise_factor=factor, progress=progress
+            )
             factor *= max(fit.noise_factors)
     waiting = list(zip(evidence, fit.problems, fit.smoothed, base, cross_check, strict=True))
     del fit, found, base, cross_check

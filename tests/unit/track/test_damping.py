@@ -50,11 +50,14 @@ def test_passes_go_on_while_the_likelihood_changes(
     """Each begins where the one before has ended, with the same noise."""
     seen: list[Any] = []
 
-    def one_pass(_problems: Any, _stages: Any, *, references: Any, noise_factor: float, **_: Any) -> Any:
+    def one_pass(_problems: Any, _stages: Any, *, references: Any, noise_factor: float, progress: Any) -> Any:
         seen.append((references, noise_factor))
+        progress("fitting", 0.0)
         return SimpleNamespace(negative_log_likelihood=scores[len(seen) - 1], trajectories=len(seen))
 
     monkeypatch.setattr(calibration, "track", one_pass)
     stage = Stage(until=0.2, force=0.07, share=0.01, passes=2)
-    converged([], stage, 0, noise_factor=0.5)  # type: ignore[arg-type]
+    shares: list[float] = []
+    converged([], stage, 0, noise_factor=0.5, progress=lambda _, share: shares.append(share))  # type: ignore[arg-type]
     assert seen == [(k, 0.5) for k in range(passes)]
+    assert shares == [k / MOST_REPEATS for k in range(passes)]

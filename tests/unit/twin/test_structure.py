@@ -338,12 +338,18 @@ def test_values_that_hold_the_neutral_one_say_nothing(lp400, name):
     assert not extension.says_nothing(machine, telling)
 
 
-def moved_fit(score: float, way: float) -> Any:
-    """A fit of one drop with two parameters of standard deviation 0.1, the second one moved by a way."""
-    problem = SimpleNamespace(parameter_slice=slice(1, 3))
+def moved_fit(score: float, way: float, further: int = 0) -> Any:
+    """A fit of one drop with two parameters of standard deviation 0.1, the second one moved by a way.
+
+    Further ones come before them: those of sensor planes that a coarse fit leaves out.
+    """
+    paths = [*(f"sensors.{k}.cross_axis" for k in range(further)), "NDE.preload", "DE.preload"]
+    problem = SimpleNamespace(
+        parameter_slice=slice(1, 1 + len(paths)), unknowns=[SimpleNamespace(path=path) for path in paths]
+    )
     smoothed = SimpleNamespace(
-        means=np.array([[5.0, 1.0, 2.0 + way]]),
-        covariance=lambda _: np.diag([9.0, 0.01, 0.01]),
+        means=np.array([[5.0, *([99.0] * further), 1.0, 2.0 + way]]),
+        covariance=lambda _: np.diag([9.0, *([0.01] * len(paths))]),
         filtered=SimpleNamespace(parameter_sample=0, negative_log_likelihood=score),
     )
     return TrackedDrops(
@@ -367,7 +373,7 @@ def test_a_whole_drop_that_moves_a_parameter_beyond_the_first_impacts_is_fitted_
 
     def converged(_problems: Any, stage: Stage, _references: Any, **_: Any) -> Any:
         stages.append(stage)
-        return moved_fit(1000.0 if len(stages) <= 2 else other, way)
+        return moved_fit(1000.0 if len(stages) <= 2 else other, way, further=2)
 
     monkeypatch.setattr(search_module, "converged", converged)
     monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
