@@ -171,6 +171,15 @@ def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
 
 def support_sag(row: Array, load: float) -> float:
     """Deflection [m] of a support under a static load [N], its foundation included."""
+    deflection = support_deflection(row, load)
+    if row[_PRESENT] == 0.0:
+        return deflection
+    speed, share = float(row[_SPEED]), max(float(row[_SHARE]), 0.0)
+    return deflection + (0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2))
+
+
+def support_deflection(row: Array, load: float) -> float:
+    """Deflection [m] of a support against its foundation under a static load [N]."""
     stiffness = float(row[L.SUPPORT_STIFFNESS_Y])
     sag = load / stiffness
     if row[_PRESENT] == 0.0:
@@ -182,9 +191,7 @@ def support_sag(row: Array, load: float) -> float:
     cubic = float(row[_CUBIC])
     # what a support is deflected by is its compliance: coupling to the side, which is free, takes 1 - κ²
     coupled = sag / (1.0 - float(row[_COUPLING]) ** 2)
-    deflection = coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
-    speed, share = float(row[_SPEED]), max(float(row[_SHARE]), 0.0)
-    return deflection + (0.0 if share == 0.0 else load * share / (float(row[L.SUPPORT_MASS_Y]) * speed**2))
+    return coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
 
 
 def _of_turned_axes(bearing: Any) -> float | None:

@@ -65,8 +65,8 @@ class Transaction:
         """Refuse a SQLite file whose indexes are not those of its rows: a drop may be counted twice there."""
         if self._mark == "?" and (found := self.run("PRAGMA integrity_check(1)")[0][0]) != "ok":
             raise DamagedFileError(
-                f"{where} is damaged: {found}. Its drops are whole; take a copy of it, and make its indexes "
-                "anew: sqlite3 LOG REINDEX"
+                f"{where} is damaged: {found}. Take a copy of it; 'rotordrop log show' names a drop that is "
+                "damaged. Where none is, make its indexes anew: sqlite3 LOG REINDEX"
             )
 
     def seal(self, what: str, digest: str | None) -> None:

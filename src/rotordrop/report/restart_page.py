@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import plotly.graph_objects as go
 
@@ -28,8 +28,10 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.restart.card import ANSWERS, RestartCard
-from rotordrop.restart.next_drop import NextDrop
 from rotordrop.units import format_quantity
+
+if TYPE_CHECKING:
+    from rotordrop.restart.next_drop import NextDrop
 
 _LEVELS: dict[str, Level] = {
     "restart": "good",

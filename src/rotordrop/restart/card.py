@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,10 @@ from rotordrop.restart.evidence import (
     require_check,
     suspicions,
 )
-from rotordrop.restart.next_drop import NextDrop
 from rotordrop.units import format_chance
+
+if TYPE_CHECKING:
+    from rotordrop.restart.next_drop import NextDrop
 
 Array = NDArray[np.float64]
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]

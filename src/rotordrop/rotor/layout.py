@@ -208,6 +208,12 @@ class StateLayout:
         support = states[:, self.support].reshape(len(states), -1, 2)
         return np.where(np.array(self.raceless)[:, None], support, race)
 
+    def support_deflection(self, states: Array, b: int) -> Array:
+        """Deflection [m] of a support, shape (T, 2), against its foundation in states (T, n)."""
+        at = self.bearing_at()[b]
+        moved, own = states[:, at[L.SUPPORT] : at[L.SUPPORT] + 2], at[L.BEARING_OWN]
+        return moved if own < 0 else moved - states[:, own : own + 2]
+
     def zeros(self) -> Array:
         """State with everything at zero."""
         return np.zeros(self.size)

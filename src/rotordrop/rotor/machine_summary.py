@@ -14,11 +14,11 @@ from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.machine.plausibility import doubts
-from rotordrop.physics.contact import contact_tangent
 from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag
+from rotordrop.rotor.suspension import stiffness_of
 from rotordrop.rotor.unknowns import prior
 from rotordrop.units import format_quantity
 
@@ -94,19 +94,16 @@ def summarise_machine(machine: Machine) -> MachineSummary:
 
 def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> BearingSummary:
     numbers = numbers_of(bearing)
-    deflection, tangent = numbers.deflection(abs(load))
-    if not bearing.bearing.has_race:
-        tangent = contact_tangent(bearing.contact.law, abs(load))
-    support = bearing.support
+    parts, support = stiffness_of(bearing, abs(load)), bearing.support
     return BearingSummary(
         name=bearing.name,
         load=load,
         figures=numbers.figures(abs(load)),
         contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
-        deflection=deflection,
-        tangent_stiffness=tangent,
+        deflection=numbers.deflection(abs(load))[0],
+        tangent_stiffness=parts.tangent,
         support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),
-        equivalent_stiffness=1.0 / (1.0 / tangent + 1.0 / float(support.stiffness)),
+        equivalent_stiffness=parts.equivalent(),
     )
 
 

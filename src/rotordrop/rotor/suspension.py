@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.elements.support import support_sag
+from rotordrop.elements.support import support_deflection
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import columns as L
@@ -80,16 +80,18 @@ def equivalent_stiffness(
 ) -> tuple[EquivalentStiffness, ...]:
     """Stiffness of each touchdown bearing under loads [N], (B,); the shares of the weight by default."""
     shares = bearing_load_shares(machine) if loads is None else loads
-    pairs = zip(machine.touchdown_bearings, shares, strict=True)
-    return tuple(_of_bearing(bearing, float(load)) for bearing, load in pairs)
+    pairs = list(zip(machine.touchdown_bearings, shares, strict=True))
+    for bearing, load in pairs:
+        if load <= 0.0:
+            raise UsageError(
+                f"touchdown bearing {bearing.name!r} carries {load:.3g} N of the rotor's weight and is not "
+                "loaded; its stiffness is not defined"
+            )
+    return tuple(stiffness_of(bearing, float(load)) for bearing, load in pairs)
 
 
-def _of_bearing(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
-    if load <= 0.0:
-        raise UsageError(
-            f"touchdown bearing {bearing.name!r} carries {load:.3g} N of the rotor's weight and is not "
-            "loaded; its stiffness is not defined"
-        )
+def stiffness_of(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
+    """Stiffness of one touchdown bearing under a load [N], part by part."""
     numbers, mount = numbers_of(bearing), bearing.mount
     contact = contact_tangent(bearing.contact.law, load)
     tangent, simple = contact, contact  # of a sleeve the contact is all that lies on the support
@@ -120,10 +122,12 @@ def _held_by(bearing: TouchdownBearing, load: float) -> tuple[float, float]:
     row = np.zeros(L.N_BEARING_COLUMNS)
     bearing.mount.fill(row)
     bearing.support.fill(row)
-    sag = support_sag(row, load)
-    depth = max(sag - float(stop.gap), 0.0)
-    pressed = float(stop.stiffness) if depth > 0.0 else 0.0
-    return stuck + pressed * depth / max(sag, 1e-300), stuck + pressed
+    deflection = support_deflection(row, load)
+    depth = deflection - float(stop.gap)
+    if depth <= 0.0:
+        return stuck, stuck
+    pressed = float(stop.stiffness)
+    return stuck + pressed * depth / deflection, stuck + pressed
 
 
 def suspension_of(machine: Machine, name: str) -> tuple[Support, ...]:

@@ -300,9 +300,8 @@ def _ended_contacts(run: Run, log: Array, already_open: int) -> tuple[Array, Arr
     count = min(int(run.progress[_loop.LOGGED]), len(log))
     entries = log[:count]
     n_b = len(run.whirl)
-    began = np.bincount(entries[already_open:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
-    if not run.windows["window_rows"]:
-        began = np.bincount(entries[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
+    fresh = entries[already_open if run.windows["window_rows"] else 0 :]
+    began = np.bincount(fresh[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
     ended = entries if run.status[PHASE] != RUNNING else entries[~np.isnan(entries[:, _loop.LOG_END])]
     ended = ended[ended[:, _loop.LOG_CONTACT] < n_b]  # of rotor and races; stops and housing are not kept
     for b in range(n_b):

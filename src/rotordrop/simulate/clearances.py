@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
-from rotordrop.physics import columns as L
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.simulate.result import ContactLog, DropResult
 
@@ -67,10 +66,11 @@ def clearance_uses(machine: Machine, result: DropResult) -> tuple[ClearanceUse, 
         moved = result.at_nodes([one.node for one in machine.clearances])
         for i, one in enumerate(machine.clearances):
             places.append((one.name, one.node, False, float(one.gap), moved[:, i]))
+    layout = StateLayout.of_machine(machine, result.shapes.shape[1])
     for b, bearing in enumerate(machine.touchdown_bearings):
         if bearing.mount.stop is not None:
-            gap = float(bearing.mount.stop.gap)
-            places.append((bearing.name, bearing.node, True, gap, support_travel(machine, result, b)))
+            moved, gap = layout.support_deflection(result.state, b), float(bearing.mount.stop.gap)
+            places.append((bearing.name, bearing.node, True, gap, moved))
     uses = []
     for name, node, stop, gap, moved in places:
         radius = np.hypot(moved[:, 0], moved[:, 1])
@@ -88,10 +88,3 @@ def clearance_uses(machine: Machine, result: DropResult) -> tuple[ClearanceUse, 
             )
         )
     return tuple(uses)
-
-
-def support_travel(machine: Machine, result: DropResult, b: int) -> Array:
-    """Deflection of a support [m], shape (T, 2), against its foundation where that gives way."""
-    own = StateLayout.of_machine(machine, result.shapes.shape[1]).bearing_at()[b, L.BEARING_OWN]
-    moved = result.support_displacement[:, b]
-    return moved if own < 0 else moved - result.state[:, own : own + 2]

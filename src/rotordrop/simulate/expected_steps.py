@@ -83,7 +83,7 @@ def long_run(machine: Machine, duration: float, most_steps: int) -> str | None:
 def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[float, str]]:
     """Rates [1/s] of what a bearing is made of, at rest; under impacts they are somewhat higher."""
     stiffness, name = rest.tangent_stiffness, bearing.name
-    damping = stiffness * float(bearing.damping_time)
+    damping = stiffness * float(bearing.damping_time) if bearing.bearing.has_race else 0.0
     race, support, friction = bearing.race, bearing.support, bearing.friction
     bodies = [(float(support.mass), "support")]
     if bearing.bearing.has_race:

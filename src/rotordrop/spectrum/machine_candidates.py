@@ -89,7 +89,7 @@ def swing_ranges(machine: Machine) -> tuple[SwingRange, ...]:
 def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float, g: float) -> SwingRange:
     indentation = depth_at(bearing.contact.law, part.load)
     race_sag = numbers_of(bearing).deflection(part.load)[0]
-    sags = (indentation, race_sag, part.load / part.support)
+    sags = (indentation, race_sag, part.load / float(bearing.support.stiffness))
     gap = bearing.air_gap
     lower, upper = gap.range or (gap.lower or float(gap), gap.upper or float(gap))
     lengths = [effective_length(value, *sags) for value in (float(gap), lower, upper)]

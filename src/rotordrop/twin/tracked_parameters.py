@@ -13,7 +13,6 @@ from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
 from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
 from rotordrop.known import NINETY, Known, Status
-from rotordrop.physics import columns as L
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.problem import DropProblem
@@ -113,11 +112,7 @@ def never_used_up(problem: DropProblem, means: Array, unknown: Unknown, value: K
     """
     if unknown.parameter.way_of != "support":
         return value
-    layout, b = problem.model.layout, unknown.targets[0].row
-    places = layout.bearing_at()[b]
-    moved = means[:, places[L.SUPPORT] : places[L.SUPPORT] + 2]
-    if places[L.BEARING_OWN] >= 0:
-        moved = moved - means[:, places[L.BEARING_OWN] : places[L.BEARING_OWN] + 2]
+    moved = problem.model.layout.support_deflection(means, unknown.targets[0].row)
     travel = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
     if travel >= value.value:
         return value

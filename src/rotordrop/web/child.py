@@ -262,7 +262,7 @@ def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str,
 
     def progress(stage: str, fraction: float) -> None:
         nonlocal last
-        now = time.time()
+        now = time.monotonic()
         left = pace.left(now, fraction)
         if now - last >= BETWEEN_WORDS_S:
             last = now

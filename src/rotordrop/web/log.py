@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +70,9 @@ def add_to_log(job: Job, log: str) -> dict[str, Any]:
     drop = read_drop(folder / "document.json")
     bearings = job.read().get("label", {}).get("bearings")
     if not bearings:
-        begun = book.is_url(log) or Path(log).is_file()
-        logged = book.logged_drops(log, machine=drop.machine) if begun else {}
+        logged: dict[int, book.LoggedDrop] = {}
+        with suppress(UsageError):  # it has not been begun; what else is wrong, adding says
+            logged = book.logged_drops(log, machine=drop.machine)
         bearings = [FIRST_SET, *(one.bearing_set for one in logged.values())][-1]
     return {"number": book.add_drop(log, book.drop_of_estimate(drop, bearings)), "bearings": bearings}
 

@@ -56,6 +56,14 @@ def test_it_starts_fast(arguments):
     assert min(times) < LIMIT_S
 
 
+def test_the_report_on_an_estimate_loads_no_simulation():
+    program = (
+        "import sys, rotordrop.estimation, rotordrop.report.estimate_page; "
+        "assert 'rotordrop.simulate.drop' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 @pytest.mark.parametrize("words", [["compare", "A", "B"], ["log", "add", "LOG", "A"]], ids=["compare", "log"])
 def test_what_reads_estimates_loads_neither_compiler_nor_scipy(words, tmp_path):
     places = {"LOG": tmp_path / "log.db", "A": tmp_path / "a.json", "B": tmp_path / "b.json"}

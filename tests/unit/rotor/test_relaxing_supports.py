@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from tests.unit.simulate.test_mount import O_RING, RIBBON, mounted
 
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.campbell import campbell_diagram
 from rotordrop.rotor.critical_speeds import critical_speed_map, critical_speeds
+from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.reduction import reduce_rotor
 from rotordrop.rotor.suspension import (
     Relaxing,
@@ -93,6 +95,34 @@ def test_a_ribbon_sticks_and_a_stop_holds_where_the_load_presses_it_shut():
     assert plain.support < last[0, 0] < last[1, 1] == plain.support + 5e8
     far = mounted('{ kind = "stop", gap = "1 mm" }')
     assert equivalent_stiffness(far)[1] == plain
+
+
+def test_a_stop_is_pressed_by_the_support_and_not_by_its_foundation():
+    plain = equivalent_stiffness(mounted())[1]
+    stop = f'{{ kind = "stop", gap = "{1.5 * plain.load / plain.support!r} m" }}'
+    foundation = next(one for one in EXTENSIONS if one.name == "foundation mode").added_to(mounted(stop))
+    assert equivalent_stiffness(foundation)[1].support == plain.support
+
+
+@pytest.mark.parametrize("mount", [RIBBON, O_RING])
+def test_the_summary_of_a_machine_has_the_stiffness_of_the_map(mount):
+    machine = mounted(mount)
+    summary, parts = summarise_machine(machine), equivalent_stiffness(machine)
+    for told, part in zip(summary.bearings, parts, strict=True):
+        assert (told.tangent_stiffness, told.equivalent_stiffness) == (part.tangent, part.equivalent())
+
+
+def test_the_stiffness_at_a_frequency_is_that_of_springs_that_relax():
+    """50 Hz, and branches whose times are near one radian of it."""
+    part = equivalent_stiffness(mounted(O_RING))[1]
+    turn = 2.0 * np.pi * 50.0
+    stored, lost = part.support, 0.0
+    for branch in part.branches:
+        way = turn * branch.time
+        stored += branch.stiffness * way**2 / (1.0 + way**2)
+        lost += branch.stiffness * way / (1.0 + way**2)
+    assert part.dynamic(50.0) == pytest.approx(complex(stored, lost), rel=1e-12)
+    assert lost > 0.01 * stored
 
 
 def test_page_and_document_say_what_the_mount_is_at_its_frequencies():

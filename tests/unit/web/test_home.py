@@ -81,6 +81,7 @@ def test_a_drop_is_named_tagged_put_away_and_removed(browser, three):
 
 
 def test_one_click_logs_a_drop_which_the_log_draws_with_what_is_allowed(browser, three):
+    (three.space.path / "drops.db").touch()  # made, as by a data base, and not begun
     browser.open(three.address)
     for name in ("small", "large"):
         browser.until(f"document.querySelector('[aria-label=\"Add {name} to the log\"]')")
