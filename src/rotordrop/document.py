@@ -22,6 +22,11 @@ ABSENT: Any = None
 DEEPEST = 40
 """Brackets or parts of a key inside one another that a file can need (chosen)."""
 
+_LONG_KEY = re.compile(
+    r"""(?<![\w."'-])(?:(?:[\w-]++|"[^"]*+"|'[^']*+')\s*+\.\s*+){%d,}""" % (DEEPEST + 1)  # noqa: UP031
+)
+"""A key of more parts than that, bare or quoted."""
+
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -114,8 +119,8 @@ def parse_toml(text: str) -> dict[str, Any]:
         square of the parts of a key, and no end of its stack.
     """
     for number, line in enumerate(text.splitlines(), start=1):
-        key = re.match(r"[\s\[]*([\w\s.-]*)", line)
-        depth = max(line.count("[") - line.count("]"), line.count("{"), key.group(1).count(".") if key else 0)
+        key = _LONG_KEY.search(line)
+        depth = max(line.count("[") - line.count("]"), line.count("{"), key.group().count(".") if key else 0)
         if depth > DEEPEST:
             raise NestedTomlError(depth, number)
     try:

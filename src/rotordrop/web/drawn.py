@@ -344,11 +344,11 @@ def vectors_of(track: OrderTrack) -> dict[str, Any]:
 
 
 def _centreline(seen: Look) -> dict[str, Any]:
-    """Where the shaft centre is on average: means of stretches of at least a turn, in every plane [m]."""
+    """Where the shaft centre is on average: means of stretches of a turn at release or more [m]."""
     time, speed = seen.motion.time, seen.record.speed
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    slowest = TURN_OF_UNKNOWN_S if not seen.speed else 2.0 * math.pi / seen.speed
-    size = max(round(slowest * rate), len(time) // MOST_PLACES, 1)
+    turn = TURN_OF_UNKNOWN_S if not seen.speed else 2.0 * math.pi / seen.speed
+    size = max(round(turn * rate), len(time) // MOST_PLACES, 1)
     starts = np.arange(0, len(time) - size + 1, size)
 
     def means(values: Array) -> list[float | None]:

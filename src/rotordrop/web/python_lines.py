@@ -40,10 +40,14 @@ for row, (near, f) in enumerate(zip(bins, path))]  # [m]
 
 _VECTORS = """import numpy as np
 track = found.planes[{plane!r}].track
-vectors = {{order: track.amplitude[:, track.of(order)] for order in (1.0, 2.0)}}  # (x, y) [m], complex
+vectors = {{order: np.where(track.separable[:, track.of(order), None], track.amplitude[:, track.of(order)], \
+np.nan) for order in (1.0, 2.0)}}  # (x, y) [m], complex; nothing where a steady line is too near
 speed = track.speed  # [rad/s]
-slow = 0.0  # speed of the vector that is taken off [rad/s]
-slow_roll = {{order: vectors[order][np.nanargmin(abs(speed - slow))] for order in vectors}}  # of a speed
+slow = 0.0  # speed of the vector that is taken off [rad/s]; 0: none
+for order, vector in vectors.items():
+    known = np.isfinite(vector[:, 0])
+    if slow > 0.0 and known.any():
+        vectors[order] = vector - vector[np.where(known, abs(speed - slow), np.inf).argmin()]
 """
 
 

@@ -13,8 +13,7 @@ from rotordrop.report.quantity import Quantity, System, display_unit
 
 SYSTEMS: tuple[System, ...] = ("SI", "US")
 SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
-_KINDS = {"N": "force", "Pa": "pressure"}
-_LABELS = {load.field: load.label for load in LOADS}
+_LOADS = {load.field: load for load in LOADS}
 
 
 def content_json(part: Any) -> Any:
@@ -59,13 +58,13 @@ def row_of(drop: LoggedDrop) -> dict[str, Any]:
             {
                 "bearing": one.bearing,
                 "field": one.quantity,
-                "quantity": _LABELS[one.quantity],
+                "quantity": _LOADS[one.quantity].label,
                 "lower": one.lower,
                 "upper": one.upper,
                 **quantity_json(
                     Quantity(
                         value=math.nan if one.value is None else one.value,
-                        kind=_KINDS[one.unit],
+                        kind=_LOADS[one.quantity].kind,
                         interval_90=(one.lower, one.upper),
                     )
                 ),

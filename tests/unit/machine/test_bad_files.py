@@ -353,6 +353,8 @@ NESTED = {
     "lists, one in a line": "a = " + 5000 * "[\n",
     "tables": "a = " + 3000 * "{a=",
     "parts of a key": 20_000 * "a." + "a = 1",
+    "quoted parts of a key": 20_000 * '"a".' + "a = 1",
+    "parts of a key in a table": "b = { " + 20_000 * "'a' . " + "a = 1 }",
 }
 
 

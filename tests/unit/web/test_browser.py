@@ -173,6 +173,9 @@ def test_two_cursors_notes_and_chosen_traces_and_their_address(browser, tmp_path
             assert change == pytest.approx(then - at, abs=0.2)
             assert least <= mean <= largest
             assert least <= min(at, then) + 0.1 and largest >= max(at, then) - 0.1
+        turns, order = (float(re.search(f"([0-9.]+){of}", caption).group(1)) for of in (" turns", "X"))
+        assert turns == pytest.approx(60.0 * 2e-3, abs=0.01)  # of a rotor that was dropped from 60 Hz
+        assert order == pytest.approx(1e3 / 2.0 / 60.0, rel=0.05)
         browser.key("i")
         browser.until("document.getElementById('instant').open")
         browser.evaluate("instanttext.value = 'here'; document.querySelector('#instant .main').click()")
@@ -412,11 +415,12 @@ def test_the_waterfall_by_keys_shows_lines_with_their_reason(browser, tmp_path, 
         browser.key("u")
         browser.until(f"document.getElementById('falllines').innerText !== {json.dumps(before)}")
         browser.key("u")
-        browser.evaluate("[...document.querySelectorAll('#fallfiles button')].at(-1).click()")
-        browser.until("document.getElementById('lines').open")
-        assert "analyse_coast_down" in words(browser, "#code")
-        browser.key("Escape")
-        browser.until("!document.getElementById('lines').open")
+        for place, line in ((-2, "analyse_coast_down"), (-1, "rotordrop waterfall")):
+            browser.evaluate(f"[...document.querySelectorAll('#fallfiles button')].at({place}).click()")
+            browser.until("document.getElementById('lines').open")
+            assert line in words(browser, "#code")
+            browser.key("Escape")
+            browser.until("!document.getElementById('lines').open")
         browser.evaluate("[...document.querySelectorAll('#cutfiles button')].at(-1).click()")
         browser.until("document.getElementById('lines').open")
         assert "course = " in words(browser, "#code") and "spectrum = " in words(browser, "#code")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
@@ -10,6 +12,7 @@ from tests.unit.web.serving import Served
 from rotordrop.spectrum.orders import track_orders
 from rotordrop.spectrum.speed_profile import fit_speed_profile
 from rotordrop.web.drawn import vectors_of
+from rotordrop.web.python_lines import vector_lines
 from rotordrop.web.workspace import Workspace
 
 RATE, TURN = 2000.0, 2.0 * np.pi
@@ -30,9 +33,15 @@ def test_the_vectors_sent_are_those_that_turn_with_the_shaft():
     angle = profile.angle_at(time)
     x, y = 3e-6 * np.exp(0.7j), 2e-6 * np.exp(-1.1j)
     moved = np.stack([(x * np.exp(1j * angle)).real, (y * np.exp(1j * angle)).real], axis=1)
-    told = vectors_of(track_orders(moved, RATE, profile, orders=(1.0, 2.0)))
+    track = track_orders(moved, RATE, profile, orders=(1.0, 2.0))
+    told = vectors_of(track)
     assert len(told["time"]) == len(told["speed"]) > 20
     assert told["speed"][0] > told["speed"][-1]
+    made = {"found": SimpleNamespace(planes={"NDE": SimpleNamespace(track=track)})}
+    exec(vector_lines("NDE").replace("slow = 0.0", f"slow = {TURN * 36.0}"), made)
+    near = np.nanargmin(np.abs(track.speed - TURN * 36.0))
+    assert made["vectors"][1.0][near] == pytest.approx([0.0, 0.0])
+    assert made["vectors"][1.0][0] == pytest.approx(track.amplitude[0, 0] - track.amplitude[near, 0])
     for axis, vector in (("x", x), ("y", y)):
         rows = np.array(told["orders"]["1"][axis])
         assert rows[:, 0] + 1j * rows[:, 1] == pytest.approx(vector, abs=1e-3 * abs(vector))
@@ -40,8 +49,8 @@ def test_the_vectors_sent_are_those_that_turn_with_the_shaft():
 
 
 def test_the_centreline_is_where_the_shaft_is_on_average(server):
-    time = np.arange(int(4 * RATE)) / RATE
-    centre = np.where(time < 2.0, -20.0, -60.0)  # [µm]
+    time = np.arange(int(2 * RATE)) / RATE  # of so many samples a turn is more than a hundredth
+    centre = np.where(time < 1.0, -20.0, -60.0)  # [µm]
     x, y = 30.0 + 40.0 * np.cos(TURN * 50.0 * time), centre + 40.0 * np.sin(TURN * 50.0 * time)
     rows = "\n".join(f"{t:.6f},{a:.4f},{b:.4f}" for t, a, b in zip(time, x, y, strict=True))
     table = f"time [s],X [um],Y [um]\n{rows}\n".encode()
@@ -51,7 +60,7 @@ def test_the_centreline_is_where_the_shaft_is_on_average(server):
     told = server.ask("GET", f"/api/jobs/{job}/look/page").told["centreline"]
     seen = np.array([told["planes"][0]["x"], told["planes"][0]["y"]])
     assert seen.shape[1] == len(told["time"]) > 50
-    begun, ended = np.array(told["time"]) < 1.9, np.array(told["time"]) > 2.1
+    begun, ended = np.array(told["time"]) < 0.9, np.array(told["time"]) > 1.1
     assert np.ptp(seen[0]) < 2e-7  # a look puts its centre where it thinks best
     assert np.ptp(seen[1][begun]) < 2e-7
     assert seen[1][ended] - seen[1][begun].mean() == pytest.approx(-40e-6, abs=2e-7)
@@ -69,6 +78,13 @@ def test_slow_roll_is_taken_off_as_a_vector_and_one_turn_is_filtered(server, tmp
             f"import('/static/vectors.js').then(m => JSON.stringify(m.vectors({told}, 1, 5).x))"
         )
         assert '"re":3,"im":2' in found and '"re":0,"im":0' in found and ",null," in found
+        nearest = browser.evaluate(  # of 50, 15.9 and 5 Hz; nothing is known at the second
+            f"import('/static/vectors.js').then(m => JSON.stringify([45, 16].map(f => "
+            f"m.vectors({told}, 1, f).x.rows)))"
+        )
+        first, last = nearest.split("]],[[") if "]],[[" in nearest else nearest[1:-1].split("],[")
+        assert '"re":0,"im":0' in first and '"re":-3,"im":-2' in first
+        assert '"re":3,"im":2' in last and '"re":0,"im":0' in last
         kept = browser.evaluate(
             f"import('/static/vectors.js').then(m => JSON.stringify(m.vectors({told}, 1, 0).x))"
         )

@@ -46,5 +46,5 @@ export function centrelineTab() {
   return [make("figure", { of: [canvas, make("header", { class: "right", of: [files("Shaft centreline", {
     csv: () => keep(new Blob([csv()], { type: "text/csv" }), `${fileName("centreline")}.csv`), svg: () => keepSvg(picture(), fileName("centreline")), png: () => keepPng(picture(), fileName("centreline")),
     python: () => showLines(python["motion 0"]), command: command && (() => showLines(command, "As command"))
-  })] })] }), make("p", { class: "small", text: "The whole record in the sensor planes; each point is a mean over at least one turn of the shaft. Numbers are shaft speeds, or times from power-off where no speed is known." })];
+  })] })] }), make("p", { class: "small", text: "The whole record in the sensor planes; each point is a mean over a turn at the speed of the release, or more. Numbers are shaft speeds, or times from power-off where no speed is known." })];
 }

@@ -54,7 +54,7 @@ export function makeOrbits() {
       const title = `Orbit ${name}`;
       return make("figure", { class: "orbit", of: [make("canvas", { role: "img" }), make("header", { of: [files(title, {
         csv: () => csv({ ...state.orbits[i], title }), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(title)),
-        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.orbits[i].verb, `orbit ${i}`))
+        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.orbits[i].verb, `orbit ${i}`)), command: () => showLines(state[state.orbits[i].verb].command, "As command")
       })] })] });
     }));
   }

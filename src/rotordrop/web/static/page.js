@@ -341,7 +341,7 @@ async function waterfall() {
 click("waterfall", waterfall);
 click("fallback", leaveFall);
 click("fallreport", () => openReport("waterfall"));
-by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => showLines(fallFiles.Python()) }));
+by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => showLines(fallFiles.Python()), command: () => showLines(fallFiles.Command(), "As command") }));
 by("cutfiles").replaceChildren(files("Cuts", { csv: cutFiles.CSV, svg: cutFiles.SVG, png: cutFiles.PNG, python: () => showLines(cutFiles.Python()) }));
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
 click("remove", () => askRemoval(state.job));

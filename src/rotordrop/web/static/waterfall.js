@@ -254,7 +254,7 @@ function csv() {
 }
 export const fallFiles = {
   CSV: csv, SVG: () => keepSvg(picture((pen) => drawMap(pen, false), title()), title()), PNG: () => keepPng(picture((pen) => drawMap(pen, false), title()), title()),
-  Python: () => fall.page.python[`${fall.plane} ${fall.part}`]
+  Python: () => fall.page.python[`${fall.plane} ${fall.part}`], Command: () => fall.page.command
 };
 
 // The spectrum at the cursor and, where a line is chosen, its course: one table under the other.
