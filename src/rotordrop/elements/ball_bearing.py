@@ -117,6 +117,10 @@ class BallBearing(RaceBearing):
     """Angle by which the second row is turned, as a fraction of the ball pitch [1]."""
     width: V.PositiveLength | None = None
     """Width of one row [m]."""
+    row_spacing: V.PositiveLength | None = None
+    """Axial distance of the middles of two rows [m], which tilt alone feels; that of their width."""
+    shoulder_height: V.PositiveLength | None = None
+    """Height of the shoulders of the races above the bottom of their grooves [m]; 0.2 ball diameters."""
     limiting_speed: V.PositiveSpeed | None = None
     """Speed up to which the maker allows the bearing [rad/s]."""
     static_load_rating: V.PositiveForce | None = None
@@ -163,10 +167,6 @@ class BallBearing(RaceBearing):
     """Whether the centrifugal force of the balls counts in a simulated drop."""
 
     states_at: ClassVar[int] = L.RING_STATES
-
-    reserved: ClassVar[Mapping[str, str]] = {
-        "row_spacing": "the axial distance of two rows, which only tilt would feel",
-    }
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:

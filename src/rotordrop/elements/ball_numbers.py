@@ -17,6 +17,7 @@ from rotordrop.elements.race_bearing import (
     THROWN,
     BearingFigure,
     BearingNumbers,
+    Climb,
     Excess,
     Ratings,
     RollingElements,
@@ -31,7 +32,7 @@ from rotordrop.physics.ball_bearing import (
     bearing_constants,
 )
 from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
-from rotordrop.physics.ball_loads import ball_loads, displacement_under
+from rotordrop.physics.ball_loads import ball_loads, displacement_under, loads_and_angles
 from rotordrop.physics.ball_set import (
     ball_set_entries,
     ball_set_gradient,
@@ -40,6 +41,7 @@ from rotordrop.physics.ball_set import (
     static_deflection,
 )
 from rotordrop.physics.ball_table import BallTable, ball_table
+from rotordrop.physics.contact import contact_energy, depth_at
 from rotordrop.physics.fast_balls import FastBalls, centred_balls, offset_on_springs
 from rotordrop.physics.hertz import compliance, race_contact
 from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
@@ -53,6 +55,10 @@ Array = NDArray[np.float64]
 CENTRIFUGAL_SHARE = 0.1
 """Ball centrifugal force over preload ball load from which it counts: chosen, not measured."""
 
+SHOULDER_HEIGHT = 0.2
+"""Height of a shoulder over the ball diameter [1]: that of rings 0.6 ball diameters apart, chosen."""
+
+_HALVINGS = 100
 _STEEL = (208e9, 0.3)
 _HARD_PUSH, _PUSHES = 10.0, 101
 """Load over that at rest [1] for which rigid and sprung preload are compared, as of a first impact; forces
@@ -93,7 +99,7 @@ class BallNumbers(BearingNumbers):
         """Radial play [m], half the clearance of deep grooves."""
         return self.constants.radial_play
 
-    def element_loads(self, moved: Array, rings: Array) -> Array:
+    def element_loads(self, moved: Array, rings: Array, along: Array) -> Array:
         """Load of every ball [N].
 
         Raises
@@ -106,7 +112,7 @@ class BallNumbers(BearingNumbers):
                 "the load of every ball is not known with ball_inertia = true, where it differs between the "
                 "races; max_ball_load and race_stress of the drop hold the largest"
             )
-        return ball_loads(self.constants, moved, rings)
+        return loads_and_angles(self.constants, moved, rings, along)[0]
 
     def element_loads_under(self, force: Array) -> Array:
         """Load of every ball [N] where they push the race with a force."""
@@ -114,6 +120,69 @@ class BallNumbers(BearingNumbers):
             seats = seat_on_springs(self.constants, self.rings(), force)
             return ball_loads(self.constants, seats[:, :2], seats[:, 2])
         return ball_loads(self.constants, displacement_under(self.constants, force))
+
+    def climb(self, moved: Array, along: Array) -> Climb:
+        """How far the balls climb in the grooves of the race that has less room for them."""
+        balls, constants = self.balls, self.constants
+        diameter, angle = float(balls.ball_diameter), constants.radial_contact_angle
+        height = SHOULDER_HEIGHT * diameter if balls.shoulder_height is None else float(balls.shoulder_height)
+        load, angles = loads_and_angles(constants, moved, 0.0, along)
+        eta = compliance(
+            *self.ring_material, float(balls.ball_youngs_modulus), float(balls.ball_poisson_ratio)
+        )
+        found = []
+        for conformity, inner in ((balls.conformity_inner, True), (balls.conformity_outer, False)):
+            radius = float(conformity) * diameter
+            ellipse = race_contact(
+                diameter, float(balls.pitch_diameter), float(conformity), angle, eta, inner=inner
+            )
+            edge = np.where(load > 0.0, angles + ellipse.semi_axes(load)[0] / radius, 0.0)
+            found.append((np.max(edge, axis=(1, 2)), math.acos(max(1.0 - height / radius, 0.0))))
+        edge, shoulder = max(found, key=lambda one: float(np.max(one[0])) - one[1])
+        return Climb(
+            angle=np.max(np.where(load > 0.0, angles, 0.0), axis=(1, 2)), edge=edge, shoulder=shoulder
+        )
+
+    def axial_figures(self, law: Array, gap: float, push: float) -> Iterator[BearingFigure]:
+        """Stiffness along the axis and against tilt; force of a landing through a gap [m] by a push [N]."""
+        constants, balls = self.constants, self.balls
+        rest = bearing_response(constants, np.zeros(5), row_spacing=self.row_spacing)
+        yield _figure("axial_stiffness_N_per_m", "axial stiffness", "stiffness", rest.stiffness[2, 2])
+        yield BearingFigure(
+            field="tilt_stiffness_N_m_per_rad",
+            label="tilt stiffness",
+            kind="rotational_stiffness",
+            value=float(rest.stiffness[3, 3]),
+            note=f'arrangement "{balls.arrangement}"; a drop has no tilt of the race',
+        )
+        if push > 0.0:
+            force, angle = self.landing(law, gap, push)
+            thrust, way = format_quantity(push, "force"), format_quantity(gap, "length")
+            note = f"of {thrust} through {way}, without any loss, contact angle {math.degrees(angle):.3g}°"
+            yield _figure("landing_force_N", "axial force of a landing", "force", force, note=note)
+
+    @property
+    def row_spacing(self) -> float:
+        """Axial distance of the middles of the rows [m]; that of their width where none is given."""
+        if self.balls.row_spacing is not None:
+            return float(self.balls.row_spacing)
+        return self.balls.usual_race_width()[0] / self.constants.row_count
+
+    def landing(self, law: Array, gap: float, push: float) -> tuple[float, float]:
+        """Largest axial force [N] and contact angle [rad] where a constant push [N] closes a gap [m].
+
+        Its work goes into face and balls, nothing is lost, the race has no mass, the housing does not move.
+        """
+        rest = bearing_response(self.constants, np.zeros(5)).energy
+        low, high = 0.0, self.constants.groove_distance
+        for _ in range(_HALVINGS):
+            way = 0.5 * (low + high)
+            balls = bearing_response(self.constants, [0.0, 0.0, way, 0.0, 0.0])
+            force = -float(balls.force[2])
+            depth = depth_at(law, force) if force > 0.0 else 0.0
+            stored = balls.energy - rest + (contact_energy(law, depth) if depth > 0.0 else 0.0)
+            low, high = (way, high) if push * (gap + way + depth) > stored else (low, way)
+        return force, float(np.max(np.abs(balls.contact_angles)))
 
     def load_of_stress(self, stress: Array) -> Array:
         """Load [N] of the ball with a stress at the inner race."""
@@ -171,9 +240,9 @@ class BallNumbers(BearingNumbers):
         """Balls up to a speed of the race [rad/s], where their inertia counts."""
         return _speed_table(self.balls, fastest) if self.balls.ball_inertia else None
 
-    def places(self, least: int = 0) -> Array:
+    def places(self, least: int = 0, facing: float = 0.0) -> Array:
         """Direction of every ball and how many stand there."""
-        return balls_of(self.constants, least)
+        return balls_of(self.constants, least, facing)
 
     def deflection(self, load: float) -> tuple[float, float]:
         """Way of the race under a load [N] and tangent stiffness there [N/m]."""
@@ -343,8 +412,12 @@ class BallNumbers(BearingNumbers):
         }
 
 
-def _figure(field: str, label: str, kind: str, value: float, described: Known | None = None) -> BearingFigure:
-    return BearingFigure(field=field, label=label, kind=kind, value=value, described=described)
+def _figure(
+    field: str, label: str, kind: str, value: float, described: Known | None = None, note: str = ""
+) -> BearingFigure:
+    return BearingFigure(
+        field=field, label=label, kind=kind, value=float(value), described=described, note=note
+    )
 
 
 def inferred_stress_sigma(bearing: BallBearing) -> float:

@@ -59,17 +59,7 @@ class Contact(Description):
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Refuse a stiffness whose unit holds another exponent than the contact."""
-        exponent = raw.get("exponent", LINE_CONTACT)
-        written = raw.get("stiffness")
-        if isinstance(written, Mapping):
-            written = written.get("value", written.get("guess"))
-        found = _UNIT_EXPONENT.search(written) if isinstance(written, str) else None
-        if found and isinstance(exponent, int | float) and abs(float(found.group(1)) - exponent) > 0.01:
-            raise Misfit(
-                f"{written!r} belongs to the exponent {found.group(1)}, but the contact has the exponent "
-                f"{exponent:.4g}; change the unit or give 'exponent'",
-                ("stiffness",),
-            )
+        refuse_other_unit(raw, LINE_CONTACT)
         return raw
 
     @property
@@ -113,6 +103,20 @@ class Contact(Description):
         why = "about a fifth of Palmgren's value for 32 mm: edges and waviness leave part of the length"
         bounds = (2e8, 4e9)
         return {"stiffness": Known(value=8e8, status="default", range=bounds, source=why, unit="N/m^n")}
+
+
+def refuse_other_unit(raw: Mapping[str, Any], usual: float) -> None:
+    """Refuse a stiffness whose unit holds another exponent than its contact; ``usual`` where none is said."""
+    exponent, written = raw.get("exponent", usual), raw.get("stiffness")
+    if isinstance(written, Mapping):
+        written = written.get("value", written.get("guess"))
+    found = _UNIT_EXPONENT.search(written) if isinstance(written, str) else None
+    if found and isinstance(exponent, int | float) and abs(float(found.group(1)) - exponent) > 0.01:
+        raise Misfit(
+            f"{written!r} belongs to the exponent {found.group(1)}, but the contact has the exponent "
+            f"{exponent:.4g}; change the unit or give 'exponent'",
+            ("stiffness",),
+        )
 
 
 def palmgren_stiffness(length: float) -> float:

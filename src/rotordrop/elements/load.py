@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 SignedAcceleration = Annotated[Known, Physical("acceleration")]
 Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 
-AXIAL = "axial motion of the rotor"
+AXIAL = "an axial acceleration of the ground"
 
 
 class LoadPoint(Description):
@@ -32,8 +33,10 @@ class LoadPoint(Description):
 class Load(Placed):
     """A force on the rotor, from before the release on."""
 
-    direction: Angle
-    """Direction of the force, from +x towards y [rad]."""
+    direction: Angle | None = None
+    """Direction of the force, from +x towards y [rad]; or "axial", towards higher nodes, or "-axial"."""
+    along: Literal["axial", "-axial"] | None = None
+    """Sense along the axis, where the direction was given so."""
     force: Force | None = None
     """Force [N]; with an exponent that at nominal speed."""
     speed_exponent: NonNegative = default(0.0, "the same at every speed")
@@ -41,30 +44,44 @@ class Load(Placed):
     over_time: tuple[LoadPoint, ...] = ()
     """In place of the force: its course, straight between points, constant before and after them."""
 
+    written_as: ClassVar[Mapping[str, str]] = {"along": "direction"}
+
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
-        """Refuse a direction along the rotor, which a later version will know."""
-        if raw.get("direction") == "axial":
-            raise Misfit(
-                f'direction = "axial" is reserved for {AXIAL}, which is not yet supported; give the angle of '
-                'a radial load, such as "-90 deg", or leave the load out',
-                ("direction",),
-            )
+        """Read a direction along the axis."""
+        if raw.get("direction") in ("axial", "-axial"):
+            raw["along"] = raw.pop("direction")
         return raw
 
     def check(self) -> None:
-        """Refuse a load without a force or with two, and a course that does not go on."""
+        """Refuse a load without direction or force or with two, and a course that does not go on."""
         super().check()
+        if (self.direction is None) == (self.along is None):
+            raise Misfit(
+                'a load needs a \'direction\': an angle from +x towards y, such as "-90 deg", or "axial" '
+                'towards higher nodes, or "-axial"'
+            )
         if (self.force is None) == (not self.over_time):
             raise Misfit("a load needs either 'force' or 'over_time', and only one of them")
         if self.over_time and "speed_exponent" in self.model_fields_set:
             raise Misfit("a course over time does not go with the speed; leave out one", ("speed_exponent",))
         check_times(self.over_time)
 
+    @property
+    def sense(self) -> float:
+        """Sense along the axis, 1 towards higher nodes or -1; zero across it."""
+        return {None: 0.0, "axial": 1.0, "-axial": -1.0}[self.along]
+
     def course(self, nominal: float) -> tuple[Array, Array]:
-        """Entries of the load and the points of its course, shape (R, 3): time [s], force in x and y [N]."""
-        c, s = math.cos(float(self.direction)), math.sin(float(self.direction))
+        """Entries of the load and the points of its course, shape (R, 3): time [s], force in x and y [N].
+
+        That of an axial load stands in the place of x.
+        """
         row = np.zeros(L.N_LOAD_COLUMNS)
+        if self.along is not None:
+            c, s, row[L.LOAD_AXIAL] = self.sense, 0.0, 1.0
+        else:
+            c, s = math.cos(float(self.direction or 0.0)), math.sin(float(self.direction or 0.0))
         points = np.array([[float(p.time), c * float(p.force), s * float(p.force)] for p in self.over_time])
         if self.force is not None:
             row[[L.LOAD_X, L.LOAD_Y]] = c * float(self.force), s * float(self.force)

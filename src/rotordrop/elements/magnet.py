@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, Strict
 
-from rotordrop.elements.description import Name, Placed
+from rotordrop.elements.description import Description, Name, Placed
 from rotordrop.elements.parameter import Entry, Extension, Parameter, Values, guess, in_words, itself
 from rotordrop.elements.values import Damping, Stiffness, follows
 from rotordrop.known import NINETY, Known
@@ -58,6 +58,17 @@ class ActiveMagneticBearing(Placed):
             why = f"{DAMPING_RATIO:.0%} of critical for the {carried_mass:.3g} kg it carries"
             values["damping"] = Known(value=value, status="default", source=why, unit="N s/m")
         return values
+
+
+class AxialMagneticBearing(Description):
+    """An axial active magnetic bearing, near its operating point; it holds the rotor until the release."""
+
+    name: Name
+    """Name, of which no two are the same."""
+    stiffness: Stiffness
+    """Stiffness of the closed loop [N/m]."""
+    damping: Damping
+    """Damping of the closed loop [N s/m]."""
 
 
 REMANENCE_SIGMA = 1.2

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -134,6 +135,17 @@ class Ratings:
     """Where the load ratings come from."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Climb:
+    """How far rolling elements climb in their grooves, (T,) [rad from the middle of the groove]."""
+
+    angle: Array
+    edge: Array
+    """Largest contact angle of a loaded element, and that of the edge of its contact ellipse."""
+    shoulder: float
+    """Angle at which the groove ends."""
+
+
 class BearingNumbers(ABC):
     """The numbers of one kind of bearing; a kind that has none of something says so."""
 
@@ -170,8 +182,11 @@ class BearingNumbers(ABC):
         return None
 
     @abstractmethod
-    def places(self, least: int = 0) -> Array:
-        """Where the force acts around the race, shape (3, Z), padded to ``least`` places."""
+    def places(self, least: int = 0, facing: float = 0.0) -> Array:
+        """Where the force acts around the race, shape (3, Z), padded to ``least`` places.
+
+        With ``facing`` only the rows that axial motion towards +z (1) or -z (-1) loads.
+        """
 
     @abstractmethod
     def deflection(self, load: float) -> tuple[float, float]:
@@ -206,12 +221,21 @@ class BearingNumbers(ABC):
         """Relative standard deviation [1] of its stress at a force, by what is inferred of it."""
         return 0.0
 
-    def element_loads(self, moved: Array, rings: Array) -> Array:
+    def element_loads(self, moved: Array, rings: Array, along: Array) -> Array:
         """Load of every rolling element [N], (T, rows, Z); none here.
 
-        The race has moved (x, y) [m], (T, 2), sprung rings have moved from it [m], (T,).
+        The race has moved (x, y) [m], (T, 2), and along the axis, (T,), sprung rings from it, (T,).
         """
         return np.zeros((len(moved), 0, 0))
+
+    def climb(self, moved: Array, along: Array) -> Climb:
+        """How far rolling elements climb; without any they meet no shoulder. Arguments as `element_loads`."""
+        nothing = np.zeros(len(moved))
+        return Climb(angle=nothing, edge=nothing, shoulder=math.inf)
+
+    def axial_figures(self, law: Array, gap: float, push: float) -> Iterator[BearingFigure]:
+        """What holds the race along the axis, and a landing through a gap [m] under a push [N]."""
+        yield from ()
 
     def element_loads_under(self, force: Array) -> Array:
         """The same under a force of the elements on the race (x, y) [N], (T, 2); none here."""
@@ -243,7 +267,15 @@ def numbers_of(bearing: TouchdownBearing) -> BearingNumbers:
     return bearing.bearing.numbers()
 
 
-def places_of(numbers: list[BearingNumbers]) -> Array:
-    """Places of every bearing, shape (B, 3, Z), padded to the longest."""
-    longest = max((one.places().shape[1] for one in numbers), default=0)
-    return np.array([one.places(longest) for one in numbers]).reshape(len(numbers), 3, -1)
+def places_of(bearings: Sequence[TouchdownBearing]) -> Array:
+    """Places of every bearing, shape (B, 3, Z), padded to the longest.
+
+    Where a bearing has a face, its rows stand apart: those that motion towards +z loads in its own place, the
+    others B places behind, (2 B, 3, Z).
+    """
+    apart = [float(bearing.face is not None) for bearing in bearings]
+    asked = [(numbers_of(bearing), face) for bearing, face in zip(bearings, apart, strict=True)]
+    if any(apart):
+        asked += [(one, -face) for one, face in asked]
+    longest = max((one.places(0, facing).shape[1] for one, facing in asked), default=0)
+    return np.array([one.places(longest, facing) for one, facing in asked]).reshape(len(asked), 3, -1)

@@ -249,6 +249,8 @@ class Rotor(Description):
     """Materials by name."""
     modal_damping: V.NonNegative = default(0.005, "0.5 % of critical on every free-free flexible mode")
     """Damping ratio of the free-free flexible modes [1]."""
+    axial: Annotated[bool, Strict()] | None = None
+    """Whether it moves along its axis; it does where a face, an axial load or an axial AMB is described."""
     stiffness_factor: V.Positive | None = None
     """Bending stiffness over the one that sections and materials give [1]."""
     mass_to_ends: V.Number | None = None

@@ -66,7 +66,7 @@ class SleeveNumbers(BearingNumbers):
         """No ball set."""
         return np.zeros(blocks.BALLS_N_ENTRIES)
 
-    def places(self, least: int = 0) -> Array:
+    def places(self, least: int = 0, facing: float = 0.0) -> Array:
         """No places but padding, which bears nothing."""
         return np.zeros((3, least))
 

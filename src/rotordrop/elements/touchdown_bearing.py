@@ -14,6 +14,7 @@ from pydantic import Field, ValidationInfo, WrapValidator
 from rotordrop.elements.ball_bearing import STEEL_DENSITY, BallBearing
 from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description, Misfit, Name, Placed
+from rotordrop.elements.face import Face
 from rotordrop.elements.friction import Friction
 from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
@@ -71,6 +72,8 @@ class TouchdownBearing(Placed):
     """What carries the outer ring."""
     mount: Mount = Field(default_factory=Mount)
     """What lies in parallel to spring and damper of the support: ribbon, branches that relax, stop."""
+    face: Face | None = None
+    """Faces of the race, on which the rotor lands when it moves along its axis."""
 
     reserved: ClassVar[Mapping[str, str]] = {
         "thermal": "the heat of the bearing",
@@ -81,7 +84,8 @@ class TouchdownBearing(Placed):
     @property
     def parts(self) -> tuple[Description, ...]:
         """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
-        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support
+        faces = () if self.face is None else (self.face,)
+        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support, *faces
 
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of clearance and parts."""
@@ -111,11 +115,33 @@ class TouchdownBearing(Placed):
                 ("air_gap",),
             )
         self.bearing.check_bore(bore)
+        self._check_face()
         if not self.bearing.has_race and self.race.model_fields_set:
             raise Misfit(
                 "a sleeve has no race; leave out the table 'race': the length of the sleeve stands under "
                 "'bearing', its mass belongs to the support",
                 ("race",),
+            )
+
+    def _check_face(self) -> None:
+        """Refuse a face of a bearing whose race does not stand between two rows, or in its play."""
+        if self.face is None:
+            return
+        bearing, told = self.bearing, ""
+        if not bearing.has_race:
+            told = "a sleeve has no race that could give way axially"
+        elif bearing.sprung:
+            told = "the two rings of a pair on springs would move apart from one another"
+        elif bearing.ball_inertia:
+            told = "the table of balls with inertia knows no axial motion"
+        elif bearing.arrangement in ("single", "tandem") and float(bearing.preload) > 0.0:
+            told = f'rows that all face one way (arrangement = "{bearing.arrangement}") need a counterpart'
+        if told:
+            raise Misfit(
+                f"the touchdown bearing {self.name} cannot have a face: {told}, which is not yet supported; "
+                "leave the face out, or describe a preloaded pair between rigid spacers or a bearing with "
+                "clearance",
+                ("face",),
             )
 
     def with_designation(self, designation: str) -> TouchdownBearing:

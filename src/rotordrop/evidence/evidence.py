@@ -437,6 +437,12 @@ def insisted(evidence: Evidence) -> Evidence:
         When the rotor does not fall in the record, or it has no speed.
     """
     machine = evidence.machine
+    if machine.axial:
+        raise RecordError(
+            f"the rotor of the machine {machine.name!r} moves along its axis, with which a record cannot be "
+            "estimated yet: no sensor of a record shows it. Leave out what is axial (face, axial loads and "
+            "AMBs, rotor.axial) to estimate the radial drop alone; 'rotordrop simulate' and 'study' know it"
+        )
     if machine.loads or machine.base is not None:
         key = "[[loads]]" if machine.loads else "[base]"
         raise RecordError(

@@ -16,7 +16,7 @@ from rotordrop.elements.air import SpeedDescription
 from rotordrop.elements.clearance import Clearance, check_clearances
 from rotordrop.elements.description import Description, Misfit, Text, place_on_nodes
 from rotordrop.elements.load import Base, Load
-from rotordrop.elements.magnet import ActiveMagneticBearing
+from rotordrop.elements.magnet import ActiveMagneticBearing, AxialMagneticBearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
 from rotordrop.elements.table import keys_of
@@ -52,6 +52,8 @@ class Machine(Description):
     """Touchdown bearings, any number, NDE first."""
     ambs: tuple[ActiveMagneticBearing, ...] = ()
     """Radial active magnetic bearings."""
+    axial_ambs: tuple[AxialMagneticBearing, ...] = ()
+    """Axial active magnetic bearings."""
     remanence_time_constant: PositiveTime | None = None
     """Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out."""
     sensors: tuple[Sensor, ...] = ()
@@ -94,12 +96,40 @@ class Machine(Description):
                     ("touchdown_bearings", index, "node" if bearing.position is None else "position"),
                 )
             first[bearing.node] = bearing.name
+        self._check_axial()
         check_clearances(self.clearances, self.touchdown_bearings, nodes)
         if self.sensors:
             check_sensors_resolve_motion(tuple(one for one in self.sensors if not one.lost), nodes)
 
+    @property
+    def axial(self) -> bool:
+        """Whether the rotor moves along its axis."""
+        described = bool(self.axial_ambs) or any(load.along for load in self.loads)
+        described = described or any(bearing.face for bearing in self.touchdown_bearings)
+        return described if self.rotor.axial is None else self.rotor.axial
+
+    def _check_axial(self) -> None:
+        """Refuse what acts along the axis of a rotor that does not move there, or that nothing stops."""
+        faces = [bearing.face for bearing in self.touchdown_bearings if bearing.face is not None]
+        loads = [(index, load) for index, load in enumerate(self.loads) if load.along]
+        if self.rotor.axial is False and (faces or loads or self.axial_ambs):
+            key = "a face" if faces else "an axial load" if loads else "an axial AMB"
+            raise Misfit(
+                f"the rotor has axial = false, and the machine has {key}; leave out one of them",
+                ("rotor", "axial"),
+            )
+        for index, load in loads:
+            if not any(face.stops(load.sense) for face in faces):
+                towards = "higher" if load.sense > 0.0 else "lower"
+                raise Misfit(
+                    f"nothing stops the rotor that this load pushes towards {towards} nodes; give a "
+                    'touchdown bearing a face there, such as face = { gap = "0.25 mm", inner_radius = '
+                    '"35 mm", outer_radius = "39 mm" }, or leave the load out',
+                    ("loads", index, "direction"),
+                )
+
     def _check_names(self) -> None:
-        for key in ("touchdown_bearings", "ambs", "sensors", "clearances"):
+        for key in ("touchdown_bearings", "ambs", "axial_ambs", "sensors", "clearances"):
             seen: set[str] = set()
             for index, part in enumerate(getattr(self, key)):
                 place = (key, index, "name")

@@ -191,6 +191,13 @@ def _add_shorthand(parts: dict[str, Any]) -> None:
     }
     bearing["rows"] = {"description": "Rows of balls, 1 or 2, where no arrangement is given", "enum": [1, 2]}
     bearing["conformity"] = {"description": "Conformity of both races", KIND_MARK: "dimensionless"}
+    load = parts["Load"]["properties"]
+    del load["along"]
+    load["direction"] = {
+        "description": load["direction"]["description"],
+        "anyOf": [{"enum": ["axial", "-axial"]}, {KIND_MARK: "angle"}],
+    }
+    parts["Load"]["required"] = [*parts["Load"].get("required", []), "direction"]
     for name in ("Disc", "Unbalance", "TouchdownBearing", "ActiveMagneticBearing", "Sensor"):
         part = parts[name]
         part["oneOf"] = [{"required": ["node"]}, {"required": ["position"]}]

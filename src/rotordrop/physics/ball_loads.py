@@ -26,6 +26,21 @@ def ball_loads(constants: BearingConstants, displacement: Array, rings: Array | 
 
     Source: Neisi 2020, eqs. (2)–(6), ball by ball.
     """
+    return loads_and_angles(constants, displacement, rings)[0]
+
+
+def loads_and_angles(
+    constants: BearingConstants,
+    displacement: Array,
+    rings: Array | float = 0.0,
+    along: Array | float = 0.0,
+) -> tuple[Array, Array]:
+    """Load of every ball [N] as `ball_loads`, and its contact angle [rad], shape (T, rows, Z).
+
+    ``along`` (T,) [m] is the displacement of the race along the axis.
+
+    Source: Neisi 2020, eqs. (2)–(6), ball by ball.
+    """
     angles = constants.row_ball_angles
     radial = (
         constants.radial_offset
@@ -33,8 +48,10 @@ def ball_loads(constants: BearingConstants, displacement: Array, rings: Array | 
         + displacement[:, 1, None, None] * np.sin(angles)
     )
     axial = np.asarray(constants.axial_offset - rings)[..., None, None]
+    axial = axial + np.asarray(along)[..., None, None] * np.array(constants.axial_signs)[:, None]
     approach = np.maximum(np.hypot(radial, axial) - constants.groove_distance, 0.0)
-    return np.asarray(constants.ball_stiffness * approach * np.sqrt(approach))
+    load = np.asarray(constants.ball_stiffness * approach * np.sqrt(approach))
+    return load, np.arctan2(np.abs(axial), radial)
 
 
 def displacement_under(constants: BearingConstants, force: Array) -> Array:

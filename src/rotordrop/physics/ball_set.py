@@ -75,13 +75,17 @@ def ball_set_entries(constants: BearingConstants) -> Array:
     return entries
 
 
-def balls_of(constants: BearingConstants, places: int = 0) -> Array:
+def balls_of(constants: BearingConstants, places: int = 0, facing: float = 0.0) -> Array:
     """Direction cosine, sine [1] and number of balls at each place, shape (3, Z8).
 
     Rows of balls that coincide are one place with a count; places are padded with count zero to whole lanes
-    of eight, to ``places`` at least. Source: Neisi 2020, eq. (2), angles of the balls.
+    of eight, to ``places`` at least. With ``facing`` [1] only the rows of that axial sign, +1 or -1.
+    Source: Neisi 2020, eq. (2), angles of the balls.
     """
     angles, counts = _merged_angles(constants)
+    if facing != 0.0:
+        angles = constants.row_ball_angles[np.array(constants.axial_signs) == facing].reshape(-1)
+        counts = np.ones(len(angles))
     balls = np.zeros((3, LANES * max(1, -(-max(len(angles), places) // LANES))))
     balls[COSINE] = 1.0
     balls[COSINE, : len(angles)] = cos_each(angles)
@@ -203,6 +207,32 @@ def ball_set_axial_force(
         delta = max(A - A_0, 0.0)
         work[0, j] = weights[j] * K * delta * math.sqrt(delta) * axial_offset / A
     return lane_sum(work[0])
+
+
+@lean_kernel
+def two_row_force(
+    entries: Array, rows: tuple[Array, Array], dx: float, dy: float, dz: float, work: Array
+) -> tuple[float, float]:
+    """Restoring force [N], x and y, of a race that has moved by (dx, dy, dz) [m].
+
+    ``rows`` are the balls (3, Z8) that motion towards +z loads and those that it relieves; other arguments as
+    of `ball_set_force`. Source: Neisi 2020, eqs. (2)–(6), with the axial offset of a row.
+    """
+    F_x, F_y = ball_set_force(entries, rows[0], dx, dy, work, -dz)
+    G_x, G_y = ball_set_force(entries, rows[1], dx, dy, work, dz)
+    return F_x + G_x, F_y + G_y
+
+
+@lean_kernel
+def two_row_axial_force(
+    entries: Array, rows: tuple[Array, Array], dx: float, dy: float, dz: float, work: Array
+) -> float:
+    """Restoring force [N] along z of a race that has moved by (dx, dy, dz) [m]; arguments as `two_row_force`.
+
+    Source: Neisi 2020, eqs. (2)–(6), with the axial offset of a row.
+    """
+    one = ball_set_axial_force(entries, rows[0], dx, dy, work, -dz)
+    return one - ball_set_axial_force(entries, rows[1], dx, dy, work, dz)
 
 
 @lean_kernel

@@ -52,6 +52,15 @@ FAST_STEP = 3
 FAST_OUTER_STRESS = 4
 FAST_N_ENTRIES = 5
 
+# Entries of an axial face; SI units. A side of zero is a face on both sides, of one and minus one a face that
+# stops the rotor towards +z and -z.
+FACE_GAP = 0
+FACE_SIDE = 1
+FACE_RADIUS = 2
+FACE_FRICTION = 3
+FACE_LAW = 4
+FACE_N_ENTRIES = FACE_LAW + CONTACT_N_ENTRIES
+
 # Entries of a form; SI units. All at zero is the plain support.
 SUPPORT_PRESENT = 0
 SUPPORT_COUPLING = 1

@@ -61,10 +61,12 @@ RING_END = RING + blocks.RING_N_ENTRIES
 FAST = RING_END
 FAST_END = FAST + blocks.FAST_N_ENTRIES
 FAST_SPEED_STEP = FAST + blocks.FAST_SPEED_STEP
-N_BEARING_COLUMNS = FAST_END
+FACE = FAST_END
+FACE_END = FACE + blocks.FACE_N_ENTRIES
+N_BEARING_COLUMNS = FACE_END
 FOUNDATION_STATES = 4
 
-# Entries of `KernelParameters.spin`.
+# Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns and what holds it along its axis.
 POLAR_INERTIA = 0
 INITIAL_SPEED = 1
 AERO_TIME_CONSTANT = 2
@@ -72,7 +74,11 @@ AERO_LINEAR = 3
 AERO_QUADRATIC = 4
 POWER_OFF_DELAY = 5
 REMANENCE_TIME_CONSTANT = 6
-N_SPIN_ENTRIES = 7
+ROTOR_MASS = 7
+AXIAL_STIFFNESS = 8
+AXIAL_DAMPING = 9
+AXIAL_HOLDING = 10
+N_SPIN_ENTRIES = 11
 
 # Entries of `KernelParameters.flags`.
 SPIN_MODE = 0
@@ -94,7 +100,7 @@ N_MAGNET_COLUMNS = 8
 
 # Columns of `KernelParameters.load`, one row per load, that of the ground last: value along x and y, power of
 # the speed and its nominal, speed and phase of a sine, first point of its course and the one behind its last,
-# whether it is the acceleration of the ground.
+# whether it is the acceleration of the ground, whether its value along x is one along the axis of the rotor.
 LOAD_X = 0
 LOAD_Y = 1
 LOAD_EXPONENT = 2
@@ -104,11 +110,13 @@ LOAD_PHASE = 5
 LOAD_FIRST = 6
 LOAD_END = 7
 LOAD_OF_BASE = 8
-N_LOAD_COLUMNS = 9
+LOAD_AXIAL = 9
+N_LOAD_COLUMNS = 10
 
 # Entries of `KernelParameters.rotor_at`: where the states of the rotor, its books and the whole vector stand.
 # The velocity of a coordinate stands N_COORDINATES behind it. The step control looks at the first
-# N_CONTROLLED states, the filter estimates the first N_DYNAMIC.
+# N_CONTROLLED states, the filter estimates the first N_DYNAMIC. AXIAL is the place of the axial displacement
+# of the rotor, its velocity behind it; -1 where it does not move along its axis.
 MODES_X = 0
 MODES_Y = 1
 ROTOR_SPEED = 2
@@ -119,12 +127,13 @@ N_COORDINATES = 6
 N_CONTROLLED = 7
 N_DYNAMIC = 8
 N_STATES = 9
-N_ROTOR_PLACES = 10
+AXIAL = 10
+N_ROTOR_PLACES = 11
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
-# Then its first contact and the one behind its last, and the first state of its departure, of its mount and
-# of its sprung rings; -1 without one.
+# Then its first contact and the one behind its last, and the first state of its departure, of its mount, of
+# its sprung rings and of the axial motion of its race; -1 without one.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
@@ -134,7 +143,8 @@ CONTACTS_END = 5
 DEPARTURE = 6
 MOUNT_STATES = 7
 RING_STATES = 8
-N_BEARING_PLACES = 9
+FACE_STATES = 9
+N_BEARING_PLACES = 10
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that
@@ -158,15 +168,16 @@ class KernelParameters(NamedTuple):
     balls.
 
     Columns and entries are named in this module. ``balls`` (B, 3, Z8) are the balls of `physics.ball_set`,
+    where a race moves axially (2 B, 3, Z8), first the rows that motion towards +z loads, then the others,
     ``ball_table`` (B, ·, ·, ·, ·) or (0, ·, ·, ·, ·) what `physics.ball_table` reads of balls at speed;
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
     of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
     (B, ·) or (0, ·) holds what `physics.departure` reads. ``load`` (K, ·), ``load_shape`` (K, m) and
     ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``rub`` (N, · + m) are the contacts of
     the rotor with its housing, numbers of `physics.touch` and then shape, ``stops`` (S,) the bearings whose
-    mount has a stop; the log has both behind the contacts with races. ``memory`` is what is remembered
-    beside the state: a right-hand side reads it, an accepted step alone writes it
-    (`simulate._loop.remember`). No element of today has any; its length is zero.
+    mount has a stop, ``faces`` (F,) those with an axial face; the log has all three behind the contacts with
+    races. ``memory`` is what is remembered beside the state: a right-hand side reads it, an accepted step
+    alone writes it (`simulate._loop.remember`). No element of today has any; its length is zero.
     """
 
     eigenvalue: Array
@@ -193,4 +204,5 @@ class KernelParameters(NamedTuple):
     load_points: Array
     rub: Array
     stops: Integers
+    faces: Integers
     memory: Array

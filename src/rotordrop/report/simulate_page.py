@@ -11,6 +11,7 @@ from rotordrop.report.drop_sections import drop_sections, speed_figure
 from rotordrop.report.machine_sections import machine_sections, weight_shares
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.simulate.clearances import clearance_uses
+from rotordrop.simulate.landing import landings
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -28,6 +29,19 @@ CLEARANCES = (
 )
 
 
+LANDINGS = (
+    Column("bearing", "name"),
+    Column("axial gap", "gap", "length"),
+    Column("largest travel", "travel", "length"),
+    Column("landings", lambda one: str(len(one.contacts))),
+    Column("largest axial force", lambda one: one.peak[0], "force"),
+    Column("at", lambda one: one.peak[1], "time", 3),
+    Column("contact angle", "contact_angle", "angle"),
+    Column("edge of the contact", "edge_angle", "angle"),
+    Column("shoulder", "shoulder_angle", "angle"),
+)
+
+
 def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportContent:
     """Build the report on one simulated drop.
 
@@ -35,6 +49,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     """
     bearings = simulated_bearings(result)
     uses = () if machine is None else clearance_uses(machine, result)
+    landed = () if machine is None else landings(machine, result)
     rotor = (History(label="rotor", time=result.time, values=result.speed),)
     races = tuple(
         History(label=f"{name} race", time=result.time, values=result.race_speed[:, index])
@@ -48,6 +63,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
         sections=(
             *drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine)),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
+            *((Section("Axial landing", tables=(table(landed, LANDINGS),)),) if landed else ()),
             Section("Speed", figures=(turning,)),
             *(() if machine is None else machine_sections(machine)),
         ),

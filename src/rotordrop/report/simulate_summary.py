@@ -15,6 +15,7 @@ from rotordrop.report.content import SIMULATED_MACHINE, Card, ReportContent, Sta
 from rotordrop.report.estimate_numbers import headline_card, static_limit_statement
 from rotordrop.report.quantity import shown
 from rotordrop.simulate.clearances import ClearanceUse, clearance_uses
+from rotordrop.simulate.landing import landings
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def _verdict(
     if machine is not None:
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
-        said += [*_springs(result, machine), *_thrown(result, machine)]
+        said += [*_springs(result, machine), *_thrown(result, machine), *_landed(result, machine)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
     sleeves = (
         ()
@@ -144,6 +145,26 @@ def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
         for excess in numbers_of(bearing).excesses(fastest, share):
             if excess.kind == THROWN:
                 yield Statement(f"{bearing.name}: {excess.text}.", "warning")
+
+
+def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """How far the rotor moved along its axis, with what force it landed, whether balls climbed too far."""
+    for one in landings(machine, result):
+        travel, gap = shown(one.travel, "length", 3), shown(one.gap, "length", 3)
+        force, moment = one.peak
+        if not len(one.contacts):
+            text = f"{one.name}: the rotor travels {travel} of {gap} along its axis"
+            yield Statement(f"{text} and never lands on the face.", "good")
+            continue
+        times = "once" if len(one.contacts) == 1 else f"{len(one.contacts)} times"
+        first = shown(one.contacts.start[0], "time", 3)
+        yield Statement(
+            f"{one.name}: the rotor lands on the face of the race {times} (gap {gap}), first at {first}, "
+            f"with {shown(force, 'force', 4)} along its axis at most, at {shown(moment, 'time', 3)}; contact "
+            f"angle up to {shown(one.contact_angle, 'angle', 3)}."
+        )
+        if one.excess is not None:
+            yield Statement(f"{one.name}: {one.excess.text}.", "bad")
 
 
 def _certificate(result: DropResult) -> Statement:

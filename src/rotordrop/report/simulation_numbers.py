@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rotordrop.estimate.bearing_drop import published_bearing, simulated_bearings
 from rotordrop.simulate.clearances import clearance_uses
+from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -59,4 +62,27 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
             entry |= {"contacts": len(use.contacts), "peak_force_N": use.peak_force}
             entry |= {"first_contact_s": float(use.contacts.start[0])} if len(use.contacts) else {}
         numbers.setdefault("stops" if use.stop else "clearances", {})[use.name] = entry
+    if machine is not None and machine.axial:
+        latest = int(np.argmax(np.abs(result.axial_displacement)))
+        numbers["axial"] = {
+            "largest_travel_m": float(abs(result.axial_displacement[latest])),
+            "time_s": float(result.time[latest]),
+            "faces": {one.name: _landed(one) for one in landings(machine, result)},
+        }
     return numbers
+
+
+def _landed(one: Landing) -> dict[str, Any]:
+    force, moment = one.peak
+    entry: dict[str, Any] = {
+        "gap_m": one.gap,
+        "largest_travel_m": one.travel,
+        "time_s": one.travel_time,
+        "contacts": len(one.contacts),
+        "peak_force_N": {"value": force, "time_s": moment if len(one.contacts) else None},
+        "contact_angle_rad": one.contact_angle,
+        "contact_edge_rad": {"value": one.edge_angle, "time_s": one.edge_time},
+        "shoulder_angle_rad": one.shoulder_angle,
+        "beyond_shoulder": one.excess is not None,
+    }
+    return entry | ({"first_contact_s": float(one.contacts.start[0])} if len(one.contacts) else {})

@@ -34,6 +34,8 @@ class StateLayout:
     """Kinds of the states of what departs at each bearing, behind the books; empty where nothing does."""
     raceless: tuple[bool, ...] = ()
     """Whether each bearing has no race, where one has none; the states of what is not there stay zero."""
+    moves_axially: bool = False
+    """Whether the rotor moves along its axis."""
     modal_x: slice = field(init=False)
     modal_y: slice = field(init=False)
     """Modal amplitudes [sqrt(kg) m]."""
@@ -48,6 +50,8 @@ class StateLayout:
     """Further states of AMBs, behind those of bearings."""
     sensors: slice = field(init=False)
     """What sensors that lag behind have got to [m]."""
+    axial: int = field(init=False, default=-1)
+    """Axial displacement of the rotor [m], its velocity behind it; -1 where it has none."""
     rotor_speed: int = field(init=False)
     rotor_angle: int = field(init=False)
     """Speed [rad/s] and angle [rad] of the rotor."""
@@ -70,6 +74,11 @@ class StateLayout:
             **{f"further {k}": (1, kind) for k, kind in enumerate(further)},
             "magnets": (sum(self.magnet_own), L.INTERNAL),
             "sensors": (self.sensor_own, L.INTERNAL),
+            **(
+                {"axial": (None, L.POSITION), "axial_velocity": (None, L.VELOCITY)}
+                if self.moves_axially
+                else {}
+            ),
             "rotor_speed": (None, L.SPIN),
             "rotor_angle": (None, L.ANGLE),
             "dissipated": (None, L.AUDIT),
@@ -77,7 +86,7 @@ class StateLayout:
         }
         sizes = [1 if size is None else size for size, _ in blocks.values()]
         for (name, (size, _)), stop in zip(blocks.items(), accumulate(sizes), strict=True):
-            if not name.startswith("further"):
+            if not name.startswith("further") and name != "axial_velocity":
                 object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
         kinds = np.repeat([kind for _, kind in blocks.values()], sizes).astype(np.int64)
         # behind the books, where what the filter estimates ends: no estimator's model holds a departure
@@ -102,6 +111,7 @@ class StateLayout:
             if all(one.bearing.has_race for one in bearings)
             else tuple(not one.bearing.has_race for one in bearings),
             sensor_own=sum(len(sensor.further_states) for sensor in machine.sensors),
+            moves_axially=machine.axial,
         )
 
     @property
@@ -145,10 +155,11 @@ class StateLayout:
         places[L.DISSIPATED], places[L.WORK_IN] = self.dissipated, self.work_in
         places[L.N_COORDINATES], places[L.N_CONTROLLED] = self.n_coordinates, self.n_controlled
         places[L.N_DYNAMIC], places[L.N_STATES] = self.n_dynamic, self.size
+        places[L.AXIAL] = self.axial
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 9), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 10), see ``RACE`` and the names beside it."""
         places = np.full((self.n_bearings, L.N_BEARING_PLACES), -1, dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
@@ -188,16 +199,18 @@ class StateLayout:
             *(f"{name} velocity" for name in coordinates),
             *(f"race {name} spin" for name in bearing_names),
             *self._names_of_further(bearing_names),
+            *((ROTOR_AXIAL, f"{ROTOR_AXIAL} velocity") if self.moves_axially else ()),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
             *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )
 
     def _names_of_further(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
         names = [f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)]
-        for name, first in zip(bearing_names, self.bearing_at()[:, L.RING_STATES], strict=True):
-            if first >= 0:
-                at = first - self.race_spin.stop
-                names[at : at + 2] = ring_state(name), f"{ring_state(name)} velocity"
+        for place, called in ((L.RING_STATES, ring_state), (L.FACE_STATES, axial_state)):
+            for name, first in zip(bearing_names, self.bearing_at()[:, place], strict=True):
+                if first >= 0:
+                    at = first - self.race_spin.stop
+                    names[at : at + 2] = called(name), f"{called(name)} velocity"
         return tuple(names)
 
     def bore(self, states: Array) -> Array:
@@ -222,6 +235,15 @@ class StateLayout:
 def ring_state(bearing: str) -> str:
     """Name of the state that holds the way of the sprung rings of a bearing."""
     return f"rings {bearing}"
+
+
+ROTOR_AXIAL = "rotor axial"
+"""Name of the state that holds the axial displacement of the rotor."""
+
+
+def axial_state(bearing: str) -> str:
+    """Name of the state that holds the axial displacement of the race of a bearing."""
+    return f"race {bearing} axial"
 
 
 def _first_of(counts: tuple[int, ...], start: int, owners: int) -> Integers:

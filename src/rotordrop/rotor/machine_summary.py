@@ -98,13 +98,24 @@ def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> Bearin
     return BearingSummary(
         name=bearing.name,
         load=load,
-        figures=numbers.figures(abs(load)),
+        figures=(*numbers.figures(abs(load)), *_axial(machine, bearing)),
         contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
         deflection=numbers.deflection(abs(load))[0],
         tangent_stiffness=parts.tangent,
         support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),
         equivalent_stiffness=parts.equivalent(),
     )
+
+
+def _axial(machine: Machine, bearing: TouchdownBearing) -> Iterator[BearingFigure]:
+    """What holds the race of a bearing with a face along the axis, and its landing by all axial loads."""
+    if bearing.face is None:
+        return
+    push = sum(
+        load.sense * float(load.force) for load in machine.loads if load.along and load.force is not None
+    )
+    pushed = abs(push) if push and bearing.face.stops(math.copysign(1.0, push)) else 0.0
+    yield from numbers_of(bearing).axial_figures(bearing.face.law, float(bearing.face.gap), pushed)
 
 
 FREQUENCY_DISTANCE = 0.15

@@ -158,7 +158,9 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
         cosine += float(unbalance.amount) * c * shape
         sine += float(unbalance.amount) * s * shape
     spin, speed = np.zeros(L.N_SPIN_ENTRIES), machine.speed
-    spin[L.POLAR_INERTIA] = fe.polar_inertia
+    spin[L.POLAR_INERTIA], spin[L.ROTOR_MASS] = fe.polar_inertia, machine.rotor.mass
+    for magnet in machine.axial_ambs:
+        spin[[L.AXIAL_STIFFNESS, L.AXIAL_DAMPING]] += float(magnet.stiffness), float(magnet.damping)
     slowed = speed.aero_time_constant
     spin[L.AERO_TIME_CONSTANT] = np.inf if slowed is None else float(slowed)
     # The machine file gives torques, the kernel wants them per polar inertia.
@@ -169,7 +171,7 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
         **_loads(machine, basis, uniform),
         **_rubs(machine, basis),
         "bearing": rows,
-        "balls": places_of([numbers_of(bearing) for bearing in bearings]),
+        "balls": places_of(bearings),
         **_of_fast_balls(machine, rows),
         "unbalance_cos": cosine,
         "unbalance_sin": sine,
@@ -194,7 +196,8 @@ def _of_fast_balls(machine: Machine, rows: Array) -> dict[str, Array]:
 def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Array]:
     """Rows, shapes and points of what pushes the rotor; ``uniform`` (m,) is the inertia of its modes."""
     courses = [load.course(float(machine.speed.nominal)) for load in machine.loads]
-    shapes = [basis.node_row(load.node) for load in machine.loads]
+    # an axial load moves no mode
+    shapes = [(0.0 if load.along else 1.0) * basis.node_row(load.node) for load in machine.loads]
     if machine.base is not None:
         courses.append(machine.base.course())
         shapes.append(-uniform)
@@ -211,12 +214,17 @@ def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Arr
 
 
 def _rubs(machine: Machine, basis: RotorBasis) -> dict[str, Any]:
-    """Numbers and shapes of the contacts of the rotor with its housing; bearings that have a stop."""
+    """Numbers and shapes of the contacts of rotor and housing; bearings that have a stop, or a face."""
     rubbing = [one for one in machine.clearances if one.stiffness is not None]
     stops = [b for b, bearing in enumerate(machine.touchdown_bearings) if bearing.mount.stop is not None]
+    faces = [b for b, bearing in enumerate(machine.touchdown_bearings) if bearing.face is not None]
     rows = [np.concatenate([one.touch(), basis.node_row(one.node)]) for one in rubbing]
     rub = np.array(rows).reshape(len(rubbing), blocks.TOUCH_N_ENTRIES + basis.size)
-    return {"rub": rub, "stops": np.array(stops, dtype=np.int64)}
+    return {
+        "rub": rub,
+        "stops": np.array(stops, dtype=np.int64),
+        "faces": np.array(faces, dtype=np.int64),
+    }
 
 
 def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:

@@ -195,7 +195,9 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     )
     log = np.zeros((len(run.open_log) + 100 + opened, _loop.N_LOG_COLUMNS))
     log[: len(run.open_log)] = run.open_log
-    method, filled, try_settled = np.zeros(3), 1, case.settled_scheme and may_be_settled(run)
+    # the scheme for settled rotors does not hold axial motion back
+    settles = case.settled_scheme and setup.model.layout.axial < 0
+    method, filled, try_settled = np.zeros(3), 1, settles and may_be_settled(run)
     while status[PHASE] == RUNNING:
         last = min(window_end, int(status[LAST_SAMPLE]))
         wanted = slice(filled, last - first + 1)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_table, blocks, departure, mount, ring, support
+from rotordrop.physics import ball_table, blocks, departure, face, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy
@@ -18,6 +18,7 @@ from rotordrop.simulate._rhs import (
     Scratch,
     ball_force,
     departing,
+    face_values,
     gap_at,
     modal_parts,
     mount_states,
@@ -25,6 +26,7 @@ from rotordrop.simulate._rhs import (
     race_deflection,
     relative_motion,
     ring_travel,
+    rows_of,
     rub_values,
     scratch_of,
     support_deflection,
@@ -83,6 +85,16 @@ def bearing_histories(times: Array, states: Array, p: KernelParameters, out: Arr
 
 
 @kernel
+def face_forces(states: Array, p: KernelParameters) -> Array:
+    """Axial force of the rotor on the face of every race [N], shape (T, B), from states (T, n)."""
+    out = np.zeros((states.shape[0], p.bearing.shape[0]))
+    for i in range(states.shape[0]):
+        for b in p.faces:
+            out[i, b] = face_values(b, states[i], p)[1]
+    return out
+
+
+@kernel
 def node_displacements(states: Array, shapes: Array) -> Array:
     """Displacement of nodes [m], shape (T, P, 2), from states (T, n) and their rows of mode shapes (P, m)."""
     m = shapes.shape[1]
@@ -124,6 +136,12 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     if row[L.FAST_SPEED_STEP] > 0.0:
         grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
+    axial = p.bearing_at[b, L.FACE_STATES]
+    if axial >= 0:
+        loaded, relieved = rows_of(b, p)
+        return ball_set_energy(balls, loaded, dx, dy, -y[axial]) + ball_set_energy(
+            balls, relieved, dx, dy, y[axial]
+        )
     energy: float = ball_set_energy(balls, p.balls[b], dx, dy, way)
     if p.bearing_at[b, L.RING_STATES] >= 0:
         speed = y[p.bearing_at[b, L.RING_STATES] + 1]
@@ -139,6 +157,20 @@ def rub_energy(y: Array, p: KernelParameters) -> float:
         delta = rub_values(i, y, p)[0]
         if delta > 0.0:
             energy += contact_energy(p.rub[i, blocks.TOUCH_LAW : blocks.TOUCH_N_ENTRIES], delta)
+    return energy
+
+
+@lean_kernel
+def axial_energy(y: Array, p: KernelParameters) -> float:
+    """Energy [J] of axial motion, of the rotor and of the races that it lands on, and in their faces."""
+    at = p.rotor_at[L.AXIAL]
+    if at < 0:
+        return 0.0
+    energy: float = 0.5 * p.spin[L.ROTOR_MASS] * y[at + 1] ** 2
+    for b in p.faces:
+        own = p.bearing_at[b, L.FACE_STATES]
+        energy += 0.5 * p.bearing[b, L.RACE_MASS] * y[own + 1] ** 2
+        energy += face.face_energy(p.bearing[b, L.FACE : L.FACE_END], y[at] - y[own])
     return energy
 
 
@@ -181,7 +213,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
-    energy += rub_energy(y, p)
+    energy += rub_energy(y, p) + axial_energy(y, p)
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
     return energy

@@ -25,10 +25,12 @@ from rotordrop.simulate._rhs import (
     ball_force,
     contact_values,
     drop_derivative,
+    face_values,
     gap_at,
     race_deflection,
     relative_motion,
     ring_travel,
+    rows_of,
     rub_values,
     scratch_of,
     support_deflection,
@@ -214,7 +216,14 @@ def contact_at(t: float, c: int, y: Array, p: KernelParameters, out: Array) -> N
 def further_values(
     c: int, y: Array, p: KernelParameters
 ) -> tuple[float, float, float, float, float, float, float]:
-    """A contact other than of rotor and race: of a support with its stop, or of rotor and housing behind."""
+    """A contact other than of rotor and race: of a support with its stop, of rotor and housing, of a face.
+
+    The normal of a face is (1, 0) towards +z and (-1, 0) towards -z.
+    """
+    beyond = c - p.stops.shape[0] - p.rub.shape[0]
+    if beyond >= 0:
+        depth, push, _x, _y, _torque, sliding, lost = face_values(p.faces[beyond], y, p)
+        return depth, abs(push), 0.0, math.copysign(1.0, push), 0.0, sliding, lost
     if c >= p.stops.shape[0]:
         return rub_values(c - p.stops.shape[0], y, p)
     b = p.stops[c]
@@ -243,7 +252,7 @@ def watched(
 
 def number_watched(p: KernelParameters) -> int:
     """Number of contacts that are logged."""
-    return len(p.contact_at) + len(p.stops) + len(p.rub)
+    return len(p.contact_at) + len(p.stops) + len(p.rub) + len(p.faces)
 
 
 @lean_kernel
@@ -389,6 +398,12 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
         inner, outer = ball_table.fast_loads(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
         stress = numbers[blocks.BALLS_STRESS_COEFFICIENT] * cube_root(inner)
         return max(inner, outer), stress, grid[blocks.FAST_OUTER_STRESS] * cube_root(outer)
+    axial = p.bearing_at[b, L.FACE_STATES]
+    if axial >= 0:
+        loaded, relieved = rows_of(b, p)
+        load, stress = ball_set_load(numbers, loaded, dx, dy, -y[axial])
+        other, beside = ball_set_load(numbers, relieved, dx, dy, y[axial])
+        return max(load, other), max(stress, beside), 0.0
     load, stress = ball_set_load(numbers, p.balls[b], dx, dy, ring_travel(b, y, p))
     return load, stress, 0.0
 
@@ -436,8 +451,9 @@ def update_peaks(
             continue
         dx, dy = race_deflection(b, y, p)
         travel = dx * dx + dy * dy
-        # rings that give way and balls that press outwards leave no order between travel and force
+        # what gives way axially and balls that press outwards leave no order between travel and force
         ordered = p.bearing_at[b, L.RING_STATES] < 0 and p.bearing[b, L.FAST_SPEED_STEP] == 0.0
+        ordered = ordered and p.bearing_at[b, L.FACE_STATES] < 0
         if ordered and travel < 0.9 * peaks[b, PEAK_TRAVEL]:
             continue
         peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])

@@ -12,15 +12,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, ball_table, blocks, departure, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, blocks, departure, face, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
-from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force, bearing_reaction
+from rotordrop.physics.ball_set import (
+    ball_set_axial_force,
+    ball_set_force,
+    bearing_reaction,
+    two_row_axial_force,
+    two_row_force,
+)
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.load import load_now
 from rotordrop.physics.remanence import remanent_fraction
+from rotordrop.physics.spin import race_drag_torque
 from rotordrop.physics.touch import touch
 
 Array = NDArray[np.float64]
@@ -145,6 +152,12 @@ def ring_travel(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @inner_kernel
+def rows_of(b: int, p: KernelParameters) -> tuple[Array, Array]:
+    """Balls of a bearing whose race moves axially: the rows loaded by motion towards +z, and the others."""
+    return p.balls[b], p.balls[p.bearing.shape[0] + b]
+
+
+@inner_kernel
 def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
     """Force of the balls of one bearing [N] against the deflection of its race, x and y.
 
@@ -156,7 +169,11 @@ def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[fl
         spin = y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_force(grid, p.ball_table[b], p.balls[b], x, z, spin, work.balls[0], work.blend)
     numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
-    F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
+    axial = p.bearing_at[b, L.FACE_STATES]
+    if axial >= 0:
+        F_x, F_y = two_row_force(numbers, rows_of(b, p), x, z, y[axial], work.balls)
+    else:
+        F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
     if p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
@@ -438,6 +455,70 @@ def add_rings(b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls:
 
 
 @lean_kernel
+def face_values(
+    b: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float, float, float, float]:
+    """Contact of the rotor with the face of one race, in the order of `physics.face.face_contact`."""
+    at, own = p.rotor_at[L.AXIAL], p.bearing_at[b, L.FACE_STATES]
+    _ux, _uy, vx, vy = relative_motion(p.bearing_at[b, L.CONTACTS], b, y, p)
+    slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[p.bearing_at[b, L.RACE_SPIN]]
+    numbers = p.bearing[b, L.FACE : L.FACE_END]
+    return face.face_contact(numbers, y[at] - y[own], y[at + 1] - y[own + 1], vx, vy, slip)
+
+
+@lean_kernel
+def add_axial_motion(
+    t: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
+) -> tuple[float, float]:
+    """Add the axial motion of the rotor and of the races that it lands on.
+
+    Returns the friction torque on the rotor [N m] and the power lost [W], which stands in ``work.power`` too.
+    """
+    n_q, at = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.AXIAL]
+    _, _, ax, ay = modal_parts(dy, p)
+    z, speed = y[at], y[at + 1]
+    force = torque = total = 0.0
+    if t < p.spin[L.POWER_OFF_DELAY]:
+        force = p.spin[L.AXIAL_HOLDING] - p.spin[L.AXIAL_STIFFNESS] * z - p.spin[L.AXIAL_DAMPING] * speed
+    for j in range(p.load.shape[0]):
+        if p.load[j, L.LOAD_AXIAL] != 0.0:
+            along, _ = load_now(p.load[j], p.load_points, t, y[p.rotor_at[L.ROTOR_SPEED]])
+            force += along
+    dy[p.rotor_at[L.WORK_IN]] += force * speed
+    for b in p.faces:
+        own, row, shape = p.bearing_at[b, L.FACE_STATES], p.bearing[b], p.bearing_shape[b]
+        _depth, push, F_x, F_y, turning, sliding, lost = face_values(b, y, p)
+        for k in range(shape.shape[0]):
+            ax[k] -= shape[k] * F_x
+            ay[k] -= shape[k] * F_y
+        race = n_q + p.bearing_at[b, L.RACE]
+        dy[race] += F_x / row[L.RACE_MASS]
+        dy[race + 1] += F_y / row[L.RACE_MASS]
+        force -= push
+        torque -= turning
+        dx, dz = race_deflection(b, y, p)
+        numbers, moved = row[L.ROLLING : L.ROLLING_END], y[own + 1]
+        held = two_row_axial_force(numbers, rows_of(b, p), dx, dz, y[own], work.balls)
+        damped = row[L.BEARING_DAMPING] * moved
+        spin = p.bearing_at[b, L.RACE_SPIN]
+        # balls roll under the sum of their loads: the drag of the axial force comes on top
+        drag = race_drag_torque(
+            abs(held), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+        )
+        dy[spin] += (turning - drag) / row[L.RACE_INERTIA]
+        dy[own] = moved
+        dy[own + 1] = (push - held - damped) / row[L.RACE_MASS]
+        power = work.power[b]
+        power[SLIDING] += sliding
+        power[IN_CONTACT] += lost
+        power[BALL_SET] += damped * moved
+        power[DRAG] += drag * y[spin]
+        total += sliding + lost + damped * moved + drag * y[spin]
+    dy[at], dy[at + 1] = speed, force / p.spin[L.ROTOR_MASS]
+    return torque, total
+
+
+@lean_kernel
 def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
     race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
@@ -570,6 +651,10 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
         contact_torque, dissipated = add_rubs(y, p, dy, work.power[p.bearing.shape[0]])
     for b in range(p.bearing.shape[0]):
         torque, lost = bearing_accelerations(t, b, y, p, dy, work)
+        contact_torque += torque
+        dissipated += lost
+    if p.rotor_at[L.AXIAL] >= 0:
+        torque, lost = add_axial_motion(t, y, p, dy, work)
         contact_torque += torque
         dissipated += lost
     work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)

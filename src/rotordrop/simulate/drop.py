@@ -154,6 +154,7 @@ def _result(
         max_ball_load=histories[..., H.H_BALL_LOAD],
         max_stress=histories[..., H.H_STRESS],
         race_stress=_race_stress(parameters, histories),
+        face_force=H.face_forces(states, parameters) if layout.moves_axially else None,
         line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
         speed=states[:, layout.rotor_speed],
         race_speed=states[:, layout.race_spin],
@@ -185,7 +186,8 @@ def _race_stress(parameters: KernelParameters, histories: Array) -> Array | None
 
 def _further_names(model: DropModel) -> tuple[str, ...]:
     stops = [f"{model.bearing_names[b]}.mount.stop" for b in model.parameters.stops]
-    return (*stops, *(one.name for one in model.machine.clearances if one.stiffness is not None))
+    rubs = [one.name for one in model.machine.clearances if one.stiffness is not None]
+    return (*stops, *rubs, *(f"{model.bearing_names[b]}.face" for b in model.parameters.faces))
 
 
 def _contact_log(log: Array, first: int) -> ContactLog:

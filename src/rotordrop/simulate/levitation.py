@@ -61,6 +61,9 @@ def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters
     spin[L.INITIAL_SPEED] = case.speed
     if case.spin == "constant":
         spin[L.AERO_TIME_CONSTANT] = np.inf  # a prescribed profile that never falls
+    # held in the middle until the release, whatever pushes: by its axial AMBs, or by what nobody described
+    axial = parameters.load[parameters.load[:, L.LOAD_AXIAL] != 0.0]
+    spin[L.AXIAL_HOLDING] = -sum(load_now(row, parameters.load_points, 0.0, case.speed)[0] for row in axial)
     flags = parameters.flags.copy()
     flags[L.SPIN_MODE] = _SPIN_MODES[case.spin]
     return parameters._replace(spin=spin, flags=flags)

@@ -13,7 +13,7 @@ from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.physics.hertz import LineContact
-from rotordrop.rotor.layout import ring_state
+from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.units import format_quantity
 
@@ -118,10 +118,13 @@ class DropResult:
     race_stress: Array | None = field(default=None, repr=False)
     """Largest Hertz stress on inner and outer race [Pa], shape (T, B, 2), of a machine with ball_inertia; a
     bearing of it without has zero on its outer race. None where the inner race governs everywhere."""
+    face_force: Array | None = field(default=None, repr=False)
+    """Axial force of the rotor on the face of each race [N], positive towards higher nodes, shape (T, B);
+    None where the rotor does not move along its axis."""
     further_names: tuple[str, ...] = ()
     further_contacts: ContactLog | None = field(default=None, repr=False)
-    """Contacts of supports with their stops, such as "DE.mount.stop", and of the rotor with its housing, by
-    the name of the clearance."""
+    """Contacts of supports with their stops, such as "DE.mount.stop", of the rotor with its housing, by the
+    name of the clearance, and with faces of races, "DE.face", whose azimuth is zero towards +z, else π."""
 
     def index_of(self, bearing: int | str) -> int:
         """Place of a bearing, given by name or by number from 0.
@@ -143,11 +146,23 @@ class DropResult:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
         b = self.index_of(bearing)
         moved = self.race_displacement[:, b] - self.support_displacement[:, b]
-        return numbers_of(machine.bearing(self.bearing_names[b])).element_loads(moved, self.ring_travel(b))
+        numbers = numbers_of(machine.bearing(self.bearing_names[b]))
+        return numbers.element_loads(moved, self.ring_travel(b), self.race_axial_displacement(b))
 
     def ring_travel(self, bearing: int | str) -> Array:
         """Way of sprung outer rings of a bearing from their balls [m], (T,); zero between spacers."""
-        name = ring_state(self.bearing_names[self.index_of(bearing)])
+        return self._state_called(ring_state(self.bearing_names[self.index_of(bearing)]))
+
+    @property
+    def axial_displacement(self) -> Array:
+        """Displacement of the rotor along its axis, towards higher nodes [m], (T,); zero without any."""
+        return self._state_called(ROTOR_AXIAL)
+
+    def race_axial_displacement(self, bearing: int | str) -> Array:
+        """Displacement of a race along the axis [m], (T,); zero without a face."""
+        return self._state_called(axial_state(self.bearing_names[self.index_of(bearing)]))
+
+    def _state_called(self, name: str) -> Array:
         if name not in self.state_names:
             return np.zeros(len(self.time))
         return self.state[:, self.state_names.index(name)]
@@ -276,6 +291,9 @@ def _write(result: DropResult, file: Any) -> None:
         _scale(file, "race", np.array(["inner", "outer"], dtype=text))
         words = "largest Hertz stress of a ball on each race"
         _dataset(file, "race_stress", result.race_stress, ("time", "bearing", "race"), "Pa", words)
+    if result.face_force is not None:
+        words = "axial force of the rotor on the face of the race"
+        _dataset(file, "face_force", result.face_force, ("time", "bearing"), "N", words)
     for item in fields(Certificate):
         value = getattr(result.certificate, item.name)
         if value is not None:
@@ -342,7 +360,7 @@ def _read(file: Any) -> DropResult:
         if f"certificate_{f.name}" in file.attrs
     }
     values["certificate"] = Certificate(**certificate)
-    for name in ("lost", "race_stress"):
+    for name in ("lost", "race_stress", "face_force"):
         values[name] = file[name][()] if name in file else None
     return DropResult(**values)
 

@@ -14,6 +14,7 @@ from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.clearances import clearance_uses, share_column, stopped
+from rotordrop.simulate.landing import landings
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
@@ -95,6 +96,15 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
     ]
     way = "largest deflection of the support over the gap of the stop of {}: stopped from one on"
     of_parts += [(share_column(b, True), "dimensionless", way.format(b)) for b in stopped(machine)]
+    for b in (one.name for one in machine.touchdown_bearings if one.face is not None):
+        of_parts += [
+            (f"{b}.face.peak_force", "force", f"{b}: largest axial force on the face of the race"),
+            (
+                f"{b}.face.edge_over_shoulder",
+                "dimensionless",
+                f"{b}: angle of the edge of a ball's contact over that of the shoulder: cut off from one on",
+            ),
+        ]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 
@@ -124,6 +134,8 @@ def row_of(model: DropModel, result: DropResult) -> Array:
         moved = result.at_nodes([amb.node for amb in machine.ambs])
         values += np.max(np.hypot(moved[..., 0], moved[..., 1]), axis=0).tolist()
     values += [use.share for use in clearance_uses(machine, result)]
+    for one in landings(machine, result):
+        values += [one.peak[0], one.edge_angle / one.shoulder_angle]
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),

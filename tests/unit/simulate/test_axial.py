@@ -1,0 +1,307 @@
+"""Rotors that move along their axis and land on faces: forces, energy, symmetry, release, what is said."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from rotordrop.elements.face import Face
+from rotordrop.errors import MachineFileError, RecordError
+from rotordrop.evidence.evidence import read_evidence
+from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop.machine.saving import machine_text
+from rotordrop.physics import columns as L
+from rotordrop.physics.ball_bearing_response import bearing_response
+from rotordrop.physics.ball_set import ball_set_energy, two_row_axial_force, two_row_force
+from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
+from rotordrop.record import example_record_path, read_record
+from rotordrop.report.machine_content import machine_json
+from rotordrop.report.simulate_page import simulate_page
+from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.rotor.machine_summary import summarise_machine
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.case import DropCase, LevitatedStart
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.landing import landings
+from rotordrop.simulate.losses import losses
+from rotordrop.simulate.result import load_result
+from rotordrop.study.quantities import columns_of, row_of
+
+TEXT = example_path("small").read_text(encoding="utf-8")
+HEAD = '[[touchdown_bearings]]\nname = "DE"\n'
+FACE = 'gap = "0.2 mm", inner_radius = "22 mm", outer_radius = "26 mm"'
+SPEED = 2.0 * np.pi * 200.0
+CASE = DropCase(speed=SPEED, duration=0.02, reduction="quick")
+PLACE = "[touchdown_bearings.bearing]\n"
+
+
+def push(force=1000.0, direction="axial"):
+    """An axial load."""
+    return f'\n[[loads]]\nnode = 3\ndirection = "{direction}"\nforce = "{force} N"\n'
+
+
+def text_of(face=FACE, more="", balls=""):
+    """The small machine with a face at its DE."""
+    before, after = TEXT.split(HEAD)
+    table = f"face = {{ {face} }}\n" if face else ""
+    for line in balls.splitlines():
+        old = re.compile(rf"^{line.split(' ')[0]} = .*\n", re.MULTILINE)
+        after = old.sub("", after)
+    return f"{before}{HEAD}{table}{after.replace(PLACE, PLACE + balls, 1)}{more}"
+
+
+def faced(more="", **others):
+    """That machine."""
+    return loads_machine(text_of(more=more, **others))
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return faced(push())
+
+
+@pytest.fixture(scope="module")
+def drop(machine):
+    return simulate_drop(build_drop_model(machine, "quick"), CASE)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, 4e-6), (-20e-6, 9e-6, 12e-6), (5e-6, -30e-6, -25e-6)])
+@pytest.mark.parametrize("offset", [0.0, 0.3])
+def test_forces_of_the_rows_are_the_slope_of_their_energy(place, offset):
+    """And they are those of the sum in five directions, ball by ball."""
+    machine = faced(balls=f"second_row_offset = {offset}\n" if offset else "")
+    p = build_drop_model(machine, "quick").parameters
+    entries, rows = p.bearing[1, L.BALL_SET : L.BALL_SET_END], (p.balls[1], p.balls[3])
+    work = np.empty((2, p.balls.shape[2]))
+
+    def energy(x, y, z):
+        return ball_set_energy(entries, rows[0], x, y, -z) + ball_set_energy(entries, rows[1], x, y, z)
+
+    step = 1e-8
+    slope = [
+        (energy(*(np.array(place) + move)) - energy(*(np.array(place) - move))) / (2.0 * step)
+        for move in step * np.eye(3)
+    ]
+    force = (*two_row_force(entries, rows, *place, work), two_row_axial_force(entries, rows, *place, work))
+    assert force == pytest.approx(slope, rel=1e-6, abs=1e-3)
+    whole = bearing_response(machine.touchdown_bearings[1].bearing.numbers().constants, [*place, 0.0, 0.0])
+    assert force == pytest.approx(-whole.force[:3], rel=1e-9, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", ["both", "+z", "-z"])
+@pytest.mark.parametrize("z", [0.25e-3, -0.23e-3])
+def test_the_push_of_a_face_is_the_slope_of_its_energy(side, z):
+    face = Face.model_validate(
+        {"gap": "0.2 mm", "inner_radius": "32 mm", "outer_radius": "36 mm", "side": side, "exponent": 1.2}
+    )
+    row = np.zeros(L.N_BEARING_COLUMNS)
+    face.fill(row)
+    numbers = row[L.FACE : L.FACE_END]
+    step = 1e-9
+    slope = (face_energy(numbers, z + step) - face_energy(numbers, z - step)) / (2.0 * step)
+    depth, force, *_ = face_contact(numbers, z, 0.0, 0.0, 0.0, 100.0)
+    assert force == pytest.approx(slope, rel=1e-6, abs=1e-9)
+    assert (depth > 0.0) == (force != 0.0) == face.stops(math.copysign(1.0, z))
+
+
+@pytest.mark.parametrize(("across", "slip"), [((0.0, 0.0), 300.0), ((3.0, -4.0), 0.0), ((1.0, 2.0), 50.0)])
+def test_friction_of_a_face_opposes_sliding_at_every_point(across, slip):
+    face = Face.model_validate({"gap": "0.2 mm", "inner_radius": "32 mm", "outer_radius": "36 mm"})
+    row = np.zeros(L.N_BEARING_COLUMNS)
+    face.fill(row)
+    radius, mu = mean_friction_radius(0.032, 0.036), 0.1
+    _, force, x, y, torque, sliding, _ = face_contact(row[L.FACE : L.FACE_END], 0.21e-3, 0.0, *across, slip)
+    assert sliding == pytest.approx(x * across[0] + y * across[1] + torque * slip, rel=1e-12)
+    if across == (0.0, 0.0):
+        assert torque == pytest.approx(mu * force * radius, rel=1e-12)
+        assert math.hypot(x, y) < 1e-9 * force
+    elif slip == 0.0:
+        assert [x, y] == pytest.approx(mu * force * np.array(across) / math.hypot(*across), rel=1e-12)
+    assert 0.0 < sliding <= mu * force * (math.hypot(*across) + abs(slip) * radius) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "balls", ["", "second_row_offset = 0.4\n", 'arrangement = "O"\nsecond_row_offset = 0.4\n']
+)
+def test_energy_closes_by_place(balls):
+    model = build_drop_model(faced(push(), balls=balls), "quick")
+    drop = simulate_drop(model, CASE)
+    assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
+    found = losses(model, drop)
+    assert found.total == pytest.approx(drop.state[-1, model.layout.dissipated], rel=1e-10)
+    contacts = drop.contacts_at("DE.face")
+    assert len(contacts) > 1
+    assert found.sliding[1] == pytest.approx(
+        np.sum(contacts.sliding_energy) + np.sum(drop.contacts.of_bearing(1).sliding_energy), rel=2e-3
+    )
+
+
+def test_a_load_the_other_way_is_the_mirror(drop):
+    other = simulate_drop(build_drop_model(faced(push(direction="-axial")), "quick"), CASE)
+    early = drop.time < 7e-3  # before a drop is chaotic
+    assert other.axial_displacement[early] == pytest.approx(-drop.axial_displacement[early], abs=1e-10)
+    assert other.face_force[early] == pytest.approx(-drop.face_force[early], rel=1e-4, abs=1.0)
+    assert other.displacement[early] == pytest.approx(drop.displacement[early], abs=1e-9)
+
+
+def test_x_pushed_one_way_is_o_pushed_the_other_way():
+    case = DropCase(speed=SPEED, duration=8e-3, reduction="quick", tolerance=1e-8)
+    offset = "second_row_offset = 0.3\n"
+    x = simulate_drop(faced(push(), balls=offset), case)
+    o = simulate_drop(faced(push(direction="-axial"), balls=f'arrangement = "O"\n{offset}'), case)
+    same = simulate_drop(faced(push(), balls=f'arrangement = "O"\n{offset}'), case)
+    assert o.axial_displacement == pytest.approx(-x.axial_displacement, abs=1e-10)
+    right, wrong = (np.max(np.abs(one.max_ball_load - x.max_ball_load)) for one in (o, same))
+    assert right < 1e-3 * wrong and wrong > 0.01
+
+
+def test_a_face_that_is_never_reached_leaves_the_radial_drop():
+    case = DropCase(speed=SPEED, duration=6e-3, reduction="quick", tolerance=1e-8)
+    plain, far = simulate_drop(loads_machine(TEXT), case), simulate_drop(faced(), case)
+    assert far.bearing_force == pytest.approx(plain.bearing_force, abs=0.1)
+    assert np.all(far.axial_displacement == 0.0)
+    assert plain.face_force is None and np.all(plain.axial_displacement == 0.0)
+
+
+def test_magnets_hold_the_rotor_until_the_release(machine):
+    held = faced(push() + '[[axial_ambs]]\nname = "thrust"\nstiffness = "1e6 N/m"\ndamping = "500 N s/m"\n')
+    case = DropCase(speed=SPEED, duration=6e-3, reduction="quick", start=LevitatedStart(delay=3e-3))
+    for one in (machine, held):
+        drop = simulate_drop(one, case)
+        z, free = drop.axial_displacement, drop.time[drop.time > 3e-3] - 3e-3
+        assert np.max(np.abs(z[drop.time < 3e-3])) < 1e-12
+        fall = 0.5 * 1000.0 / one.rotor.mass * free**2
+        inside = fall < 0.2e-3
+        assert z[drop.time > 3e-3][inside] == pytest.approx(fall[inside], abs=1e-7)
+
+
+def test_the_face_spins_the_race_up_and_brakes_the_rotor(machine, drop):
+    smooth = simulate_drop(machine.with_values({"DE.face.friction": 0.0}), CASE)
+    assert drop.race_speed[-1, 1] > 5.0 * smooth.race_speed[-1, 1]
+    assert drop.speed[-1] < smooth.speed[-1]
+
+
+def test_ball_loads_follow_the_axial_motion(machine, drop):
+    loads = drop.ball_loads(machine, "DE")
+    assert np.max(loads, axis=(1, 2)) == pytest.approx(drop.max_ball_load[:, 1], rel=1e-9)
+    pushed = np.argmax(drop.race_axial_displacement("DE"))
+    assert np.max(loads[pushed, 1]) > 10.0 * np.max(loads[pushed, 0]) == 0.0
+
+
+def test_log_page_and_document_say_how_it_landed(machine, drop):
+    (one,) = landings(machine, drop)
+    force, moment = one.peak
+    assert force == pytest.approx(np.max(drop.face_force[:, 1]), rel=0.02)
+    assert np.all(drop.face_force[:, 0] == 0.0)
+    assert drop.time[np.argmax(drop.face_force[:, 1])] == pytest.approx(moment, abs=2e-5)
+    assert np.all(one.contacts.azimuth == 0.0)
+    entry = simulation_numbers(drop, machine)["axial"]
+    assert entry["faces"]["DE"]["peak_force_N"] == {"value": force, "time_s": moment}
+    assert entry["largest_travel_m"] == np.max(drop.axial_displacement)
+    said = [s for s in simulate_summary(drop, machine).verdict if "lands on the face" in s.text]
+    assert len(said) == 1 and f"{len(one.contacts)} times" in said[0].text
+    (section,) = [part for part in simulate_page(drop, machine).sections if part.heading == "Axial landing"]
+    assert len(section.tables[0].rows) == 1
+    row = dict(
+        zip(
+            [q.name for q in columns_of(machine)],
+            row_of(build_drop_model(machine, "quick"), drop),
+            strict=True,
+        )
+    )
+    assert row["DE.face.peak_force"] == force
+    assert 0.0 < row["DE.face.edge_over_shoulder"] < 1.0
+
+
+def test_a_contact_over_the_shoulder_is_said_with_its_angles():
+    low = faced(push(6000.0), balls='shoulder_height = "0.4 mm"\n')
+    drop = simulate_drop(low, CASE)
+    (one,) = landings(low, drop)
+    assert one.edge_angle > one.contact_angle > 0.0
+    assert one.excess is not None and one.excess.limit == one.shoulder_angle < one.edge_angle
+    (said,) = [s for s in simulate_summary(drop, low).verdict if "shoulder" in s.text]
+    assert said.level == "bad" and f"{math.degrees(one.shoulder_angle):.3g}°" in said.text
+    assert simulation_numbers(drop, low)["axial"]["faces"]["DE"]["beyond_shoulder"] is True
+
+
+def test_a_rotor_without_thrust_never_lands():
+    machine = faced()
+    drop = simulate_drop(machine, DropCase(speed=SPEED, duration=2e-3, reduction="quick"))
+    (said,) = [s for s in simulate_summary(drop, machine).verdict if "never lands" in s.text]
+    assert said.level == "good"
+    assert simulation_numbers(drop, machine)["axial"]["faces"]["DE"]["peak_force_N"]["value"] == 0.0
+
+
+def test_check_says_what_a_landing_makes(machine, drop):
+    figures = machine_json(machine, summarise_machine(machine), ())["bearings"]["DE"]
+    # bearing and face lose little in the first landing, and the race adds its own swing
+    assert figures["landing_force_N"] == pytest.approx(np.max(drop.face_force), rel=0.15)
+    assert figures["axial_stiffness_N_per_m"] > 0.0
+    assert "landing_force_N" not in machine_json(faced(), summarise_machine(faced()), ())["bearings"]["DE"]
+    stiffer = faced(balls='arrangement = "O"\n')
+    other = machine_json(stiffer, summarise_machine(stiffer), ())["bearings"]["DE"]
+    assert other["tilt_stiffness_N_m_per_rad"] > 2.0 * figures["tilt_stiffness_N_m_per_rad"]
+
+
+def test_a_coast_down_takes_the_face_with_it():
+    machine = faced(push(200.0))
+    air = {"speed.aero_linear": 1e-6}
+    case = CoastDownCase(speed=SPEED, duration=0.1)
+    run = simulate_coast_down(machine.with_values(air), case)
+    free = simulate_coast_down(machine.with_values({"DE.face.friction": 0.0, **air}), case)
+    assert run.windows.speed[-1] < free.windows.speed[-1]
+    assert run.energy_residual < 1e-6 * run.energy_scale
+
+
+def test_result_and_machine_are_written_and_read_again(machine, drop, tmp_path):
+    drop.save(tmp_path / "drop.h5")
+    again = load_result(tmp_path / "drop.h5")
+    assert np.array_equal(again.face_force, drop.face_force)
+    assert np.array_equal(again.contacts_at("DE.face").impulse, drop.contacts_at("DE.face").impulse)
+    both = faced(
+        push(300.0, "-axial")
+        + '[[axial_ambs]]\nname = "thrust"\nstiffness = "1e6 N/m"\ndamping = "500 N s/m"\n'
+    )
+    assert loads_machine(machine_text(both)) == both
+
+
+def test_an_estimate_of_such_a_machine_is_refused():
+    text = '[[axial_ambs]]\nname = "thrust"\nstiffness = "1e6 N/m"\ndamping = "500 N s/m"\n'
+    machine = loads_machine(machine_text(example_machine("lp400")) + text)
+    record = read_record(example_record_path("lp400_drop_060"), machine)
+    with pytest.raises(
+        RecordError, match=r"moves along its axis, .*no sensor of a record shows it.*Leave out"
+    ):
+        read_evidence(build_drop_model(machine, "quick"), record)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (text_of(FACE.replace("0.2 mm", "0 mm")), r"must be positive"),
+        (text_of(FACE.replace("26 mm", "21 mm")), r"inner radius of the face, 22 mm, must be .* 21 mm"),
+        (text_of(f'{FACE}, side = "up"'), r"side"),
+        (text_of(f'{FACE}, stiffness = "1e9 N/m^1.2"'), r"belongs to the exponent 1.2, but .* exponent 1"),
+        (text_of(f"{FACE}, friction = -0.1"), r"must not be negative"),
+        (text_of("", push()), r"nothing stops the rotor .* towards higher nodes; give .* face"),
+        (text_of(f'{FACE}, side = "-z"', push()), r"nothing stops the rotor .* towards higher nodes"),
+        (text_of().replace("[rotor]\n", "[rotor]\naxial = false\n"), r"axial = false, .* has a face"),
+        (text_of(more='[[loads]]\nnode = 3\nforce = "1 N"\n'), r"needs a 'direction'.*axial"),
+        (text_of(more='[[loads]]\nnode = 3\ndirection = "up"\nforce = "1 N"\n'), r"up"),
+        (
+            text_of(balls='preload_kind = "spring"\n'),
+            r"DE cannot have a face: the two rings .* springs .* leave the face out",
+        ),
+        (text_of(balls="ball_inertia = true\n"), r"balls with inertia knows no axial motion"),
+        (text_of(balls='arrangement = "tandem"\n'), r"rows that all face one way"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused(text, message):
+    with pytest.raises(MachineFileError, match=message):
+        loads_machine(text)

@@ -1,0 +1,170 @@
+"""Axial motion: forces at rest by the ball sum, landings and the spin-up by a face by `simulate_drop`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from cases import Compute, check, fails_with, load_case
+
+from rotordrop.machine import loads_machine
+from rotordrop.physics import columns as L
+from rotordrop.physics.ball_bearing_response import bearing_response
+from rotordrop.physics.contact import contact_law
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
+from rotordrop.simulate.case import CentredStart, DropCase
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.landing import landings
+from rotordrop.simulate.result import DropResult
+
+pytestmark = pytest.mark.acceptance
+Inputs = Mapping[str, Any]
+
+RIGID = 1e4
+"""Factor on the stiffness of the balls that makes them rigid beside a face."""
+
+
+def model_of(v: Inputs, rigid_balls: bool = False) -> DropModel:
+    """A rigid rotor without weight in the plane, pushed along its axis onto the face of one pair."""
+    u = {"m": 20.0, "push": 0.0, "gap": 1e-4, "face": 1e12, "lam": 0.0, "mu": 0.0, "race_mass": 5e-3} | dict(
+        v
+    )
+    machine = loads_machine(
+        f"""
+name = "rigid"
+gravity = "0 m/s^2"
+speed = {{ nominal = "250 Hz" }}
+[rotor]
+sections = [{{ length = "0.1 m", elements = 2, outer_diameter = "1 mm" }}]
+discs = [{{ node = 2, mass = "{u["m"] - np.pi / 4 * 1e-7 * 7850.0} kg", polar_inertia = "0.01 kg m^2", \
+diametral_inertia = "0.01 kg m^2" }}]
+materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }} }}
+[[loads]]
+node = 2
+direction = "axial"
+force = "{u["push"]} N"
+[[touchdown_bearings]]
+name = "A"
+node = 2
+air_gap = "0.25 mm"
+bore_radius = "34 mm"
+damping_time = "0 s"
+bearing = {{ ball_diameter = "{u["ball_diameter"]} m", ball_count = {u["balls"]}, \
+pitch_diameter = "{u["pitch_diameter"]} m", contact_angle = "25 deg", preload = "{u["preload"]} N", \
+conformity = {u["conformity"]}, arrangement = "{u.get("arrangement", "X")}", \
+row_spacing = "{u.get("row_spacing", 0.016)} m" }}
+face = {{ gap = "{u["gap"]} m", inner_radius = "{u.get("inner", 0.035)} m", \
+outer_radius = "{u.get("outer", 0.039)} m", stiffness = "{u["face"]} N/m", damping = "{u["lam"]} s/m", \
+friction = {u["mu"]} }}
+contact = {{ stiffness = "1e9 N/m^1.1111" }}
+race = {{ mass = "{u["race_mass"]} kg", inertia = "{u.get("inertia", 4e-4)} kg m^2", drag_coefficient = 0.0 }}
+support = {{ mass = "10 kg", stiffness = "1e8 N/m" }}
+"""
+    )
+    model = build_drop_model(machine, Reduction(modes=2, attachment=False))
+    if not rigid_balls:
+        return model
+    bearing = model.parameters.bearing.copy()
+    bearing[:, L.BALL_STIFFNESS] *= RIGID
+    return replace(model, parameters=model.parameters._replace(bearing=bearing))
+
+
+def dropped(model: DropModel, duration: float, speed: float = 0.0, output_step: float = 1e-6) -> DropResult:
+    case = DropCase(
+        speed=speed, duration=duration, output_step=output_step, tolerance=1e-8, spin="constant",
+        start=CentredStart(),
+    )  # fmt: skip
+    return simulate_drop(model, case)
+
+
+def at_rest(v: Inputs) -> dict[str, float]:
+    """Axial forces of the pair at two displacements, and its stiffness against tilt in both arrangements."""
+    numbers = model_of(v).machine.touchdown_bearings[0].bearing.numbers()
+    found = {}
+    for name in ("near", "far"):
+        response = bearing_response(numbers.constants, [0.0, 0.0, v[name], 0.0, 0.0])
+        found[f"axial force, {name}"] = -float(response.force[2])
+    found["load of the relieved row, far"] = float(np.min(np.max(response.ball_loads, axis=1)))
+    for arrangement in ("X", "O"):
+        bearing = model_of({**v, "arrangement": arrangement}).machine.touchdown_bearings[0].bearing
+        (tilt,) = [
+            one.value
+            for one in bearing.numbers().axial_figures(contact_law(1e9, 1.0, 0.0), 1e-4, 0.0)
+            if one.field == "tilt_stiffness_N_m_per_rad"
+        ]
+        found[f"tilt stiffness, {arrangement}"] = tilt
+    return found
+
+
+def landed(v: Inputs) -> dict[str, float]:
+    """Largest force of the balls along the axis and contact angle of two rotors, simulated and by energy."""
+    found = {}
+    for name in ("light", "heavy"):
+        mass, gap = v[name]["m"], v[name]["gap"]
+        push = mass * v["g"]
+        model = model_of({**v, "m": mass, "gap": gap, "push": push})
+        fall = math.sqrt(2.0 * gap * mass / push)
+        drop = dropped(model, fall + 2.5e-3)
+        numbers = model.machine.touchdown_bearings[0].bearing.numbers()
+        deepest = float(np.max(drop.race_axial_displacement("A")))
+        response = bearing_response(numbers.constants, [0.0, 0.0, deepest, 0.0, 0.0])
+        found[f"axial force, {name} rotor"] = -float(response.force[2])
+        (one,) = landings(model.machine, drop)
+        found[f"contact angle, {name} rotor"] = math.degrees(one.contact_angle)
+        rigid = numbers.landing(contact_law(1e15, 1.0, 0.0), gap, push)
+        found[f"axial force by energy, {name} rotor"] = rigid[0]
+    return found
+
+
+def on_a_spring(v: Inputs) -> dict[str, float]:
+    """Largest force on a linear face before balls as good as rigid."""
+    drop = dropped(model_of(v, rigid_balls=True), v["duration"])
+    contacts = drop.contacts_at("A.face")
+    assert contacts is not None
+    return {"axial force": float(np.max(contacts.peak_force))}
+
+
+def spun_up(v: Inputs) -> dict[str, float]:
+    """Time until the race turns with the rotor, by its even acceleration, and the heat of sliding."""
+    omega = 2.0 * math.pi * v["speed"]
+    drop = dropped(model_of(v), v["duration"], omega, 1e-4)
+    race = drop.race_speed[:, 0]
+    most = int(np.argmax(race > 0.9 * omega))
+    assert drop.lost is not None
+    # the last of it creeps below the smoothing speed
+    return {
+        "race in step after": float(drop.time[most] * omega / race[most]),
+        "heat of sliding": float(drop.lost[0, 0]),
+    }
+
+
+CASES: dict[str, Compute] = {"AX01": at_rest, "AX02": landed, "AX03": on_a_spring, "AX04": spun_up}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    case = load_case(name)
+    check(case, CASES[name](case.inputs))
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("AX01", {"far": 1.41e-5}),
+        ("AX01", {"preload": 535.0}),
+        ("AX01", {"row_spacing": 0.0161}),
+        ("AX02", {"heavy__gap": 3.02e-4}),
+        ("AX02", {"light__m": 20.1}),
+        ("AX03", {"face": 3.03e8}),
+        ("AX03", {"push": 2010.0}),
+        ("AX04", {"mu": 0.121}),
+        ("AX04", {"outer": 0.0394}),
+    ],
+)
+def test_a_changed_input_is_noticed(name: str, change: dict[str, Any]) -> None:
+    fails_with(name, change, CASES)
