@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -146,19 +146,21 @@ class BallNumbers(BearingNumbers):
     def axial_figures(self, law: Array, gap: float, push: float) -> Iterator[BearingFigure]:
         """Stiffness along the axis and against tilt; force of a landing through a gap [m] by a push [N]."""
         constants, balls = self.constants, self.balls
-        rest = bearing_response(constants, np.zeros(5), row_spacing=self.row_spacing)
-        yield _figure("axial_stiffness_N_per_m", "axial stiffness", "stiffness", rest.stiffness[2, 2])
-        yield BearingFigure(
-            field="tilt_stiffness_N_m_per_rad",
-            label="tilt stiffness",
-            kind="rotational_stiffness",
-            value=float(rest.stiffness[3, 3]),
-            note=f'arrangement "{balls.arrangement}"; a drop has no tilt of the race',
-        )
+        if self.held:
+            rest = bearing_response(constants, np.zeros(5), row_spacing=self.row_spacing)
+            yield _figure("axial_stiffness_N_per_m", "axial stiffness", "stiffness", rest.stiffness[2, 2])
+            yield _figure(
+                "tilt_stiffness_N_m_per_rad",
+                "tilt stiffness",
+                "rotational_stiffness",
+                rest.stiffness[3, 3],
+                note=f'arrangement "{balls.arrangement}"; a drop has no tilt of the race',
+            )
         if push > 0.0:
-            force, angle = self.landing(law, gap, push)
-            thrust, way = format_quantity(push, "force"), format_quantity(gap, "length")
-            note = f"of {thrust} through {way}, without any loss, contact angle {math.degrees(angle):.3g}°"
+            force, way = self.landing(law, gap, push)
+            angle = math.degrees(float(self.climb(np.zeros((1, 2)), np.array([way])).angle[0]))
+            thrust, through = format_quantity(push, "force"), format_quantity(gap, "length")
+            note = f"of {thrust} through {through}, without any loss, contact angle {angle:.3g}°"
             yield _figure("landing_force_N", "axial force of a landing", "force", force, note=note)
 
     @property
@@ -169,7 +171,7 @@ class BallNumbers(BearingNumbers):
         return self.balls.usual_race_width()[0] / self.constants.row_count
 
     def landing(self, law: Array, gap: float, push: float) -> tuple[float, float]:
-        """Largest axial force [N] and contact angle [rad] where a constant push [N] closes a gap [m].
+        """Largest axial force [N] and way of the race [m] where a constant push [N] closes a gap [m].
 
         Its work goes into face and balls, nothing is lost, the race has no mass, the housing does not move.
         """
@@ -182,7 +184,16 @@ class BallNumbers(BearingNumbers):
             depth = depth_at(law, force) if force > 0.0 else 0.0
             stored = balls.energy - rest + (contact_energy(law, depth) if depth > 0.0 else 0.0)
             low, high = (way, high) if push * (gap + way + depth) > stored else (low, way)
-        return force, float(np.max(np.abs(balls.contact_angles)))
+        return force, way
+
+    def landing_excess(self, law: Array, gap: float, push: float) -> Excess | None:
+        """A contact that a landing without any loss takes over the shoulder."""
+        _force, way = self.landing(law, gap, push)
+        found = self.climb(np.zeros((1, 2)), np.array([way])).excess
+        if found is None:
+            return None
+        thrust, through = format_quantity(push, "force"), format_quantity(gap, "length")
+        return replace(found, text=f"in a landing of {thrust} through {through} {found.text}")
 
     def load_of_stress(self, stress: Array) -> Array:
         """Load [N] of the ball with a stress at the inner race."""

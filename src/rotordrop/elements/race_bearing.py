@@ -135,15 +135,38 @@ class Ratings:
     """Where the load ratings come from."""
 
 
+SHOULDER = "shoulder of the race"
+"""Kind of excess of rolling elements that climb out of their grooves."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Climb:
-    """How far rolling elements climb in their grooves, (T,) [rad from the middle of the groove]."""
+    """How far rolling elements climb in their grooves [rad from the middle of the groove], shape (T,)."""
 
     angle: Array
     edge: Array
     """Largest contact angle of a loaded element, and that of the edge of its contact ellipse."""
     shoulder: float
     """Angle at which the groove ends."""
+
+    @property
+    def highest(self) -> int:
+        """Index of the instant at which an edge lies highest."""
+        return int(np.argmax(self.edge))
+
+    @property
+    def excess(self) -> Excess | None:
+        """What lies beyond the shoulder, where a contact reaches over it."""
+        edge, angle = float(self.edge[self.highest]), float(self.angle[self.highest])
+        if edge <= self.shoulder:
+            return None
+        reach, at, room = (f"{math.degrees(one):.3g}°" for one in (edge, angle, self.shoulder))
+        text = (
+            f"the contact of a ball reaches {reach} up its groove (contact angle {at}), and the shoulder "
+            f"stands at {room}; the model takes the groove to go on: force and stress are not those of a "
+            "contact cut off there"
+        )
+        return Excess(kind=SHOULDER, value=edge, limit=self.shoulder, text=text)
 
 
 class BearingNumbers(ABC):
@@ -236,6 +259,10 @@ class BearingNumbers(ABC):
     def axial_figures(self, law: Array, gap: float, push: float) -> Iterator[BearingFigure]:
         """What holds the race along the axis, and a landing through a gap [m] under a push [N]."""
         yield from ()
+
+    def landing_excess(self, law: Array, gap: float, push: float) -> Excess | None:
+        """What of such a landing is beyond a limit; nothing without rolling elements."""
+        return None
 
     def element_loads_under(self, force: Array) -> Array:
         """The same under a force of the elements on the race (x, y) [N], (T, 2); none here."""

@@ -132,6 +132,8 @@ def simple_radial_stiffness(
     at the static load of a preloaded pair it is far below the tangent stiffness.
     Not validated: which simple method the paper used.
     """
+    if radial_load == 0.0:  # without weight across the axis; the limit of the formula
+        return 0.0
     Q = _STRIBECK_LOAD_FACTOR * radial_load / (ball_count * math.cos(contact_angle))
     delta = _PALMGREN_RADIAL * (compliance_ratio * Q) ** (2.0 / 3.0) / ball_diameter ** (1.0 / 3.0)
     return float(1.5 * radial_load * math.cos(contact_angle) / delta)

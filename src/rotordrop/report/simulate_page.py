@@ -10,8 +10,9 @@ from rotordrop.report.content import Column, Figure, ReportContent, Section, tab
 from rotordrop.report.drop_sections import drop_sections, speed_figure
 from rotordrop.report.machine_sections import machine_sections, weight_shares
 from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.time_panels import Panel, time_panels
 from rotordrop.simulate.clearances import clearance_uses
-from rotordrop.simulate.landing import landings
+from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ LANDINGS = (
     Column("at", lambda one: one.peak[1], "time", 3),
     Column("contact angle", "contact_angle", "angle"),
     Column("edge of the contact", "edge_angle", "angle"),
-    Column("shoulder", "shoulder_angle", "angle"),
+    Column("shoulder", lambda one: one.climb.shoulder, "angle"),
 )
 
 
@@ -63,10 +64,29 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
         sections=(
             *drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine)),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
-            *((Section("Axial landing", tables=(table(landed, LANDINGS),)),) if landed else ()),
+            *((_landing(result, landed),) if landed else ()),
             Section("Speed", figures=(turning,)),
             *(() if machine is None else machine_sections(machine)),
         ),
         lead=1,
         ends=(bearings[0].name, bearings[-1].name),
     )
+
+
+def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
+    """Force on the faces against time, and what each landing came to."""
+    assert result.face_force is not None
+    forces = {one.name: result.face_force[:, result.index_of(one.name)] for one in landed}
+    rows = [
+        [
+            Panel(
+                title=name,
+                axis="axial force",
+                histories=(History(label="simulated", time=result.time, values=force),),
+            )
+        ]
+        for name, force in forces.items()
+    ]
+    caption = "Axial force of the rotor on the face of the race, positive towards higher nodes."
+    figure = Figure(time_panels(rows, 1.0, "N"), caption, "axial force")
+    return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS),))

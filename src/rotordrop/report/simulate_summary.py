@@ -61,6 +61,11 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
     if bearing.first_contact is not None and bearing.air_gap is not None:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
         figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
+    landed = result.contacts_at(f"{bearing.name}.face")
+    if landed is not None and len(landed):
+        hardest = int(np.argmax(landed.peak_force))
+        when = shown(landed.peak_time[hardest], "time", 3)
+        figures.append(fact("Peak axial force", landed.peak_force[hardest], "force", note=f"at {when}"))
     lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
     figures.append(
         fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
@@ -163,8 +168,8 @@ def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
             f"with {shown(force, 'force', 4)} along its axis at most, at {shown(moment, 'time', 3)}; contact "
             f"angle up to {shown(one.contact_angle, 'angle', 3)}."
         )
-        if one.excess is not None:
-            yield Statement(f"{one.name}: {one.excess.text}.", "bad")
+        if one.climb.excess is not None:
+            yield Statement(f"{one.name}: {one.climb.excess.text}.", "bad")
 
 
 def _certificate(result: DropResult) -> Statement:

@@ -82,7 +82,7 @@ def _landed(one: Landing) -> dict[str, Any]:
         "peak_force_N": {"value": force, "time_s": moment if len(one.contacts) else None},
         "contact_angle_rad": one.contact_angle,
         "contact_edge_rad": {"value": one.edge_angle, "time_s": one.edge_time},
-        "shoulder_angle_rad": one.shoulder_angle,
-        "beyond_shoulder": one.excess is not None,
+        "shoulder_angle_rad": one.climb.shoulder,
+        "beyond_shoulder": one.climb.excess is not None,
     }
     return entry | ({"first_contact_s": float(one.contacts.start[0])} if len(one.contacts) else {})

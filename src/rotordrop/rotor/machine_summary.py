@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.face import Face
 from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
@@ -108,14 +109,17 @@ def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> Bearin
 
 
 def _axial(machine: Machine, bearing: TouchdownBearing) -> Iterator[BearingFigure]:
-    """What holds the race of a bearing with a face along the axis, and its landing by all axial loads."""
-    if bearing.face is None:
-        return
-    push = sum(
-        load.sense * float(load.force) for load in machine.loads if load.along and load.force is not None
-    )
-    pushed = abs(push) if push and bearing.face.stops(math.copysign(1.0, push)) else 0.0
-    yield from numbers_of(bearing).axial_figures(bearing.face.law, float(bearing.face.gap), pushed)
+    """What holds the race of a bearing with a face along the axis, and its landing."""
+    if bearing.face is not None:
+        push = _push(machine, bearing.face)
+        yield from numbers_of(bearing).axial_figures(bearing.face.law, float(bearing.face.gap), push)
+
+
+def _push(machine: Machine, face: Face) -> float:
+    """Constant axial loads together [N], where they push towards a face; else zero."""
+    loads = [load for load in machine.loads if load.along and load.force is not None]
+    push = math.fsum(load.sense * float(load.force or 0.0) for load in loads)
+    return abs(push) if push and face.stops(math.copysign(1.0, push)) else 0.0
 
 
 FREQUENCY_DISTANCE = 0.15
@@ -137,7 +141,7 @@ class MachineWarning:
 
     kind: str
     """"limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
-    "guess", or one of the doubts about the description itself."""
+    "shoulder of the race", "guess", or one of the doubts about the description itself."""
     bearing: str
     """Name of the touchdown bearing, or of the part of the machine."""
     value: float
@@ -158,7 +162,7 @@ def machine_warnings(
     omega = float(machine.speed.nominal) if speed is None else speed
     found = [MachineWarning(**vars(doubt), doubtful=True) for doubt in doubts(machine)]
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
-        found += _excesses(bearing, rest, omega)
+        found += [*_excesses(bearing, rest, omega), *_landing(machine, bearing)]
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
         found += _guesses_aside(bearing)
     return tuple(found)
@@ -168,6 +172,14 @@ def _excesses(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> 
     for excess in numbers_of(bearing).excesses(omega, abs(rest.load)):
         told = _warning(excess.kind, bearing.name, excess.value, excess.limit, excess.text)
         yield replace(told, doubtful=excess.doubtful)
+
+
+def _landing(machine: Machine, bearing: TouchdownBearing) -> Iterator[MachineWarning]:
+    if bearing.face is None or (push := _push(machine, bearing.face)) == 0.0:
+        return
+    excess = numbers_of(bearing).landing_excess(bearing.face.law, float(bearing.face.gap), push)
+    if excess is not None:
+        yield _warning(excess.kind, bearing.name, excess.value, excess.limit, excess.text)
 
 
 def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[MachineWarning]:

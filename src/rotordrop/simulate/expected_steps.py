@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.machine_summary import BearingSummary, summarise_machine
 
 STABLE = 3.3
@@ -98,6 +99,9 @@ def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[fl
     )
     if not bearing.bearing.has_race:
         return
+    if bearing.face is not None:
+        pressed = contact_tangent(bearing.face.law, max(abs(rest.load), 1.0)) / float(race.mass)
+        yield math.sqrt(pressed), f"the mass of {name}'s race ({float(race.mass):.3g} kg) on its face"
     grip = float(friction.static) * abs(rest.load) * float(bearing.bore_radius) ** 2
     yield (
         grip / (float(friction.smoothing_speed) * float(race.inertia)),

@@ -22,12 +22,13 @@ from rotordrop.report.machine_content import machine_json
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
-from rotordrop.rotor.machine_summary import summarise_machine
+from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase, LevitatedStart
 from rotordrop.simulate.coast_down import simulate_coast_down
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.expected_steps import expected_steps
 from rotordrop.simulate.landing import landings
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import load_result
@@ -142,6 +143,36 @@ def test_energy_closes_by_place(balls):
     )
 
 
+def test_a_row_of_deep_grooves_lands_after_its_play():
+    """Within its play nothing holds the race along the axis."""
+    before, name, after = text_of(more=push(300.0)).partition(HEAD)
+    for old in ("preload = .*\n", "arrangement = .*\n"):
+        after = re.sub(old, "", after, count=1)
+    machine = loads_machine(
+        before + name + re.sub("designation = .*", 'designation = "6008/C3"', after, count=1)
+    )
+    model = build_drop_model(machine, "quick")
+    drop = simulate_drop(model, CASE)
+    numbers = machine.touchdown_bearings[1].bearing.numbers()
+    pushed = drop.race_axial_displacement("DE")[np.argmax(drop.face_force[:, 1])]
+    assert pushed > 0.5 * numbers.constants.axial_play > 10e-6
+    assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
+    figures = machine_json(machine, summarise_machine(machine), ())["bearings"]["DE"]
+    assert figures["landing_force_N"] == pytest.approx(np.max(drop.face_force), rel=0.15)
+    assert "axial_stiffness_N_per_m" not in figures
+
+
+def test_a_vertical_rotor_has_its_weight_along_the_axis():
+    text = text_of(more=push(130.8)).replace('gravity = "9.81 m/s^2"', 'gravity = "0 m/s^2"')
+    machine = loads_machine(text)
+    assert summarise_machine(machine).bearings[1].load == pytest.approx(0.0, abs=1e-9)
+    drop = simulate_drop(machine, CASE)
+    fall = math.sqrt(2.0 * 0.2e-3 * machine.rotor.mass / 130.8)
+    assert drop.contacts_at("DE.face").start[0] == pytest.approx(fall, rel=1e-3)
+    assert len(drop.contacts) == 0
+    assert "Axial landing" in [part.heading for part in simulate_page(drop, machine).sections]
+
+
 def test_a_load_the_other_way_is_the_mirror(drop):
     other = simulate_drop(build_drop_model(faced(push(direction="-axial")), "quick"), CASE)
     early = drop.time < 7e-3  # before a drop is chaotic
@@ -208,6 +239,8 @@ def test_log_page_and_document_say_how_it_landed(machine, drop):
     assert len(said) == 1 and f"{len(one.contacts)} times" in said[0].text
     (section,) = [part for part in simulate_page(drop, machine).sections if part.heading == "Axial landing"]
     assert len(section.tables[0].rows) == 1
+    drawn = np.asarray(section.figures[0].chart.data[0].y)
+    assert np.max(drawn) == pytest.approx(np.max(drop.face_force), rel=1e-6)
     row = dict(
         zip(
             [q.name for q in columns_of(machine)],
@@ -224,10 +257,24 @@ def test_a_contact_over_the_shoulder_is_said_with_its_angles():
     drop = simulate_drop(low, CASE)
     (one,) = landings(low, drop)
     assert one.edge_angle > one.contact_angle > 0.0
-    assert one.excess is not None and one.excess.limit == one.shoulder_angle < one.edge_angle
+    assert one.climb.excess is not None and one.climb.excess.limit == one.climb.shoulder < one.edge_angle
     (said,) = [s for s in simulate_summary(drop, low).verdict if "shoulder" in s.text]
-    assert said.level == "bad" and f"{math.degrees(one.shoulder_angle):.3g}°" in said.text
+    assert said.level == "bad" and f"{math.degrees(one.climb.shoulder):.3g}°" in said.text
     assert simulation_numbers(drop, low)["axial"]["faces"]["DE"]["beyond_shoulder"] is True
+
+
+def test_check_warns_of_a_landing_over_the_shoulder(machine):
+    low = faced(push(6000.0), balls='shoulder_height = "0.4 mm"\n')
+    (told,) = [one for one in machine_warnings(low, summarise_machine(low)) if "shoulder" in one.kind]
+    assert told.bearing == "DE" and told.value > told.limit
+    assert "6.00 kN through 200 µm" in told.message and f"{math.degrees(told.limit):.3g}°" in told.message
+    assert not any("shoulder" in one.kind for one in machine_warnings(machine, summarise_machine(machine)))
+
+
+def test_a_stiff_face_is_known_to_take_long(machine):
+    stiff = machine.with_values({"DE.face.stiffness": 1e14})
+    assert "its face" in expected_steps(stiff, 0.1).cause
+    assert expected_steps(stiff, 0.1).steps > 10.0 * expected_steps(machine, 0.1).steps
 
 
 def test_a_rotor_without_thrust_never_lands():
