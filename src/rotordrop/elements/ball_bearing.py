@@ -25,8 +25,8 @@ from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
-from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
+from rotordrop.physics import ring
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -559,7 +559,7 @@ STATED: tuple[Parameter, ...] = (
         guess_sigma=0.1,
         given_sigma=1e-4,
         lower=0.0,
-        entries=bearing_entries(L.RING + blocks.RING_FRICTION),
+        entries=bearing_entries(L.RING + ring.FRICTION),
     ),
     Parameter(
         path="bearing.spring_rate",
@@ -567,7 +567,7 @@ STATED: tuple[Parameter, ...] = (
         kind="stiffness",
         guess_sigma=0.7,
         given_sigma=1e-4,
-        entries=bearing_entries(L.RING + blocks.RING_RATE),
+        entries=bearing_entries(L.RING + ring.RATE),
     ),
     Parameter(
         path="bearing.ring_mass",
@@ -576,7 +576,7 @@ STATED: tuple[Parameter, ...] = (
         measured_by="an outer ring of {owner}, weighed",
         guess_sigma=0.2,
         given_sigma=1e-4,
-        entries=bearing_entries(L.RING + blocks.RING_MASS),
+        entries=bearing_entries(L.RING + ring.MASS),
     ),
     Parameter(
         path="bearing.ring_travel",
@@ -584,7 +584,7 @@ STATED: tuple[Parameter, ...] = (
         kind="length",
         guess_sigma=0.4,
         given_sigma=1e-4,
-        entries=bearing_entries(L.RING + blocks.RING_TRAVEL),
+        entries=bearing_entries(L.RING + ring.TRAVEL),
     ),
 )
 """Unknowns of rings that springs press on."""

@@ -25,7 +25,7 @@ from rotordrop.elements.race_bearing import (
 )
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY, Known
-from rotordrop.physics import blocks
+from rotordrop.physics import ring
 from rotordrop.physics.ball_bearing import (
     BearingConstants,
     ball_centrifugal_force,
@@ -238,13 +238,13 @@ class BallNumbers(BearingNumbers):
 
     def rings(self) -> Array:
         """Mass, springs, stop and fit of outer rings that springs press on."""
-        numbers, balls = np.zeros(blocks.RING_N_ENTRIES), self.balls
+        numbers, balls = np.zeros(ring.N_ENTRIES), self.balls
         if balls.sprung:
-            numbers[blocks.RING_MASS], numbers[blocks.RING_RATE] = balls.ring_mass, balls.spring_rate
-            numbers[blocks.RING_TRAVEL], numbers[blocks.RING_FRICTION] = balls.ring_travel, balls.fit_friction
-            numbers[blocks.RING_STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
-            numbers[blocks.RING_BALLS] = self.constants.ball_count
-            numbers[blocks.RING_ROWS] = self.constants.row_count
+            numbers[ring.MASS], numbers[ring.RATE] = balls.ring_mass, balls.spring_rate
+            numbers[ring.TRAVEL], numbers[ring.FRICTION] = balls.ring_travel, balls.fit_friction
+            numbers[ring.STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
+            numbers[ring.BALLS] = self.constants.ball_count
+            numbers[ring.ROWS] = self.constants.row_count
         return numbers
 
     def speed_table(self, fastest: float) -> BallTable | None:

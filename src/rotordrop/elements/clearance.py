@@ -13,7 +13,8 @@ from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.values import ContactDamping, NonNegative, PositiveLength, Stiffness
 from rotordrop.known import Known
-from rotordrop.physics import blocks
+from rotordrop.physics import touch as law
+from rotordrop.physics.contact import contact_law
 from rotordrop.units import format_quantity
 
 _OF_CONTACT: Mapping[str, tuple[float, tuple[float, float], str, str]] = {
@@ -86,16 +87,14 @@ class Clearance(Placed):
 
     def touch(self) -> NDArray[np.float64]:
         """The numbers of its contact for `rotordrop.physics.touch`."""
-        from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
-
         assert self.stiffness and self.friction and self.damping and self.radius
-        numbers = np.zeros(blocks.TOUCH_N_ENTRIES)
-        numbers[blocks.TOUCH_AIR_GAP], numbers[blocks.TOUCH_ROTOR_RADIUS] = self.gap.value, self.radius.value
-        numbers[blocks.TOUCH_BORE_RADIUS] = self.radius.value + self.gap.value
-        numbers[[blocks.TOUCH_FRICTION_STATIC, blocks.TOUCH_FRICTION_DYNAMIC]] = self.friction.value
-        numbers[blocks.TOUCH_STRIBECK_SPEED] = STRIBECK_SPEED
-        numbers[blocks.TOUCH_SMOOTHING_SPEED] = SMOOTHING_SPEED
-        numbers[blocks.TOUCH_LAW :] = contact_law(self.stiffness.value, 1.0, self.damping.value)
+        numbers = np.zeros(law.N_ENTRIES)
+        numbers[law.AIR_GAP], numbers[law.ROTOR_RADIUS] = self.gap.value, self.radius.value
+        numbers[law.BORE_RADIUS] = self.radius.value + self.gap.value
+        numbers[[law.FRICTION_STATIC, law.FRICTION_DYNAMIC]] = self.friction.value
+        numbers[law.STRIBECK_SPEED] = STRIBECK_SPEED
+        numbers[law.SMOOTHING_SPEED] = SMOOTHING_SPEED
+        numbers[law.LAW :] = contact_law(self.stiffness.value, 1.0, self.damping.value)
         return numbers
 
 

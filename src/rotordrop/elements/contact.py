@@ -17,6 +17,7 @@ from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, Val
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
+from rotordrop.physics.contact import contact_law, depth_at
 
 Array = NDArray[np.float64]
 
@@ -65,14 +66,10 @@ class Contact(Description):
     @property
     def law(self) -> Array:
         """The law for the functions of `physics.contact`."""
-        from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
-
         return contact_law(float(self.stiffness), float(self.exponent), float(self.damping))
 
     def typical_depth(self, load: float) -> float:
         """Indentation [m] by which the stiffness keeps its meaning, for the mean load of a bearing [N]."""
-        from rotordrop.physics.contact import depth_at
-
         return depth_at(self.law, TYPICAL_LOADS * load)
 
     def fill(self, row: Array) -> None:

@@ -19,8 +19,9 @@ from rotordrop.elements.values import (
     PositiveLength,
     default,
 )
-from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
+from rotordrop.physics import face as law
+from rotordrop.physics.contact import contact_law
 
 Array = NDArray[np.float64]
 
@@ -88,8 +89,6 @@ class Face(Description):
     @property
     def law(self) -> Array:
         """The law for the functions of `physics.contact`."""
-        from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
-
         return contact_law(self.stiffness.value, self.exponent.value, self.damping.value)
 
     def stops(self, sense: float) -> bool:
@@ -98,10 +97,8 @@ class Face(Description):
 
     def fill(self, row: Array) -> None:
         """Write the columns of the face."""
-        from rotordrop.physics.face import mean_friction_radius
-
         numbers = row[L.FACE : L.FACE_END]
-        numbers[blocks.FACE_GAP], numbers[blocks.FACE_SIDE] = self.gap.value, SIDES[self.side]
-        radius = mean_friction_radius(self.inner_radius.value, self.outer_radius.value)
-        numbers[blocks.FACE_RADIUS], numbers[blocks.FACE_FRICTION] = radius, self.friction.value
-        numbers[blocks.FACE_LAW :] = self.law
+        numbers[law.GAP], numbers[law.SIDE] = self.gap.value, SIDES[self.side]
+        radius = law.mean_friction_radius(self.inner_radius.value, self.outer_radius.value)
+        numbers[law.RADIUS], numbers[law.FRICTION] = radius, self.friction.value
+        numbers[law.LAW :] = self.law

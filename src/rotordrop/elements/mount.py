@@ -17,8 +17,9 @@ from rotordrop.elements.description import Description, Misfit
 from rotordrop.elements.parameter import Parameter, bearing_entries
 from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
-from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
+from rotordrop.physics import mount as law
+from rotordrop.physics.contact import contact_law
 from rotordrop.units import format_quantity
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ _OF_SUPPORT: Mapping[str, tuple[str, ...]] = {
 
 def _branch_at(k: int) -> int:
     """First entry of a branch in the numbers of a mount."""
-    return blocks.MOUNT_BRANCHES + k * blocks.MOUNT_BRANCH_ENTRIES
+    return law.BRANCHES + k * law.BRANCH_ENTRIES
 
 
 class Stop(Description):
@@ -102,9 +103,9 @@ class Mount(Description):
     def check(self) -> None:
         """Refuse branches that do not descend, or too many."""
         times = [branch.time.value for branch in self.maxwell]
-        if len(times) > blocks.MOUNT_MOST_BRANCHES:
+        if len(times) > law.MOST_BRANCHES:
             raise Misfit(
-                f"the mount has {len(times)} branches; {blocks.MOUNT_MOST_BRANCHES} cover two decades of "
+                f"the mount has {len(times)} branches; {law.MOST_BRANCHES} cover two decades of "
                 "frequency and are the most",
                 ("maxwell",),
             )
@@ -143,17 +144,16 @@ class Mount(Description):
     def fill(self, row: Array) -> None:
         """Write the columns of the mount."""
         numbers = row[L.MOUNT : L.MOUNT_END]
-        numbers[blocks.MOUNT_PRESENT], numbers[blocks.MOUNT_STATES] = self.present, len(self.further_states)
+        numbers[law.PRESENT], numbers[law.STATES] = self.present, len(self.further_states)
         if self.stop is not None:
-            numbers[blocks.MOUNT_STOP_GAP] = float(self.stop.gap)
-            from rotordrop.physics.contact import contact_law  # compiled: a description needs no compiler
-
-            law = contact_law(float(self.stop.stiffness), 1.0, float(self.stop.damping))
-            numbers[blocks.MOUNT_STOP : blocks.MOUNT_STOP_END] = law
+            numbers[law.GAP] = float(self.stop.gap)
+            numbers[law.STOP : law.STOP_END] = contact_law(
+                float(self.stop.stiffness), 1.0, float(self.stop.damping)
+            )
         if self.ribbon is not None:
-            numbers[blocks.MOUNT_RIBBON_STIFFNESS] = float(self.ribbon.friction_stiffness)
-            numbers[blocks.MOUNT_RIBBON_SLIP] = float(self.ribbon.slip_force)
-            numbers[blocks.MOUNT_RIBBON_SHARPNESS] = float(self.ribbon.sharpness)
+            numbers[law.RIBBON] = float(self.ribbon.friction_stiffness)
+            numbers[law.SLIP] = float(self.ribbon.slip_force)
+            numbers[law.SHARPNESS] = float(self.ribbon.sharpness)
         for k, branch in enumerate(self.maxwell):
             at = _branch_at(k)
             numbers[at], numbers[at + 1] = float(branch.stiffness), float(branch.time)
@@ -213,7 +213,7 @@ STATED: tuple[Parameter, ...] = (
         measured_by="a push of the bearing in its housing at {owner} until it stops",
         guess_sigma=0.2,
         given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + blocks.MOUNT_STOP_GAP),
+        entries=bearing_entries(L.MOUNT + law.GAP),
     ),
     Parameter(
         path="mount.stop.stiffness",
@@ -221,7 +221,7 @@ STATED: tuple[Parameter, ...] = (
         kind="stiffness",
         guess_sigma=0.7,
         given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + blocks.MOUNT_STOP),
+        entries=bearing_entries(L.MOUNT + law.STOP),
     ),
     Parameter(
         path="mount.ribbon.friction_stiffness",
@@ -229,7 +229,7 @@ STATED: tuple[Parameter, ...] = (
         kind="stiffness",
         guess_sigma=0.5,
         given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + blocks.MOUNT_RIBBON_STIFFNESS),
+        entries=bearing_entries(L.MOUNT + law.RIBBON),
     ),
     Parameter(
         path="mount.ribbon.slip_force",
@@ -237,7 +237,7 @@ STATED: tuple[Parameter, ...] = (
         kind="force",
         guess_sigma=0.7,
         given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + blocks.MOUNT_RIBBON_SLIP),
+        entries=bearing_entries(L.MOUNT + law.SLIP),
     ),
     *chain.from_iterable(
         (
@@ -259,7 +259,7 @@ STATED: tuple[Parameter, ...] = (
                 entries=bearing_entries(L.MOUNT + _branch_at(k) + 1),
             ),
         )
-        for k in range(blocks.MOUNT_MOST_BRANCHES)
+        for k in range(law.MOST_BRANCHES)
     ),
 )
 """Unknowns of a mount, of a bearing that has it."""

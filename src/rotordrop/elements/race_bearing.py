@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.description import Description, Text
 from rotordrop.known import Known
-from rotordrop.physics import blocks
+from rotordrop.physics import ring
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -198,7 +198,7 @@ class BearingNumbers(ABC):
 
     def rings(self) -> Array:
         """Numbers of outer rings that springs press on, in the order of `rotordrop.physics.ring`; no such."""
-        return np.zeros(blocks.RING_N_ENTRIES)
+        return np.zeros(ring.N_ENTRIES)
 
     def speed_table(self, fastest: float) -> BallTable | None:
         """Table of rolling elements whose inertia counts, for a race up to a speed [rad/s]; None without."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements.race_bearing import BearingFigure, BearingNumbers, Excess, RaceBearing
 from rotordrop.elements.values import PoissonRatio, PositiveLength, Pressure, default
-from rotordrop.physics import blocks
+from rotordrop.physics import ball_set
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class SleeveNumbers(BearingNumbers):
 
     def entries(self) -> Array:
         """No ball set."""
-        return np.zeros(blocks.BALLS_N_ENTRIES)
+        return np.zeros(ball_set.N_ENTRIES)
 
     def places(self, least: int = 0, facing: float = 0.0) -> Array:
         """No places but padding, which bears nothing."""

@@ -29,20 +29,21 @@ from rotordrop.elements.parameter import (
 )
 from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
-from rotordrop.physics import blocks
 from rotordrop.physics import columns as L
+from rotordrop.physics import mount as mount_law
+from rotordrop.physics import support as law
 
 Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
 
-_PRESENT = L.SUPPORT_FORM + blocks.SUPPORT_PRESENT
-_COUPLING = L.SUPPORT_FORM + blocks.SUPPORT_COUPLING
-_CUBIC = L.SUPPORT_FORM + blocks.SUPPORT_CUBIC
-_SHARE = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE
-_SPEED = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SPEED
-_DAMPING = L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_DAMPING
-_STOP_GAP, _STOP = L.MOUNT + blocks.MOUNT_STOP_GAP, L.MOUNT + blocks.MOUNT_STOP
+_PRESENT = L.SUPPORT_FORM + law.PRESENT
+_COUPLING = L.SUPPORT_FORM + law.COUPLING
+_CUBIC = L.SUPPORT_FORM + law.CUBIC
+_SHARE = L.SUPPORT_FORM + law.FOUNDATION_SHARE
+_SPEED = L.SUPPORT_FORM + law.FOUNDATION_SPEED
+_DAMPING = L.SUPPORT_FORM + law.FOUNDATION_DAMPING
+_STOP_GAP, _STOP = L.MOUNT + mount_law.GAP, L.MOUNT + mount_law.STOP
 
 _FORM = ("coupling", "cubic", "foundation_share", "foundation_frequency", "foundation_damping_ratio")
 """What a support may have beyond a spring and a damper on two axes."""

@@ -4,6 +4,9 @@ Kernels are compiled under strict floating point (no ``fastmath``: it gives othe
 cached) and cached on disk. Numba's own cache looks only at the file of a function and not at the files of the
 functions it calls, so the cache folder is named after a digest of all kernel sources: after an update or an
 edit a stale machine code can never be loaded.
+
+The compiler itself is loaded when a kernel is called first, so that whoever needs of a law only where its
+numbers stand, such as the description of a machine, loads no compiler.
 """
 
 from __future__ import annotations
@@ -11,25 +14,24 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Iterable
-from functools import cached_property, lru_cache, update_wrapper
+from functools import lru_cache, update_wrapper
 from pathlib import Path
+from threading import RLock
 from typing import Any, TypeVar, cast
-
-import numba
-from numba.core import config
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARK = "rotordrop.physics._compile import"
-_CONSTANTS = tuple(
-    _PACKAGE / "physics" / name for name in ("blocks.py", "columns.py", "elementary_tables.py")
-)
+_CONSTANTS = tuple(_PACKAGE / "physics" / name for name in ("columns.py", "elementary_tables.py"))
 """Compiled into the kernels as numbers though they have no kernel themselves."""
 
 
 _FOLDERS = tuple(_PACKAGE / name for name in ("physics", "rotor", "simulate", "track"))
 """Where the kernels of this package stand."""
+
+_MAKING = RLock()
+"""Held while a kernel is handed to the compiler: two threads that call it first must get one."""
 
 
 def _kernel_sources(folders: Iterable[Path]) -> list[Path]:
@@ -43,6 +45,8 @@ def cache_folder(beside: Path | None = None) -> str:
 
     Kernels of another package, in the folder `beside`, call those of this one: the sources of both count.
     """
+    import numba
+
     digest = hashlib.sha256(numba.__version__.encode())
     for file in _kernel_sources((*_FOLDERS, *([] if beside is None else [beside]))):
         digest.update(file.name.encode())
@@ -54,7 +58,7 @@ def cache_folder(beside: Path | None = None) -> str:
 
 def kernel(function: Function) -> Function:
     """Compile a function with strict floating point, without the interpreter lock, cached on disk."""
-    return cast(Function, _compiled(function))
+    return _lazy(function)
 
 
 def lean_kernel(function: Function) -> Function:
@@ -62,44 +66,58 @@ def lean_kernel(function: Function) -> Function:
 
     Views of arrays are allowed; new arrays and the assignment of an array to a slice of another are not.
     """
-    return _part(function, _nrt=False)
+    return _lazy(function, is_part=True, _nrt=False)
 
 
 def inner_kernel(function: Function) -> Function:
     """Compile a lean kernel into its callers: for what is called millions of times and does little."""
-    return _part(function, _nrt=False, forceinline=True)
-
-
-def _part(function: Function, **options: Any) -> Function:
-    settings: Any = config
-    return function if settings.DISABLE_JIT else cast(Function, _Part(function, options))
+    return _lazy(function, is_part=True, _nrt=False, forceinline=True)
 
 
 def compile_for(function: Callable[..., Any], *examples: Any) -> None:
     """Compile a kernel for arguments of the types of these, and put it into the cache."""
+    import numba
+
     compiled: Any = function
     type_of: Any = numba.typeof
-    compiled.compile(tuple(type_of(one) for one in examples))
+    compiled.outer.compile(tuple(type_of(one) for one in examples))
 
 
-class _Part:
-    """A kernel that other kernels call, and Python seldom.
+def _lazy(function: Function, *, is_part: bool = False, **options: Any) -> Function:
+    interpreted = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
+    return function if interpreted else cast(Function, _Kernel(function, is_part, options))
 
-    The code by which Python calls a kernel takes a third of its time to compile, and nobody needs it of a
-    part. Kernels call `inner`, which has none; the first call from Python compiles `outer`, which has it.
+
+class _Kernel:
+    """A kernel, handed to the compiler when it is called first.
+
+    Some are parts, which other kernels call, and Python seldom: the code by which Python calls a kernel takes
+    a third of its time to compile, and nobody needs it of a part. Kernels call `inner`, which has none; the
+    first call from Python compiles `outer`, which has it.
     """
 
-    def __init__(self, function: Function, options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any], is_part: bool, options: dict[str, Any]) -> None:
         self.py_func = function
-        self._options = options
-        # A folder apart: the compiler's index of a cache does not tell the two forms of a function apart.
-        self.inner = _compiled(function, "parts", no_cpython_wrapper=True, **options)
-        self._numba_type_ = self.inner._numba_type_
+        self._is_part, self._options = is_part, options
+        self._made: dict[str, Any] = {}
         update_wrapper(self, function)
 
-    @cached_property
+    @property
+    def inner(self) -> Any:
+        """What kernels call."""
+        if not self._is_part:
+            return self.outer
+        # A folder apart: the compiler's index of a cache does not tell the two forms of a function apart.
+        return self._compiled("parts", no_cpython_wrapper=True)
+
+    @property
     def outer(self) -> Any:
-        return _compiled(self.py_func, **self._options)
+        """What Python calls."""
+        return self._compiled("")
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self.inner._numba_type_
 
     @property
     def overloads(self) -> Any:
@@ -108,8 +126,18 @@ class _Part:
     def __call__(self, *args: Any) -> Any:
         return self.outer(*args)
 
+    def _compiled(self, place: str, **further: Any) -> Any:
+        if place not in self._made:  # looked at again under the lock, which later calls need not take
+            with _MAKING:
+                if place not in self._made:
+                    self._made[place] = _compiled(self.py_func, place, **self._options, **further)
+        return self._made[place]
 
-def _compiled(function: Callable[..., Any], place: str = "", **options: Any) -> Any:
+
+def _compiled(function: Callable[..., Any], place: str, **options: Any) -> Any:
+    import numba
+    from numba.core import config
+
     settings: Any = config
     # no_cfunc_wrapper: no kernel is handed to another as a value.
     options |= {

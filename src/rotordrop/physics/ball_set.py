@@ -14,42 +14,27 @@ from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_bearing import BearingConstants
-from rotordrop.physics.blocks import (
-    BALLS_AXIAL_OFFSET as AXIAL_OFFSET,
-)
-from rotordrop.physics.blocks import (
-    BALLS_BALL_STIFFNESS as BALL_STIFFNESS,
-)
-from rotordrop.physics.blocks import (
-    BALLS_GROOVE_DISTANCE as GROOVE_DISTANCE,
-)
-from rotordrop.physics.blocks import (
-    BALLS_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    BALLS_RADIAL_OFFSET as RADIAL_OFFSET,
-)
-from rotordrop.physics.blocks import (
-    BALLS_STRESS_COEFFICIENT as STRESS_COEFFICIENT,
-)
-from rotordrop.physics.blocks import (
-    ROLLING_DAMPING as DAMPING,
-)
-from rotordrop.physics.blocks import (
-    ROLLING_DRAG_COEFFICIENT as DRAG_COEFFICIENT,
-)
-from rotordrop.physics.blocks import (
-    ROLLING_DRAG_SPEED as DRAG_SPEED,
-)
-from rotordrop.physics.blocks import (
-    ROLLING_PITCH_DIAMETER as PITCH_DIAMETER,
-)
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
 from rotordrop.physics.linear_algebra import solve
 from rotordrop.physics.spin import race_drag_torque
 
 Array = NDArray[np.float64]
 LANES = 8
+
+# Entries of a ball set; SI units.
+BALL_STIFFNESS = 0
+GROOVE_DISTANCE = 1
+RADIAL_OFFSET = 2
+AXIAL_OFFSET = 3
+STRESS_COEFFICIENT = 4
+N_ENTRIES = 5
+
+# Entries of a rolling bearing: its ball set, then its drag and damping; SI units.
+DRAG_COEFFICIENT = N_ENTRIES
+DRAG_SPEED = N_ENTRIES + 1
+PITCH_DIAMETER = N_ENTRIES + 2
+DAMPING = N_ENTRIES + 3
+ROLLING_N_ENTRIES = N_ENTRIES + 4
 
 LEAST_DAMPING = 1e-9
 """Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""

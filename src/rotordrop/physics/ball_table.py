@@ -16,27 +16,17 @@ from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_set import COSINE, COUNT, SINE
-from rotordrop.physics.blocks import (
-    FAST_FIRST as FIRST,
-)
-from rotordrop.physics.blocks import (
-    FAST_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    FAST_OUTER_STRESS as OUTER_STRESS,
-)
-from rotordrop.physics.blocks import (
-    FAST_SPEED_STEP as SPEED_STEP,
-)
-from rotordrop.physics.blocks import (
-    FAST_STEP as STEP,
-)
-from rotordrop.physics.blocks import (
-    FAST_TOUCH as TOUCH,
-)
 from rotordrop.physics.fast_balls import FastBalls, ball_equilibrium, centred_balls
 
 Array = NDArray[np.float64]
+
+# Entries of a table of balls at speed; SI units. A step of the speed of zero is balls without inertia.
+SPEED_STEP = 0
+TOUCH = 1
+FIRST = 2
+STEP = 3
+OUTER_STRESS = 4
+N_ENTRIES = 5
 
 PLACES, SPEEDS = 129, 97
 """Nodes of the table: forces come out within 1e-6 of the largest one, and so does their change with speed."""

@@ -11,21 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, kernel
-from rotordrop.physics.blocks import (
-    CONTACT_DAMPING as DAMPING,
-)
-from rotordrop.physics.blocks import (
-    CONTACT_EXPONENT as EXPONENT,
-)
-from rotordrop.physics.blocks import (
-    CONTACT_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    CONTACT_STIFFNESS as STIFFNESS,
-)
 from rotordrop.physics.elementary import power
 
 Array = NDArray[np.float64]
+
+# Entries of a contact law; SI units.
+STIFFNESS = 0
+EXPONENT = 1
+DAMPING = 2
+N_ENTRIES = 3
 
 
 def contact_law(stiffness: float, exponent: float, damping: float) -> Array:

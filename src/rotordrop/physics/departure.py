@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics import columns as L
+from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel, lean_kernel
-from rotordrop.physics.blocks import CONTACT_N_ENTRIES
 from rotordrop.physics.contact import contact_energy
 from rotordrop.physics.elementary import exp, sine_cosine
 
@@ -31,7 +31,7 @@ GAP_DRIFT, GAP_DRIFT_TIME = 18, 19  # [m] within [s]
 GAP_CLOSING, GAP_HEAT = 20, 21  # [m] when much more than [J] were rubbed
 CAGE_RATIO = 22  # turn of the cage per turn of the race
 LAW_PIECES, LAW = 23, 24
-LAW_UNTIL, LAW_WIDTH = CONTACT_N_ENTRIES, CONTACT_N_ENTRIES + 1  # behind a contact law, its end [m]
+LAW_UNTIL, LAW_WIDTH = contact.N_ENTRIES, contact.N_ENTRIES + 1  # behind a contact law, its end [m]
 MOST_PIECES = 8
 N_COLUMNS = LAW + MOST_PIECES * LAW_WIDTH
 

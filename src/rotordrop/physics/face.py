@@ -7,30 +7,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.physics import contact
 from rotordrop.physics._compile import lean_kernel
-from rotordrop.physics.blocks import (
-    FACE_FRICTION as FRICTION,
-)
-from rotordrop.physics.blocks import (
-    FACE_GAP as GAP,
-)
-from rotordrop.physics.blocks import (
-    FACE_LAW as LAW,
-)
-from rotordrop.physics.blocks import (
-    FACE_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    FACE_RADIUS as RADIUS,
-)
-from rotordrop.physics.blocks import (
-    FACE_SIDE as SIDE,
-)
 from rotordrop.physics.contact import contact_energy, contact_force
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.friction import stribeck_coefficient
 
 Array = NDArray[np.float64]
+
+# Entries of an axial face; SI units. A side of zero is a face on both sides, of one and minus one a face that
+# stops the rotor towards +z and -z.
+GAP = 0
+SIDE = 1
+RADIUS = 2
+FRICTION = 3
+LAW = 4
+N_ENTRIES = LAW + contact.N_ENTRIES
 
 POINTS = 8
 """Points of the ring at which sliding is taken [1]: chosen, as good as a ring."""

@@ -14,38 +14,25 @@ from numpy.typing import NDArray
 
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel
-from rotordrop.physics.blocks import (
-    MOUNT_BRANCH_ENTRIES as BRANCH_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_BRANCHES as BRANCHES,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_RIBBON_SHARPNESS as SHARPNESS,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_RIBBON_SLIP as SLIP,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_RIBBON_STIFFNESS as RIBBON,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_STOP as STOP,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_STOP_END as STOP_END,
-)
-from rotordrop.physics.blocks import (
-    MOUNT_STOP_GAP as GAP,
-)
 from rotordrop.physics.elementary import power
 
 Array = NDArray[np.float64]
 Matrix = tuple[float, float, float, float]
 """Of x and y: xx, xy, yx, yy."""
+
+# Entries of a mount; SI units. All at zero is none: no stop, no ribbon, no branch that relaxes.
+PRESENT = 0
+STATES = 1
+GAP = 2
+STOP = 3
+STOP_END = STOP + contact.N_ENTRIES
+RIBBON = STOP_END
+SLIP = STOP_END + 1
+SHARPNESS = STOP_END + 2
+BRANCHES = STOP_END + 3
+BRANCH_ENTRIES = 2
+MOST_BRANCHES = 3
+N_ENTRIES = BRANCHES + BRANCH_ENTRIES * MOST_BRANCHES
 
 
 @inner_kernel

@@ -14,42 +14,20 @@ from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.ball_bearing import BearingConstants, row_axial_stiffness
-from rotordrop.physics.blocks import (
-    BALLS_AXIAL_OFFSET as AXIAL_OFFSET,
-)
-from rotordrop.physics.blocks import (
-    BALLS_BALL_STIFFNESS as BALL_STIFFNESS,
-)
-from rotordrop.physics.blocks import (
-    BALLS_GROOVE_DISTANCE as GROOVE_DISTANCE,
-)
-from rotordrop.physics.blocks import (
-    BALLS_RADIAL_OFFSET as RADIAL_OFFSET,
-)
-from rotordrop.physics.blocks import (
-    RING_BALLS as BALLS,
-)
-from rotordrop.physics.blocks import (
-    RING_FRICTION as FRICTION,
-)
-from rotordrop.physics.blocks import (
-    RING_MASS as MASS,
-)
-from rotordrop.physics.blocks import (
-    RING_RATE as RATE,
-)
-from rotordrop.physics.blocks import (
-    RING_ROWS as ROWS,
-)
-from rotordrop.physics.blocks import (
-    RING_STOP as STOP,
-)
-from rotordrop.physics.blocks import (
-    RING_TRAVEL as TRAVEL,
-)
+from rotordrop.physics.ball_set import AXIAL_OFFSET, BALL_STIFFNESS, GROOVE_DISTANCE, RADIAL_OFFSET
 from rotordrop.physics.elementary import tanh
 
 Array = NDArray[np.float64]
+
+# Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers.
+MASS = 0
+RATE = 1
+TRAVEL = 2
+STOP = 3
+FRICTION = 4
+BALLS = 5
+ROWS = 6
+N_ENTRIES = 7
 
 SMOOTHING_SPEED = 1e-2
 """Speed of a ring [m/s] below which the friction of its fit is smoothed: chosen, not measured. A hundredth of
@@ -74,7 +52,7 @@ def row_rigidity(constants: BearingConstants) -> float:
 def preload_force(numbers: Array, entries: Array) -> float:
     """Force [N] of the springs on one ring where the race is centred: what its row says at its offset.
 
-    ``numbers`` (7,) as `rotordrop.physics.blocks` lists them, ``entries`` (5,) of the ball set. Source: Neisi
+    ``numbers`` (7,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi
     2020, eqs. (3)–(6), for an axial displacement.
     """
     radial, axial = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET]

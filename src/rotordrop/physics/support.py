@@ -12,14 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel
-from rotordrop.physics.blocks import (
-    SUPPORT_COUPLING as COUPLING,
-)
-from rotordrop.physics.blocks import (
-    SUPPORT_CUBIC as CUBIC,
-)
 
 Array = NDArray[np.float64]
+
+# Entries of a form; SI units. All at zero is the plain support.
+PRESENT = 0
+COUPLING = 1
+CUBIC = 2
+FOUNDATION_SHARE = 3
+FOUNDATION_SPEED = 4
+FOUNDATION_DAMPING = 5
+N_ENTRIES = 6
 
 
 LARGEST_SOFTENING = 0.3

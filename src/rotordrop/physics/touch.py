@@ -13,37 +13,21 @@ from numpy.typing import NDArray
 
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel, lean_kernel
-from rotordrop.physics.blocks import (
-    TOUCH_AIR_GAP as AIR_GAP,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_BORE_RADIUS as BORE_RADIUS,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_FRICTION_DYNAMIC as FRICTION_DYNAMIC,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_FRICTION_STATIC as FRICTION_STATIC,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_LAW as LAW,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_N_ENTRIES as N_ENTRIES,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_ROTOR_RADIUS as ROTOR_RADIUS,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_SMOOTHING_SPEED as SMOOTHING_SPEED,
-)
-from rotordrop.physics.blocks import (
-    TOUCH_STRIBECK_SPEED as STRIBECK_SPEED,
-)
 from rotordrop.physics.friction import stribeck_coefficient, stribeck_gradient
 from rotordrop.physics.spin import surface_speed
 
 Array = NDArray[np.float64]
+
+# Entries of a contact; SI units.
+AIR_GAP = 0
+ROTOR_RADIUS = 1
+BORE_RADIUS = 2
+FRICTION_STATIC = 3
+FRICTION_DYNAMIC = 4
+STRIBECK_SPEED = 5
+SMOOTHING_SPEED = 6
+LAW = 7
+N_ENTRIES = LAW + contact.N_ENTRIES
 
 
 @inner_kernel

@@ -14,7 +14,7 @@ from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.machine import Machine, TouchdownBearing
-from rotordrop.physics import aerodynamics, blocks, departure
+from rotordrop.physics import aerodynamics, departure, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
@@ -219,7 +219,7 @@ def _rubs(machine: Machine, basis: RotorBasis) -> dict[str, Any]:
     stops = [b for b, bearing in enumerate(machine.touchdown_bearings) if bearing.mount.stop is not None]
     faces = [b for b, bearing in enumerate(machine.touchdown_bearings) if bearing.face is not None]
     rows = [np.concatenate([one.touch(), basis.node_row(one.node)]) for one in rubbing]
-    rub = np.array(rows).reshape(len(rubbing), blocks.TOUCH_N_ENTRIES + basis.size)
+    rub = np.array(rows).reshape(len(rubbing), touch.N_ENTRIES + basis.size)
     return {
         "rub": rub,
         "stops": np.array(stops, dtype=np.int64),

@@ -214,7 +214,7 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
             H.bearing_histories(times[:got], states[fresh], setup.parameters, histories[fresh])
         filled += got
         _after(setup, run, outcome, first + filled - 1)
-    ended, began = _ended_contacts(run, log, already_open)
+    ended, began = _ended_contacts(run, log, already_open, setup.parameters)
     kept = filled if status[PHASE] != RUNNING else filled - 1
     times = _grid(first, first + kept, case.output_step)
     C.follow_whirl(times, relative_displacement(setup, states[:kept]), run.whirl)
@@ -295,19 +295,20 @@ def _after(setup: Setup, run: Run, outcome: int, sample: int) -> None:
         status[PHASE] = max(status[PHASE], ENDED)
 
 
-def _ended_contacts(run: Run, log: Array, already_open: int) -> tuple[Array, Array]:
+def _ended_contacts(run: Run, log: Array, already_open: int, p: KernelParameters) -> tuple[Array, Array]:
     """Contacts that ended in this window, with those still open at the end of the run; and how many began at
     each bearing.
     """
     count = min(int(run.progress[_loop.LOGGED]), len(log))
     entries = log[:count]
     n_b = len(run.whirl)
-    fresh = entries[already_open if run.windows["window_rows"] else 0 :]
-    began = np.bincount(fresh[:, _loop.LOG_CONTACT].astype(int), minlength=n_b)[:n_b]
-    ended = entries if run.status[PHASE] != RUNNING else entries[~np.isnan(entries[:, _loop.LOG_END])]
-    ended = ended[ended[:, _loop.LOG_CONTACT] < n_b]  # of rotor and races; stops and housing are not kept
+    owner = _loop.bearings_logged(entries, p)
+    fresh = owner[already_open if run.windows["window_rows"] else 0 :]
+    began = np.bincount(fresh[fresh >= 0], minlength=n_b)
+    done = np.full(count, run.status[PHASE] != RUNNING) | ~np.isnan(entries[:, _loop.LOG_END])
+    ended = entries[done & (owner >= 0)]  # of rotor and races; stops and housing are not kept
     for b in range(n_b):
-        mine = ended[ended[:, _loop.LOG_CONTACT] == b]
+        mine = entries[done & (owner == b)]
         run.totals[b, 1] += float(np.sum(mine[:, _loop.LOG_DISSIPATED]))
         run.totals[b, 0] += float(began[b])
     kept = C.carry_open_contacts(log, count, run.running)

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_table, blocks, departure, face, mount, ring, support
+from rotordrop.physics import ball_table, departure, face, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
-from rotordrop.simulate._loop import contact_at, race_loads
+from rotordrop.simulate._loop import borne, contact_at
 from rotordrop.simulate._rhs import (
     Scratch,
-    ball_force,
     departing,
+    depth_now,
     face_values,
-    gap_at,
     modal_parts,
     mount_states,
     project,
     race_deflection,
-    relative_motion,
     ring_travel,
     rows_of,
     rub_values,
@@ -54,22 +50,9 @@ N_HISTORIES = 12
 def fill_history(t: float, b: int, y: Array, p: KernelParameters, work: Scratch, out: Array) -> None:
     """Fill ``out`` (12,) with what one bearing does in a state."""
     contact_at(t, p.bearing_at[b, L.CONTACTS], y, p, out)
-    if p.bearing_at[b, L.RACE] < 0:  # without a race the contact itself is what the bearing bears
-        out[H_BEARING_FORCE_X] = (
-            out[H_FRICTION_FORCE] * out[H_NORMAL_Y] - out[H_CONTACT_FORCE] * out[H_NORMAL_X]
-        )
-        out[H_BEARING_FORCE_Y] = (
-            -out[H_FRICTION_FORCE] * out[H_NORMAL_X] - out[H_CONTACT_FORCE] * out[H_NORMAL_Y]
-        )
-        out[H_BALL_LOAD] = out[H_OUTER_STRESS] = 0.0
-        out[H_STRESS] = p.bearing[b, L.STRESS_COEFFICIENT] * math.sqrt(out[H_CONTACT_FORCE])
-        out[H_INNER_STRESS] = out[H_STRESS]
-        return
-    F_x, F_y, _exchanged = ball_force(b, y, p, work)
-    out[H_BEARING_FORCE_X] = -F_x
-    out[H_BEARING_FORCE_Y] = -F_y
-    out[H_BALL_LOAD], out[H_INNER_STRESS], out[H_OUTER_STRESS] = race_loads(b, y, p)
-    out[H_STRESS] = max(out[H_INNER_STRESS], out[H_OUTER_STRESS])
+    F_x, F_y, load, inner, outer = borne(t, b, y, p, work)
+    out[H_BEARING_FORCE_X], out[H_BEARING_FORCE_Y], out[H_BALL_LOAD] = F_x, F_y, load
+    out[H_STRESS], out[H_INNER_STRESS], out[H_OUTER_STRESS] = max(inner, outer), inner, outer
 
 
 @kernel
@@ -119,11 +102,11 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
     if row[L.MOUNT] != 0.0:
         first, last = mount_states(b, p)
         energy += mount.mount_energy(row[L.MOUNT : L.MOUNT_END], x, z, y[first:last])
-    if own >= 0 and form[blocks.SUPPORT_FOUNDATION_SHARE] > 0.0:
-        mass = row[L.SUPPORT_MASS_Y] / form[blocks.SUPPORT_FOUNDATION_SHARE]
+    if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
+        mass = row[L.SUPPORT_MASS_Y] / form[support.FOUNDATION_SHARE]
         for axis in range(2):
             u, v = y[own + axis], y[own + 2 + axis]
-            energy += 0.5 * mass * (v * v + form[blocks.SUPPORT_FOUNDATION_SPEED] ** 2 * u * u)
+            energy += 0.5 * mass * (v * v + form[support.FOUNDATION_SPEED] ** 2 * u * u)
     return energy
 
 
@@ -156,7 +139,7 @@ def rub_energy(y: Array, p: KernelParameters) -> float:
     for i in range(p.rub.shape[0]):
         delta = rub_values(i, y, p)[0]
         if delta > 0.0:
-            energy += contact_energy(p.rub[i, blocks.TOUCH_LAW : blocks.TOUCH_N_ENTRIES], delta)
+            energy += contact_energy(p.rub[i, touch.LAW : touch.N_ENTRIES], delta)
     return energy
 
 
@@ -187,8 +170,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         row = p.bearing[b]
         r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
         for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-            ux, uy, _vx, _vy = relative_motion(c, b, y, p)
-            delta = math.sqrt(ux * ux + uy * uy) - gap_at(t, b, y, p)
+            delta = depth_now(t, c, b, y, p)
             law = row[L.CONTACT : L.CONTACT_END]
             if delta > 0.0 and p.bearing_at[b, L.DEPARTURE] >= 0:
                 energy += departure.energy_in_contact(p.departure[b], law, delta)
@@ -210,7 +192,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
                 0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2
                 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
             )
-        if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
+        if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
     energy += rub_energy(y, p) + axial_energy(y, p)

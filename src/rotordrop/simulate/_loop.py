@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_table, blocks, mount
+from rotordrop.physics import ball_set, ball_table, mount
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
@@ -24,12 +24,12 @@ from rotordrop.simulate._rhs import (
     Scratch,
     ball_force,
     contact_values,
+    depth_now,
     drop_derivative,
     face_values,
-    gap_at,
     race_deflection,
-    relative_motion,
     ring_travel,
+    rises_with_travel,
     rows_of,
     rub_values,
     scratch_of,
@@ -230,7 +230,7 @@ def further_values(
     x, z, vx, vz = support_deflection(b, y, p)
     numbers = p.bearing[b, L.MOUNT : L.MOUNT_END]
     radius = math.sqrt(x * x + z * z)
-    depth = radius - numbers[blocks.MOUNT_STOP_GAP]
+    depth = radius - numbers[mount.GAP]
     if depth <= 0.0:
         return depth, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     F_x, F_y, lost = mount.stop_force(numbers, x, z, vx, vz)
@@ -248,6 +248,12 @@ def watched(
     if c < p.contact_at.shape[0]:
         return contact_values(t, c, p.contact_at[c, L.CONTACT_BEARING], y, p)
     return further_values(c - p.contact_at.shape[0], y, p)
+
+
+def bearings_logged(log: Array, p: KernelParameters) -> NDArray[np.int64]:
+    """Bearing of every entry of the contact log; -1 of a stop or the housing."""
+    of_contacts = np.append(p.contact_at[:, L.CONTACT_BEARING], -1)
+    return of_contacts[np.minimum(log[:, LOG_CONTACT].astype(np.int64), len(p.contact_at))]
 
 
 def number_watched(p: KernelParameters) -> int:
@@ -277,8 +283,7 @@ def crossing_fraction(
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
         if c < p.contact_at.shape[0]:  # its motion alone: the forces of thirty halvings cost a step
-            ux, uy, _vx, _vy = relative_motion(c, b, scratch, p)
-            inside = math.sqrt(ux * ux + uy * uy) > gap_at(t + middle * h, b, scratch, p)
+            inside = depth_now(t + middle * h, c, b, scratch, p) > 0.0
         else:
             inside = further_values(c - p.contact_at.shape[0], scratch, p)[0] > 0.0
         if inside == (delta_0 > 0.0):
@@ -396,8 +401,8 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
         spin = y[p.bearing_at[b, L.RACE_SPIN]]
         inner, outer = ball_table.fast_loads(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
-        stress = numbers[blocks.BALLS_STRESS_COEFFICIENT] * cube_root(inner)
-        return max(inner, outer), stress, grid[blocks.FAST_OUTER_STRESS] * cube_root(outer)
+        stress = numbers[ball_set.STRESS_COEFFICIENT] * cube_root(inner)
+        return max(inner, outer), stress, grid[ball_table.OUTER_STRESS] * cube_root(outer)
     axial = p.bearing_at[b, L.FACE_STATES]
     if axial >= 0:
         loaded, relieved = rows_of(b, p)
@@ -409,12 +414,30 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
 
 
 @lean_kernel
-def force_and_stress(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float]:
-    """Magnitude of the ball force [N] and largest Hertz stress [Pa] of one bearing in a state."""
+def borne_by_contacts(t: float, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float]:
+    """Force on a sleeve or the like, x and y [N], and its stress [Pa]: the contacts are all it bears."""
+    x = z = hardest = 0.0
+    for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
+        _delta, F_r, F_mu, nx, ny, _sliding, _lost = contact_values(t, c, b, y, p)
+        x += F_mu * ny - F_r * nx
+        z += -F_mu * nx - F_r * ny
+        hardest = max(hardest, F_r)
+    return x, z, p.bearing[b, L.STRESS_COEFFICIENT] * math.sqrt(hardest)
+
+
+@inner_kernel
+def borne(
+    t: float, b: int, y: Array, p: KernelParameters, work: Scratch
+) -> tuple[float, float, float, float, float]:
+    """What one bearing bears: force on its race, x and y, and largest load of a ball [N], stress on inner and
+    outer race [Pa] as of `race_loads`.
+    """
+    if p.bearing_at[b, L.RACE] < 0:
+        x, z, stress = borne_by_contacts(t, b, y, p)
+        return x, z, 0.0, stress, 0.0
     F_x, F_y, _exchanged = ball_force(b, y, p, work)
-    _load, inner, outer = race_loads(b, y, p)
-    stress = max(inner, outer)
-    return math.sqrt(F_x * F_x + F_y * F_y), stress
+    load, inner, outer = race_loads(b, y, p)
+    return -F_x, -F_y, load, inner, outer
 
 
 @inner_kernel
@@ -443,22 +466,14 @@ def update_peaks(
             if running[c, RUN_DELTA] > peaks[b, PEAK_INDENTATION]:
                 peaks[b, PEAK_INDENTATION] = running[c, RUN_DELTA]
                 peaks[b, PEAK_INDENTATION + 1] = t
-        if p.bearing_at[b, L.RACE] < 0:
-            c = p.bearing_at[b, L.CONTACTS]
-            _delta, normal, friction, _nx, _ny, _sliding, _lost = contact_values(t, c, b, y, p)
-            force = math.sqrt(normal * normal + friction * friction)
-            note_largest(t, force, p.bearing[b, L.STRESS_COEFFICIENT] * math.sqrt(normal), peaks[b])
-            continue
-        dx, dy = race_deflection(b, y, p)
-        travel = dx * dx + dy * dy
-        # what gives way axially and balls that press outwards leave no order between travel and force
-        ordered = p.bearing_at[b, L.RING_STATES] < 0 and p.bearing[b, L.FAST_SPEED_STEP] == 0.0
-        ordered = ordered and p.bearing_at[b, L.FACE_STATES] < 0
-        if ordered and travel < 0.9 * peaks[b, PEAK_TRAVEL]:
-            continue
-        peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
-        force, stress = force_and_stress(b, y, p, work)
-        note_largest(t, force, stress, peaks[b])
+        if rises_with_travel(b, p):
+            dx, dy = race_deflection(b, y, p)
+            travel = dx * dx + dy * dy
+            if travel < 0.9 * peaks[b, PEAK_TRAVEL]:
+                continue
+            peaks[b, PEAK_TRAVEL] = max(travel, peaks[b, PEAK_TRAVEL])
+        F_x, F_y, _load, inner, outer = borne(t, b, y, p, work)
+        note_largest(t, math.sqrt(F_x * F_x + F_y * F_y), max(inner, outer), peaks[b])
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, ball_table, blocks, departure, face, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, departure, face, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -28,7 +28,6 @@ from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.load import load_now
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque
-from rotordrop.physics.touch import touch
 
 Array = NDArray[np.float64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
@@ -117,6 +116,13 @@ def gap_at(t: float, b: int, y: Array, p: KernelParameters) -> float:
 
 
 @inner_kernel
+def depth_now(t: float, c: int, b: int, y: Array, p: KernelParameters) -> float:
+    """Indentation [m] of contact ``c`` of bearing ``b`` by the motion alone; negative in flight."""
+    ux, uy, _vx, _vy = relative_motion(c, b, y, p)
+    return math.sqrt(ux * ux + uy * uy) - gap_at(t, b, y, p)
+
+
+@inner_kernel
 def contact_values(
     t: float, c: int, b: int, y: Array, p: KernelParameters
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -130,7 +136,7 @@ def contact_values(
         s = p.departure[b]
         at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
         law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
-    return touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
+    return touch.touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
 
 
 @inner_kernel
@@ -155,6 +161,17 @@ def ring_travel(b: int, y: Array, p: KernelParameters) -> float:
 def rows_of(b: int, p: KernelParameters) -> tuple[Array, Array]:
     """Balls of a bearing whose race moves axially: the rows loaded by motion towards +z, and the others."""
     return p.balls[b], p.balls[p.bearing.shape[0] + b]
+
+
+@inner_kernel
+def rises_with_travel(b: int, p: KernelParameters) -> bool:
+    """Whether the force of a bearing grows with the travel of its race, whatever else stands in the state.
+
+    What gives way axially and balls that press outwards leave no order between the two.
+    """
+    carried: bool = p.bearing_at[b, L.RACE] >= 0 and p.bearing_at[b, L.RING_STATES] < 0
+    slow: bool = p.bearing[b, L.FAST_SPEED_STEP] == 0.0 and p.bearing_at[b, L.FACE_STATES] < 0
+    return carried and slow
 
 
 @inner_kernel
@@ -194,7 +211,7 @@ def support_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, fl
 def mount_states(b: int, p: KernelParameters) -> tuple[int, int]:
     """Place of the first state of a mount and the one behind its last; equal where it has none."""
     first = max(p.bearing_at[b, L.MOUNT_STATES], 0)
-    return first, first + int(p.bearing[b, L.MOUNT + blocks.MOUNT_STATES])
+    return first, first + int(p.bearing[b, L.MOUNT + mount.STATES])
 
 
 @inner_kernel
@@ -312,7 +329,7 @@ def add_loads(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
                 put_in -= numbers[L.SUPPORT_MASS_X + axis] * a * y[n_q + h + axis]
                 if own >= 0:
                     dy[own + 2 + axis] -= a
-                    share = numbers[L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE]
+                    share = numbers[L.SUPPORT_FORM + support.FOUNDATION_SHARE]
                     if share > 0.0:
                         put_in -= numbers[L.SUPPORT_MASS_Y] / share * a * y[own + 2 + axis]
     return put_in
@@ -343,8 +360,8 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     dy[n_q + h + 1] += (c_y * sy + k_y * y[h + 1] - F_y) / row[L.SUPPORT_MASS_Y]
     if own < 0:
         return dissipated
-    speed, share = form[blocks.SUPPORT_FOUNDATION_SPEED], max(form[blocks.SUPPORT_FOUNDATION_SHARE], 0.0)
-    damping, mobility = 2.0 * form[blocks.SUPPORT_FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
+    speed, share = form[support.FOUNDATION_SPEED], max(form[support.FOUNDATION_SHARE], 0.0)
+    damping, mobility = 2.0 * form[support.FOUNDATION_DAMPING] * speed, share / row[L.SUPPORT_MASS_Y]
     for axis in range(2):
         force = F_x if axis == 0 else F_y
         u, v = y[own + axis], y[own + 2 + axis]
@@ -384,11 +401,11 @@ def rub_values(
     i: int, y: Array, p: KernelParameters
 ) -> tuple[float, float, float, float, float, float, float]:
     """One contact of the rotor with its housing, in the order of `rotordrop.physics.touch.touch`."""
-    numbers, shape = p.rub[i, : blocks.TOUCH_N_ENTRIES], p.rub[i, blocks.TOUCH_N_ENTRIES :]
+    numbers, shape = p.rub[i, : touch.N_ENTRIES], p.rub[i, touch.N_ENTRIES :]
     qx, qy, sx, sy = modal_parts(y, p)
     ux, uy, vx, vy = project(shape, qx), project(shape, qy), project(shape, sx), project(shape, sy)
-    gap, law = numbers[blocks.TOUCH_AIR_GAP], numbers[blocks.TOUCH_LAW :]
-    return touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], 0.0)
+    gap, law = numbers[touch.AIR_GAP], numbers[touch.LAW :]
+    return touch.touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], 0.0)
 
 
 @lean_kernel
@@ -404,11 +421,11 @@ def add_rubs(y: Array, p: KernelParameters, dy: Array, power: Array) -> tuple[fl
         delta, F_r, F_mu, nx, ny, sliding, lost = rub_values(i, y, p)
         if delta <= 0.0:
             continue
-        shape, x, z = p.rub[i, blocks.TOUCH_N_ENTRIES :], F_r * nx - F_mu * ny, F_r * ny + F_mu * nx
+        shape, x, z = p.rub[i, touch.N_ENTRIES :], F_r * nx - F_mu * ny, F_r * ny + F_mu * nx
         for k in range(shape.shape[0]):
             ax[k] -= shape[k] * x
             ay[k] -= shape[k] * z
-        torque -= F_mu * p.rub[i, blocks.TOUCH_ROTOR_RADIUS]
+        torque -= F_mu * p.rub[i, touch.ROTOR_RADIUS]
         total += sliding + lost
     power[RUBBING] = total
     return torque, total
@@ -448,9 +465,9 @@ def add_rings(b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls:
     pushed = ball_set_axial_force(row[L.ROLLING : L.ROLLING_END], p.balls[b], x, z, balls, y[at])
     held, _rate = ring.spring_force(numbers, row[L.ROLLING : L.ROLLING_END], y[at])
     friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
-    rows = numbers[blocks.RING_ROWS]
+    rows = numbers[ring.ROWS]
     dy[at] = y[at + 1]
-    dy[at + 1] = (pushed / rows - held - friction) / numbers[blocks.RING_MASS]
+    dy[at + 1] = (pushed / rows - held - friction) / numbers[ring.MASS]
     return float(rows * friction * y[at + 1])
 
 
@@ -609,7 +626,7 @@ def bearing_accelerations(
     dy[n_q + h + 1] = (F_y - row[L.SUPPORT_DAMPING_Y] * sy - row[L.SUPPORT_STIFFNESS_Y] * y[h + 1]) / row[
         L.SUPPORT_MASS_Y
     ]
-    if row[L.SUPPORT_FORM + blocks.SUPPORT_PRESENT] != 0.0:
+    if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
         by_support = add_support_form(b, y, p, dy)
     if departs:
         by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy)

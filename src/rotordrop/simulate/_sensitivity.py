@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import aerodynamics, ball_table, blocks, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
@@ -180,7 +180,7 @@ def _ring_jacobian(
     total_y = F[1] + C * (y[n_q + r + 1] - y[n_q + h + 1])
     size = math.sqrt(total_x * total_x + total_y * total_y)
     _friction, by_force, by_speed = ring.fit_friction(numbers, size, y[at + 1])
-    mass, rows = numbers[blocks.RING_MASS], numbers[blocks.RING_ROWS]
+    mass, rows = numbers[ring.MASS], numbers[ring.ROWS]
     along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
     elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
     by_drag, _by_spin = race_drag_gradient(
@@ -220,7 +220,7 @@ def _mount_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     numbers = row[L.MOUNT : L.MOUNT_END]
     x, z, vx, vz = support_deflection(b, y, p)
     first, last = mount_states(b, p)
-    mobility = max(row[L.SUPPORT_FORM + blocks.SUPPORT_FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+    mobility = max(row[L.SUPPORT_FORM + support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
     k, c = mount.stop_tangent(numbers, x, z, vx, vz)
     for i in range(2):
         for body in range(1 if own < 0 else 2):  # the force acts on the support and back on its foundation
@@ -253,7 +253,7 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
     c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
     k, c = (k_x, 0.0, k_y), (c_x, 0.0, c_y)
-    if form[blocks.SUPPORT_PRESENT] != 0.0:
+    if form[support.PRESENT] != 0.0:
         x, z, vx, vz = support_deflection(b, y, p)
         k, c = support.support_tangent(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
     for i in range(2):
@@ -261,14 +261,14 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
         if own < 0:
             continue
-        mobility = max(form[blocks.SUPPORT_FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
-        speed = form[blocks.SUPPORT_FOUNDATION_SPEED]
+        mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
+        speed = form[support.FOUNDATION_SPEED]
         _couple(J, n_q + h + i, 1.0 / m_h, own, own + 2, i, k, c)
         _couple(J, own + 2 + i, mobility, h, n_q + h, i, k, c)
         _couple(J, own + 2 + i, -mobility, own, own + 2, i, k, c)
         J[own + i, own + 2 + i] = 1.0
         J[own + 2 + i, own + i] -= speed * speed
-        J[own + 2 + i, own + 2 + i] -= 2.0 * form[blocks.SUPPORT_FOUNDATION_DAMPING] * speed
+        J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
     if row[L.MOUNT] != 0.0:
         _mount_jacobian(b, y, p, J)
 

@@ -140,8 +140,9 @@ def _result(
     H.bearing_histories(times, states, parameters, histories)
     displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
-    of_races = log[:, _loop.LOG_CONTACT] < n_b
-    contacts, further = _contact_log(log[of_races], 0), _further_names(model)
+    owner, further = _loop.bearings_logged(log, parameters), _further_names(model)
+    others = log[owner < 0]
+    contacts = _contact_log(log[owner >= 0], owner[owner >= 0])
     return DropResult(
         time=times,
         displacement=displacement,
@@ -160,7 +161,11 @@ def _result(
         race_speed=states[:, layout.race_spin],
         state=states,
         contacts=contacts,
-        further_contacts=_contact_log(log[~of_races], n_b) if further else None,
+        further_contacts=_contact_log(
+            others, others[:, _loop.LOG_CONTACT].astype(np.int64) - len(parameters.contact_at)
+        )
+        if further
+        else None,
         further_names=further,
         bearing_names=model.bearing_names,
         state_names=layout.names(model.bearing_names),
@@ -190,9 +195,9 @@ def _further_names(model: DropModel) -> tuple[str, ...]:
     return (*stops, *rubs, *(f"{model.bearing_names[b]}.face" for b in model.parameters.faces))
 
 
-def _contact_log(log: Array, first: int) -> ContactLog:
+def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
     return ContactLog(
-        bearing=log[:, _loop.LOG_CONTACT].astype(np.int64) - first,
+        bearing=owner,
         start=log[:, _loop.LOG_START].copy(),
         end=log[:, _loop.LOG_END].copy(),
         peak_force=log[:, _loop.LOG_PEAK_FORCE].copy(),

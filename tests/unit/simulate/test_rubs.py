@@ -9,7 +9,7 @@ from rotordrop.errors import MachineFileError, RecordError
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.physics import blocks
+from rotordrop.physics import touch
 from rotordrop.record import example_record_path, read_record
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
@@ -135,7 +135,7 @@ def test_further_contacts_are_saved(drop, tmp_path):
 def test_the_contact_is_written_and_varied_by_name(rubbed):
     assert loads_machine(machine_text(rubbed)) == rubbed
     other = rubbed.with_values({"clearances.seal.friction": 0.1})
-    friction = [blocks.TOUCH_FRICTION_STATIC, blocks.TOUCH_FRICTION_DYNAMIC]
+    friction = [touch.FRICTION_STATIC, touch.FRICTION_DYNAMIC]
     assert np.all(build_drop_model(other, "quick").parameters.rub[0, friction] == 0.1)
     assert float(rubbed.clearances[0].friction) == 0.2
     node = rubbed.clearances[0].node

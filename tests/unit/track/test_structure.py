@@ -20,8 +20,8 @@ from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import Known
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.physics import blocks, support
 from rotordrop.physics import columns as L
+from rotordrop.physics import support
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.simulate.case import DropCase
@@ -65,9 +65,9 @@ def sensing(machine: Machine) -> Machine:
 
 
 def form_of(**entries: float) -> np.ndarray:
-    form = np.zeros(blocks.SUPPORT_N_ENTRIES)
+    form = np.zeros(support.N_ENTRIES)
     for name, value in entries.items():
-        form[getattr(blocks, f"SUPPORT_{name}")] = value
+        form[getattr(support, name)] = value
     return form
 
 
