@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from rotordrop.elements.face import Face
 from rotordrop.errors import MachineFileError, RecordError
@@ -24,7 +25,7 @@ from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate.case import DropCase, LevitatedStart
+from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart
 from rotordrop.simulate.coast_down import simulate_coast_down
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.drop import simulate_drop
@@ -97,7 +98,7 @@ def test_forces_of_the_rows_are_the_slope_of_their_energy(place, offset):
 
 @pytest.mark.parametrize("side", ["both", "+z", "-z"])
 @pytest.mark.parametrize("z", [0.25e-3, -0.23e-3])
-def test_the_push_of_a_face_is_the_slope_of_its_energy(side, z):
+def test_the_thrustof_a_face_is_the_slope_of_its_energy(side, z):
     face = Face.model_validate(
         {"gap": "0.2 mm", "inner_radius": "32 mm", "outer_radius": "36 mm", "side": side, "exponent": 1.2}
     )
@@ -127,11 +128,42 @@ def test_friction_of_a_face_opposes_sliding_at_every_point(across, slip):
     assert 0.0 < sliding <= mu * force * (math.hypot(*across) + abs(slip) * radius) * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize(
-    "balls", ["", "second_row_offset = 0.4\n", 'arrangement = "O"\nsecond_row_offset = 0.4\n']
-)
-def test_energy_closes_by_place(balls):
-    model = build_drop_model(faced(push(), balls=balls), "quick")
+def test_the_landing_is_that_of_plain_equations():
+    """Of a rotor without weight across: two masses and a spin on the ball sum in five directions."""
+    thrust = 400.0
+    text = text_of(more=push(thrust)).replace('gravity = "9.81 m/s^2"', 'gravity = "0 m/s^2"')
+    model = build_drop_model(loads_machine(text), "quick")
+    case = DropCase(
+        speed=SPEED, duration=6e-3, reduction="quick", tolerance=1e-9, spin="constant", start=CentredStart()
+    )
+    drop = simulate_drop(model, case)
+    bearing, row = model.machine.touchdown_bearings[1], model.parameters.bearing[1]
+    constants, face = bearing.bearing.numbers().constants, bearing.face
+    mass, race, inertia = model.machine.rotor.mass, float(bearing.race.mass), float(bearing.race.inertia)
+
+    def rates(_t, s):
+        z, v, u, w, spin = s
+        depth = z - u - float(face.gap)
+        growth = max(1.0 + 1.5 * float(face.damping) * (v - w), 0.0)
+        force = float(face.stiffness) * max(depth, 0.0) * growth
+        held = -bearing_response(constants, [0.0, 0.0, u, 0.0, 0.0]).force[2]
+        torque = float(face.friction) * force * mean_friction_radius(0.022, 0.026)
+        drag = row[L.DRAG_COEFFICIENT] * abs(held) * 0.5 * row[L.PITCH_DIAMETER]
+        drag *= math.tanh(spin / row[L.DRAG_SPEED])
+        damped = row[L.BEARING_DAMPING] * w
+        return [v, (thrust - force) / mass, w, (force - held - damped) / race, (torque - drag) / inertia]
+
+    found = solve_ivp(rates, (0.0, 6e-3), np.zeros(5), rtol=1e-9, atol=1e-13, t_eval=drop.time, max_step=2e-5)
+    assert drop.contacts_at("DE.face").end[0] < 6e-3
+    assert drop.axial_displacement == pytest.approx(found.y[0], abs=1e-9)
+    assert drop.race_axial_displacement("DE") == pytest.approx(found.y[2], abs=1e-9)
+    assert drop.race_speed[:, 1] == pytest.approx(found.y[4], rel=1e-3, abs=0.1)
+
+
+@pytest.mark.parametrize("arrangement", ["", 'arrangement = "O"\n'])
+@pytest.mark.parametrize("offset", ["", "second_row_offset = 0.4\n"])
+def test_energy_closes_by_place(arrangement, offset):
+    model = build_drop_model(faced(push(), balls=arrangement + offset), "quick")
     drop = simulate_drop(model, CASE)
     assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
     found = losses(model, drop)
