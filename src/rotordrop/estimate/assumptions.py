@@ -10,6 +10,7 @@ import numpy as np
 from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import RACE_MASS
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.evidence.quality import not_seen
 from rotordrop.known import NINETY
 from rotordrop.physics import columns as L
 from rotordrop.rotor.reduction import contact_frequency
@@ -20,6 +21,7 @@ from rotordrop.units import format_quantity
 
 def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
     """What every method takes where the record does not say."""
+    yield not_seen(tail=evidence.tail is not None)
     machine = evidence.model.machine
     if evidence.speed.note:
         yield f"speed: {evidence.speed.note}"

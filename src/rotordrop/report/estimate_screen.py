@@ -11,6 +11,7 @@ import numpy as np
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
+from rotordrop.evidence.quality import not_seen
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
 from rotordrop.report.estimate_numbers import static_limit_statement
 from rotordrop.report.estimate_page import estimate_verdict
@@ -28,7 +29,8 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     judgement, _part, *others = estimate_verdict(estimate)
     later = {one.sentence() for one in estimate.later if one.larger}
     static = [static_limit_statement(b, certain=estimate.consistent) for b in estimate.bearings]
-    elsewhere = {*estimate.assumed, *(one.text for one in static)}
+    unseen = [note for note in estimate.notes if note in (not_seen(tail=True), not_seen(tail=False))]
+    elsewhere = {*estimate.assumed, *unseen, *(one.text for one in static)}
     limits = [one for one in others if one.level != "good" and one.text not in elsewhere]
     # what hides a loss first, then what is a warning
     limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
@@ -38,6 +40,7 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     closing = (
         f"{len(limits) - len(said)} more with --all" if len(limits) > len(said) else "",
         f"assumed: {assumed}",
+        *unseen,
         f"to do next: {'; '.join(remedies)}" if remedies else "",
     )
     return ReportContent(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.evidence.quality import not_seen
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -62,6 +63,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         verdict=(
             *_verdict(seen),
             *quality_statements(seen.findings),
+            Statement(not_seen(tail=False)),
             *(() if drawn else (read, *notes)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),

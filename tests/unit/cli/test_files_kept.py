@@ -174,8 +174,8 @@ CALLS = {
 }
 """Commands that end soon with what they write."""
 LONG = {"clearance", "estimate", "calibrate", "study repeat", "study rare", "study design"}
-"""Commands that compute for long, or need a recording of their own: what they write is written by functions
-that `test_written_files` gives a full disk."""
+"""Commands that compute for long: `studies/interruptions/full.py` calls them with a full disk, and what they
+write is written by functions that `test_written_files` gives one."""
 BEYOND = {"look share": "--licence CC0-1.0"}
 
 

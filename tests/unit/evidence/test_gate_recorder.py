@@ -10,8 +10,10 @@ from scipy.signal import butter, sosfilt
 from rotordrop.evidence import check_record, fit_levitated
 from rotordrop.evidence.quality.arrangement import check_ends_named
 from rotordrop.evidence.quality.continuity import check_continuity, check_orbit
-from rotordrop.evidence.quality.recorder import check_filters
+from rotordrop.evidence.quality.recorder import check_blocks, check_filters
 from rotordrop.evidence.quality.tail import check_rest_in_record
+from rotordrop.machine import example_machine
+from rotordrop.record.record import Record
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.sensor_chain import PERFECT
 
@@ -259,6 +261,26 @@ def test_neighbouring_blocks_exchanged_in_one_channel(count, drop, machine):
     found = worst(with_signals(drop, exchange), machine)
     assert (found.kind, found.channel) == ("damaged block", drop.channel_names[1])
     assert found.time == pytest.approx(drop.time[6000 + count], abs=1.01 * count * 5e-5)
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_blocks_whose_jumps_are_small_show_by_vanishing_together(every):
+    """At most 4 µm at 0.5 µm of noise: no jump by itself is beyond what the readings leave room for."""
+    random = np.random.default_rng(26)
+    time = np.arange(4000) / 20e3
+    wave = 25e-6 * np.cos(2.0 * np.pi * 60.0 * time[:, None] + np.arange(4))
+    clean = wave + 0.5e-6 * random.standard_normal((4000, 4))
+    sensors = example_machine("lp400").sensors
+    record = Record(time=time, signals=clean, sensors=sensors, sampling_rate=20e3)
+    assert not check_blocks(record)
+    torn = clean.copy()
+    which = slice(None) if every else [2]
+    torn[2000:2016, which] = np.roll(clean[2000:2016], 8, axis=0)[:, which]
+    (found,) = check_blocks(replace(record, signals=torn))
+    assert (found.kind, found.severity) == ("damaged block", "warning")
+    assert found.channel == (None if every else sensors[2].name)
+    assert found.time == pytest.approx(0.1, abs=1.01 / 20e3)
+    assert "the 8 samples from here on change places with the 8 after them" in found.message
 
 
 def test_twenty_lost_samples_under_a_running_clock(fast_drop, machine):

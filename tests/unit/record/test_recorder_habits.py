@@ -217,6 +217,11 @@ def test_what_is_no_text_is_refused_by_its_beginning(tmp_path):
     path.write_bytes(b"1" * 20_000_000)
     with pytest.raises(RecordError, match=r"line 1 has more than 1000000 characters; no row"):
         read_recording(path, Profile())
+    path.write_bytes(b'"' + b"1,\n" * 2_000_000)
+    with pytest.raises(
+        RecordError, match=r"2000000 lines of 3\.0 characters in the mean; a row of two numbers"
+    ):
+        read_recording(path, Profile())
     assert tracemalloc.get_traced_memory()[1] < 30e6
     tracemalloc.stop()
 

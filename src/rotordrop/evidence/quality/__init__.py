@@ -20,7 +20,17 @@ from rotordrop.evidence.quality.arrangement import check_ends_named, check_plane
 from rotordrop.evidence.quality.channels import check_channels, check_rail
 from rotordrop.evidence.quality.continuity import check_orbit
 from rotordrop.evidence.quality.fall import check_ends, check_exchanged, fell_as_described
-from rotordrop.evidence.quality.finding import Finding, Kind, Severity, ranked, refuse_unusable, stops
+from rotordrop.evidence.quality.finding import (
+    UNSEEN,
+    UNSEEN_IN_TAIL,
+    Finding,
+    Kind,
+    Severity,
+    not_seen,
+    ranked,
+    refuse_unusable,
+    stops,
+)
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
 from rotordrop.evidence.quality.motion import (
     check_length,
@@ -268,11 +278,14 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
 
 
 __all__ = [
+    "UNSEEN",
+    "UNSEEN_IN_TAIL",
     "Finding",
     "Kind",
     "Severity",
     "check_record",
     "checked",
+    "not_seen",
     "ranked",
     "refuse_unusable",
     "standing",

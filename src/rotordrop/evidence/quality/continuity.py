@@ -63,6 +63,24 @@ samples, against twice the 9 over the samples of a parabola's."""
 _SURELY = 2.0
 """Standard deviations of that noise by which it may hide what the parabolas leave out [1]."""
 
+_BLOCK = 256
+"""Longest block looked for where two neighbouring ones may be exchanged [samples]: 512 bytes, the smallest
+unit of a disk, in readings of 16 bits."""
+
+_MIDDLE = 4.0
+"""Jump in the middle of two exchanged blocks, in standard deviations, from which they are looked for [1]: a
+steady motion jumps there by twice what it does at both ends."""
+
+_BESIDE = 64
+"""Places on either side that say how large jumps are there [1]."""
+
+_EXCHANGED = 50.0
+"""By how much the squares of three jumps, in their variances, fall with two blocks exchanged back from where
+they are named [1]: 37 at most in 500 clean drops of all rotors; 56 where 8 samples are 0.8 ms long."""
+
+_BACK = 5.0
+"""Standard deviations by which the squares that are left then may lie above those of chance [1]."""
+
 _SAME_WAY = 3.0
 """Standard deviations up to which channels agree on the missing time [1]."""
 
@@ -119,8 +137,11 @@ class _Sides:
 class _Jumps:
     """Jumps of the motion between the parabolas before and after every place; shape (N, S)."""
 
+    end: Array
+    begin: Array
+    """Where the parabolas before and after the place meet it [m]."""
     jump: Array
-    """By how much [m]."""
+    """How far these are apart [m]."""
     before: Array
     after: Array
     """Velocity on both sides [m per sample]."""
@@ -148,21 +169,24 @@ def check_continuity(record: Record) -> list[Finding]:
     uneven = _uneven(record, noise)
     if uneven:
         return uneven  # readings that are early or late jump by themselves
-    torn, lost = _Worst(), _Worst()
+    torn, lost, exchanged = _Worst(), _Worst(), _Exchanged()
     for sides in map(_Sides.of, counts):
-        reach = 2 * sides.count
+        reach = 2 * (sides.count + _BLOCK + _BESIDE)
         for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
             part = signals[begin : begin + _PART + reach]
-            if len(part) > reach:
+            if len(part) > 2 * sides.count:
                 seen = _jumps_of(part, sides, noise)
-                if sides.count == _FEWEST or sides.count <= _LONGEST * record.sampling_rate:
+                short = sides.count <= _LONGEST * record.sampling_rate
+                if sides.count == _FEWEST or short:
                     torn.keep(_size_of_jump(seen), seen, begin + sides.count)
+                if short:
+                    exchanged.keep(seen, begin, sides.count)
                 lost.keep(_size_of_loss(seen), seen, begin + sides.count)
     if lost.size >= _LOST:
         return [_lost(lost, record)]
     if torn.size >= _TORN:
         return [_torn(torn, record)]
-    return []
+    return [exchanged.finding(record)] if exchanged.size >= _EXCHANGED else []
 
 
 def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
@@ -179,6 +203,8 @@ def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
     out, into = windows @ sides.slope, windows @ -sides.slope[::-1]
     excess = left / noise**2 - free
     return _Jumps(
+        end=ends[:-count],
+        begin=begins[count:],
         jump=begins[count:] - ends[:-count],
         before=out[:-count],
         after=into[count:],
@@ -238,6 +264,56 @@ class _Worst:
         self.size, self.at, self.sizes = float(np.max(sizes)), begin + row, sizes[row]
         self.jump = np.abs(seen.jump[row])
         self.velocity = 0.5 * (seen.before[row] + seen.after[row])
+
+
+class _Exchanged:
+    """Two neighbouring blocks that the motion says were exchanged: three jumps that vanish with them back."""
+
+    def __init__(self) -> None:
+        self.size, self.at, self.length = 0.0, 0, 0
+        self.channel: int | None = None
+
+    def keep(self, seen: _Jumps, begin: int, count: int) -> None:
+        """Keep the surest of more places, between parabolas of `count` samples, the first at a sample."""
+        jump, channels = seen.jump / seen.error, seen.jump.shape[1]
+        reach, lengths = _BLOCK + _BESIDE, np.arange(count, _BLOCK + 1)
+        beside = np.arange(_FEWEST + 1, _FEWEST + 1 + _BESIDE)
+        beside = np.concatenate([-beside, beside])
+        places = reach + np.flatnonzero(np.max(np.abs(jump[reach:-reach]), axis=1, initial=0.0) > _MIDDLE)
+        for place in places.tolist():
+            first, last = place - lengths, place + lengths
+            # where the motion is rougher than noise, by how rough it is there
+            usual = np.maximum(SIGMA_OF_MEDIAN * np.median(np.abs(jump[place + beside]), axis=0), 1.0)
+            now = jump[first] ** 2 + jump[place] ** 2 + jump[last] ** 2
+            back = [
+                seen.begin[place] - seen.end[first],
+                seen.begin[first] - seen.end[last],
+                seen.begin[last] - seen.end[place],
+            ]
+            left = np.sum((np.array(back) / seen.error) ** 2, axis=0) / usual**2
+            gain = now / usual**2 - left
+            for channel in (*range(channels), None):
+                own = slice(None) if channel is None else [channel]
+                free = 3.0 * (channels if channel is None else 1)
+                fits = np.sum(left[:, own], axis=1) < free + _BACK * math.sqrt(2.0 * free)
+                sizes = np.sum(gain[:, own], axis=1) * fits
+                best = int(np.argmax(sizes))
+                if sizes[best] > self.size:
+                    self.size, self.channel = float(sizes[best]), channel
+                    self.at, self.length = begin + count + int(first[best]), int(lengths[best])
+
+    def finding(self, record: Record) -> Finding:
+        """What is said of them."""
+        return Finding(
+            kind=Kind.TORN,
+            message=f"the motion goes on smoothly only where the {self.length} samples from here on change "
+            f"places with the {self.length} after them, {math.sqrt(self.size):.0f} standard deviations: two "
+            "blocks were exchanged",
+            remedy="copy or export the recording again",
+            severity="warning",
+            channel=None if self.channel is None else record.channel_names[self.channel],
+            time=float(record.time[self.at]),
+        )
 
 
 def _lost(worst: _Worst, record: Record) -> Finding:

@@ -14,6 +14,16 @@ Severity = Literal["stop", "warning", "note"]
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
+UNSEEN = ("exchanged blocks of up to 20 µm", "1 to 5 lost samples", "the mass of another rotor")
+UNSEEN_IN_TAIL = ("a tail with its ends or axes exchanged", "its zeros moved by 2 % of the air gap")
+"""What passes the gate, most of it in `studies/gate`, in a few words: it is said where people decide."""
+
+
+def not_seen(*, tail: bool) -> str:
+    """What no check sees of a record, with or without a tail of its own."""
+    return f"No check sees: {', '.join((*UNSEEN, *UNSEEN_IN_TAIL) if tail else UNSEEN)}"
+
+
 class Kind(StrEnum):
     """What the gate can find, by the names that documents carry."""
 

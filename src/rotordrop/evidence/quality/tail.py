@@ -49,8 +49,8 @@ there; and samples there that say how low the rotor passes [1]."""
 _BAND = (5.0, 95.0)
 """Share of them by height [%] between which the rest should lie."""
 
-_OFF_PATH = 0.03
-"""Distance of the rest from there over the air gap that is named [1]: less than 1 % in 25 clean drops of all
+_OFF_PATH = 0.02
+"""Distance of the rest from there over the air gap that is named [1]: 0.3 % at most in 130 clean drops of all
 rotors."""
 
 

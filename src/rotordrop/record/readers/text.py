@@ -44,6 +44,10 @@ _WIDE = (b"\xff\xfe", b"\xfe\xff")
 _LONGEST_LINE = 1_000_000
 """Characters of a row (chosen): two thousand channels of twenty digits are a twentieth of it."""
 
+_SHORTEST_ROW, _MANY_LINES = 4, 100_000
+"""Characters of two numbers, the sign between them and the line end; and lines from which their mean is asked
+(chosen): a line takes some sixty bytes however short it is."""
+
 _SEPARATORS = (";", "\t", ",", "|", " ")
 
 _SAMPLED_LINES = 60
@@ -93,16 +97,28 @@ def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
         raise RecordError(f"{path} cannot be read as {encoding}: {error}; name another encoding") from error
     if "\x00" in text:
         raise _no_text(path, text.index("\x00"))
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    long = next((i for i, line in enumerate(lines) if len(line) > _LONGEST_LINE), None)
-    if long is not None:
-        raise _too_long(path, long + 1, str(len(lines[long])))
+    lines = _lines_of(text, path)
     complete = lines[-1] == ""
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
         raise RecordError(f"{path} is blank ({len(content)} bytes); export the recording again")
     return lines, complete, encoding
+
+
+def _lines_of(text: str, path: Path) -> list[str]:
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    ends = text.count("\n")
+    if ends > _MANY_LINES and len(text) < _SHORTEST_ROW * ends:
+        raise RecordError(
+            f"{path} has {ends} lines of {len(text) / ends:.1f} characters in the mean; a row of two numbers "
+            f"has {_SHORTEST_ROW} at least: export the recording again, one row per sample"
+        )
+    lines = text.split("\n")
+    long = next((i for i, line in enumerate(lines) if len(line) > _LONGEST_LINE), None)
+    if long is not None:
+        raise _too_long(path, long + 1, str(len(lines[long])))
+    return lines
 
 
 def _no_text(path: Path, at: int) -> RecordError:
