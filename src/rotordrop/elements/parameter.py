@@ -336,8 +336,6 @@ class Extension:
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
-    shows_when_consistent: bool = True
-    """Whether it can show beside a base model that is consistent with the record."""
 
     def values(self, machine: Any) -> dict[str, Known]:
         """Values that a description with this extension names; none where it names some already."""

@@ -162,8 +162,6 @@ def _extension(
     name: str,
     neutral: float,
     words: tuple[str, float, str],
-    *,
-    shows_when_consistent: bool = True,
 ) -> Extension:
     """An extension with one unknown of each sensor; words are unit, its size [SI] and text."""
     unit, size, text = words
@@ -182,7 +180,6 @@ def _extension(
         joined=", ",
         frame=text,
         rows=(row,),
-        shows_when_consistent=shows_when_consistent,
     )
 
 
@@ -211,8 +208,6 @@ PARAMETERS: tuple[Parameter, ...] = (
 """Unknowns of every sensor."""
 
 EXTENSIONS: tuple[Extension, ...] = (
-    # Stiffness and mass of the supports take a lag up: the likelihood rose by 5 to 16 without one (eight
-    # drops of 60 kg rotors), and by 10 at most with one of 2 kHz.
     _extension(
         Parameter(
             path="time_constant",
@@ -228,7 +223,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         "sensor lag",
         1e-5,
         ("µs", 1e-6, "sensors that lag behind by {}"),
-        shows_when_consistent=False,
     ),
     _extension(
         Parameter(

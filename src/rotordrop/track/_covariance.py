@@ -10,7 +10,8 @@ from rotordrop.physics._compile import lean_kernel
 Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 
-LARGEST_VARIANCE = 1e20
+LARGEST_VARIANCE = 1e30
+"""Beyond the square of every unknown in its SI unit: the cubic term of a stiff support is 1e11 1/m²."""
 
 
 @lean_kernel

@@ -88,7 +88,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             by_path=False,
             remedy="check that sensor against a known distance, or give its gain a range",
         ),
-        direction_check(problem, smoothed),
+        direction_check(problem),
         _departure_check(
             "parameters",
             parameters,
@@ -209,9 +209,9 @@ def _departure_check(
     )
 
 
-def direction_check(problem: DropProblem, smoothed: Smoothed) -> Check:
+def direction_check(problem: DropProblem) -> Check:
     """Whether both directions are seen at every node with sensors; the rest follows from the model alone."""
-    live = np.flatnonzero(np.isfinite(normalised_innovations(smoothed)).any(axis=0))
+    live = np.flatnonzero(np.isfinite(problem.readings).any(axis=0))
     sensors = [problem.model.machine.sensors[c] for c in live]
     blind = []
     for node in sorted({sensor.node for sensor in problem.model.machine.sensors}):

@@ -8,8 +8,11 @@ lets each record say how wide its own are.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.track.calibration import (
     THREADS,
@@ -18,7 +21,10 @@ from rotordrop.track.calibration import (
     handed_on,
     stage_settings,
 )
+from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, forward
+
+Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 0.125, 64.0
 """Limits of the size, over the usual one [1]. Below the smaller one the sensors' noise and the machine's
@@ -43,30 +49,39 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
     needed = max(fit.noise_factors, default=1.0)
 
     def negative_log_likelihood(power: int) -> float:
-        drops = forward_passes(fit, stage, needed * STEP**power)
-        lost = any(one.done < len(drop.means) for one, drop in zip(drops, fit.smoothed, strict=True))
-        return math.inf if lost else sum(one.negative_log_likelihood for one in drops)
+        drops = forward_passes(fit.problems, fit.trajectories, stage, needed * STEP**power)
+        return sum(likelihood_of(one) for one in drops)
 
     found: float = needed * STEP ** _lowest(negative_log_likelihood)
     return min(max(found, needed if needed > 1.0 else SMALLEST), LARGEST)
 
 
-def forward_passes(fit: TrackedDrops, stage: Stage, factor: float) -> list[Forward]:
-    """The drops filtered with unknown impulses of a size over the usual one [1], linearised at a fit."""
-    settings = stage_settings(fit.problems[0], stage, factor)
-    passes = []
-    for d, (problem, drop) in enumerate(zip(fit.problems, fit.smoothed, strict=True)):
+def likelihood_of(one: Forward) -> float:
+    """Negative log likelihood of the readings of a pass [1]; infinite where the filter lost the drop."""
+    return one.negative_log_likelihood if one.done == len(one.means) else math.inf
+
+
+def forward_passes(
+    problems: Sequence[DropProblem], references: Sequence[Array], stage: Stage, factor: float
+) -> list[Forward]:
+    """Drops of one machine filtered along references, each of shape (M, n), as far as these reach.
+
+    Unknown impulses are larger than those of the stage by a factor [1]. Nothing is kept for a smoother.
+    """
+    settings = stage_settings(problems[0], stage, factor)
+    passes: list[Forward] = []
+    for problem, reference in zip(problems, references, strict=True):
         mean, covariance = problem.mean, problem.covariance
-        if d > 0:
-            mean, covariance = handed_on(fit.smoothed[d - 1].filtered, problem)
+        if passes:
+            mean, covariance = handed_on(passes[-1], problem)
         passes.append(
             forward(
                 problem,
                 settings,
                 mean=mean,
                 covariance=covariance,
-                reference=drop.means,
-                samples=len(drop.means),
+                reference=reference,
+                samples=len(reference),
                 smoothing=False,
             )
         )

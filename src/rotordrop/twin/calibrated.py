@@ -22,13 +22,12 @@ from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import weight_per_magnet
-from rotordrop.track.calibration import converged
-from rotordrop.track.consistency import Check, consistency_checks, judged_by
-from rotordrop.track.noise_size import likeliest_noise
+from rotordrop.track.consistency import Check, consistency_checks
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.joint_covariance import joint_covariance
-from rotordrop.twin.search import CALIBRATION_STAGE, track_drops
+from rotordrop.twin.problems import Drops, tail_first
+from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
 
@@ -128,20 +127,13 @@ def calibrate_machine(
     stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
-    found = track_drops(machine, evidence, calibrate_only=True, progress=progress)
-    machine, base = found.machine, found.fit
-    factor = likeliest_noise(base, CALIBRATION_STAGE)
-    tracked = converged(base.problems, CALIBRATION_STAGE, base.trajectories, noise_factor=factor)
-    factor *= max(tracked.noise_factors)
+    drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=True)
+    search = Search(drops=drops, progress=progress)
+    found = track_drops(search, search.with_rotor(machine))
+    machine, tracked = found.machine, found.fit
     checks = {
-        name: consistency_checks(
-            problem,
-            replace(smoothed, filtered=judged_by(problem, smoothed.filtered, past.filtered)),
-            factor,
-        )
-        for name, problem, smoothed, past in zip(
-            stems, tracked.problems, tracked.smoothed, base.smoothed, strict=True
-        )
+        name: consistency_checks(problem, judged, found.noise_factor)
+        for name, problem, judged in zip(stems, tracked.problems, found.judged, strict=True)
     }
     consistent = all(check.passed for one in checks.values() for check in one)
     problem, smoothed = tracked.problems[-1], tracked.smoothed[-1]
@@ -158,13 +150,13 @@ def calibrate_machine(
     fitted = machine_values(bearings, known, source)
     joint = joint_covariance(problem, mean, covariance, known)
     said = values | _of_drop(problem, mean, covariance)
-    drops = [
+    calibrated_on = [
         CalibrationDrop(name=name, sha256=record.sha256, lift=_lift(one, followed))
         for name, record, one, followed in zip(
             stems, records, tracked.problems, tracked.smoothed, strict=True
         )
     ]
-    origin = CalibrationOrigin(drops=tuple(drops), consistent=consistent, joint=joint)
+    origin = CalibrationOrigin(drops=tuple(calibrated_on), consistent=consistent, joint=joint)
     return Calibration(
         machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
@@ -172,7 +164,7 @@ def calibrate_machine(
         confounded=_confounded(problem, covariance),
         checks=checks,
         consistent=consistent,
-        nis=dict(zip(stems, base.nis, strict=True)),
+        nis={name: one.nis for name, one in zip(stems, found.usual, strict=True)},
         structure=tuple(one.structure(machine, said, believed=consistent) for one in found.accepted),
     )
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
-from rotordrop.track.calibration import converged
-from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks, judged_by
+from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
-from rotordrop.track.noise_size import likeliest_noise
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
-from rotordrop.twin.search import WHOLE_STAGE, Accepted, Progress, track_drops
+from rotordrop.twin.problems import Drops, tail_first
+from rotordrop.twin.search import Accepted, Progress, Search, track_drops
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
 
 
@@ -64,7 +63,7 @@ def tracked_drop(
     evidence: Evidence,
     problem: DropProblem,
     smoothed: Smoothed,
-    base: Forward,
+    judged: Smoothed,
     noise_factor: float,
     drops: int = 1,
     accepted: tuple[Accepted, ...] = (),
@@ -72,14 +71,13 @@ def tracked_drop(
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     forces = force_history(problem, smoothed)
-    seen = judged_by(problem, smoothed.filtered, base)
     return TrackedDrop(
         evidence=evidence,
         problem=problem,
         smoothed=smoothed,
-        judged=seen,
+        judged=judged.filtered,
         forces=with_form_error(forces, problem.model.machine.rotor.force_sigma),
-        checks=consistency_checks(problem, replace(smoothed, filtered=seen), noise_factor),
+        checks=consistency_checks(problem, judged, noise_factor),
         noise_factor=noise_factor,
         drops=drops,
         accepted=accepted,
@@ -98,21 +96,21 @@ def followed_drops(
 
     Each is handed out with its arrays, so that no more than one is held when its result has been made.
     """
-    found = track_drops(machine, evidence, quick=quick, progress=progress)
-    fit, factor, count, accepted = found.fit, max(found.fit.noise_factors), len(evidence), found.accepted
-    base = [drop.filtered for drop in fit.smoothed]
-    cross_check: list[Future[InputEstimate] | None] = [None] * count
-    if not quick:
-        # The estimate without contact law takes nothing from these passes, which leave a core to it.
-        with ThreadPoolExecutor(max_workers=1) as pool:
-            cross_check = checks_begun(pool, fit)
-            factor = likeliest_noise(fit, WHOLE_STAGE)
-            fit = converged(
-                fit.problems, WHOLE_STAGE, fit.trajectories, noise_factor=factor, progress=progress
-            )
-            factor *= max(fit.noise_factors)
-    waiting = list(zip(evidence, fit.problems, fit.smoothed, base, cross_check, strict=True))
-    del fit, found, base, cross_check
+    search = Search(
+        drops=Drops(evidence=tuple(tail_first(evidence)), calibrate_only=False), progress=progress
+    )
+    machine = search.with_rotor(machine)
+    # The estimate without contact law takes nothing from the passes, which leave a core to it.
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        cross_check: list[Future[InputEstimate] | None] = [None] * len(evidence)
+        if not quick:
+            cross_check = checks_begun(pool, search.drops.fine(machine))
+        found = track_drops(search, machine, quick=quick)
+    factor, accepted, count = found.noise_factor, found.accepted, len(evidence)
+    waiting = list(
+        zip(evidence, found.fit.problems, found.fit.smoothed, found.judged, cross_check, strict=True)
+    )
+    del search, found, cross_check
     while waiting:
         item, problem, smoothed, judged, check = waiting.pop(0)
         yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from functools import reduce
@@ -34,7 +34,6 @@ from rotordrop.estimate.bearing_drop import (
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.simulate.certificate import refined_peak
-from rotordrop.track.calibration import TrackedDrops
 from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
@@ -105,11 +104,11 @@ def check_without_contact_law(problem: DropProblem) -> InputEstimate:
     return check_with_form_error(check, problem.model.machine.rotor.force_sigma)
 
 
-def checks_begun(pool: Executor, fit: TrackedDrops) -> list[Future[InputEstimate] | None]:
-    """The cross-check of every drop of a fit that is seen in all directions, begun in a pool."""
+def checks_begun(pool: Executor, problems: Sequence[DropProblem]) -> list[Future[InputEstimate] | None]:
+    """The cross-check of every drop that is seen in all directions, begun in a pool."""
     return [
-        pool.submit(check_without_contact_law, problem) if direction_check(problem, drop).passed else None
-        for problem, drop in zip(fit.problems, fit.smoothed, strict=True)
+        pool.submit(check_without_contact_law, problem) if direction_check(problem).passed else None
+        for problem in problems
     ]
 
 

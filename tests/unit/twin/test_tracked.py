@@ -37,8 +37,8 @@ from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import corrections_by_record, input_state_estimate
 from rotordrop.track.smoother import parameter_sample
-from rotordrop.twin.problems import drop_problem, tail_first
-from rotordrop.twin.search import track_drops
+from rotordrop.twin.problems import Drops, drop_problem, tail_first
+from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.tracked import TrackedDrop, followed_drops, tracked_drop
 from rotordrop.twin.tracked_estimate import _cross_checked, estimate_of
 from rotordrop.twin.tracked_loads import (
@@ -232,8 +232,9 @@ def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
 
 
 def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
-    fit = track_drops(machine, [item], quick=True).fit
-    drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], fit.smoothed[0].filtered, 1.0)
+    search = Search(drops=Drops(evidence=(item,), calibrate_only=False), progress=None)
+    fit = track_drops(search, machine, quick=True).fit
+    drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], fit.smoothed[0], 1.0)
     facts = RecordFacts(findings=(), warnings=(), simulated=True)
     return drop, estimate_of(drop, Tracked(quick=True), facts)
 
@@ -592,7 +593,8 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
     machine = load_machine(Path(__file__).parents[2] / "machines" / "long_rotor.toml")
     made = synthesize_drop(hidden_machine(machine, 1), 2.0 * math.pi * 120.0, 10, duration=0.1, name="long")
     evidence = read_evidence(build_drop_model(machine), made.record, made.tail)
-    fit = track_drops(machine, [evidence], calibrate_only=True).fit
+    search = Search(drops=Drops(evidence=(evidence,), calibrate_only=True), progress=None)
+    fit = track_drops(search, machine).fit
     assert not is_inconsistent(fit), (fit.nis, fit.noise_factors)
     problem, smoothed = fit.problems[0], fit.smoothed[0]
     assert problem.n_channels == 6
