@@ -74,7 +74,7 @@ DAMPED_SCHEDULE: tuple[Stage, ...] = (
 
 CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
     Stage(until=0.02, force=0.07, share=0.01, passes=1),
-    Stage(until=0.2, force=0.07, share=0.01, passes=1),
+    Stage(until=0.06, force=0.07, share=0.01, passes=1),
 )
 """With a calibrated machine: what is left is the state, the sensors and the drop's own unknowns."""
 
@@ -113,7 +113,7 @@ class TrackedDrops:
     diverged: tuple[bool, ...] = field(default=())
     """Drops in which the filter had to give up."""
     noise_factors: tuple[float, ...] = field(default=())
-    """Factor on the usual process noise that the last pass needed to follow each drop [1]."""
+    """Process noise of the last pass over the usual one, as each drop needed it to be followed [1]."""
 
     @property
     def negative_log_likelihood(self) -> float:
@@ -188,7 +188,7 @@ def track(
         smoothed=tuple(smoothed),
         nis=tuple(s.filtered.nis for s in smoothed),
         diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
-        noise_factors=tuple(s.filtered.impulse / settings.impulse for s in smoothed),
+        noise_factors=tuple(noise_factor * s.filtered.impulse / settings.impulse for s in smoothed),
     )
 
 

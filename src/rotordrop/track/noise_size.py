@@ -46,7 +46,7 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
     stage : Stage
         Says what is usual.
     """
-    needed = max(fit.noise_factors, default=1.0)
+    needed = max(1.0, *fit.noise_factors)
 
     def negative_log_likelihood(power: int) -> float:
         drops = forward_passes(fit.problems, fit.trajectories, stage, needed * STEP**power)

@@ -138,13 +138,11 @@ class Candidate:
     accepted: tuple[Accepted, ...] = ()
     usual: tuple[Forward, ...] = ()
     """The drops filtered with process noise of the usual size, where the fit has that of the likeliest."""
-    given_noise: float = 1.0
-    """Process noise given to the fit, over the usual one [1]."""
 
     @property
     def noise_factor(self) -> float:
-        """Process noise that followed the record, over the usual one [1]."""
-        return self.given_noise * max(self.fit.noise_factors)
+        """Process noise of the fit over the usual one [1]."""
+        return max(self.fit.noise_factors)
 
     @property
     def inconsistent(self) -> bool:
@@ -224,14 +222,15 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         if quick:
             usual = tuple(one.filtered for one in fit.smoothed)
             return search.not_lost(Candidate(machine=machine, fit=fit, usual=usual))
-        fit = converged(fit.problems, schedule[-1], fit.trajectories, progress=search.progress)
-        found: Candidate | None = Candidate(machine=machine, fit=fit)
+        first = Candidate(machine=machine, fit=fit)
+        noise = likeliest_noise(fit, CALIBRATED_SCHEDULE[-1])
+        found: Candidate | None = search.at_rest(first, fit.trajectories, noise)
     else:
         base = Candidate(machine=machine, fit=search.fit_base(machine))
         # First: the coarse basis alone may not fit a record that the finer one fits, or lose it there.
         found = search.refine_if_followed(base)
     if found is not None:
-        found = search.weighed(search.sized(found))
+        found = search.weighed(found)
     if found is None or not fits(found):
         if search.progress is not None:
             search.progress("trying extensions of the base model, and other starts", 0.0)
@@ -240,7 +239,7 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
         if again is not None:
-            again = search.sized(search.without_silent(again, machine))
+            again = search.without_silent(again, machine)
         followed = [one for one in (found, again) if one is not None]
         if not followed:
             return search.not_lost(search.refine(other))  # says where it was lost
@@ -419,31 +418,35 @@ class Search:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.drops.fine(first.machine)
         carried = _carried(first.fit, fine)
-        if self.drops.calibrate_only:
-            return replace(first, fit=converged(fine, CALIBRATION_STAGE, carried, progress=self.progress))
         # The finer basis may lie in the valley that the coarse one only came near: turned axes of a support
         # were found at one bearing by the coarse one and at both by the finer, some passes later.
         passes = MOST_REPEATS if first.accepted else 1
 
-        def begun_with(stage: Stage) -> TrackedDrops:
+        def begun_with(stage: Stage) -> Candidate:
             start = converged(fine, stage, carried, passes=passes)
-            return converged(fine, WHOLE_STAGE, start.trajectories, progress=self.progress)
+            return self.at_rest(first, start.trajectories, likeliest_noise(start, stage))
 
-        fit = begun_with(CALIBRATION_STAGE)
-        if largest_move(first.fit, fit) > PLAUSIBLE_MOVE:
-            fit = min(fit, begun_with(SHORT_STAGE), key=score_of)
-        return replace(first, fit=fit)
+        found = begun_with(CALIBRATION_STAGE)
+        if not self.drops.calibrate_only and largest_move(first.fit, found.fit) > PLAUSIBLE_MOVE:
+            found = min(found, begun_with(SHORT_STAGE), key=lambda one: one.sized_score)
+        return found
 
-    def sized(self, found: Candidate) -> Candidate:
-        """The candidate with process noise of the size that makes the readings likeliest."""
-        stage, fit = self._last_stage, found.fit
-        factor = likeliest_noise(fit, stage)
-        return replace(
-            found,
-            fit=converged(fit.problems, stage, fit.trajectories, noise_factor=factor, progress=self.progress),
-            usual=tuple(one.filtered for one in fit.smoothed),
-            given_noise=factor,
-        )
+    def at_rest(self, first: Candidate, references: Sequence[Array], noise: float) -> Candidate:
+        """The candidate with a fit over its last window, repeated while that pays.
+
+        ``references`` are where to linearise at first, shape (M, n) each, ``noise`` the size of process noise
+        that made the first impacts likeliest, over the usual one [1].
+        """
+        problems = self.drops.fine(first.machine)
+        stage = CALIBRATION_STAGE if self.drops.calibrate_only else WHOLE_STAGE
+        fit = converged(problems, stage, references, noise_factor=noise, progress=self.progress)
+        usual = forward_passes(problems, fit.trajectories, stage, 1.0)
+        if sum(map(likelihood_of, usual)) < fit.negative_log_likelihood:
+            # the whole drop leaves more unexplained than its first impacts
+            noise = likeliest_noise(fit, stage)
+            fit = converged(problems, stage, fit.trajectories, noise_factor=noise, progress=self.progress)
+            usual = forward_passes(problems, fit.trajectories, stage, 1.0)
+        return replace(first, fit=fit, usual=tuple(usual))
 
     def weighed(self, found: Candidate) -> Candidate:
         """The candidate with the extensions that the readings ask for, one on top of the other.
@@ -505,13 +508,8 @@ class Search:
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""
-        problems = self.drops.fine(machine)
-        fit = converged(problems, self._last_stage, _carried(found.fit, problems), progress=self.progress)
-        return self.sized(replace(found, machine=machine, fit=fit, given_noise=1.0))
-
-    @property
-    def _last_stage(self) -> Stage:
-        return CALIBRATION_STAGE if self.drops.calibrate_only else WHOLE_STAGE
+        references = _carried(found.fit, self.drops.fine(machine))
+        return self.at_rest(replace(found, machine=machine), references, found.noise_factor)
 
     def without_silent(self, found: Candidate, described: Machine) -> Candidate:
         """The candidate without the extensions whose values all hold the one that says nothing.
@@ -532,7 +530,8 @@ class Search:
         silent = replace(found, accepted=tuple(telling))
         with suppress(IdentificationError):
             without = self.refine(replace(silent, machine=machine))
-            if gain_of(found, without) < LEAST_RISE:
+            lost, unlikelihood = without.sized_score
+            if not lost and unlikelihood - found.sized_score[1] < ASKED_FOR:
                 return without
         return silent
 
