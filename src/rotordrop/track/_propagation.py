@@ -69,7 +69,8 @@ class ParameterTargets(NamedTuple):
 class FilterSettings(NamedTuple):
     """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
-    ``substeps`` is a multiple of ``frozen``, the number of steps over which the Jacobian is held.
+    ``substeps`` is a multiple of ``frozen``, the number of steps over which the Jacobian is held; ``terms`` of
+    its exponential are taken then, 3 or 4.
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
@@ -79,6 +80,7 @@ class FilterSettings(NamedTuple):
     dt: float
     substeps: int
     frozen: int
+    terms: int
     impulse: float
     share: float
     spin_noise: float
@@ -364,6 +366,7 @@ def propagate(
     first = np.empty((s, columns))
     second = np.empty((s, columns))
     third = np.empty((s, columns))
+    fourth = np.zeros((s, columns))
     entries = np.empty(s * s)
     places = np.empty(s * s, dtype=np.int64)
     starts = np.empty(s + 1, dtype=np.int64)
@@ -400,16 +403,19 @@ def propagate(
         for c in range(p.contact_at.shape[0]):
             contact_at(now + 0.5 * h, c, middle, p, contact)
             impulses[p.contact_at[c, L.CONTACT_BEARING]] += h * contact[1]
-        # F <- exp(hJ) F + what the parameters add, to third order: at second order light modes would grow
+        # F <- exp(hJ) F + what the parameters add, to third order at least: at second light modes would grow
         jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
         for i in range(s):
             for j in range(columns - s):
                 first[i, s + j] += B[i, j]
         jacobian_product(entries, places, starts, touching, g, p, first, moved, second)
         jacobian_product(entries, places, starts, touching, g, p, second, moved, third)
+        if settings.terms > 3:
+            jacobian_product(entries, places, starts, touching, g, p, third, moved, fourth)
         for i in range(s):
             for j in range(columns):
-                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
+                last = third[i, j] + 0.25 * h * fourth[i, j]
+                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * last))
 
 
 @kernel

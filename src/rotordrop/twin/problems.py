@@ -17,11 +17,10 @@ from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
 from rotordrop.twin.tracked_parameters import UNSURE_GAP
 
-COARSE_BASIS = Reduction(modes=6, attachment=True)
-FINE_BASIS = Reduction(modes=10, attachment=True)
-"""Bases with the fewest modes; a rotor whose modes lie lower against its contact frequency gets more."""
+COARSE_BASIS = FINE_BASIS = Reduction(modes=6, attachment=True)
+"""The basis with the fewest modes; a rotor whose modes lie lower against its contact frequency gets more."""
 
-COARSE_REACH, FINE_REACH = 2.25, 6.0
+COARSE_REACH, FINE_REACH = 2.25, 8.0
 """The highest mode over the contact frequency, at least [1]: a rotor of 1.8 m and 130 kg with a sensor plane
 at mid-span was lost at 2.1 and followed from 3.2 on, one of 1.1 m and 60 kg is followed at 2.4."""
 
