@@ -1,63 +1,40 @@
-"""What each extension brings beside a usual model that fits: rises of the log marginal likelihood.
+"""What each extension brings beside a base model that has come to rest: rises of the log likelihood.
 
 Usage: python studies/structure/beside.py MACHINE CASE SEED [SEED ...]
 
-Machines are those of ``extensions.py``. The usual model is fitted by the coarse basis, then every extension
-gets one pass, and those that rise a few more, as ``extension_when_consistent`` does. Writes
-``beside.json``, in which a rise of null after more passes means that the first pass brought nothing.
+Machines are those of ``extensions.py``. The base model is fitted from guesses, and every extension gets one
+pass over the first impacts, as an estimate gives it. Writes ``results/beside.json``.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 
 from extensions import CASES, SPEED_HZ, recorded
 
-from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import RotordropError
-from rotordrop.estimation import estimate_drop
+from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine.examples import example_machine
-from rotordrop.twin import search as model_search
-from rotordrop.twin.search import RELINEARISED_PASSES, Candidate, Fits, gain_of
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.twin.problems import Drops
+from rotordrop.twin.search import Candidate, Search
 
-FOUND = Path(__file__).parent / "beside.json"
+FOUND = Path(__file__).parent / "results" / "beside.json"
 CASES["cross-axis 2 %"] = ({"sensors": {"cross_axis": 0.02}}, {}, "cross-axis sensitivity")
 
 
-class _Measured(Exception):
-    """Ends an estimate where the extensions have been measured."""
-
-
-def rises(kind: str, case: str, seed: int) -> dict[str, list[float | None]] | str:
-    """One pass and more passes of every extension, or why there are none."""
-    drop = recorded(kind, case, seed)[0]
-    found: dict[str, list[float | None]] = {}
-
-    def measure(base: Candidate, search: Fits) -> Candidate:
-        plain = search.likelihood(base.fit, base.machine)
-        again = replace(base, fit=search.relinearise(base.fit, base.machine, RELINEARISED_PASSES))
-        for one in EXTENSIONS:
-            machine = one.added_to(base.machine)
-            rise, more = plain - search.likelihood(base.fit, machine), None
-            if rise > 0.0:
-                fit = search.relinearise(base.fit, machine, RELINEARISED_PASSES)
-                more = round(gain_of(Candidate(machine=machine, fit=fit), again), 1)
-            found[one.name] = [round(rise, 1), more]
-        raise _Measured
-
-    plain_way, model_search.extension_when_consistent = model_search.extension_when_consistent, measure
+def rises(kind: str, case: str, seed: int) -> dict[str, float] | str:
+    """The rise with every extension, or why there is none."""
+    drop, machine = recorded(kind, case, seed)[0], example_machine(kind)
+    evidence = read_evidence(build_drop_model(machine), drop.record, drop.tail, name="drop")
+    search = Search(drops=Drops(evidence=(evidence,), calibrate_only=False), progress=None)
     try:
-        estimate_drop(example_machine(kind), drop.record, drop.tail, name="drop")
-    except _Measured:
-        return found
+        found = search.refine(Candidate(machine=machine, fit=search.fit_base(machine)))
     except RotordropError as error:
         return str(error)
-    finally:
-        model_search.extension_when_consistent = plain_way
-    return "the usual model does not fit"
+    return {one.name: round(rise, 1) for rise, one in search.rises(found)}
 
 
 def main() -> None:

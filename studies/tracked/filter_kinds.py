@@ -29,12 +29,13 @@ from numpy.typing import NDArray
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.reduction import Reduction
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track import forces
 from rotordrop.track.problem import DropProblem, private_copy
 from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth
-from rotordrop.twin.problems import FINE_BASIS, drop_problem
+from rotordrop.twin.problems import drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.recording import SyntheticDrop
 
@@ -278,7 +279,7 @@ def study(seed: int, hz: float, members: int = 300) -> dict[str, Any]:
     drop = synthesize_drop(hidden, 2.0 * math.pi * hz, seed)
     machine = hidden.machine.model_copy(update={"sensors": example_machine("lp400").sensors})
     problem = drop_problem(
-        build_drop_model(machine, FINE_BASIS),
+        build_drop_model(machine, Reduction(modes=10, attachment=True)),
         read_evidence(build_drop_model(machine), drop.record, drop.tail),
     )
     settings = PassSettings(impulse=1e-3, share=0.01)

@@ -97,7 +97,11 @@ def score_estimate(
         "consistent": found.get("consistent", _at(found, "consistency.consistent")),
         "drop": whole,
         "bearings": bearings,
-        "named": [entry["name"] for entry in _listed(found, "structure") if "name" in entry],
+        "named": [
+            entry["name"]
+            for entry in _listed(found, "structure")
+            if "name" in entry and entry.get("probability") is None
+        ],
         "violated": list(truth.values.get("violated", [])),
         "structure": structure,
         "impacts": {name: score for name, score in impacts.items() if score},

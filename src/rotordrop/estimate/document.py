@@ -146,7 +146,12 @@ def combined(documents: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[
 def published_structure(structure: Sequence[Structure]) -> list[published.Structure]:
     """What a machine has beyond the base model."""
     return [
-        published.Structure(name=one.name, log_likelihood_rise=finite(one.gain), sentence=one.sentence)
+        published.Structure(
+            name=one.name,
+            log_likelihood_rise=finite(one.gain),
+            sentence=one.sentence,
+            probability=one.probability,
+        )
         for one in structure
     ]
 

@@ -142,9 +142,11 @@ class Structure:
     """What it is called."""
     gain: float
     """Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
-    it needed larger process noise."""
+    it needed larger process noise. Of another model, the logarithm of its odds."""
     sentence: str
     """What was found, with intervals."""
+    probability: float | None = None
+    """Probability of another model that the record does not tell from the stated one [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -211,8 +211,11 @@ class Structure(Document):
 
     name: str
     log_likelihood_rise: float | None
-    """Of the readings, by it; null where the model without it needed larger process noise."""
+    """Of the readings, by it; null where the model without it needed larger process noise. Of another model,
+    the logarithm of its odds."""
     sentence: str
+    probability: float | None = None
+    """Of another model that the record does not tell from the stated one; null of what the stated one has."""
 
 
 class Advice(Document):

@@ -69,8 +69,8 @@ class ParameterTargets(NamedTuple):
 class FilterSettings(NamedTuple):
     """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
-    ``substeps`` is a multiple of ``frozen``, the number of steps over which the Jacobian is held; ``terms`` of
-    its exponential are taken then, 3 or 4.
+    ``substeps`` is a multiple of ``frozen``, the number of steps over which the Jacobian is held; of its
+    exponential 3 or 4 ``terms`` are taken then.
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late

@@ -46,6 +46,7 @@ from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
 from rotordrop.track.transfer import transferred
+from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_parameters import parameters
@@ -90,6 +91,8 @@ In the fine basis, where a fit has come to rest: of ten extensions none rose abo
 departure, and the right one by 5 to 16, the only one above this (``studies/structure``).
 """
 
+MOST_LOG_ODDS = 100.0
+"""Logarithm of the odds from which a model is as good as certain [1]: larger ones overflow."""
 MOST_EXTENSIONS = 2
 MOST_TRIED = 2
 """Extensions fitted beside a fit at most, those of the largest rise: the right one was first (chosen)."""
@@ -138,6 +141,9 @@ class Candidate:
     accepted: tuple[Accepted, ...] = ()
     usual: tuple[Forward, ...] = ()
     """The drops filtered with process noise of the usual size, where the fit has that of the likeliest."""
+
+    alternatives: tuple[Alternative, ...] = ()
+    """Models that the readings do not tell from this one."""
 
     @property
     def noise_factor(self) -> float:
@@ -454,17 +460,18 @@ class Search:
         A slight departure does not show in the size of the innovations, which nobody knows to a tenth, and
         yet moves peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, a lag of 80 µs by 5.3 %.
         """
-        while len(found.accepted) < MOST_EXTENSIONS:
-            promising = sorted(self._rises(found), key=lambda pair: -pair[0])[:MOST_TRIED]
-            better = (self._extended(found, extension) for _, extension in promising)
-            one = next((one for one in better if one is not None), None)
-            if one is None:
+        while (kept := len(found.accepted)) < MOST_EXTENSIONS:
+            rising = [pair for pair in self.rises(found) if pair[0] > 0.0]
+            for _, extension in sorted(rising, key=lambda pair: -pair[0])[:MOST_TRIED]:
+                found = self._beside(found, extension)
+                if len(found.accepted) > kept:
+                    break
+            else:
                 break
-            found = one
         return found
 
-    def _rises(self, found: Candidate) -> list[tuple[float, Extension]]:
-        """Extensions with which the log likelihood of the first impacts rises, linearised at a fit [1].
+    def rises(self, found: Candidate) -> list[tuple[float, Extension]]:
+        """Rise of the log likelihood of the first impacts [1] with every extension, linearised at a fit.
 
         An extension that says nothing costs what its unknowns leave open, so that most fall.
         """
@@ -489,22 +496,30 @@ class Search:
                     return described.result() - with_it
                 return unlikelihood(one.as_base_model(found.machine)) - with_it
 
-            rises = list(pool.map(rise, able))
-        return [pair for pair in zip(rises, able, strict=True) if pair[0] > 0.0]
+            return list(zip(pool.map(rise, able), able, strict=True))
 
-    def _extended(self, found: Candidate, extension: Extension) -> Candidate | None:
-        """The candidate with an extension; None where that is less probable than the one without."""
+    def _beside(self, found: Candidate, extension: Extension) -> Candidate:
+        """The more probable one of a candidate and the same with an extension; the other is remembered."""
         without = found
         if extension.base_values(found.machine):
             without = self._again(found, extension.as_base_model(found.machine))
         try:
-            better = self._again(found, extension.added_to(found.machine))
+            other = self._again(found, extension.added_to(found.machine))
         except IdentificationError:
-            return None
-        gain = without.sized_score[1] - better.sized_score[1]
-        if better.sized_score[0] or gain < ASKED_FOR:
-            return None
-        return replace(better, accepted=(*found.accepted, Accepted(extension=extension, gain=gain)))
+            return found
+        gain = without.sized_score[1] - other.sized_score[1]
+        odds = 0.0 if other.sized_score[0] else math.exp(min(gain - ASKED_FOR, MOST_LOG_ODDS))
+        had = tuple(one.extension for one in found.accepted)
+        if odds < 1.0:
+            beside = Alternative(extensions=(*had, extension), odds=odds, fit=other.fit)
+            return replace(found, alternatives=worth_keeping((*found.alternatives, beside)))
+        beside = Alternative(extensions=had, odds=1.0, fit=found.fit)
+        scaled = [replace(one, odds=one.odds / odds) for one in (*found.alternatives, beside)]
+        return replace(
+            other,
+            accepted=(*found.accepted, Accepted(extension=extension, gain=gain)),
+            alternatives=worth_keeping(scaled),
+        )
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""

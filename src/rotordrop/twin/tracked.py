@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
+from rotordrop.estimate.estimate import Structure
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks
@@ -13,9 +14,20 @@ from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
+from rotordrop.twin.mixture import Alternative, left_open, probabilities
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Accepted, Progress, Search, track_drops
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
+
+
+@dataclass(frozen=True, kw_only=True)
+class OtherModel:
+    """A drop as another model has followed it, and the probability of that model [1]."""
+
+    probability: float
+    problem: DropProblem
+    smoothed: Smoothed
+    forces: ForceHistory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +53,10 @@ class TrackedDrop:
     """Extensions of the base model that the readings paid for."""
     cross_check: Future[InputEstimate] | None = None
     """The estimate without contact law, where it was begun while the passes ran."""
+    others: tuple[OtherModel, ...] = ()
+    """What other models make of it that the readings do not tell from this one."""
+    left_open: tuple[Structure, ...] = ()
+    """These models in words."""
 
     def without_contact_law(self) -> InputEstimate:
         """The estimate without contact law: as it was begun, or made now."""
@@ -68,21 +84,44 @@ def tracked_drop(
     drops: int = 1,
     accepted: tuple[Accepted, ...] = (),
     cross_check: Future[InputEstimate] | None = None,
+    others: tuple[OtherModel, ...] = (),
+    left_open: tuple[Structure, ...] = (),
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
-    forces = force_history(problem, smoothed)
     return TrackedDrop(
         evidence=evidence,
         problem=problem,
         smoothed=smoothed,
         judged=judged.filtered,
-        forces=with_form_error(forces, problem.model.machine.rotor.force_sigma),
+        forces=_forces(problem, smoothed),
         checks=consistency_checks(problem, judged, noise_factor),
         noise_factor=noise_factor,
         drops=drops,
         accepted=accepted,
         cross_check=cross_check,
+        others=others,
+        left_open=left_open,
     )
+
+
+def _forces(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
+    return with_form_error(force_history(problem, smoothed), problem.model.machine.rotor.force_sigma)
+
+
+def _of_drop(alternatives: Sequence[Alternative], number: int) -> tuple[OtherModel, ...]:
+    """What other models of a fit make of one of its drops."""
+    found = []
+    for one, probability in zip(alternatives, probabilities(alternatives), strict=True):
+        problem, smoothed = one.fit.problems[number], one.fit.smoothed[number]
+        found.append(
+            OtherModel(
+                probability=probability,
+                problem=problem,
+                smoothed=smoothed,
+                forces=_forces(problem, smoothed),
+            )
+        )
+    return tuple(found)
 
 
 def followed_drops(
@@ -107,10 +146,12 @@ def followed_drops(
             cross_check = checks_begun(pool, search.drops.fine(machine))
         found = track_drops(search, machine, quick=quick)
     factor, accepted, count = found.noise_factor, found.accepted, len(evidence)
+    alternatives = found.alternatives
     waiting = list(
         zip(evidence, found.fit.problems, found.fit.smoothed, found.judged, cross_check, strict=True)
     )
     del search, found, cross_check
-    while waiting:
+    for number in range(count):
         item, problem, smoothed, judged, check = waiting.pop(0)
-        yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check)
+        others, words = _of_drop(alternatives, number), left_open(alternatives)
+        yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check, others, words)

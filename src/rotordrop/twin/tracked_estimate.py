@@ -38,6 +38,7 @@ from rotordrop.twin.tracked_loads import (
     is_beyond_accuracy,
     is_beyond_factor,
     loads_of_cross_check,
+    mixed_loads,
     twin_loads,
     widened_to_cross_check,
     widening_of,
@@ -47,6 +48,7 @@ from rotordrop.twin.tracked_parameters import (
     gap_of_record,
     is_lost,
     joint_estimate,
+    mixed_parameters,
     parameters,
     sensor_errors,
 )
@@ -125,8 +127,9 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         sensors=judged.sensors,
         joint=joint_estimate(problem, drop.smoothed) if judged.fits else None,
         unbalance=unbalance,
-        structure=tuple(
-            one.structure(problem.model.machine, values, believed=judged.fits) for one in drop.accepted
+        structure=(
+            *(one.structure(problem.model.machine, values, believed=judged.fits) for one in drop.accepted),
+            *(drop.left_open if judged.fits else ()),
         ),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
@@ -224,6 +227,14 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     fits = drop.consistent or check is None
     widening = widening_of(drop.checks)
     found = {one.path: one for one in parameters(problem, smoothed, fits=fits, widening=widening)}
+    if fits:
+        found = mixed_parameters(
+            found,
+            [
+                (one.probability, parameters(one.problem, one.smoothed, fits=fits, widening=widening))
+                for one in drop.others
+            ],
+        )
     replaced_at = [False] * len(problem.model.bearing_names)
     if not fits and check is not None:
         for b, name in enumerate(problem.model.bearing_names):
@@ -293,8 +304,12 @@ def _loads(drop: TrackedDrop, judged: _Judgement, b: int, preload: Known | None 
 
 def _twin(drop: TrackedDrop, judged: _Judgement, b: int) -> Loads:
     """Loads of the twin, replaced or not."""
-    numbers = numbers_of(drop.problem.model.machine.touchdown_bearings[b])
-    return twin_loads(drop.forces, b, judged.widening, numbers.stress_sigma)
+    sigma = numbers_of(drop.problem.model.machine.touchdown_bearings[b]).stress_sigma
+    loads = twin_loads(drop.forces, b, judged.widening, sigma)
+    if not judged.fits:
+        return loads
+    others = [(one.probability, twin_loads(one.forces, b, judged.widening, sigma)) for one in drop.others]
+    return mixed_loads(loads, others)
 
 
 def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...]:

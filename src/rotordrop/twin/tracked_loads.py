@@ -38,6 +38,7 @@ from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.track.problem import DropProblem
+from rotordrop.twin.mixture import mixed
 
 Array = NDArray[np.float64]
 
@@ -188,6 +189,27 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
         peak_stress=_peak(stress, stress_sigma, widening, "Pa", model_sigma),
         means=means,
         missing={} if late_mean is not None else {"mean_force_0p15_0p2_N": NO_LATE_MEAN},
+    )
+
+
+def mixed_loads(loads: Loads, others: Sequence[tuple[float, Loads]]) -> Loads:
+    """Force and stress with the intervals of a mixture of models: their probabilities [1] and their loads."""
+    if not others:
+        return loads
+    force = [(weight, one.peak_force.known) for weight, one in others]
+    stress = [(weight, one.peak_stress.known) for weight, one in others]
+    peak_force = replace(loads.peak_force, known=mixed(loads.peak_force.known, force))
+    peak_stress = replace(loads.peak_stress, known=mixed(loads.peak_stress.known, stress))
+    return replace(
+        loads,
+        force_band=_stretched(loads.force_band, loads.force, peak_force),
+        stress_band=_stretched(loads.stress_band, loads.stress, peak_stress),
+        peak_force=peak_force,
+        peak_stress=peak_stress,
+        means={
+            name: mixed(known, [(weight, one.means[name]) for weight, one in others])
+            for name, known in loads.means.items()
+        },
     )
 
 

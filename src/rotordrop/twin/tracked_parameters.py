@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.twin.mixture import mixed
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
 
 Array = NDArray[np.float64]
@@ -103,6 +105,23 @@ def parameters(
             value = replace(value, status=INCONSISTENT, interval_90=_hull(value, prior), allowance_90=None)
         found.append(FittedParameter(row=unknown.parameter, owner=unknown.owner, prior=prior, estimate=value))
     return tuple(found)
+
+
+def mixed_parameters(
+    found: dict[str, FittedParameter], others: Sequence[tuple[float, tuple[FittedParameter, ...]]]
+) -> dict[str, FittedParameter]:
+    """Parameters by path with the intervals of a mixture of models: probabilities [1] and what they found.
+
+    A model that does not have a parameter says nothing of it.
+    """
+    known = [(weight, {one.path: one.estimate for one in listed}) for weight, listed in others]
+    return {
+        path: replace(
+            one,
+            estimate=mixed(one.estimate, [(weight, there[path]) for weight, there in known if path in there]),
+        )
+        for path, one in found.items()
+    }
 
 
 def never_used_up(problem: DropProblem, means: Array, unknown: Unknown, value: Known) -> Known:

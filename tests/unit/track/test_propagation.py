@@ -22,8 +22,8 @@ ANGLES = np.array([-1.3, -1.8])
 """Direction of the contact at both bearings [rad]."""
 
 
-def settings(substeps: int, frozen: int = 1) -> P.FilterSettings:
-    return PassSettings().for_sampling(DT)._replace(substeps=substeps, frozen=frozen)
+def settings(substeps: int, frozen: int = 1, terms: int = 3) -> P.FilterSettings:
+    return PassSettings().for_sampling(DT)._replace(substeps=substeps, frozen=frozen, terms=terms)
 
 
 def theta_of(problem: DropProblem) -> np.ndarray:
@@ -54,14 +54,16 @@ def start_of(model: DropModel, indentation: float) -> np.ndarray:
     return y
 
 
-def advanced(problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int, frozen: int = 1):
+def advanced(
+    problem: DropProblem, y: np.ndarray, theta: np.ndarray, substeps: int, frozen: int = 1, terms: int = 3
+):
     """State after one sample, with sensitivity and contact impulses."""
     s, n_p = problem.n_dynamic, len(problem.unknowns)
     after, F = y.copy(), np.zeros((s, s + n_p))
     impulses = np.zeros(problem.model.layout.n_bearings)
     p = private_copy(problem.model.parameters)
     P.apply_parameters(theta.copy(), problem.targets, p)
-    P.propagate(2e-4, after, theta.copy(), problem.targets, p, settings(substeps, frozen), F, impulses)
+    P.propagate(2e-4, after, theta.copy(), problem.targets, p, settings(substeps, frozen, terms), F, impulses)
     return after, F, impulses
 
 
@@ -131,10 +133,28 @@ def test_a_jacobian_held_for_some_steps_is_that_of_their_middle(flight, frozen):
     assert errors[1] < 0.35 * errors[0] < 0.35 * 2e-3
 
 
-def test_a_jacobian_is_held_while_the_fastest_mode_turns_by_less_than_a_step_of_third_order_bears():
-    usual = PassSettings(substeps=4)
-    assert [usual.for_sampling(DT, phase / DT).frozen for phase in (0.0, 2.3, 2.5, 4.1)] == [2, 2, 1, 1]
-    assert PassSettings(substeps=3).for_sampling(DT).frozen == 1
+@pytest.mark.parametrize(("terms", "order"), [(3, 3), (4, 4)])
+def test_the_exponential_of_the_jacobian_has_the_order_that_is_asked_for(flight, terms, order):
+    """In flight the Jacobian changes little, so that the order in the step is that of the exponential."""
+    y, theta = start_of(flight.model, -60e-6), theta_of(flight)
+    exact = advanced(flight, y, theta, 192, 1, 4)[1]
+    errors = [
+        np.median(relative_errors(flight, advanced(flight, y, theta, substeps, 1, terms)[1], exact))
+        for substeps in (2, 4)
+    ]
+    assert errors[1] == pytest.approx(errors[0] / 2**order, rel=0.5)
+
+
+def test_a_jacobian_is_held_for_two_steps_with_the_order_that_the_fastest_mode_asks_for():
+    usual = [PassSettings(substeps=4).for_sampling(DT, phase / DT) for phase in (0.0, 2.3, 2.5, 4.1)]
+    assert [(one.substeps, one.frozen, one.terms) for one in usual] == [
+        (4, 2, 3),
+        (4, 2, 3),
+        (4, 2, 4),
+        (6, 2, 4),
+    ]
+    single = PassSettings(substeps=1).for_sampling(DT)
+    assert (single.substeps, single.frozen) == (1, 1)
 
 
 @pytest.mark.parametrize("indentation", [-60e-6, 4e-6])

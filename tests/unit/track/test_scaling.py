@@ -11,13 +11,13 @@ from tests.scaled_machines import scaled_machine
 
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.track._filter import is_plausible
-from rotordrop.track.calibration import BLIND_SCHEDULE, CALIBRATED_SCHEDULE, stage_settings, window_end
+from rotordrop.track.calibration import BLIND_SCHEDULE, QUICK_SCHEDULE, stage_settings, window_end
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import PassSettings
 from rotordrop.twin.problems import COARSE_BASIS
 
-LAST = CALIBRATED_SCHEDULE[-1]
+LAST = QUICK_SCHEDULE[-1]
 
 
 def of_mass(flight: DropProblem, mass: float) -> DropProblem:

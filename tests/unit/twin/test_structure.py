@@ -229,7 +229,7 @@ def test_what_the_readings_ask_for_beside_a_model_that_fits_is_added(lp400, monk
     weighed = Weighed(monkeypatch, first, {BASE: 1000.0, SOFTER: 980.0, SOFTER | CROSS: 979.0, CROSS: 990.0})
     found = weighed.found(lp400)
     assert names(found) == ["rotor stiffness"] and found.accepted[0].gain == pytest.approx(20.0)
-    assert has(found.machine) == SOFTER and found.noise_factor == 0.125
+    assert has(found.machine) == SOFTER and found.alternatives == ()
     assert not any(AXES & one for one in weighed.fitted)
 
 
@@ -242,7 +242,31 @@ def test_a_second_departure_is_found_beside_the_first(lp400, monkeypatch):
 @pytest.mark.parametrize(("share", "kept"), [(0.9, []), (1.1, ["cross-axis sensitivity"])])
 def test_an_extension_is_kept_from_even_odds_on(lp400, monkeypatch, share, kept):
     rest = {BASE: 1000.0, CROSS: 1000.0 - share * ASKED_FOR}
-    assert names(Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest).found(lp400)) == kept
+    found = Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest).found(lp400)
+    assert names(found) == kept
+    (other,) = found.alternatives
+    assert other.name == ("the base model" if kept else "cross-axis sensitivity")
+    assert other.odds == pytest.approx(math.exp(-0.1 * ASKED_FOR))
+
+
+@pytest.mark.parametrize("rise", [-0.1, 6.1])
+def test_a_model_of_less_than_five_per_cent_is_left_out(lp400, monkeypatch, rise):
+    rest = {BASE: 1000.0, CROSS: 1000.0 - rise}
+    assert Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest).found(lp400).alternatives == ()
+
+
+def test_what_is_left_open_beside_the_first_extension_counts_against_the_one_that_is_stated(
+    lp400, monkeypatch
+):
+    """A third model that was as probable as the base model pales with it."""
+    first = {BASE: 100.0, SOFTER: 90.0, CROSS: 91.0}
+    rest = {BASE: 1000.0, SOFTER: 1000.0 - 0.9 * ASKED_FOR, CROSS: 1000.0 - 1.5 * ASKED_FOR}
+    found = Weighed(monkeypatch, first, rest).found(lp400)
+    assert names(found) == ["cross-axis sensitivity"]
+    odds = {one.name: one.odds for one in found.alternatives}
+    assert odds == pytest.approx(
+        {"the base model": math.exp(-0.5 * ASKED_FOR), "rotor stiffness": math.exp(-0.6 * ASKED_FOR)}
+    )
 
 
 def test_an_extension_that_loses_the_record_gives_way_to_the_next(lp400, monkeypatch):
@@ -287,7 +311,12 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
     said = Accepted(extension=extension, gain=math.inf).structure(machine, values, believed=True)
     assert said.sentence.startswith("Found: ") and " to " in said.sentence
     assert [one.as_json() for one in published_structure([said])] == [
-        {"name": extension.name, "log_likelihood_rise": None, "sentence": said.sentence}
+        {
+            "name": extension.name,
+            "log_likelihood_rise": None,
+            "sentence": said.sentence,
+            "probability": None,
+        }
     ]
 
 
@@ -421,10 +450,13 @@ def test_a_whole_drop_that_moves_a_parameter_beyond_the_first_impacts_is_fitted_
 
     monkeypatch.setattr(search_module, "converged", converged)
     monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
+    monkeypatch.setattr(search_module, "likeliest_noise", lambda *_: 0.125)
+    monkeypatch.setattr(search_module, "forward_passes", lambda *_: [SimpleNamespace(nll=2000.0)])
+    monkeypatch.setattr(search_module, "likelihood_of", lambda one: one.nll)
     drops = SimpleNamespace(calibrate_only=False, fine=lambda _: (None,))
     search = Search(drops=drops, progress=None)  # type: ignore[arg-type]
     first = Candidate(machine=lp400, fit=moved_fit(2000.0, 0.0))
-    assert search.refine(first).score[2] == best
+    assert search.refine(first).sized_score == (False, best)
     assert len(stages) == windows
     assert stages[-2].until < stages[0].until or windows == 2
 
