@@ -28,7 +28,6 @@ from rotordrop.twin import search as search_module
 from rotordrop.twin.calibrated import _with_unbalance
 from rotordrop.twin.problems import Drops
 from rotordrop.twin.search import (
-    ASKED_FOR,
     CALIBRATION_STAGE,
     FIRST_OTHER_START,
     LEAST_RISE,
@@ -36,6 +35,7 @@ from rotordrop.twin.search import (
     Candidate,
     Checkpoint,
     Search,
+    asked_for,
     best_structure,
     score_of,
 )
@@ -184,6 +184,9 @@ def test_an_extension_that_loses_the_record_is_no_candidate(lp400):
     assert names(found) == [] and found.machine == lp400
 
 
+ASKED = asked_for(1)
+
+
 class Weighed:
     """A search that weighs extensions by made-up negative log likelihoods of the machines that have them.
 
@@ -241,15 +244,15 @@ def test_a_second_departure_is_found_beside_the_first(lp400, monkeypatch):
 
 @pytest.mark.parametrize(("share", "kept"), [(0.9, []), (1.1, ["cross-axis sensitivity"])])
 def test_an_extension_is_kept_from_even_odds_on(lp400, monkeypatch, share, kept):
-    rest = {BASE: 1000.0, CROSS: 1000.0 - share * ASKED_FOR}
+    rest = {BASE: 1000.0, CROSS: 1000.0 - share * ASKED}
     found = Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest).found(lp400)
     assert names(found) == kept
     (other,) = found.alternatives
     assert other.name == ("the base model" if kept else "cross-axis sensitivity")
-    assert other.odds == pytest.approx(math.exp(-0.1 * ASKED_FOR))
+    assert other.odds == pytest.approx(math.exp(-0.1 * ASKED))
 
 
-@pytest.mark.parametrize("rise", [-0.1, 6.1])
+@pytest.mark.parametrize("rise", [ASKED - 3.1, ASKED + 3.1])
 def test_a_model_of_less_than_five_per_cent_is_left_out(lp400, monkeypatch, rise):
     rest = {BASE: 1000.0, CROSS: 1000.0 - rise}
     assert Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest).found(lp400).alternatives == ()
@@ -260,13 +263,11 @@ def test_what_is_left_open_beside_the_first_extension_counts_against_the_one_tha
 ):
     """A third model that was as probable as the base model pales with it."""
     first = {BASE: 100.0, SOFTER: 90.0, CROSS: 91.0}
-    rest = {BASE: 1000.0, SOFTER: 1000.0 - 0.9 * ASKED_FOR, CROSS: 1000.0 - 1.5 * ASKED_FOR}
+    rest = {BASE: 1000.0, SOFTER: 1000.3 - ASKED, CROSS: 998.5 - ASKED}
     found = Weighed(monkeypatch, first, rest).found(lp400)
     assert names(found) == ["cross-axis sensitivity"]
     odds = {one.name: one.odds for one in found.alternatives}
-    assert odds == pytest.approx(
-        {"the base model": math.exp(-0.5 * ASKED_FOR), "rotor stiffness": math.exp(-0.6 * ASKED_FOR)}
-    )
+    assert odds == pytest.approx({"the base model": math.exp(-1.5), "rotor stiffness": math.exp(-1.8)})
 
 
 def test_an_extension_that_loses_the_record_gives_way_to_the_next(lp400, monkeypatch):
@@ -281,6 +282,11 @@ def test_a_long_remanence_is_compared_with_a_fall_of_the_same_process_noise(lp40
     long = frozenset({"long remanence"})
     weighed = Weighed(monkeypatch, {BASE: 1000.0, long: 900.0}, {BASE: 1000.0, long: 900.0})
     assert names(weighed.found(lp400)) == []
+
+
+def test_more_drops_ask_for_a_larger_rise():
+    """What a model leaves out adds up from drop to drop."""
+    assert 0.0 < asked_for(1) < asked_for(2) < 2.0 * asked_for(1)
 
 
 # sentences
