@@ -2,7 +2,7 @@
 import * as address from "./address.js";
 import { isOpen, menu } from "./menu.js";
 import * as server from "./server.js";
-import { by, say } from "./state.js";
+import { by, say, tried } from "./state.js";
 import { BADGES, make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -14,7 +14,7 @@ export const logged = (job, log = home.log) => (job.row && log ? log.drops.find(
 const speedOf = (row) => row?.speed?.[units.chosen()][0] || "–";
 
 // The largest of a kind over the bearings, by the upper end of its interval.
-const worst = (row, field) => (row?.numbers || []).filter((one) => one.field === field).sort((a, b) => b.upper - a.upper)[0];
+export const worst = (row, field) => (row?.numbers || []).filter((one) => one.field === field).sort((a, b) => b.upper - a.upper)[0];
 export const numberCell = (one) => make("td", { class: "number", of: one ? [make("span", { class: "value", text: one[units.chosen()][0] }),
   make("span", { class: "interval", text: [one[units.chosen()][1], one.bearing].filter(Boolean).join(", ") })] : [make("span", { text: "–" })] });
 
@@ -64,7 +64,6 @@ async function say_of(job, order) {
   await server.label(job.id, order);
   await load();
 }
-const tried = (promise) => Promise.resolve(promise).catch((error) => say(error.message, "bad"));
 export async function addToLog(job) {
   const { number, bearings } = await server.addToLog(job.id);
   say(`${job.name} was logged as drop ${number} of its machine, bearings ${bearings}.`, "good");

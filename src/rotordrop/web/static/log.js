@@ -1,7 +1,7 @@
 // The log: force and stress from drop to drop of one set of bearings, with limits and what is allowed.
 import * as address from "./address.js";
 import { canvasPen, colours, faint, keep, keepPng, keepSvg, placeColour, svgPen, ticks } from "./figures.js";
-import { numberCell } from "./home.js";
+import { numberCell, worst } from "./home.js";
 import * as server from "./server.js";
 import { by, files, say, showLines } from "./state.js";
 import { make, sentence } from "./tables.js";
@@ -84,7 +84,6 @@ function show() {
   const used = log.used.find((one) => keyOf(one) === keyOf(view)), said = [...(used ? [{ text: `${used.sentence}.`, level: used.allowed && used.drops > used.allowed ? "bad" : "notice" }] : []),
     ...log.trends.filter((text) => text.startsWith(`${view.machine}, bearings ${view.bearings}:`)).map((text) => ({ text, level: "warning" })),
     ...(used && used.allowed === null ? [{ text: `Nobody has stated how many drops are allowed: rotordrop log allow ${quoted(log.name)} --machine ${quoted(view.machine)} --drops N --source TEXT`, level: "notice" }] : [])];
-  const worst = (drop, field) => drop.numbers.filter((one) => one.field === field).sort((a, b) => b.upper - a.upper)[0];
   const rows = drops.map((drop) => {
     const job = view.jobs.find((one) => one.row?.sha256 === drop.sha256 && drop.sha256);
     return make("tr", { of: [make("th", { scope: "row", text: String(drop.log) }), make("td", { text: units.minuteText(drop.recorded) || `logged ${units.minuteText(drop.added)}` }),

@@ -3,7 +3,7 @@ import * as address from "./address.js";
 import { menu } from "./menu.js";
 import { keep } from "./figures.js";
 import * as server from "./server.js";
-import { by, say, showLines } from "./state.js";
+import { by, say, showLines, tried } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -44,7 +44,6 @@ function machines() {
 }
 const nameOf = (jobs) => jobs.find((job) => job.row?.machine)?.row.machine || jobs[0].files.machine.name;
 const stateOf = (jobs, verb) => jobs.find((job) => ["waiting", "running"].includes(job.states[verb]?.state)) || jobs.find((job) => job.states[verb]?.result) || jobs.find((job) => job.states[verb]) || jobs[0];
-const tried = (promise) => Promise.resolve(promise).catch((error) => say(error.message, "bad"));
 
 function list() {
   const rows = [...machines()].map(([key, jobs]) => {

@@ -41,6 +41,9 @@ export function say(text, level, ...more) {
   by("status").replaceChildren(make("ul", { class: "words", of: [sentence({ text, level })] }), ...more);
 }
 
+// What goes wrong in an action is said on the page.
+export const tried = (promise) => Promise.resolve(promise).catch((error) => say(error.message, "bad"));
+
 export function showLines(text, title = "As Python") {
   by("linestitle").textContent = title;
   by("code").textContent = text;
