@@ -175,7 +175,7 @@ def _extension(
         owner="sensor",
         names=(row.path,),
         neutral=lambda _: {row.path: guess(neutral)},
-        nothing={} if row.logarithmic else {row.path: neutral},
+        nothing={row.path: neutral},
         sentence=sentence,
         joined=", ",
         frame=text,

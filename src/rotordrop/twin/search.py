@@ -260,6 +260,19 @@ def asked_for(drops: int) -> float:
     return math.log((1.0 - ASSUMED_SHARE) / ASSUMED_SHARE) + drops * RISE_OF_NOTHING
 
 
+def _odds(other: Candidate, without: Candidate) -> float:
+    """Probability of a candidate with an extension over that of the one without it [1]."""
+    (lost, unlikelihood), drops = other.sized_score, len(other.fit.problems)
+    log_odds = without.sized_score[1] - unlikelihood - asked_for(drops)
+    return 0.0 if lost else math.exp(min(log_odds, MOST_LOG_ODDS))
+
+
+def _says_nothing(found: Candidate, extension: Extension) -> bool:
+    """Whether all values of an extension that a candidate has hold the one that says nothing."""
+    stated = parameters(found.fit.problems[-1], found.fit.smoothed[-1], fits=True, widening=1.0)
+    return extension.says_nothing(found.machine, {one.path: one.estimate for one in stated})
+
+
 def score_of(fit: TrackedDrops) -> Score:
     """How a fit follows the record."""
     return any(fit.diverged), max(fit.noise_factors), fit.negative_log_likelihood
@@ -507,22 +520,27 @@ class Search:
 
     def _beside(self, found: Candidate, extension: Extension) -> Candidate:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
-        without = found
-        if extension.base_values(found.machine):
-            without = self._again(found, extension.as_base_model(found.machine))
+        plain = found.machine
+        if extension.base_values(plain):
+            plain = extension.as_base_model(plain)
+        without = found if plain is found.machine else self._again(found, plain)
         try:
             other = self._again(found, extension.added_to(found.machine))
+            if _odds(other, without) >= 1.0:
+                # It may have only led to a better start: the model without it is given what it has found.
+                back = self._again(other, plain)
+                without = min(without, back, key=lambda one: one.sized_score)
         except IdentificationError:
             return found
-        gain = without.sized_score[1] - other.sized_score[1]
-        log_odds = min(gain - asked_for(len(found.fit.problems)), MOST_LOG_ODDS)
-        odds = 0.0 if other.sized_score[0] else math.exp(log_odds)
-        had = tuple(one.extension for one in found.accepted)
+        silent = _says_nothing(other, extension)
+        odds, had = 0.0 if silent else _odds(other, without), tuple(one.extension for one in found.accepted)
         if odds < 1.0:
+            stated = without if plain is found.machine else found
             beside = Alternative(extensions=(*had, extension), odds=odds, fit=other.fit)
-            return replace(found, alternatives=worth_keeping((*found.alternatives, beside)))
-        beside = Alternative(extensions=had, odds=1.0, fit=found.fit)
+            return replace(stated, alternatives=worth_keeping((*found.alternatives, beside)))
+        beside = Alternative(extensions=had, odds=1.0, fit=without.fit)
         scaled = [replace(one, odds=one.odds / odds) for one in (*found.alternatives, beside)]
+        gain = without.sized_score[1] - other.sized_score[1]
         return replace(
             other,
             accepted=(*found.accepted, Accepted(extension=extension, gain=gain)),
@@ -542,9 +560,7 @@ class Search:
         """
         if not found.accepted:
             return found
-        stated = parameters(found.fit.problems[-1], found.fit.smoothed[-1], fits=True, widening=1.0)
-        values = {one.path: one.estimate for one in stated}
-        telling = [one for one in found.accepted if not one.extension.says_nothing(found.machine, values)]
+        telling = [one for one in found.accepted if not _says_nothing(found, one.extension)]
         if len(telling) == len(found.accepted):
             return found
         machine = described

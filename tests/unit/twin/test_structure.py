@@ -191,12 +191,14 @@ class Weighed:
     """A search that weighs extensions by made-up negative log likelihoods of the machines that have them.
 
     ``first`` are those of the first impacts, linearised beside the fit; ``rest`` those of a fit at rest.
-    What ``rest`` does not hold is lost.
+    What ``rest`` does not hold is lost; ``back`` is that of a base model fitted once more.
     """
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, first: Any, rest: Any) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, first: Any, rest: Any, back: float | None = None
+    ) -> None:
         self.fitted: list[frozenset[str]] = []
-        self.rest = rest
+        self.rest, self.back = rest, back
         monkeypatch.setattr(search_module, "forward_passes", lambda problems, *_: problems)
         monkeypatch.setattr(
             search_module, "likelihood_of", lambda one: first.get(has(one.machine), first[frozenset()])
@@ -204,6 +206,7 @@ class Weighed:
         monkeypatch.setattr(search_module, "converged", lambda problems, *_, **__: self.fit(problems))
         monkeypatch.setattr(search_module, "likeliest_noise", lambda *_: 0.125)
         monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
+        monkeypatch.setattr(search_module, "parameters", lambda *_, **__: ())
 
     def problems(self, machine: Machine) -> Any:
         return (SimpleNamespace(machine=machine, first_contact=0.007, fall_time=0.007, time=np.zeros(3)),)
@@ -212,7 +215,8 @@ class Weighed:
         self.fitted.append(has(problems[0].machine))
         if self.fitted[-1] not in self.rest:
             raise IdentificationError("lost")
-        found = fit_of(self.rest[self.fitted[-1]], 0.9)
+        again = self.back is not None and self.fitted.count(BASE) > 1 and self.fitted[-1] == BASE
+        found = fit_of(self.back if again else self.rest[self.fitted[-1]], 0.9)
         found.problems, found.trajectories = problems, [np.zeros((3, 2))]
         found.smoothed = [SimpleNamespace(filtered=None)]
         return found
@@ -275,6 +279,16 @@ def test_an_extension_that_loses_the_record_gives_way_to_the_next(lp400, monkeyp
     assert names(Weighed(monkeypatch, first, {BASE: 1000.0, CROSS: 980.0}).found(lp400)) == [
         "cross-axis sensitivity"
     ]
+
+
+@pytest.mark.parametrize(("back", "kept"), [(969.0, []), (985.0, ["cross-axis sensitivity"])])
+def test_an_extension_that_only_led_to_a_better_start_is_not_kept(lp400, monkeypatch, back, kept):
+    """On a drop of a foreign code a lag raised it by 22, to a place that serves the base model as well."""
+    rest = {BASE: 1000.0, CROSS: 965.0}
+    found = Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest, back).found(lp400)
+    assert names(found) == kept
+    assert found.sized_score[1] == (965.0 if kept else back)
+    assert not kept or found.accepted[0].gain == pytest.approx(back - 965.0)
 
 
 def test_a_long_remanence_is_compared_with_a_fall_of_the_same_process_noise(lp400, monkeypatch):
