@@ -95,7 +95,7 @@ def estimate() -> Estimate:
     evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
     problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
     smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    drop = tracked_drop(evidence, problem, smoothed, smoothed.filtered, 1.0)
+    drop = tracked_drop(evidence, problem, smoothed, smoothed, 1.0)
     return estimate_of(
         drop, Tracked(), facts_of(Evidence(record=record, machine=machine, tail=tail, name="drop_060"))
     )
