@@ -221,10 +221,11 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
     except MemoryError:
         return fail("there is not enough memory for this; free some, or give a shorter record", 1)
     except OSError as error:
-        if error.errno not in _NO_ROOM or error.filename is not None:
-            raise
-        _discard_standard_output()
-        return fail(f"cannot write the output: {error.strerror}", OutputError.exit_code)
+        if error.errno in _NO_ROOM and error.filename is None:
+            _discard_standard_output()
+            return fail(f"cannot write the output: {error.strerror}", OutputError.exit_code)
+        place = error.filename or "the current folder"
+        return fail(f"{place}: {error.strerror or error}", OutputError.exit_code)
 
 
 def _discard_standard_output() -> None:

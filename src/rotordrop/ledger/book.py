@@ -228,7 +228,8 @@ def remove_drop(where: str | Path, number: int) -> None:
     """Take a drop out of a log by its number, whether it is damaged or not."""
     with transaction(where, writing=True) as log:
         known = f"drop {number}" in log.seals
-        if not known and not log.run("SELECT id FROM drops WHERE id = ?", (number,)):
+        possible = type(number) is int and 0 < number < 2**63
+        if not known and not (possible and log.run("SELECT id FROM drops WHERE id = ?", (number,))):
             raise UsageError(f"the log has no drop {number}; 'rotordrop log show' lists them")
         log.run("DELETE FROM severity WHERE drop_id = ?", (number,))
         log.run("DELETE FROM drops WHERE id = ?", (number,))

@@ -176,6 +176,8 @@ def require_same_version(plan: Mapping[str, Any], path: Path) -> None:
 def study_of(path: str | Path) -> Study:
     """The study that a folder holds, for whoever joins the work with nothing but the folder."""
     plan, file = read_plan(path), Path(path) / "machine.toml"
+    if not file.is_file():
+        raise DamagedFileError(f"{file} is gone; remove plan.json too, and run the study again")
     if plan["format"] == FORMAT and digest_of_file(file) != plan["machine_sha256"]:
         raise DamagedFileError(
             f"{file} is damaged, or was changed after the study began: plan and machine file do not belong "
@@ -251,7 +253,10 @@ def read_shards(
         if raw[-_SEAL:] != _seal(study, content):
             problem = "is damaged: it is not what was computed"
         else:
-            table = np.load(io.BytesIO(content), allow_pickle=False)
+            try:
+                table = np.load(io.BytesIO(content), allow_pickle=False)
+            except (ValueError, EOFError):  # sealed by a conversion that took it as it was
+                table = np.zeros(0)
             fits = table.dtype == shard_type(study) and np.array_equal(table["drop"], np.asarray(drops))
             if not fits:
                 problem = f"does not hold drops {drops.start} to {drops.stop - 1} of this study"

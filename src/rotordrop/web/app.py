@@ -248,7 +248,9 @@ async def label_job(desk: Desk, request: Request) -> Response:
 async def read_log(desk: Desk, request: Request) -> Response:
     """The log: its drops, what they are allowed, and what rises from drop to drop."""
     logs = await asyncio.to_thread(import_module, "rotordrop.web.log")
-    return JSONResponse(await asyncio.to_thread(logs.log_told, desk.log, desk.own_log))
+    told = await asyncio.to_thread(logs.log_told, desk.log, desk.own_log)
+    place = Path(desk.log).absolute().parent
+    return JSONResponse({**told, "problem": without_folder(told["problem"], place)})
 
 
 async def add_to_log(desk: Desk, request: Request) -> Response:

@@ -30,7 +30,7 @@ def row_of_job(job: Job) -> dict[str, Any] | None:
     verbs: tuple[Verb, ...] = ("estimate", "look")
     for verb in verbs:
         try:
-            folder = result_folder(job, verb, "page.json", "document.json")
+            folder = result_folder(job, verb)
             if folder is not None:
                 return {**_row_in(folder, verb), **damaged}
         except (DamagedFileError, UsageError) as error:

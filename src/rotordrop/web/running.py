@@ -81,9 +81,11 @@ def result_folder(job: Job, verb: Verb, *names: str) -> Path | None:
         return None
     folder: Path = job.path / f"{verb}.{told['run']}"
     for name in names or told["files"]:
-        if digest_at(folder / name) != told["files"].get(name, ""):
+        there = (folder / name).is_file()
+        if not there or digest_at(folder / name) != told["files"].get(name, ""):
             raise DamagedFileError(
-                f"{name} of {verb!r} is damaged: it has changed on the disk since it was computed; {_AGAIN}"
+                f"{name} of {verb!r} is damaged: it is gone, or changed on the disk since it was computed; "
+                f"{_AGAIN}"
             )
     return folder
 

@@ -107,9 +107,9 @@ class Workspace:
             for part in (folder, folder / "files"):
                 clear_after_killed_runs(part)
             if not (folder / "job.json").exists():
-                with suppress(OSError):  # empty: an earlier version was killed while it made a job
-                    (folder / "files").rmdir()
-                    folder.rmdir()
+                for part in (folder / "files", folder):  # empty: killed while it made a job
+                    with suppress(OSError):
+                        part.rmdir()
         with suppress(OSError, OutputError):  # a folder that may only be read
             self._give_digests()
 

@@ -220,6 +220,30 @@ def test_a_folder_that_cannot_be_made_is_a_sentence(verb, place, things, tmp_pat
     assert (tmp_path / "file").read_text() == "mine"
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        "log show {long}",
+        "study run {long}",
+        "check {long}.toml",
+        "init {long}.toml --simple",
+        "watch {long} --machines {long} --once",
+        "log allow l.db --machine M --drops 3 --source s",
+        "log export l.db x.csv",
+    ],
+)
+def test_a_name_that_is_too_long_and_a_folder_that_is_gone_are_a_sentence(
+    call, tmp_path, monkeypatch, capsys
+):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    if "{long}" not in call:
+        gone.rmdir()
+    assert run(call.format(long="x" * 300).split()) not in (0, 1)
+    assert "Traceback" not in _told(capsys)
+
+
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
 @pytest.mark.parametrize("arguments", [[], ["--json", "-"]])
 def test_any_encoding_of_the_terminal_will_do(machine, encoding, arguments):

@@ -61,8 +61,9 @@ def test_one_recording_counts_once(log):
     remove_drop(log, 1)
     assert [drop.bearing_set for drop in logged_drops(log).values()] == ["2027"]
     add_drop(log, DROP)
-    with pytest.raises(UsageError, match="the log has no drop 99"):
-        remove_drop(log, 99)
+    for number in (99, 2**70, -1, 1.0, True):
+        with pytest.raises(UsageError, match=f"the log has no drop {number}"):
+            remove_drop(log, number)  # type: ignore[arg-type]
 
 
 def test_adding_a_drop_reads_no_other(log, monkeypatch):

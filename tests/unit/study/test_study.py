@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
@@ -163,6 +164,23 @@ def test_one_bit_changed_anywhere_is_named(serial, tmp_path, part):
         bit_flipped(place / part, bit)
         with pytest.raises(DamagedFileError, match=rf"{part.split('/')[-1]} is damaged"):
             load_results(place)
+
+
+@pytest.mark.parametrize("content", [b"", b"\x93NUMPY\x01\x00"])
+def test_a_shard_that_was_sealed_as_it_was_and_holds_no_table_is_named(serial, tmp_path, content):
+    """A folder of an earlier format had no digests; a later run gives what is there one."""
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    shard, study = place / "shards" / "000001.npy", study_of(place)
+    shard.write_bytes(content + hashlib.sha256(study.digest.encode() + content).digest())
+    with pytest.raises(DamagedFileError, match=r"000001\.npy does not hold drops"):
+        load_results(place)
+
+
+def test_a_folder_without_its_machine_is_refused_in_words(serial, tmp_path):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    (place / "machine.toml").unlink()
+    with pytest.raises(DamagedFileError, match=r"machine\.toml is gone; remove plan\.json"):
+        load_results(place)
 
 
 def test_a_damaged_shard_is_computed_again_and_kept(serial, tmp_path):

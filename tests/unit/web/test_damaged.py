@@ -141,6 +141,15 @@ def test_a_log_that_is_damaged_hides_no_estimate(tmp_path):
     answer = server.ask("GET", "/api/log").told
     server.stop()
     assert (answer["drops"], "is not a log of drops" in answer["problem"]) == ([], True)
+    assert str(tmp_path) not in answer["problem"]
+
+
+@pytest.mark.parametrize("files", [True, False])
+def test_the_empty_folder_of_a_job_that_was_never_made_goes(tmp_path, files):
+    place = tmp_path / "served" / "jobs" / ("0" * 16)
+    (place / "files" if files else place).mkdir(parents=True)
+    Workspace(tmp_path / "served").prepare()
+    assert not place.exists()
 
 
 def test_port_80_is_the_page_too(tmp_path):

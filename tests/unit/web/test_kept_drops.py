@@ -47,11 +47,19 @@ def test_the_thumbnail_is_the_orbit_in_its_clearance_circle(server):
     assert angle[-1] - angle[0] == pytest.approx(0.15 * SPEED, rel=0.02)
 
 
-def test_a_damaged_result_is_named_in_its_row_and_hides_no_other(server):
+@pytest.mark.parametrize("harm", ["changed", "cut", "gone"])
+@pytest.mark.parametrize("number", range(4))
+def test_a_damaged_result_is_named_in_its_row_and_hides_no_other(server, harm, number):
+    """Any file of it, one of those that the thumbnail is drawn from too."""
     broken, whole = (estimated(server, name, name * 64, 1000.0) for name in "ab")
-    (server.space.job(broken).path / f"estimate.{'0' * 16}" / "document.json").write_text("{}")
+    files = sorted((server.space.job(broken).path / f"estimate.{'0' * 16}").iterdir())
+    file = files[number % len(files)]
+    content = file.read_bytes()
+    file.unlink()
+    if harm != "gone":
+        file.write_bytes(content[:-5] if harm == "cut" else content[:-1] + bytes([content[-1] ^ 1]))
     rows = listed(server)
-    assert "document.json of 'estimate' is damaged" in rows[broken]["row"]["damaged"]
+    assert f"{file.name} of 'estimate' is damaged" in rows[broken]["row"]["damaged"]
     assert "numbers" not in rows[broken]["row"]
     assert rows[whole]["row"]["numbers"][0]["value"] == 1000.0
 

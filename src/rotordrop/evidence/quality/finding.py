@@ -14,7 +14,12 @@ Severity = Literal["stop", "warning", "note"]
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
-UNSEEN = ("exchanged blocks of up to 20 µm", "1 to 5 lost samples", "the mass of another rotor")
+UNSEEN = (
+    "exchanged blocks of up to 20 µm",
+    "1 to 5 lost samples",
+    "a gain error that all channels share",
+    "the mass of another rotor",
+)
 UNSEEN_IN_TAIL = ("a tail with its ends or axes exchanged", "its zeros moved by 40 µm")
 """What passes the gate, most of it in `studies/gate`, in a few words: it is said where people decide."""
 
