@@ -51,7 +51,7 @@ RUNS = (
     "calibrate calibrated.toml drop.h5 --tail tail.csv --even-if-inconsistent -o n.toml --json PLACE/n.json",
 )
 LEFT = (4096, 0)
-"""Bytes that are left [1]."""
+"""What is left on the disk [B]."""
 
 
 def _fill(place: Path, left: int) -> None:

@@ -16,7 +16,7 @@ from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.naming import LineEvidence, LineKind, Name, name_line
 from rotordrop.spectrum.rate import reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
-from rotordrop.spectrum.waterfall import PlanarSignal
+from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +95,6 @@ class Line:
 EVEN = 1.0 / math.sqrt(12.0)
 """Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
 
-FEWEST_SAMPLES = 16
-"""Samples in which a line may be looked for [1]: those of the shortest frame."""
-
 SWING_ERROR = 0.05
 """How well the frequency of a wandering swing is known at any time [Hz]."""
 
@@ -134,7 +131,7 @@ def find_lines(
     def lines_of(displacement: PlanarSignal) -> list[FoundLine]:
         thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
         first = round(skip * rate)
-        if len(thin) - first < FEWEST_SAMPLES:  # the record ends while the rotor bounces
+        if len(thin) - first < FEWEST_POINTS:  # the record ends while the rotor bounces
             return []
         search = LineSearch(
             thin[first:],

@@ -29,6 +29,10 @@ class PlanarSignal(Protocol):
     def __getitem__(self, key: slice, /) -> ArrayLike: ...
 
 
+FEWEST_POINTS = 16
+"""Samples of the shortest frame [1], without which no line is looked for (chosen)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class WaterfallSettings:
     """How the signal is cut into frames; the defaults are those of the paper."""
@@ -42,8 +46,10 @@ class WaterfallSettings:
     """
 
     def __post_init__(self) -> None:
-        if self.points < 16:
-            raise UsageError(f"waterfall: {self.points} points per frame given, at least 16 are needed")
+        if self.points < FEWEST_POINTS:
+            raise UsageError(
+                f"waterfall: {self.points} points per frame given, at least {FEWEST_POINTS} are needed"
+            )
         if not 0.0 <= self.overlap < 1.0:
             raise UsageError(f"waterfall: overlap {self.overlap} given, expected at least 0 and below 1")
 

@@ -253,10 +253,7 @@ def read_shards(
         if raw[-_SEAL:] != _seal(study, content):
             problem = "is damaged: it is not what was computed"
         else:
-            try:
-                table = np.load(io.BytesIO(content), allow_pickle=False)
-            except (ValueError, EOFError):  # sealed by a conversion that took it as it was
-                table = np.zeros(0)
+            table = _table_in(content)
             fits = table.dtype == shard_type(study) and np.array_equal(table["drop"], np.asarray(drops))
             if not fits:
                 problem = f"does not hold drops {drops.start} to {drops.stop - 1} of this study"
@@ -267,6 +264,14 @@ def read_shards(
             yield shard, DamagedFileError(f"{file} {problem}; {remedy}")
         else:
             yield shard, table
+
+
+def _table_in(content: bytes) -> NDArray[Any]:
+    """The table of a shard; an empty one where it holds none, though sealed when an older folder was."""
+    try:
+        return np.asarray(np.load(io.BytesIO(content), allow_pickle=False))
+    except (ValueError, EOFError):
+        return np.zeros(0)
 
 
 def put_damaged_aside(folder: StudyFolder, study: Study) -> None:

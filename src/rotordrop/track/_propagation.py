@@ -366,7 +366,7 @@ def propagate(
     first = np.empty((s, columns))
     second = np.empty((s, columns))
     third = np.empty((s, columns))
-    fourth = np.zeros((s, columns))
+    fourth = np.empty((s if settings.terms > 3 else 0, columns))
     entries = np.empty(s * s)
     places = np.empty(s * s, dtype=np.int64)
     starts = np.empty(s + 1, dtype=np.int64)
@@ -412,10 +412,11 @@ def propagate(
         jacobian_product(entries, places, starts, touching, g, p, second, moved, third)
         if settings.terms > 3:
             jacobian_product(entries, places, starts, touching, g, p, third, moved, fourth)
+            for i in range(s):
+                add_row(0.25 * h, fourth[i], third[i])
         for i in range(s):
             for j in range(columns):
-                last = third[i, j] + 0.25 * h * fourth[i, j]
-                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * last))
+                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
 
 
 @kernel

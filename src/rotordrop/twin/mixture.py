@@ -10,7 +10,6 @@ from statistics import NormalDist
 from scipy.optimize import brentq
 
 from rotordrop.elements.parameter import Extension
-from rotordrop.estimate.estimate import Structure
 from rotordrop.known import Known
 from rotordrop.track.calibration import TrackedDrops
 
@@ -18,7 +17,7 @@ LEAST_PROBABILITY = 0.05
 """Probability below which a model is left out [1]: a 90 % interval leaves as much outside at either end."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Alternative:
     """Another model of the same drops, with its fit."""
 
@@ -43,22 +42,6 @@ def probabilities(alternatives: Sequence[Alternative]) -> list[float]:
     """Posterior probability of each alternative [1]; the stated model has the rest."""
     total = 1.0 + math.fsum(one.odds for one in alternatives)
     return [one.odds / total for one in alternatives]
-
-
-def left_open(alternatives: Sequence[Alternative]) -> tuple[Structure, ...]:
-    """What the record does not tell from the model that is stated, in words."""
-    return tuple(
-        Structure(
-            name=one.name,
-            gain=math.log(one.odds),
-            probability=probability,
-            sentence=(
-                f"Not to be told from it: {one.name}, with a probability of {probability:.0%}. "
-                "The intervals hold both."
-            ),
-        )
-        for one, probability in zip(alternatives, probabilities(alternatives), strict=True)
-    )
 
 
 def mixed(known: Known, others: Sequence[tuple[float, Known]]) -> Known:

@@ -260,11 +260,12 @@ def asked_for(drops: int) -> float:
     return math.log((1.0 - ASSUMED_SHARE) / ASSUMED_SHARE) + drops * RISE_OF_NOTHING
 
 
-def _odds(other: Candidate, without: Candidate) -> float:
-    """Probability of a candidate with an extension over that of the one without it [1]."""
-    (lost, unlikelihood), drops = other.sized_score, len(other.fit.problems)
-    log_odds = without.sized_score[1] - unlikelihood - asked_for(drops)
-    return 0.0 if lost else math.exp(min(log_odds, MOST_LOG_ODDS))
+def times_likelier(one: Candidate, other: Candidate) -> float:
+    """Marginal likelihood of the readings by a candidate over that by another one [1]; nothing where lost."""
+    (lost, unlikelihood), (other_lost, of_other) = one.sized_score, other.sized_score
+    if lost or other_lost:
+        return 0.0 if lost else math.exp(MOST_LOG_ODDS)
+    return math.exp(min(of_other - unlikelihood, MOST_LOG_ODDS))
 
 
 def _says_nothing(found: Candidate, extension: Extension) -> bool:
@@ -520,32 +521,29 @@ class Search:
 
     def _beside(self, found: Candidate, extension: Extension) -> Candidate:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
-        plain = found.machine
-        if extension.base_values(plain):
-            plain = extension.as_base_model(plain)
-        without = found if plain is found.machine else self._again(found, plain)
+        described, had = found.machine, tuple(one.extension for one in found.accepted)
+        plain = extension.as_base_model(described) if extension.base_values(described) else described
+        against = math.exp(-asked_for(len(found.fit.problems)))
         try:
-            other = self._again(found, extension.added_to(found.machine))
-            if _odds(other, without) >= 1.0:
-                # It may have only led to a better start: the model without it is given what it has found.
-                back = self._again(other, plain)
-                without = min(without, back, key=lambda one: one.sized_score)
+            without = found if plain is described else self._again(found, plain)
+            other = self._again(found, extension.added_to(described))
         except IdentificationError:
             return found
-        silent = _says_nothing(other, extension)
-        odds, had = 0.0 if silent else _odds(other, without), tuple(one.extension for one in found.accepted)
+        if against * times_likelier(other, without) >= 1.0:
+            # It may have only led to a better start: the model without it is given what it has found.
+            with suppress(IdentificationError):
+                back = self._again(other, plain)
+                without = min(without, back, key=lambda one: one.sized_score)
+        odds = 0.0 if _says_nothing(other, extension) else against * times_likelier(other, without)
+        stated = without if plain is described else found
         if odds < 1.0:
-            stated = without if plain is found.machine else found
-            beside = Alternative(extensions=(*had, extension), odds=odds, fit=other.fit)
-            return replace(stated, alternatives=worth_keeping((*found.alternatives, beside)))
-        beside = Alternative(extensions=had, odds=1.0, fit=without.fit)
-        scaled = [replace(one, odds=one.odds / odds) for one in (*found.alternatives, beside)]
-        gain = without.sized_score[1] - other.sized_score[1]
-        return replace(
-            other,
-            accepted=(*found.accepted, Accepted(extension=extension, gain=gain)),
-            alternatives=worth_keeping(scaled),
-        )
+            paler, beside = times_likelier(found, stated), Alternative((*had, extension), odds, other.fit)
+        else:
+            paler, beside = 1.0 / odds, Alternative(had, 1.0 / odds, without.fit)
+            gain = math.inf if without.sized_score[0] else without.sized_score[1] - other.sized_score[1]
+            stated = replace(other, accepted=(*found.accepted, Accepted(extension=extension, gain=gain)))
+        before = [replace(one, odds=paler * one.odds) for one in found.alternatives]
+        return replace(stated, alternatives=worth_keeping((*before, beside)))
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
-from rotordrop.twin.mixture import Alternative, left_open, probabilities
+from rotordrop.twin.mixture import Alternative, probabilities
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Accepted, Progress, Search, track_drops
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
@@ -22,12 +23,28 @@ from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun
 
 @dataclass(frozen=True, kw_only=True)
 class OtherModel:
-    """A drop as another model has followed it, and the probability of that model [1]."""
+    """A drop as another model has followed it, which the readings do not tell from the one that is stated."""
 
+    name: str
+    odds: float
+    """Its probability over that of the model that is stated [1]."""
     probability: float
+    """Its probability [1]."""
     problem: DropProblem
     smoothed: Smoothed
     forces: ForceHistory
+
+    def structure(self) -> Structure:
+        """The model in words."""
+        return Structure(
+            name=self.name,
+            gain=math.log(self.odds),
+            probability=self.probability,
+            sentence=(
+                f"Not to be told from it: {self.name}, with a probability of "
+                f"{100.0 * self.probability:.0f} %. The intervals hold both."
+            ),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +72,6 @@ class TrackedDrop:
     """The estimate without contact law, where it was begun while the passes ran."""
     others: tuple[OtherModel, ...] = ()
     """What other models make of it that the readings do not tell from this one."""
-    left_open: tuple[Structure, ...] = ()
-    """These models in words."""
 
     def without_contact_law(self) -> InputEstimate:
         """The estimate without contact law: as it was begun, or made now."""
@@ -85,7 +100,6 @@ def tracked_drop(
     accepted: tuple[Accepted, ...] = (),
     cross_check: Future[InputEstimate] | None = None,
     others: tuple[OtherModel, ...] = (),
-    left_open: tuple[Structure, ...] = (),
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     return TrackedDrop(
@@ -100,7 +114,6 @@ def tracked_drop(
         accepted=accepted,
         cross_check=cross_check,
         others=others,
-        left_open=left_open,
     )
 
 
@@ -115,6 +128,8 @@ def _of_drop(alternatives: Sequence[Alternative], number: int) -> tuple[OtherMod
         problem, smoothed = one.fit.problems[number], one.fit.smoothed[number]
         found.append(
             OtherModel(
+                name=one.name,
+                odds=one.odds,
                 probability=probability,
                 problem=problem,
                 smoothed=smoothed,
@@ -153,5 +168,5 @@ def followed_drops(
     del search, found, cross_check
     for number in range(count):
         item, problem, smoothed, judged, check = waiting.pop(0)
-        others, words = _of_drop(alternatives, number), left_open(alternatives)
-        yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check, others, words)
+        others = _of_drop(alternatives, number)
+        yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check, others)

@@ -129,7 +129,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         unbalance=unbalance,
         structure=(
             *(one.structure(problem.model.machine, values, believed=judged.fits) for one in drop.accepted),
-            *(drop.left_open if judged.fits else ()),
+            *(one.structure() for one in drop.others if judged.fits),
         ),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),

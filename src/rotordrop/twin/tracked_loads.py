@@ -200,17 +200,11 @@ def mixed_loads(loads: Loads, others: Sequence[tuple[float, Loads]]) -> Loads:
     stress = [(weight, one.peak_stress.known) for weight, one in others]
     peak_force = replace(loads.peak_force, known=mixed(loads.peak_force.known, force))
     peak_stress = replace(loads.peak_stress, known=mixed(loads.peak_stress.known, stress))
-    return replace(
-        loads,
-        force_band=_stretched(loads.force_band, loads.force, peak_force),
-        stress_band=_stretched(loads.stress_band, loads.stress, peak_stress),
-        peak_force=peak_force,
-        peak_stress=peak_stress,
-        means={
-            name: mixed(known, [(weight, one.means[name]) for weight, one in others])
-            for name, known in loads.means.items()
-        },
-    )
+    means = {
+        name: mixed(known, [(weight, one.means[name]) for weight, one in others])
+        for name, known in loads.means.items()
+    }
+    return _as_wide_as(loads, peak_force, peak_stress, means)
 
 
 def _history(
@@ -284,22 +278,28 @@ def widened_to_cross_check(loads: Loads, check: InputEstimate, b: int, preload: 
     if late is not None and np.isfinite(check.mean_magnitude_late[b]):
         # Mean magnitude with mean magnitude: where the force turns, the mean vector is a fraction of it, and
         # the ratio of two mean vectors says nothing of the stated number.
-        means = (float(check.mean_magnitude_late[b]), _calm_mean(check, b))
-        held["mean_force_0p15_0p2_N"] = [(one / max(late.value, 1e-9), MEAN_ERROR) for one in means]
+        late_means = (float(check.mean_magnitude_late[b]), _calm_mean(check, b))
+        held["mean_force_0p15_0p2_N"] = [(one / max(late.value, 1e-9), MEAN_ERROR) for one in late_means]
     peak_force = replace(loads.peak_force, known=widened_to(loads.peak_force.known, force_ratio, peak_error))
     peak_stress = replace(
         loads.peak_stress, known=widened_to(loads.peak_stress.known, stress_ratio, stress_error)
     )
+    means = {
+        name: reduce(lambda known, other: widened_to(known, *other), held.get(name, ()), value)
+        for name, value in loads.means.items()
+    }
+    return _as_wide_as(loads, peak_force, peak_stress, means)
+
+
+def _as_wide_as(loads: Loads, force: Peak, stress: Peak, means: Mapping[str, Known]) -> Loads:
+    """The loads with other peaks and means, and bands at least as wide as these peaks."""
     return replace(
         loads,
-        force_band=_stretched(loads.force_band, loads.force, peak_force),
-        stress_band=_stretched(loads.stress_band, loads.stress, peak_stress),
-        peak_force=peak_force,
-        peak_stress=peak_stress,
-        means={
-            name: reduce(lambda known, other: widened_to(known, *other), held.get(name, ()), value)
-            for name, value in loads.means.items()
-        },
+        force_band=_stretched(loads.force_band, loads.force, force),
+        stress_band=_stretched(loads.stress_band, loads.stress, stress),
+        peak_force=force,
+        peak_stress=stress,
+        means=means,
     )
 
 

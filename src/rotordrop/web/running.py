@@ -81,8 +81,7 @@ def result_folder(job: Job, verb: Verb, *names: str) -> Path | None:
         return None
     folder: Path = job.path / f"{verb}.{told['run']}"
     for name in names or told["files"]:
-        there = (folder / name).is_file()
-        if not there or digest_at(folder / name) != told["files"].get(name, ""):
+        if digest_at(folder / name) != told["files"].get(name, ""):
             raise DamagedFileError(
                 f"{name} of {verb!r} is damaged: it is gone, or changed on the disk since it was computed; "
                 f"{_AGAIN}"

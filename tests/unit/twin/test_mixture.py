@@ -11,7 +11,8 @@ import pytest
 
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.known import NINETY, Known
-from rotordrop.twin.mixture import Alternative, left_open, mixed, probabilities, worth_keeping
+from rotordrop.twin.mixture import Alternative, mixed, probabilities, worth_keeping
+from rotordrop.twin.tracked import OtherModel
 
 
 def normal(value: float, sigma: float) -> Known:
@@ -20,7 +21,7 @@ def normal(value: float, sigma: float) -> Known:
 
 
 def alternative(odds: float, *extensions: Any) -> Alternative:
-    return Alternative(extensions=extensions, odds=odds, fit=SimpleNamespace())  # type: ignore[arg-type]
+    return Alternative(extensions, odds, SimpleNamespace())  # type: ignore[arg-type]
 
 
 def test_one_model_alone_keeps_its_interval():
@@ -53,6 +54,13 @@ def test_odds_become_probabilities_of_what_the_record_does_not_tell_apart():
     open_ones = worth_keeping([alternative(1.0), alternative(0.5, lag), alternative(0.05, lag, lag)])
     assert [one.name for one in open_ones] == ["the base model", "sensor lag"]
     assert probabilities(open_ones) == pytest.approx([0.4, 0.2])
-    base, other = left_open(open_ones)
-    assert "the base model, with a probability of 40 %" in base.sentence.replace("%", " %")
-    assert other.name == "sensor lag" and other.probability == pytest.approx(0.2)
+
+
+def test_a_model_that_is_left_open_is_named_with_its_probability():
+    nothing: Any = SimpleNamespace()
+    other = OtherModel(
+        name="sensor lag", odds=0.25, probability=0.2, problem=nothing, smoothed=nothing, forces=nothing
+    )
+    said = other.structure()
+    assert (said.name, said.probability, said.gain) == ("sensor lag", 0.2, math.log(0.25))
+    assert "sensor lag, with a probability of 20 %" in said.sentence

@@ -191,7 +191,8 @@ class Weighed:
     """A search that weighs extensions by made-up negative log likelihoods of the machines that have them.
 
     ``first`` are those of the first impacts, linearised beside the fit; ``rest`` those of a fit at rest.
-    What ``rest`` does not hold is lost; ``back`` is that of a base model fitted once more.
+    What ``rest`` does not hold is lost; ``back`` is that of a base model fitted once more, and lost where
+    it is infinite.
     """
 
     def __init__(
@@ -213,10 +214,11 @@ class Weighed:
 
     def fit(self, problems: Any) -> Any:
         self.fitted.append(has(problems[0].machine))
-        if self.fitted[-1] not in self.rest:
-            raise IdentificationError("lost")
         again = self.back is not None and self.fitted.count(BASE) > 1 and self.fitted[-1] == BASE
-        found = fit_of(self.back if again else self.rest[self.fitted[-1]], 0.9)
+        unlikelihood = self.back if again else self.rest.get(self.fitted[-1], math.inf)
+        if unlikelihood == math.inf:
+            raise IdentificationError("lost")
+        found = fit_of(unlikelihood, 0.9)
         found.problems, found.trajectories = problems, [np.zeros((3, 2))]
         found.smoothed = [SimpleNamespace(filtered=None)]
         return found
@@ -289,6 +291,24 @@ def test_an_extension_that_only_led_to_a_better_start_is_not_kept(lp400, monkeyp
     assert names(found) == kept
     assert found.sized_score[1] == (965.0 if kept else back)
     assert not kept or found.accepted[0].gain == pytest.approx(back - 965.0)
+
+
+def test_an_extension_is_kept_where_the_base_model_loses_the_record_from_there(lp400, monkeypatch):
+    rest = {BASE: 1000.0, CROSS: 965.0}
+    found = Weighed(monkeypatch, {BASE: 100.0, CROSS: 90.0}, rest, math.inf).found(lp400)
+    assert names(found) == ["cross-axis sensitivity"] and found.accepted[0].gain == pytest.approx(35.0)
+
+
+def test_what_was_left_open_beside_a_worse_start_pales_beside_the_better_one(lp400, monkeypatch):
+    """Cross-axis sensitivity was nearly as probable as a base model that turns out likelier by a factor e."""
+    first = {BASE: 100.0, SOFTER: 91.0, CROSS: 90.0}
+    rest = {BASE: 1000.0, CROSS: 1000.5 - ASKED, SOFTER: 999.3 - ASKED}
+    found = Weighed(monkeypatch, first, rest, back=999.0).found(lp400)
+    assert names(found) == [] and found.sized_score[1] == 999.0
+    odds = {one.name: one.odds for one in found.alternatives}
+    assert odds == pytest.approx(
+        {"cross-axis sensitivity": math.exp(-1.5), "rotor stiffness": math.exp(-0.3)}
+    )
 
 
 def test_a_long_remanence_is_compared_with_a_fall_of_the_same_process_noise(lp400, monkeypatch):
