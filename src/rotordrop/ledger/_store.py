@@ -123,6 +123,8 @@ def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
 
 @contextmanager
 def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
+    if "\0" in str(file):
+        raise ValueError("its name holds a NUL, where SQLite would end it")
     if not writing and not file.is_file():
         raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
     try:

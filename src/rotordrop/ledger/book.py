@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import secrets
+import sys
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
@@ -106,10 +107,31 @@ def _text(name: str, value: Any) -> str:
 def _number(name: str, value: Any, least: float = -math.inf) -> float:
     """A finite number from a least one on."""
     real = isinstance(value, int | float) and not isinstance(value, bool)
-    if not real or not abs(value) < math.inf or value < least:
+    if not real or not abs(value) <= sys.float_info.max or value < least:
         start = "" if least == -math.inf else f" from {least:g} on"
         raise UsageError(f"{name} = {value!r}; expected a finite number{start}")
     return float(value)
+
+
+def _severity(given: Any) -> list[Severity]:
+    """Numbers of severity that a log may hold."""
+    if not isinstance(given, tuple) or not all(isinstance(one, Severity) for one in given):
+        raise UsageError(f"severity = {given!r}; expected a tuple of numbers of severity")
+    severity = []
+    for one in given:
+        who = f"{one.quantity} at {one.bearing}"
+        for name in ("bearing", "quantity", "unit"):
+            _text(name, getattr(one, name))
+        lower, upper = _number(f"{who}: lower", one.lower), _number(f"{who}: upper", one.upper)
+        value = None if one.value is None else _number(f"{who}: value", one.value)
+        if lower > upper:
+            raise UsageError(f"{who} runs from {lower:g} to {upper:g}; expected the smaller end first")
+        severity.append(replace(one, value=value, lower=lower, upper=upper))
+    stated = [(one.bearing, one.quantity) for one in severity]
+    for bearing, quantity in stated:
+        if stated.count((bearing, quantity)) > 1:
+            raise UsageError(f"{quantity} at {bearing} is stated twice; leave one of them out")
+    return severity
 
 
 def _checked(drop: LoggedDrop) -> LoggedDrop:
@@ -125,25 +147,11 @@ def _checked(drop: LoggedDrop) -> LoggedDrop:
             ) from None
     if not isinstance(drop.simulated, bool):
         raise UsageError(f"simulated = {drop.simulated!r}; expected True or False")
-    severity = []
-    for one in drop.severity:
-        who = f"{one.quantity} at {one.bearing}"
-        for name in ("bearing", "quantity", "unit"):
-            _text(name, getattr(one, name))
-        lower, upper = _number(f"{who}: lower", one.lower), _number(f"{who}: upper", one.upper)
-        value = None if one.value is None else _number(f"{who}: value", one.value)
-        if lower > upper:
-            raise UsageError(f"{who} runs from {lower:g} to {upper:g}; expected the smaller end first")
-        severity.append(replace(one, value=value, lower=lower, upper=upper))
-    stated = [(one.bearing, one.quantity) for one in severity]
-    for bearing, quantity in stated:
-        if stated.count((bearing, quantity)) > 1:
-            raise UsageError(f"{quantity} at {bearing} is stated twice; leave one of them out")
     return replace(
         drop,
         speed=_number("speed", drop.speed, 0.0),
         duration=None if drop.duration is None else _number("duration", drop.duration, 0.0),
-        severity=tuple(sorted(severity, key=lambda one: (one.bearing, one.quantity))),
+        severity=tuple(sorted(_severity(drop.severity), key=lambda one: (one.bearing, one.quantity))),
     )
 
 

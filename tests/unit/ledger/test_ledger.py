@@ -52,6 +52,12 @@ def test_what_is_added_comes_back(log):
     assert logged_drops(log) == {number: DROP, other: ranged}
 
 
+def test_a_log_whose_name_holds_a_nul_is_refused(tmp_path):
+    with pytest.raises(UsageError, match="its name holds a NUL"):
+        add_drop(f"{tmp_path}/a\0.db", DROP)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_one_recording_counts_once(log):
     add_drop(log, DROP)
     with pytest.raises(UsageError, match=r"drop_060\.h5 is in the log already, as drop 1 of LP-400"):
@@ -132,6 +138,9 @@ def test_a_write_that_fails_leaves_nothing(log, monkeypatch):
 WRONG = [
     ({"speed": math.nan}, "speed = nan; expected a finite number from 0 on"),
     ({"speed": math.inf}, "speed = inf"),
+    ({"speed": 10**400}, "speed = 1000"),
+    ({"severity": None}, "severity = None; expected a tuple"),
+    ({"severity": (1,)}, r"severity = \(1,\); expected a tuple"),
     ({"speed": "fast"}, "speed = 'fast'; expected a finite number"),
     ({"speed": True}, "speed = True"),
     ({"duration": -5.0}, r"duration = -5\.0; expected a finite number from 0 on"),
