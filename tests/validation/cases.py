@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -104,11 +104,23 @@ def check(case: Case, computed: Mapping[str, float]) -> None:
     assert not wrong, f"{case.id} ({case.title}):\n  " + "\n  ".join(wrong)
 
 
-def fails_with(name: str, change: Mapping[str, Any], compute: Mapping[str, Compute]) -> None:
-    """Insist that a case fails when its inputs are changed."""
-    case = load_case(name).with_inputs(**change)
-    with pytest.raises(AssertionError, match=rf"{name} .*\n.*deviation .* tolerance"):
+def checks_of(
+    compute: Mapping[str, Compute], changes: Iterable[tuple[str, Mapping[str, Any]]]
+) -> tuple[Callable[[str], None], Callable[[str, Mapping[str, Any]], None]]:
+    """The tests of a module: each of its cases holds, and fails where one of its inputs is changed."""
+
+    @pytest.mark.parametrize("name", compute)
+    def test_case(name: str) -> None:
+        case = load_case(name)
         check(case, compute[name](case.inputs))
+
+    @pytest.mark.parametrize(("name", "change"), changes)
+    def test_a_changed_input_is_noticed(name: str, change: Mapping[str, Any]) -> None:
+        case = load_case(name).with_inputs(**change)
+        with pytest.raises(AssertionError, match=rf"{name} .*\n.*deviation .* tolerance"):
+            check(case, compute[name](case.inputs))
+
+    return test_case, test_a_changed_input_is_noticed
 
 
 def _disagreement(expected: Expected, value: float) -> str:

@@ -1,4 +1,4 @@
-"""A rigid rotor in one touchdown bearing with balls as good as rigid: small drop cases by `simulate_drop`."""
+"""A rigid rotor in one touchdown bearing, which may have balls as good as rigid: small drop cases."""
 
 from __future__ import annotations
 
@@ -15,8 +15,34 @@ from rotordrop.rotor.reduction import Reduction
 LINK = 1e13
 """Stiffness [N/m] of the balls between race and support, which share the mass of the support of a case."""
 
+SHAFT = np.pi / 4 * 1e-7 * 7850.0
+"""Mass of the shaft [kg], which is there for its nodes."""
+
 _BALLS = 8
 _PRESS = 1e-2
+
+
+def disc_in(
+    more: str, mass: float, gravity: float, speed: float = 100.0, inertia: tuple[float, float] = (0.01, 0.01)
+) -> DropModel:
+    """Drop model of a disc at node 2, the middle of a thin shaft, in the bearings of a text.
+
+    Its mass [kg], polar and diametral inertia [kg m²]; gravity [m/s²] and nominal speed [Hz].
+    """
+    machine = loads_machine(
+        f"""
+name = "rigid"
+gravity = "{gravity} m/s^2"
+speed = {{ nominal = "{speed} Hz" }}
+[rotor]
+sections = [{{ length = "0.1 m", elements = 2, outer_diameter = "1 mm" }}]
+discs = [{{ node = 2, mass = "{mass} kg", polar_inertia = "{inertia[0]} kg m^2", \
+diametral_inertia = "{inertia[1]} kg m^2" }}]
+materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }} }}
+{more}
+"""
+    )
+    return build_drop_model(machine, Reduction(modes=2, attachment=False))
 
 
 def rigid_model(values: dict[str, Any], link: float = LINK, more: str = "") -> DropModel:
@@ -33,20 +59,10 @@ def rigid_model(values: dict[str, Any], link: float = LINK, more: str = "") -> D
     """
     v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"], "me": 0.0, "phase": 0.0} | values
     half = 0.5 * v["ms"]
-    unbalance = (
-        f'unbalances = [{{ node = 2, amount = "{v["me"]} kg m", phase = "{v["phase"] - 0.5 * np.pi} rad" }}]'
-    )
-    machine = loads_machine(
-        f"""
-name = "rigid"
-gravity = "{v["g"]} m/s^2"
-speed = {{ nominal = "100 Hz" }}
+    phase = v["phase"] - 0.5 * np.pi
+    unbalance = f'[[unbalances]]\nnode = 2\namount = "{v["me"]} kg m"\nphase = "{phase} rad"'
+    bearing = f"""
 {unbalance if v["me"] else ""}
-[rotor]
-sections = [{{ length = "0.1 m", elements = 2, outer_diameter = "1 mm" }}]
-discs = [{{ node = 2, mass = "{v["m"] - np.pi / 4 * 1e-7 * 7850.0} kg", polar_inertia = "0.01 kg m^2", \
-diametral_inertia = "0.01 kg m^2" }}]
-materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }} }}
 [[touchdown_bearings]]
 name = "A"
 node = 2
@@ -61,8 +77,7 @@ race = {{ mass = "{half} kg", inertia = "{v["I"]} kg m^2", drag_coefficient = 0.
 support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"]} N s/m" }}
 {more}
 """
-    )
-    model = build_drop_model(machine, Reduction(modes=2, attachment=False))
+    model = disc_in(bearing, v["m"] - SHAFT, v["g"])
     return replace(model, parameters=linked(model, link, half))
 
 

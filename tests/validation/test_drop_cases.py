@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
 
 from rotordrop.machine import Machine, example_machine
 from rotordrop.physics import columns as L
@@ -98,14 +98,8 @@ def _without_losses(model: DropModel, inputs: Inputs) -> DropModel:
 CASES: dict[str, Compute] = {"M01": mirrored, "M03": undamped}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("M01", {"mirrored": ["speed", "place"]}),
         ("M01", {"mirrored": ["place", "unbalance phase"]}),
@@ -117,5 +111,3 @@ def test_case(name: str) -> None:
         ("M03", {"tolerance": 1e-4}),
     ],
 )
-def test_perturbed_input_fails_the_case(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
 
 from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
 from rotordrop.physics.fast_balls import (
@@ -134,14 +134,8 @@ def controlled(v: Inputs) -> dict[str, float]:
 CASES: dict[str, Compute] = {"FB01": at_speeds, "FB02": others, "FB03": slopes, "FB04": controlled}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("FB01", {"ball_density": 3300.0}),
         ("FB01", {"preload": 535.0}),
@@ -151,5 +145,3 @@ def test_case(name: str) -> None:
         ("FB04", {"ball_density": 7600.0}),
     ],
 )
-def test_a_changed_input_is_noticed(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
@@ -115,14 +115,8 @@ def stopped(inputs: Inputs) -> dict[str, float]:
 CASES: dict[str, Compute] = {"MT01": cycle, "MT02": branches, "MT03": stopped}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("MT01", {"slip_force": 1530.0}),
         ("MT01", {"sharpness": 10.0}),
@@ -132,5 +126,3 @@ def test_case(name: str) -> None:
         ("MT03", {"stop_stiffness": 5.1e8}),
     ],
 )
-def test_a_changed_input_is_noticed(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
+from rigid_machine import disc_in
 
-from rotordrop.machine import loads_machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_set import ball_set_gradient
 from rotordrop.physics.ring import seat_on_springs
-from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
 
@@ -26,16 +25,7 @@ FREE = 'preload_kind = "spring", spring_rate = "1 N/m", fit_friction = 0.0, ring
 
 def model_of(v: Inputs, springs: str = "") -> DropModel:
     """A rigid rotor in one pair, whose first ball stands on the line of the load."""
-    machine = loads_machine(
-        f"""
-name = "rigid"
-gravity = "{v["g"]} m/s^2"
-speed = {{ nominal = "100 Hz" }}
-[rotor]
-sections = [{{ length = "0.1 m", elements = 2, outer_diameter = "1 mm" }}]
-discs = [{{ node = 2, mass = "{v["m"]} kg", polar_inertia = "0.01 kg m^2", \
-diametral_inertia = "0.01 kg m^2" }}]
-materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }} }}
+    pair = f"""
 [[touchdown_bearings]]
 name = "A"
 node = 2
@@ -50,8 +40,7 @@ race = {{ mass = "{v["race_mass"]} kg", inertia = "4e-4 kg m^2", drag_coefficien
 support = {{ mass = "{v["support_mass"]} kg", stiffness = "{v["support_stiffness"]} N/m", \
 damping_ratio = {v["support_damping_ratio"]} }}
 """
-    )
-    model = build_drop_model(machine, Reduction(modes=2, attachment=False))
+    model = disc_in(pair, v["m"], v["g"])
     bearing = model.parameters.bearing.copy()
     bearing[:, L.BEARING_DAMPING] = v["race_damping"]
     return replace(model, parameters=model.parameters._replace(bearing=bearing))
@@ -87,14 +76,8 @@ def impact(v: Inputs) -> dict[str, float]:
 CASES: dict[str, Compute] = {"PL01": pushed, "PL02": impact}
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("PL01", {"push": 1.01e-5}),
         ("PL01", {"preload": 540.0}),
@@ -102,5 +85,3 @@ def test_case(name: str) -> None:
         ("PL02", {"ring_mass": 0.05}),
     ],
 )
-def test_a_changed_input_is_noticed(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)

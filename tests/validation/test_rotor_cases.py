@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
 from scipy.optimize import minimize_scalar
 from tests.reference.closed_forms import rectangle_shear_coefficient
 
@@ -219,14 +219,8 @@ CASES: dict[str, Compute] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("R01", {"d": 0.0501}),
         ("R01", {"G": 76e9}),
@@ -261,5 +255,3 @@ def test_case(name: str) -> None:
         ("R18", {"unsymmetric__k2": 1.304e6}),
     ],
 )
-def test_perturbed_input_fails_the_case(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)

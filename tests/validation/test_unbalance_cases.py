@@ -9,8 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
-from cases import Compute, check, fails_with, load_case
+from cases import Compute, checks_of
 from test_rotor_cases import disc_rotor, rigid_rotor, rpm
 
 from rotordrop.rotor.campbell import Crossing, response_peaks, separations
@@ -136,14 +135,8 @@ CASES: dict[str, Compute] = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_case(name: str) -> None:
-    case = load_case(name)
-    check(case, CASES[name](case.inputs))
-
-
-@pytest.mark.parametrize(
-    ("name", "change"),
+test_case, test_a_changed_input_is_noticed = checks_of(
+    CASES,
     [
         ("U01", {"damping_ratio": 0.0505}),
         ("U01", {"k": 4.03e6}),
@@ -158,5 +151,3 @@ def test_case(name: str) -> None:
         ("U07", {"stiffness": [1.01e6, 2e6]}),
     ],
 )
-def test_perturbed_input_fails_the_case(name: str, change: dict[str, Any]) -> None:
-    fails_with(name, change, CASES)
