@@ -8,15 +8,17 @@ spin, and does not know what rolls behind the race. The numbers are a short arra
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
-from rotordrop.physics.ball_bearing import BearingConstants
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
-from rotordrop.physics.linear_algebra import solve
 from rotordrop.physics.spin import race_drag_torque
+
+if TYPE_CHECKING:
+    from rotordrop.physics.ball_bearing import BearingConstants
 
 Array = NDArray[np.float64]
 LANES = 8
@@ -357,6 +359,8 @@ def _loose_seat(
     constants: BearingConstants, entries: Array, balls: Array, load: float
 ) -> tuple[float, float]:
     """Newton steps on the convex energy of the balls and the load, damped until it falls."""
+    from rotordrop.physics.linear_algebra import solve  # none that reads entries needs it
+
     root = cube_root(abs(load) / constants.ball_stiffness)
     single = root * root
     # Deep enough for the two lowest balls of any bearing (three balls: twice the play) to be loaded at once.

@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_set import COSINE, COUNT, SINE
-from rotordrop.physics.fast_balls import FastBalls, ball_equilibrium, centred_balls
+
+if TYPE_CHECKING:
+    from rotordrop.physics.fast_balls import FastBalls
 
 Array = NDArray[np.float64]
 
@@ -57,6 +60,8 @@ def ball_table(balls: FastBalls, fastest: float, outer_stress: float) -> BallTab
     ``outer_stress`` is the stress on the outer race over the third root of a load [Pa/N^⅓]. Source:
     `ball_equilibrium` on a grid.
     """
+    from rotordrop.physics.fast_balls import ball_equilibrium, centred_balls
+
     A_0 = balls.inner_groove + balls.outer_groove
     touch = math.sqrt(A_0 * A_0 - balls.axial_offset * balls.axial_offset) - balls.radial_offset
     least, most = -math.sqrt(REACH * A_0 + touch), math.sqrt(REACH * A_0 - touch)

@@ -8,14 +8,17 @@ stands here, the force of the balls in `rotordrop.physics.ball_set`.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.physics._compile import inner_kernel
-from rotordrop.physics.ball_bearing import BearingConstants, row_axial_stiffness
 from rotordrop.physics.ball_set import AXIAL_OFFSET, BALL_STIFFNESS, GROOVE_DISTANCE, RADIAL_OFFSET
 from rotordrop.physics.elementary import tanh
+
+if TYPE_CHECKING:
+    from rotordrop.physics.ball_bearing import BearingConstants
 
 Array = NDArray[np.float64]
 
@@ -39,21 +42,19 @@ STOP_STIFFNESS = 10.0
 
 def row_rigidity(constants: BearingConstants) -> float:
     """Axial stiffness of one row at its preload [N/m]. Source: Neisi 2020, eqs. (3)–(6), differentiated."""
+    from rotordrop.physics.ball_bearing import row_axial_stiffness
+
     stiffness = constants.ball_count * constants.ball_stiffness
-    approach, groove, angle = (
-        constants.preload_approach,
-        constants.groove_distance,
-        constants.contact_angle,
-    )
-    return float(row_axial_stiffness(approach, stiffness, groove, angle))
+    approach, groove = constants.preload_approach, constants.groove_distance
+    return float(row_axial_stiffness(approach, stiffness, groove, constants.contact_angle))
 
 
 @inner_kernel
 def preload_force(numbers: Array, entries: Array) -> float:
     """Force [N] of the springs on one ring where the race is centred: what its row says at its offset.
 
-    ``numbers`` (7,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi
-    2020, eqs. (3)–(6), for an axial displacement.
+    ``numbers`` (7,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi 2020, eqs.
+    (3)–(6), for an axial displacement.
     """
     radial, axial = entries[RADIAL_OFFSET], entries[AXIAL_OFFSET]
     A = math.sqrt(radial * radial + axial * axial)
