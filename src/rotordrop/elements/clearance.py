@@ -15,6 +15,7 @@ from rotordrop.elements.values import ContactDamping, NonNegative, PositiveLengt
 from rotordrop.known import Known
 from rotordrop.physics import touch as law
 from rotordrop.physics.contact import contact_law
+from rotordrop.physics.friction import SMOOTHING_SPEED
 from rotordrop.units import format_quantity
 
 _OF_CONTACT: Mapping[str, tuple[float, tuple[float, float], str, str]] = {
@@ -23,9 +24,8 @@ _OF_CONTACT: Mapping[str, tuple[float, tuple[float, float], str, str]] = {
 }
 """What a contact is where the file gives its stiffness alone: value, range, why, unit."""
 
-SMOOTHING_SPEED, STRIBECK_SPEED = 0.02, 1.0
-"""Sliding speed [m/s] below which the friction is smoothed; the other one changes nothing where static and
-dynamic coefficient are one."""
+STRIBECK_SPEED = 1.0
+"""Speed of the Stribeck curve [m/s], which changes nothing where static and dynamic coefficient are one."""
 
 
 class Clearance(Placed):

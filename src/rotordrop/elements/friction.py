@@ -11,6 +11,7 @@ from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
+from rotordrop.physics.friction import SMOOTHING_SPEED
 
 _STATIC_OVER_DYNAMIC = 1.3
 _RATIO_ERROR = 0.15
@@ -25,7 +26,9 @@ class Friction(Description):
     """Friction coefficients at rest and when sliding fast [1]."""
     stribeck_speed: Velocity = default(0.5, "as in the reference machine", (0.1, 2.0))
     """Sliding speed over which static falls to dynamic [m/s]."""
-    smoothing_speed: Velocity = default(0.02, "small against any sliding speed that matters in a drop")
+    smoothing_speed: Velocity = default(
+        SMOOTHING_SPEED, "small against any sliding speed that matters in a drop"
+    )
     """Sliding speed below which the friction is smoothed [m/s]."""
 
     columns: ClassVar[Mapping[str, int]] = {

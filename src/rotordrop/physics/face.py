@@ -11,7 +11,7 @@ from rotordrop.physics import contact
 from rotordrop.physics._compile import lean_kernel
 from rotordrop.physics.contact import contact_energy, contact_force
 from rotordrop.physics.elementary import sine_cosine
-from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.physics.friction import SMOOTHING_SPEED, stribeck_coefficient
 
 Array = NDArray[np.float64]
 
@@ -26,9 +26,6 @@ N_ENTRIES = LAW + contact.N_ENTRIES
 
 POINTS = 8
 """Points of the ring at which sliding is taken [1]: chosen, as good as a ring."""
-
-SMOOTHING_SPEED = 0.02
-"""Sliding speed [m/s] below which friction is smoothed: that of the contact of rotor and race."""
 
 
 def mean_friction_radius(inner: float, outer: float) -> float:
@@ -80,6 +77,7 @@ def face_contact(
         tx, ty = vx - slip * radius * s, vy + slip * radius * c
         speed = math.sqrt(tx * tx + ty * ty)
         if speed > 0.0:
+            # of one coefficient the Stribeck speed changes nothing
             pull = push / POINTS * stribeck_coefficient(speed, mu, mu, 1.0, SMOOTHING_SPEED) / speed
             F_x += pull * tx
             F_y += pull * ty

@@ -7,6 +7,10 @@ import math
 from rotordrop.physics._compile import inner_kernel, kernel
 from rotordrop.physics.elementary import exp
 
+SMOOTHING_SPEED = 0.02
+"""Sliding speed [m/s] below which friction is smoothed where none is given: chosen, small against any that
+matters in a drop."""
+
 
 @inner_kernel
 def stribeck_coefficient(v: float, mu_s: float, mu_d: float, v_stribeck: float, v_smooth: float) -> float:
