@@ -58,7 +58,6 @@ CENTRIFUGAL_SHARE = 0.1
 SHOULDER_HEIGHT = 0.2
 """Height of a shoulder over the ball diameter [1]: that of rings 0.6 ball diameters apart, chosen."""
 
-_HALVINGS = 100
 _STEEL = (208e9, 0.3)
 _HARD_PUSH, _PUSHES = 10.0, 101
 """Load over that at rest [1] for which rigid and sprung preload are compared, as of a first impact; forces
@@ -175,16 +174,21 @@ class BallNumbers(BearingNumbers):
 
         Its work goes into face and balls, nothing is lost, the race has no mass, the housing does not move.
         """
+        from scipy.optimize import brentq  # slow to load, and few machines have a face
+
         rest = bearing_response(self.constants, np.zeros(5)).energy
-        low, high = 0.0, self.constants.groove_distance
-        for _ in range(_HALVINGS):
-            way = 0.5 * (low + high)
+
+        def pressed(way: float) -> tuple[float, float]:
             balls = bearing_response(self.constants, [0.0, 0.0, way, 0.0, 0.0])
-            force = -float(balls.force[2])
-            depth = depth_at(law, force) if force > 0.0 else 0.0
-            stored = balls.energy - rest + (contact_energy(law, depth) if depth > 0.0 else 0.0)
-            low, high = (way, high) if push * (gap + way + depth) > stored else (low, way)
-        return force, way
+            force = max(-float(balls.force[2]), 0.0)
+            depth = depth_at(law, force)
+            return force, push * (gap + way + depth) - (balls.energy - rest + contact_energy(law, depth))
+
+        furthest = self.constants.groove_distance
+        while pressed(furthest)[1] > 0.0:
+            furthest *= 2.0
+        way: float = brentq(lambda way: pressed(way)[1], 0.0, furthest, xtol=1e-16)
+        return pressed(way)[0], way
 
     def landing_excess(self, law: Array, gap: float, push: float) -> Excess | None:
         """A contact that a landing without any loss takes over the shoulder."""
@@ -299,18 +303,13 @@ class BallNumbers(BearingNumbers):
                 *self._on_springs(load),
             )
         loads, clearance = self.ball_loads(load), 2.0 * self.play
+        shared = f"on {np.count_nonzero(loads)} balls"
         axial = _figure("axial_play_m", "axial play", "length", constants.axial_play)
         return (
             _figure("clearance_m", "radial clearance", "length", clearance, balls.clearance),
             *((axial,) if constants.row_count == 1 else ()),
             _figure("contact_angle_rad", "free contact angle", "angle", constants.contact_angle),
-            BearingFigure(
-                field="ball_load_N",
-                label="largest ball load at rest",
-                kind="force",
-                value=float(np.max(loads)),
-                note=f"on {np.count_nonzero(loads)} balls",
-            ),
+            _figure("ball_load_N", "largest ball load at rest", "force", np.max(loads), note=shared),
         )
 
     def _on_springs(self, load: float) -> Iterator[BearingFigure]:
@@ -322,13 +321,8 @@ class BallNumbers(BearingNumbers):
         pushes = np.column_stack([np.zeros(_PUSHES), np.linspace(0.0, heavy, _PUSHES)])
         way = -seat_on_springs(springs.constants, springs.rings(), pushes)[:, 1]
         left = float(np.interp(static_deflection(self.constants, heavy)[0], way, pushes[:, 1])) / heavy
-        yield BearingFigure(
-            field="force_on_springs",
-            label="force left on preload springs",
-            kind="dimensionless",
-            value=left,
-            note=f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind",
-        )
+        note = f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind"
+        yield _figure("force_on_springs", "force left on preload springs", "dimensionless", left, note=note)
 
     def excesses(self, omega: float, load: float) -> Iterator[Excess]:
         """Speed beyond what the maker allows, centrifugal force of the balls, stress by preload."""

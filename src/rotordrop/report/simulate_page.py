@@ -35,8 +35,8 @@ LANDINGS = (
     Column("axial gap", "gap", "length"),
     Column("largest travel", "travel", "length"),
     Column("landings", lambda one: str(len(one.contacts))),
-    Column("largest axial force", lambda one: one.peak[0], "force"),
-    Column("at", lambda one: one.peak[1], "time", 3),
+    Column("largest axial force", lambda one: one.contacts.peak[0], "force"),
+    Column("at", lambda one: one.contacts.peak[1], "time", 3),
     Column("contact angle", "contact_angle", "angle"),
     Column("edge of the contact", "edge_angle", "angle"),
     Column("shoulder", lambda one: one.climb.shoulder, "angle"),
@@ -76,17 +76,11 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
 def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
     """Force on the faces against time, and what each landing came to."""
     assert result.face_force is not None
-    forces = {one.name: result.face_force[:, result.index_of(one.name)] for one in landed}
-    rows = [
-        [
-            Panel(
-                title=name,
-                axis="axial force",
-                histories=(History(label="simulated", time=result.time, values=force),),
-            )
-        ]
-        for name, force in forces.items()
-    ]
+    rows = []
+    for one in landed:
+        force = result.face_force[:, result.index_of(one.name)]
+        simulated = History(label="simulated", time=result.time, values=force)
+        rows.append([Panel(title=one.name, axis="axial force", histories=(simulated,))])
     caption = "Axial force of the rotor on the face of the race, positive towards higher nodes."
     figure = Figure(time_panels(rows, 1.0, "N"), caption, "axial force")
     return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS),))

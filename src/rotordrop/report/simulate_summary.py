@@ -63,9 +63,8 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
         figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
     landed = result.contacts_at(f"{bearing.name}.face")
     if landed is not None and len(landed):
-        hardest = int(np.argmax(landed.peak_force))
-        when = shown(landed.peak_time[hardest], "time", 3)
-        figures.append(fact("Peak axial force", landed.peak_force[hardest], "force", note=f"at {when}"))
+        force, moment = landed.peak
+        figures.append(fact("Peak axial force", force, "force", note=f"at {shown(moment, 'time', 3)}"))
     lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
     figures.append(
         fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
@@ -156,7 +155,7 @@ def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
     """How far the rotor moved along its axis, with what force it landed, whether balls climbed too far."""
     for one in landings(machine, result):
         travel, gap = shown(one.travel, "length", 3), shown(one.gap, "length", 3)
-        force, moment = one.peak
+        force, moment = one.contacts.peak
         if not len(one.contacts):
             text = f"{one.name}: the rotor travels {travel} of {gap} along its axis"
             yield Statement(f"{text} and never lands on the face.", "good")

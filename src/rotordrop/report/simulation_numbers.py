@@ -73,7 +73,7 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
 
 
 def _landed(one: Landing) -> dict[str, Any]:
-    force, moment = one.peak
+    force, moment = one.contacts.peak
     entry: dict[str, Any] = {
         "gap_m": one.gap,
         "largest_travel_m": one.travel,

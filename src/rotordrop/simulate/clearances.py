@@ -46,7 +46,7 @@ class ClearanceUse:
     @property
     def peak_force(self) -> float:
         """Largest normal force there [N]; zero where it does not touch, NaN where no force acts."""
-        return math.nan if self.contacts is None else float(np.max(self.contacts.peak_force, initial=0.0))
+        return math.nan if self.contacts is None else self.contacts.peak[0]
 
 
 def share_column(name: str, stop: bool) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,14 +38,6 @@ class Landing:
     def edge_angle(self) -> float:
         """Largest angle of the edge of a contact ellipse [rad]."""
         return float(self.climb.edge[self.climb.highest])
-
-    @property
-    def peak(self) -> tuple[float, float]:
-        """Largest axial force there [N] and when [s]; zero and NaN where it does not land."""
-        if not len(self.contacts):
-            return 0.0, math.nan
-        hardest = int(np.argmax(self.contacts.peak_force))
-        return float(self.contacts.peak_force[hardest]), float(self.contacts.peak_time[hardest])
 
 
 def landings(machine: Machine, result: DropResult) -> tuple[Landing, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,6 +57,14 @@ class ContactLog:
     def duration(self) -> Array:
         """Duration of each contact [s]."""
         return self.end - self.start
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Largest normal force [N] and when [s]; zero and NaN without any contact."""
+        if not len(self):
+            return 0.0, math.nan
+        hardest = int(np.argmax(self.peak_force))
+        return float(self.peak_force[hardest]), float(self.peak_time[hardest])
 
     def of_bearing(self, index: int) -> ContactLog:
         """The contacts of one bearing only."""

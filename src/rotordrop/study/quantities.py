@@ -135,7 +135,7 @@ def row_of(model: DropModel, result: DropResult) -> Array:
         values += np.max(np.hypot(moved[..., 0], moved[..., 1]), axis=0).tolist()
     values += [use.share for use in clearance_uses(machine, result)]
     for one in landings(machine, result):
-        values += [one.peak[0], one.edge_angle / one.climb.shoulder]
+        values += [one.contacts.peak[0], one.edge_angle / one.climb.shoulder]
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),

@@ -98,7 +98,7 @@ def test_forces_of_the_rows_are_the_slope_of_their_energy(place, offset):
 
 @pytest.mark.parametrize("side", ["both", "+z", "-z"])
 @pytest.mark.parametrize("z", [0.25e-3, -0.23e-3])
-def test_the_thrustof_a_face_is_the_slope_of_its_energy(side, z):
+def test_the_thrust_of_a_face_is_the_slope_of_its_energy(side, z):
     face = Face.model_validate(
         {"gap": "0.2 mm", "inner_radius": "32 mm", "outer_radius": "36 mm", "side": side, "exponent": 1.2}
     )
@@ -259,7 +259,7 @@ def test_ball_loads_follow_the_axial_motion(machine, drop):
 
 def test_log_page_and_document_say_how_it_landed(machine, drop):
     (one,) = landings(machine, drop)
-    force, moment = one.peak
+    force, moment = one.contacts.peak
     assert force == pytest.approx(np.max(drop.face_force[:, 1]), rel=0.02)
     assert np.all(drop.face_force[:, 0] == 0.0)
     assert drop.time[np.argmax(drop.face_force[:, 1])] == pytest.approx(moment, abs=2e-5)
@@ -289,10 +289,23 @@ def test_a_contact_over_the_shoulder_is_said_with_its_angles():
     drop = simulate_drop(low, CASE)
     (one,) = landings(low, drop)
     assert one.edge_angle > one.contact_angle > 0.0
+    balls = low.touchdown_bearings[1].bearing
+    groove = min(float(balls.conformity_inner), float(balls.conformity_outer)) * float(balls.ball_diameter)
+    assert groove * (1.0 - math.cos(one.climb.shoulder)) == pytest.approx(0.4e-3, rel=1e-9)
     assert one.climb.excess is not None and one.climb.excess.limit == one.climb.shoulder < one.edge_angle
     (said,) = [s for s in simulate_summary(drop, low).verdict if "shoulder" in s.text]
     assert said.level == "bad" and f"{math.degrees(one.climb.shoulder):.3g}°" in said.text
     assert simulation_numbers(drop, low)["axial"]["faces"]["DE"]["beyond_shoulder"] is True
+
+
+@pytest.mark.parametrize("thrust", [1e3, 1e6])
+def test_face_and_balls_store_the_work_of_a_landing(machine, thrust):
+    bearing, gap = machine.touchdown_bearings[1], 0.2e-3
+    numbers = bearing.bearing.numbers()
+    force, way = numbers.landing(bearing.face.law, gap, thrust)
+    depth = force / float(bearing.face.stiffness)
+    pressed, rest = (bearing_response(numbers.constants, [0.0, 0.0, z, 0.0, 0.0]).energy for z in (way, 0.0))
+    assert thrust * (gap + way + depth) == pytest.approx(pressed - rest + 0.5 * force * depth, rel=1e-9)
 
 
 def test_check_warns_of_a_landing_over_the_shoulder(machine):
