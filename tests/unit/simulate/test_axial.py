@@ -8,6 +8,8 @@ import re
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
 from rotordrop.elements.face import Face
 from rotordrop.errors import MachineFileError, RecordError
@@ -292,6 +294,19 @@ def test_a_contact_over_the_shoulder_is_said_with_its_angles():
     balls = low.touchdown_bearings[1].bearing
     groove = min(float(balls.conformity_inner), float(balls.conformity_outer)) * float(balls.ball_diameter)
     assert groove * (1.0 - math.cos(one.climb.shoulder)) == pytest.approx(0.4e-3, rel=1e-9)
+    # the ellipse by its area and by its axis ratio, of Legendre's integrals
+    at = one.climb.highest
+    gamma = float(balls.ball_diameter) / float(balls.pitch_diameter) * math.cos(float(balls.contact_angle))
+    bent, curved = 2.0 * gamma / (1.0 - gamma), 1.0 / float(balls.conformity_inner)
+    difference = (curved + bent) / (4.0 - curved + bent)
+
+    def off(kappa):
+        E, K = ellipe(1.0 - kappa**-2), ellipk(1.0 - kappa**-2)
+        return ((kappa**2 + 1.0) * E - 2.0 * K) / ((kappa**2 - 1.0) * E) - difference
+
+    area = 1.5 * drop.max_ball_load[at, 1] / drop.max_stress[at, 1]
+    reach = math.sqrt(area / math.pi * brentq(off, 1.01, 100.0))
+    assert one.edge_angle - one.climb.angle[at] == pytest.approx(reach / groove, rel=1e-3)
     assert one.climb.excess is not None and one.climb.excess.limit == one.climb.shoulder < one.edge_angle
     (said,) = [s for s in simulate_summary(drop, low).verdict if "shoulder" in s.text]
     assert said.level == "bad" and f"{math.degrees(one.climb.shoulder):.3g}°" in said.text
