@@ -94,25 +94,21 @@ def summarise_machine(machine: Machine) -> MachineSummary:
 
 
 def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> BearingSummary:
-    numbers = numbers_of(bearing)
+    numbers, face = numbers_of(bearing), bearing.face
     parts, support = stiffness_of(bearing, abs(load)), bearing.support
+    figures = numbers.figures(abs(load))
+    if face is not None:
+        figures += tuple(numbers.axial_figures(face.law, float(face.gap), _push(machine, face)))
     return BearingSummary(
         name=bearing.name,
         load=load,
-        figures=(*numbers.figures(abs(load)), *_axial(machine, bearing)),
+        figures=figures,
         contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
         deflection=numbers.deflection(abs(load))[0],
         tangent_stiffness=parts.tangent,
         support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),
         equivalent_stiffness=parts.equivalent(),
     )
-
-
-def _axial(machine: Machine, bearing: TouchdownBearing) -> Iterator[BearingFigure]:
-    """What holds the race of a bearing with a face along the axis, and its landing."""
-    if bearing.face is not None:
-        push = _push(machine, bearing.face)
-        yield from numbers_of(bearing).axial_figures(bearing.face.law, float(bearing.face.gap), push)
 
 
 def _push(machine: Machine, face: Face) -> float:
