@@ -495,12 +495,15 @@ def add_axial_motion(
     _, _, ax, ay = modal_parts(dy, p)
     z, speed = y[at], y[at + 1]
     force = torque = total = 0.0
-    if t < p.spin[L.POWER_OFF_DELAY]:
+    levitated = t < p.spin[L.POWER_OFF_DELAY]
+    if levitated:
         force = p.spin[L.AXIAL_HOLDING] - p.spin[L.AXIAL_STIFFNESS] * z - p.spin[L.AXIAL_DAMPING] * speed
     for j in range(p.load.shape[0]):
         if p.load[j, L.LOAD_AXIAL] != 0.0:
             along, _ = load_now(p.load[j], p.load_points, t, y[p.rotor_at[L.ROTOR_SPEED]])
             force += along
+    if levitated and p.spin[L.AXIAL_STIFFNESS] == 0.0:
+        force = 0.0  # nobody described what holds the rotor, so that no load moves it
     dy[p.rotor_at[L.WORK_IN]] += force * speed
     for b in p.faces:
         own, row, shape = p.bearing_at[b, L.FACE_STATES], p.bearing[b], p.bearing_shape[b]

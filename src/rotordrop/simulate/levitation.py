@@ -61,7 +61,7 @@ def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters
     spin[L.INITIAL_SPEED] = case.speed
     if case.spin == "constant":
         spin[L.AERO_TIME_CONSTANT] = np.inf  # a prescribed profile that never falls
-    # held in the middle until the release, whatever pushes: by its axial AMBs, or by what nobody described
+    # axial AMBs hold the rotor in the middle against what pushes at the beginning
     axial = parameters.load[parameters.load[:, L.LOAD_AXIAL] != 0.0]
     spin[L.AXIAL_HOLDING] = -sum(load_now(row, parameters.load_points, 0.0, case.speed)[0] for row in axial)
     flags = parameters.flags.copy()

@@ -246,6 +246,19 @@ def test_magnets_hold_the_rotor_until_the_release(machine):
         assert z[drop.time > 3e-3][inside] == pytest.approx(fall[inside], abs=1e-7)
 
 
+def test_a_load_that_grows_moves_no_rotor_before_the_release():
+    """It drifted by half the axial gap where no axial AMB was described."""
+    course = 'over_time = [{ time = "0 s", force = "0 N" }, { time = "3 ms", force = "1000 N" }]'
+    growing = faced(push().replace('force = "1000.0 N"', course))
+    case = DropCase(speed=SPEED, duration=6e-3, reduction="quick", start=LevitatedStart(delay=3e-3))
+    drop = simulate_drop(growing, case)
+    late = drop.time[drop.time > 3e-3] - 3e-3
+    assert np.all(drop.axial_displacement[drop.time < 3e-3] == 0.0)
+    fall = 0.5 * 1000.0 / growing.rotor.mass * late**2
+    inside = fall < 0.2e-3
+    assert drop.axial_displacement[drop.time > 3e-3][inside] == pytest.approx(fall[inside], abs=1e-7)
+
+
 def test_the_face_spins_the_race_up_and_brakes_the_rotor(machine, drop):
     smooth = simulate_drop(machine.with_values({"DE.face.friction": 0.0}), CASE)
     assert drop.race_speed[-1, 1] > 5.0 * smooth.race_speed[-1, 1]
