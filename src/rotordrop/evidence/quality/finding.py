@@ -15,12 +15,12 @@ _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
 UNSEEN = (
-    "exchanged blocks of up to 20 µm",
+    "blocks exchanged within 20 µm",
     "1 to 5 lost samples",
-    "a gain error that all channels share",
+    "a gain error of all channels",
     "the mass of another rotor",
 )
-UNSEEN_IN_TAIL = ("a tail with its ends or axes exchanged", "its zeros moved by 40 µm")
+UNSEEN_IN_TAIL = ("a tail's ends or axes exchanged", "its zeros off by 40 µm")
 """What passes the gate, most of it in `studies/gate`, in a few words: it is said where people decide."""
 
 
