@@ -21,6 +21,7 @@ from rotordrop.elements.catalog.boundary import (
 )
 from rotordrop.elements.description import Misfit, Text, Usual
 from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries
+from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import default, follows
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
     from rotordrop.elements.catalog.lookup import CatalogueBearing
 
 BallMaterial = Literal["silicon nitride", "steel"]
-
-STEEL_DENSITY = 7800.0
-"""Of bearing steel, rings and balls [kg/m³]."""
 
 _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
     "silicon nitride": {
@@ -242,6 +240,23 @@ class BallBearing(RaceBearing):
     def sprung(self) -> bool:
         """Whether springs press on the outer rings."""
         return self.preload_kind == "spring"
+
+    @property
+    def beyond_estimates(self) -> tuple[str, str] | None:
+        """Balls with inertia."""
+        more = "; leave out ball_inertia: 'rotordrop check' says what it would change"
+        return ("has balls with inertia", more) if self.ball_inertia else None
+
+    @property
+    def no_face(self) -> str:
+        """Springs, balls with inertia and rows that face one way."""
+        if self.sprung:
+            return "the two rings of a pair on springs would move apart from one another"
+        if self.ball_inertia:
+            return "the table of balls with inertia knows no axial motion"
+        if self.arrangement in ("single", "tandem") and float(self.preload) > 0.0:
+            return f'rows that all face one way (arrangement = "{self.arrangement}") need a counterpart'
+        return ""
 
     @property
     def further_states(self) -> tuple[int, ...]:
@@ -454,10 +469,11 @@ class BallBearing(RaceBearing):
             return rows * self.width.value, "width of all rows"
         return rows * 1.6 * self.ball_diameter.value, "1.6 ball diameters per row"
 
-    def race_radius(self) -> tuple[float, str]:
-        """Outer radius of what spins with the inner race [m], and why."""
+    def race_of_size(self, race: Race, width: Known, bore: float) -> Race:
+        """Give the race the mass of a ring from the bore to below the balls."""
         radius = 0.5 * (self.pitch_diameter.value - 0.6 * self.ball_diameter.value)
-        return radius, "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
+        why = "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
+        return race.sized(width, bore, radius, why)
 
     def oddities(self, bore_radius: float) -> Iterator[Oddity]:
         """A preload beyond the heavy class, balls far from the bore."""

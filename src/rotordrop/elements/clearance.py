@@ -68,6 +68,17 @@ class Clearance(Placed):
                     (key,),
                 )
 
+    @property
+    def beyond_estimates(self) -> tuple[str, str] | None:
+        """A housing that the rotor touches."""
+        if self.stiffness is None:
+            return None
+        return (
+            "has a 'stiffness'",
+            ": the housing would pass for something else. Leave it out where the rotor did not touch there; "
+            "'rotordrop simulate' and 'study' know it",
+        )
+
     def completed(self, rotor: Rotor) -> dict[str, Any]:
         """What its contact leaves out, on a rotor."""
         if self.stiffness is None:

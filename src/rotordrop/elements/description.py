@@ -149,6 +149,11 @@ class Description(BaseModel):
         return ()
 
     @property
+    def beyond_estimates(self) -> tuple[str, str] | None:
+        """What it has or is that no record can be estimated with yet, and what more to say of it."""
+        return None
+
+    @property
     def remembered(self) -> int:
         """Number of entries that it keeps in the discrete memory of a drop."""
         return 0

@@ -19,6 +19,10 @@ SignedAcceleration = Annotated[Known, Physical("acceleration")]
 Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 
 AXIAL = "an axial acceleration of the ground"
+_NOT_ESTIMATED = (
+    ": the fall before the first contact is taken as one under gravity alone. Leave it out to estimate "
+    "without it; 'rotordrop simulate' and 'study' know it"
+)
 
 
 class LoadPoint(Description):
@@ -66,6 +70,11 @@ class Load(Placed):
         if self.over_time and "speed_exponent" in self.model_fields_set:
             raise Misfit("a course over time does not go with the speed; leave out one", ("speed_exponent",))
         check_times(self.over_time)
+
+    @property
+    def beyond_estimates(self) -> tuple[str, str]:
+        """It acts during the fall."""
+        return "has [[loads]]", _NOT_ESTIMATED
 
     @property
     def sense(self) -> float:
@@ -124,6 +133,11 @@ class Base(Description):
         if sine and (self.frequency is None or not sine & {"x", "y"}):
             raise Misfit("the sine of a base needs 'frequency' and an amplitude, 'x' or 'y'")
         check_times(self.over_time)
+
+    @property
+    def beyond_estimates(self) -> tuple[str, str]:
+        """It acts during the fall."""
+        return "has [base]", _NOT_ESTIMATED
 
     def course(self) -> tuple[Array, Array]:
         """Entries of the base as a load, and the points of its course, shape (R, 3) [s], [m/s²]."""

@@ -10,7 +10,19 @@ from rotordrop.elements import values as V
 from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
 from rotordrop.elements.values import default, follows
+from rotordrop.known import Known
 from rotordrop.physics import columns as L
+
+STEEL_DENSITY = 7800.0
+"""Of bearing steel, rings and balls [kg/m³]."""
+
+RACE_MASS, RACE_FORM = 1.25, 1.3
+"""Factors within which mass and form, inertia over mass, of a race lie that are inferred from its size [1].
+
+Grooves and shoulders make up a fifth of a ring. One with a carrier 2.3 times as heavy was met, with a form
+within 7 %: what spins along has to be stated. A mass within a factor of 2 did not follow it either, and moved
+peaks of ordinary rings by up to 6 % (five drops of DropBench, rings within 10 % of the inferred mass).
+"""
 
 
 class Race(Description):
@@ -35,6 +47,25 @@ class Race(Description):
         "drag_coefficient": L.DRAG_COEFFICIENT,
         "drag_speed": L.DRAG_SPEED,
     }
+
+    def sized(self, width: Known, inner: float, outer: float, why: str) -> Race:
+        """Give the race a width, and where left out the mass and inertia of a steel ring of two radii [m]."""
+        outer = max(outer, 1.05 * inner)
+        mass = STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width.value
+        inertia = 0.5 * mass * (outer**2 + inner**2)
+        values, spread = {"width": width}, RACE_FORM
+        if "mass" not in self.model_fields_set:
+            bounds = (mass / RACE_MASS, mass * RACE_MASS)
+            values["mass"] = Known(value=mass, status="inferred", range=bounds, source=why, unit="kg")
+            spread = math.exp(math.hypot(math.log(RACE_MASS), math.log(RACE_FORM)))
+        else:
+            inertia *= self.mass.value / mass
+        if "inertia" not in self.model_fields_set:
+            bounds = (inertia / spread, inertia * spread)
+            values["inertia"] = Known(
+                value=inertia, status="inferred", range=bounds, source=why, unit="kg m^2"
+            )
+        return self.completed_with(values)
 
 
 PARAMETERS: tuple[Parameter, ...] = (

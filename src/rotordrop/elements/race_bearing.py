@@ -16,6 +16,7 @@ from rotordrop.known import Known
 from rotordrop.physics import ring
 
 if TYPE_CHECKING:
+    from rotordrop.elements.race import Race
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.physics.ball_table import BallTable
 
@@ -32,8 +33,13 @@ class RaceBearing(Description):
     designation: Text | None = None
     """What its maker calls it."""
 
-    has_race: ClassVar[bool] = True
-    """Whether a race spins between rotor and support."""
+    no_race: ClassVar[str] = ""
+    """Why no table 'race' goes with it, where none spins between rotor and support; empty where one does."""
+
+    @property
+    @abstractmethod
+    def no_face(self) -> str:
+        """Why its race cannot have a face on which the rotor lands; empty where it can."""
 
     @abstractmethod
     def numbers(self) -> BearingNumbers:
@@ -48,8 +54,8 @@ class RaceBearing(Description):
         """Width of the race [m] where none is given, and why."""
 
     @abstractmethod
-    def race_radius(self) -> tuple[float, str]:
-        """Outer radius of what spins with the race [m], and why."""
+    def race_of_size(self, race: Race, width: Known, bore: float) -> Race:
+        """Give a race its width, and mass and inertia that were left out, around a bore radius [m]."""
 
     def oddities(self, bore_radius: float) -> Iterator[Oddity]:
         """What looks odd in the description, which can be used all the same."""
@@ -226,6 +232,14 @@ class BearingNumbers(ABC):
     @abstractmethod
     def simple_stiffness(self, load: float) -> float:
         """Radial stiffness [N/m] under a load [N] by the engineering formula of handbooks."""
+
+    def in_series(self, contact: float, load: float) -> tuple[float, float, float]:
+        """Stiffness [N/m] under a load [N] of a contact, given, and behind its race, tangent and simple."""
+        return contact, self.tangent_stiffness(load), self.simple_stiffness(load)
+
+    def damping(self, time: float, load: float) -> float:
+        """Its damping [N s/m] under a static load [N] where damping over tangent stiffness is given [s]."""
+        return time * self.tangent_stiffness(load)
 
     @abstractmethod
     def figures(self, load: float) -> tuple[BearingFigure, ...]:

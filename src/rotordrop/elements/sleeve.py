@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.race import Race
 from rotordrop.elements.race_bearing import BearingFigure, BearingNumbers, Excess, RaceBearing
 from rotordrop.elements.values import PoissonRatio, PositiveLength, Pressure, default
+from rotordrop.known import Known
 from rotordrop.physics import ball_set
 
 Array = NDArray[np.float64]
@@ -27,9 +29,16 @@ class Sleeve(RaceBearing):
     poisson_ratio: PoissonRatio = default(0.34, "bronze", (0.27, 0.4))
     """Poisson's ratio [1]."""
 
-    has_race: ClassVar[bool] = False
-    ball_inertia: ClassVar[bool] = False
+    no_race: ClassVar[str] = (
+        "a sleeve has no race; leave out the table 'race': the length of the sleeve stands under 'bearing', "
+        "its mass belongs to the support"
+    )
     ring_travel: ClassVar[None] = None
+    beyond_estimates: ClassVar[tuple[str, str]] = (
+        "is a sleeve",
+        "; 'rotordrop simulate', 'coast-down' and 'study' know it",
+    )
+    no_face: ClassVar[str] = "a sleeve has no race that could give way axially"
 
     def numbers(self) -> SleeveNumbers:
         """Give the numbers that follow from it."""
@@ -42,9 +51,10 @@ class Sleeve(RaceBearing):
         """Its length."""
         return self.length.value, "the length of the sleeve"
 
-    def race_radius(self) -> tuple[float, str]:
+    def race_of_size(self, race: Race, width: Known, bore: float) -> Race:
         """Nothing spins with it."""
-        return 0.0, "a sleeve does not spin"
+        none = Known(value=0.0, status="default", source="a sleeve does not spin", unit="kg")
+        return race.completed_with({"width": width, "mass": none, "inertia": replace(none, unit="kg m^2")})
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,14 @@ class SleeveNumbers(BearingNumbers):
     def simple_stiffness(self, load: float) -> float:
         """Rigid."""
         return math.inf
+
+    def in_series(self, contact: float, load: float) -> tuple[float, float, float]:
+        """The contact is all that lies on the support."""
+        return math.inf, contact, contact
+
+    def damping(self, time: float, load: float) -> float:
+        """None but that of contact and support."""
+        return 0.0
 
     def figures(self, load: float) -> tuple[BearingFigure, ...]:
         """Nothing holds it but its support."""

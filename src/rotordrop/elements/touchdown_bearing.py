@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, WrapValidator
 
-from rotordrop.elements.ball_bearing import STEEL_DENSITY, BallBearing
+from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description, Misfit, Name, Placed
 from rotordrop.elements.face import Face
@@ -19,29 +18,27 @@ from rotordrop.elements.friction import Friction
 from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
 from rotordrop.elements.race import Race
+from rotordrop.elements.race_bearing import RaceBearing
 from rotordrop.elements.sleeve import Sleeve
 from rotordrop.elements.support import Support
 from rotordrop.elements.values import PositiveLength, Time, default, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
-RACE_MASS, RACE_FORM = 1.25, 1.3
-"""Factors within which mass and form, inertia over mass, of a race lie that are inferred from its size [1].
-
-Grooves and shoulders make up a fifth of a ring. One with a carrier 2.3 times as heavy was met, with a form
-within 7 %: what spins along has to be stated. A mass within a factor of 2 did not follow it either, and moved
-peaks of ordinary rings by up to 6 % (five drops of DropBench, rings within 10 % of the inferred mass).
-"""
 _MOUNTING = frozenset(
     ("arrangement", "first_ball_angle", "second_row_offset", "preload_class", "clearance_class")
 )
 
+_WITHOUT_BALLS: Mapping[str, type[RaceBearing]] = {"sleeve": Sleeve}
+"""Kinds of touchdown bearings whose table 'bearing' describes no ball bearing."""
+
 
 def _of_its_kind(raw: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
     """Read a table 'bearing' as the kind of touchdown bearing says."""
-    if info.data.get("kind") != "sleeve":
+    kind = _WITHOUT_BALLS.get(info.data.get("kind", ""))
+    if kind is None:
         return handler(raw)
-    return raw if isinstance(raw, Sleeve) else Sleeve.model_validate(raw)
+    return raw if isinstance(raw, kind) else kind.model_validate(raw)
 
 
 class TouchdownBearing(Placed):
@@ -82,6 +79,12 @@ class TouchdownBearing(Placed):
     columns: ClassVar[Mapping[str, int]] = {"air_gap": L.AIR_GAP, "bore_radius": L.BORE_RADIUS}
 
     @property
+    def masses(self) -> dict[str, float]:
+        """What moves between rotor and ground, from the rotor outwards, and its mass [kg]."""
+        race = {} if self.bearing.no_race else {"race": float(self.race.mass)}
+        return race | {"support": float(self.support.mass)}
+
+    @property
     def parts(self) -> tuple[Description, ...]:
         """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
         faces = () if self.face is None else (self.face,)
@@ -103,7 +106,7 @@ class TouchdownBearing(Placed):
                 'kind = "planetary" is reserved for bearings of several rollers, which are not yet supported'
             )
             raise Misfit(f'{told}; there are "ball bearing" and "sleeve"', ("kind",))
-        return mounted({"bearing": {}} | raw if raw.get("kind") == "sleeve" else raw)
+        return mounted({"bearing": {}} | raw if raw.get("kind") in _WITHOUT_BALLS else raw)
 
     def check(self) -> None:
         """Refuse a clearance that leaves no rotor and a bore outside the balls."""
@@ -115,34 +118,15 @@ class TouchdownBearing(Placed):
                 ("air_gap",),
             )
         self.bearing.check_bore(bore)
-        self._check_face()
-        if not self.bearing.has_race and self.race.model_fields_set:
+        if self.face is not None and self.bearing.no_face:
             raise Misfit(
-                "a sleeve has no race; leave out the table 'race': the length of the sleeve stands under "
-                "'bearing', its mass belongs to the support",
-                ("race",),
-            )
-
-    def _check_face(self) -> None:
-        """Refuse a face of a bearing whose race does not stand between two rows, or in its play."""
-        if self.face is None:
-            return
-        bearing, told = self.bearing, ""
-        if not bearing.has_race:
-            told = "a sleeve has no race that could give way axially"
-        elif bearing.sprung:
-            told = "the two rings of a pair on springs would move apart from one another"
-        elif bearing.ball_inertia:
-            told = "the table of balls with inertia knows no axial motion"
-        elif bearing.arrangement in ("single", "tandem") and float(bearing.preload) > 0.0:
-            told = f'rows that all face one way (arrangement = "{bearing.arrangement}") need a counterpart'
-        if told:
-            raise Misfit(
-                f"the touchdown bearing {self.name} cannot have a face: {told}, which is not yet supported; "
-                "leave the face out, or describe a preloaded pair between rigid spacers or a bearing with "
-                "clearance",
+                f"the touchdown bearing {self.name} cannot have a face: {self.bearing.no_face}, which is not "
+                "yet supported; leave the face out, or describe a preloaded pair between rigid spacers or a "
+                "bearing with clearance",
                 ("face",),
             )
+        if self.bearing.no_race and self.race.model_fields_set:
+            raise Misfit(self.bearing.no_race, ("race",))
 
     def with_designation(self, designation: str) -> TouchdownBearing:
         """Give the same touchdown bearing around another rolling bearing, with its catalogue values.
@@ -151,8 +135,8 @@ class TouchdownBearing(Placed):
         and lengths of the bearing before it do not. Mass and inertia of the race change as those of steel
         rings of both sizes do.
         """
-        if not self.bearing.has_race:
-            raise ValueError('it is a sleeve; give the file kind = "ball bearing" and a bearing')
+        if self.kind != "ball bearing":
+            raise ValueError(f'it is a {self.kind}; give the file kind = "ball bearing" and a bearing')
         kept = self.bearing.model_fields_set & _MOUNTING
         mounted = {name: getattr(self.bearing, name) for name in kept}
         inside = BallBearing.model_validate({"designation": designation} | mounted)
@@ -167,32 +151,9 @@ class TouchdownBearing(Placed):
 
     def left_out(self) -> dict[str, Any]:
         """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
-        given = self.race.model_fields_set
-        width = self.race.width if "width" in given else self._race_width()
-        if not self.bearing.has_race:
-            none = Known(value=0.0, status="default", source="a sleeve does not spin", unit="kg")
-            values = {"width": width, "mass": none, "inertia": replace(none, unit="kg m^2")}
-            return {
-                "race": self.race.completed_with(values),
-                "mount": self.mount.beside(self.support.stiffness),
-            }
-        mass, inertia = self._race_from_size(width.value)
-        why = self.bearing.race_radius()[1]
-        values = {"width": width}
-        spread = RACE_FORM
-        if "mass" not in given:
-            bounds = (mass / RACE_MASS, mass * RACE_MASS)
-            values["mass"] = Known(value=mass, status="inferred", range=bounds, source=why, unit="kg")
-            spread = math.exp(math.hypot(math.log(RACE_MASS), math.log(RACE_FORM)))
-        else:
-            inertia *= self.race.mass.value / mass
-        if "inertia" not in given:
-            bounds = (inertia / spread, inertia * spread)
-            values["inertia"] = Known(
-                value=inertia, status="inferred", range=bounds, source=why, unit="kg m^2"
-            )
+        width = self.race.width if "width" in self.race.model_fields_set else self._race_width()
         return {
-            "race": self.race.completed_with(values),
+            "race": self.bearing.race_of_size(self.race, width, self.bore_radius.value),
             "mount": self.mount.beside(self.support.stiffness),
         }
 
@@ -201,12 +162,6 @@ class TouchdownBearing(Placed):
             return replace(self.contact.length, status="inferred", source="the length of the line contact")
         value, why = self.bearing.usual_race_width()
         return Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
-
-    def _race_from_size(self, width: float) -> tuple[float, float]:
-        inner = self.bore_radius.value
-        outer = max(self.bearing.race_radius()[0], 1.05 * inner)
-        mass = STEEL_DENSITY * math.pi * (outer**2 - inner**2) * width
-        return mass, 0.5 * mass * (outer**2 + inner**2)
 
 
 MODEL_GAP_ERROR = 0.008

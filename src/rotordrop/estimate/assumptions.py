@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from rotordrop.elements.race import RACE_MASS
 from rotordrop.elements.table import parameter
-from rotordrop.elements.touchdown_bearing import RACE_MASS
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
 from rotordrop.evidence.quality import not_seen
 from rotordrop.known import NINETY

@@ -437,35 +437,8 @@ def insisted(evidence: Evidence) -> Evidence:
         When the rotor does not fall in the record, or it has no speed.
     """
     machine = evidence.machine
-    if machine.axial:
-        raise RecordError(
-            f"the rotor of the machine {machine.name!r} moves along its axis, with which a record cannot be "
-            "estimated yet: no sensor of a record shows it. Leave out what is axial (face, axial loads and "
-            "AMBs, rotor.axial) to estimate the radial drop alone; 'rotordrop simulate' and 'study' know it"
-        )
-    if machine.loads or machine.base is not None:
-        key = "[[loads]]" if machine.loads else "[base]"
-        raise RecordError(
-            f"the machine {machine.name!r} has {key}, with which a record cannot be estimated yet: the fall "
-            "before the first contact is taken as one under gravity alone. Leave it out to estimate without "
-            "it; 'rotordrop simulate' and 'study' know it"
-        )
-    if rubbing := [one.name for one in machine.clearances if one.stiffness is not None]:
-        raise RecordError(
-            f"the clearance {rubbing[0]!r} of the machine {machine.name!r} has a 'stiffness', with which a "
-            "record cannot be estimated yet: the housing would pass for something else. "
-            "Leave it out where the rotor did not touch there; 'rotordrop simulate' and 'study' know it"
-        )
-    if sleeves := [one.name for one in machine.touchdown_bearings if not one.bearing.has_race]:
-        raise RecordError(
-            f"the touchdown bearing {sleeves[0]!r} of the machine {machine.name!r} is a sleeve, with which "
-            "a record cannot be estimated yet; 'rotordrop simulate', 'coast-down' and 'study' know it"
-        )
-    if any(bearing.bearing.ball_inertia for bearing in machine.touchdown_bearings):
-        raise RecordError(
-            f"the machine {machine.name!r} has balls with inertia, with which a record cannot be estimated "
-            "yet; leave out ball_inertia: 'rotordrop check' says what it would change"
-        )
+    if machine.not_estimated:
+        raise RecordError(machine.not_estimated)
     if evidence.record.speed_readings is None:
         raise RecordError(
             f"the record {evidence.name} has no rotor speed; expected one. Name its channel in a profile "

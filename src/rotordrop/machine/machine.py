@@ -30,6 +30,12 @@ from rotordrop.units import GRAVITY, format_quantity, in_si
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 
+_AXIAL = (
+    "moves along its axis",
+    ": no sensor of a record shows it. Leave out what is axial (face, axial loads and AMBs, rotor.axial) to "
+    "estimate the radial drop alone; 'rotordrop simulate' and 'study' know it",
+)
+
 
 class Machine(Description):
     """A machine whose rotor can drop onto its touchdown bearings; immutable."""
@@ -107,6 +113,24 @@ class Machine(Description):
         described = bool(self.axial_ambs) or any(load.along for load in self.loads)
         described = described or any(bearing.face for bearing in self.touchdown_bearings)
         return described if self.rotor.axial is None else self.rotor.axial
+
+    @property
+    def not_estimated(self) -> str:
+        """Why no record of it can be estimated yet; empty where one can."""
+        machine = f"the machine {self.name!r}"
+        parts: list[tuple[str, tuple[str, str] | None]] = [
+            (f"the rotor of {machine}", _AXIAL if self.axial else None),
+            *((machine, load.beyond_estimates) for load in self.loads),
+            (machine, self.base.beyond_estimates if self.base else None),
+            *((f"the clearance {one.name!r} of {machine}", one.beyond_estimates) for one in self.clearances),
+        ]
+        for bearing in self.touchdown_bearings:
+            who = f"the touchdown bearing {bearing.name!r} of {machine}"
+            parts += [(who, part.beyond_estimates) for part in bearing.parts]
+        found = ((who, *said) for who, said in parts if said is not None)
+        return next(
+            (f"{w} {what}, with which a record cannot be estimated yet{more}" for w, what, more in found), ""
+        )
 
     def _check_axial(self) -> None:
         """Refuse what acts along the axis of a rotor that does not move there, or that nothing stops."""

@@ -189,7 +189,7 @@ def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator
     """Race, support and contact of a bearing against the weight of the rotor and the size of the bearing."""
     name, mass, gap = bearing.name, machine.rotor.mass, bearing.air_gap.value
     support, contact = bearing.support, bearing.contact
-    if bearing.bearing.has_race:
+    if "race" in bearing.masses:
         yield from _of_the_race(bearing, mass)
     look = f"the rotor weighs {mass:.3g} kg"
     weight = mass * GRAVITY / len(machine.touchdown_bearings)

@@ -87,12 +87,9 @@ def _verdict(
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
         said += [*_springs(result, machine), *_thrown(result, machine), *_landed(result, machine)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
-    sleeves = (
-        ()
-        if machine is None
-        else [one.name for one in machine.touchdown_bearings if not one.bearing.has_race]
-    )
-    said += [static_limit_statement(bearing) for bearing in bearings if bearing.name not in sleeves]
+    known = () if machine is None else machine.touchdown_bearings
+    unrated = [one.name for one in known if numbers_of(one).rolling_elements() is None]
+    said += [static_limit_statement(bearing) for bearing in bearings if bearing.name not in unrated]
     said += [_used(use) for use in uses]
     if machine is not None and machine.defaults_in_use:
         count = len(machine.defaults_in_use)

@@ -103,13 +103,12 @@ class StateLayout:
         ]
         # by column, not by part: who lists the parts of a bearing otherwise moves no state
         places = sorted({place for states in asked for place in states})
+        raceless = tuple("race" not in one.masses for one in bearings)
         return cls(
             n_modes=n_modes,
             n_bearings=len(bearings),
             further=tuple((place, tuple(one.get(place, ()) for one in asked)) for place in places),
-            raceless=()
-            if all(one.bearing.has_race for one in bearings)
-            else tuple(not one.bearing.has_race for one in bearings),
+            raceless=raceless if any(raceless) else (),
             sensor_own=sum(len(sensor.further_states) for sensor in machine.sensors),
             moves_axially=machine.axial,
         )

@@ -193,7 +193,8 @@ def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[Machin
 
 def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
     race, radius, numbers = bearing.race, float(bearing.bore_radius), numbers_of(bearing)
-    if not bearing.bearing.has_race:
+    room, against = numbers.room_to_grow()
+    if room == math.inf:
         return
     sliding, rolling = friction_heat(
         F_r=max(rest.load, 0.0),
@@ -206,7 +207,6 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
         duration=HEAT_WINDOW,
     )
     warming, growth = growth_of_race(0.5 * sliding + rolling, float(race.mass), radius)
-    room, against = numbers.room_to_grow()
     if growth <= GROWTH_SHARE * room:
         return
     speed, grown, small = (

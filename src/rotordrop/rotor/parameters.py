@@ -145,7 +145,7 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
     bearings = machine.touchdown_bearings
     rows = np.array([bearing_row(bearing, load) for bearing, load in zip(bearings, shares, strict=True)])
     for row, bearing in zip(rows, bearings, strict=True):
-        if not bearing.bearing.has_race:  # what stresses a sleeve is the rotor in it
+        if row[L.STRESS_COEFFICIENT] == 0.0:  # without rolling elements the rotor stresses what it lies in
             row[L.STRESS_COEFFICIENT] = float(rotor_on_race(machine, bearing).maximum_pressure(1.0))
         # A held race gives way to its own weight by nanometres; a loose one falls.
         if not numbers_of(bearing).held:
@@ -236,8 +236,7 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.RING : L.RING_END] = numbers.rings()
     row[L.PITCH_DIAMETER] = numbers.drag_diameter
-    if bearing.bearing.has_race:
-        row[L.BEARING_DAMPING] = float(bearing.damping_time) * numbers.tangent_stiffness(static_load)
+    row[L.BEARING_DAMPING] = numbers.damping(float(bearing.damping_time), static_load)
     bearing.fill(row)
     return row
 

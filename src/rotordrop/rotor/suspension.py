@@ -54,7 +54,8 @@ class EquivalentStiffness:
     support: float
     """Stiffness of the support [N/m]: its spring, a ribbon that sticks, a stop that the load presses shut."""
     contact: float
-    """Slope of the contact law between rotor and race at that load [N/m]."""
+    """Slope of the contact law between rotor and race at that load [N/m]; infinite without a race, where the
+    bearing is the contact."""
     branches: tuple[Relaxing, ...] = ()
     """Branches of the mount that relax: nothing at rest, stiffer the faster the rotor moves."""
 
@@ -94,9 +95,7 @@ def stiffness_of(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
     """Stiffness of one touchdown bearing under a load [N], part by part."""
     numbers, mount = numbers_of(bearing), bearing.mount
     contact = contact_tangent(bearing.contact.law, load)
-    tangent, simple = contact, contact  # of a sleeve the contact is all that lies on the support
-    if bearing.bearing.has_race:
-        tangent, simple = numbers.tangent_stiffness(load), numbers.simple_stiffness(load)
+    contact, tangent, simple = numbers.in_series(contact, load)
     return EquivalentStiffness(
         bearing=bearing.name,
         node=bearing.node,
@@ -104,7 +103,7 @@ def stiffness_of(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
         tangent=tangent,
         simple=simple,
         support=float(bearing.support.stiffness) + _held_by(bearing, load)[1],
-        contact=contact if bearing.bearing.has_race else math.inf,
+        contact=contact,
         branches=tuple(Relaxing(stiffness=float(b.stiffness), time=float(b.time)) for b in mount.maxwell),
     )
 
@@ -168,17 +167,15 @@ def touchdown_supports(
         race = parts.tangent if formula == "tangent" else parts.simple
         beside, below = _held_by(bearing, parts.load)
         links = (
-            *((link(parts.contact),) if bearing.bearing.has_race else ()),
-            link(race, float(bearing.damping_time) * parts.tangent if bearing.bearing.has_race else 0.0),
+            *((link(parts.contact),) if parts.contact < math.inf else ()),
+            link(race, numbers_of(bearing).damping(float(bearing.damping_time), parts.load)),
             link(
                 (float(ground.stiffness_horizontal) + beside, float(ground.stiffness) + below),
                 (float(ground.damping_horizontal), float(ground.damping)),
                 parts.branches,
             ),
         )
-        masses = (float(bearing.race.mass),) if bearing.bearing.has_race else ()
-        masses = (*masses, float(ground.mass))
-        supports.append(Support(node=bearing.node, links=links, masses=masses))
+        supports.append(Support(node=bearing.node, links=links, masses=tuple(bearing.masses.values())))
     return tuple(supports)
 
 

@@ -14,7 +14,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, magnitude
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.rotor.suspension import equivalent_stiffness
+from rotordrop.rotor.suspension import touchdown_supports
 from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
@@ -101,16 +101,11 @@ def prepare(model: DropModel, case: CoastDownCase) -> Setup:
 
 
 def _settled_parts(model: DropModel, output_step: float) -> int:
-    """Steps per sample that keep the settled scheme stable: the races swing 0.92 rad in a step."""
+    """Steps per sample that keep the settled scheme stable: what the rotor lies on swings 0.92 rad in one."""
     fastest = 0.0
-    for bearing, parts in zip(
-        model.machine.touchdown_bearings, equivalent_stiffness(model.machine), strict=True
-    ):
-        if bearing.bearing.has_race:
-            square = (parts.contact + parts.tangent) / float(bearing.race.mass)
-        else:
-            square = (parts.tangent + parts.support) / float(bearing.support.mass)
-        fastest = max(fastest, math.sqrt(square))
+    for support in touchdown_supports(model.machine):
+        inner, outer = (float(link.stiffness[1, 1]) for link in support.links[:2])
+        fastest = max(fastest, math.sqrt((inner + outer) / support.masses[0]))
     return max(1, math.ceil(output_step * fastest / SETTLED_STEP))
 
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.machine_summary import BearingSummary, summarise_machine
@@ -84,12 +85,9 @@ def long_run(machine: Machine, duration: float, most_steps: int) -> str | None:
 def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[float, str]]:
     """Rates [1/s] of what a bearing is made of, at rest; under impacts they are somewhat higher."""
     stiffness, name = rest.tangent_stiffness, bearing.name
-    damping = stiffness * float(bearing.damping_time) if bearing.bearing.has_race else 0.0
+    damping = numbers_of(bearing).damping(float(bearing.damping_time), abs(rest.load))
     race, support, friction = bearing.race, bearing.support, bearing.friction
-    bodies = [(float(support.mass), "support")]
-    if bearing.bearing.has_race:
-        bodies.insert(0, (float(race.mass), "race"))
-    for mass, what in bodies:
+    for what, mass in bearing.masses.items():
         own = stiffness + (float(support.stiffness) if what == "support" else 0.0)
         yield math.sqrt(own / mass), f"the mass of {name}'s {what} ({mass:.3g} kg) on its springs"
         yield damping / mass, f"the bearing damping of {name} on the mass of its {what} ({mass:.3g} kg)"
@@ -97,7 +95,7 @@ def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[fl
         float(support.damping) / float(support.mass),
         f"the support damping of {name} on its mass ({float(support.mass):.3g} kg)",
     )
-    if not bearing.bearing.has_race:
+    if "race" not in bearing.masses:
         return
     if bearing.face is not None:
         pressed = contact_tangent(bearing.face.law, max(abs(rest.load), 1.0)) / float(race.mass)

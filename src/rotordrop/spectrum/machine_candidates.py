@@ -94,7 +94,7 @@ def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float,
     lower, upper = gap.range or (gap.lower or float(gap), gap.upper or float(gap))
     lengths = [effective_length(value, *sags) for value in (float(gap), lower, upper)]
     bore, rotor = float(bearing.bore_radius), float(bearing.bore_radius) - float(gap)
-    spun = float(bearing.race.inertia) if bearing.bearing.has_race else math.inf  # a sleeve does not turn
+    spun = float(bearing.race.inertia) or math.inf  # without a race nothing turns
     turning = spin_participation(rotor, bore, inertia, spun)
     ratio = 1.0 + turning * g / part.load
     slowest = float(small_frequency(lengths[2], g, ratio)) / float(period_ratio(LARGEST_SWING))
