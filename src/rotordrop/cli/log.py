@@ -135,10 +135,10 @@ def _say_what_has_no_digest(where: str) -> None:
     from rotordrop.ledger.book import read_log
 
     with suppress(RotordropError):  # a log that is not there yet, or damaged
-        if older := read_log(where).unsealed:
+        if not read_log(where).sealed:
             console(sys.stderr).print(
-                f"note: an older rotordrop added {', '.join(older)} to this log, without a digest; the next "
-                "drop or allowance that is added gives them one"
+                "note: an older rotordrop made this log, without digests; the next drop or allowance that is "
+                "added gives it some"
             )
 
 

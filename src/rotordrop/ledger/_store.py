@@ -1,14 +1,17 @@
 """Where a log of drops is kept: a SQLite file, or a PostgreSQL data base by URL.
 
 Beside the tables of version 1 stands one of seals: the version, and a digest for every drop and every
-allowance, so that what has changed or gone is named. An older rotordrop goes on with the same log and leaves
-the seals alone.
+allowance, so that what has changed, gone or come by another way is named.
+
+A SQLite log has a rollback journal and no write-ahead log: of one that a killed program left, SQLite drops
+without a word every page from the first on that fails its checksum, acknowledged drops with them.
 """
 
 from __future__ import annotations
 
 import os
 import sqlite3
+import struct
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -55,6 +58,8 @@ class Transaction:
         self._mark = mark
         self.seals: dict[str, str] = {}
         """Digests by what they are of, as they stand in the log."""
+        self.sealed = False
+        """Whether the log had digests when it was opened."""
 
     def run(self, statement: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
         """Run a statement and give its rows."""
@@ -80,7 +85,13 @@ class Transaction:
         there = {name for (name,) in self.run(catalogue)}
         if not writing and "drops" not in there:
             raise UsageError(f"{where} holds no log of drops; 'rotordrop log add' makes one")
-        if "seals" in there:
+        missing = {"drops", "severity", "allowances"} - there
+        if missing and there & {"drops", "severity", "allowances", "seals"}:
+            raise DamagedFileError(
+                f"{where} is damaged: its {' and '.join(sorted(missing))} are gone; take a copy of it"
+            )
+        self.sealed = "seals" in there
+        if self.sealed:
             self.seals = dict(self.run("SELECT sealed, digest FROM seals"))
             version = self.seals.pop("version", "")
             if not (version.isascii() and version.isdigit()):
@@ -123,17 +134,13 @@ def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
 
 @contextmanager
 def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
-    if "\0" in str(file):
-        raise ValueError("its name holds a NUL, where SQLite would end it")
-    if not writing and not file.is_file():
-        raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
     try:
         with closing(_connected(file, writing)) as connection:
             opened = Transaction(connection.cursor(), "?")
             if writing:
-                _make_wal(connection)
-                # FULL: what was added survives a power cut
-                connection.execute("PRAGMA synchronous = FULL")
+                _leave_wal(connection)
+                # EXTRA: what was added survives a power cut
+                connection.execute("PRAGMA synchronous = EXTRA")
                 connection.execute("PRAGMA foreign_keys = ON")
             opened.run("BEGIN IMMEDIATE" if writing else "BEGIN")
             try:
@@ -146,36 +153,92 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
                     connection.execute("ROLLBACK")
                 raise
     except sqlite3.OperationalError as error:
-        raise OutputError(f"{file}: the log cannot be used: {error}") from error
+        left = [one.name for one in _left_by_killed(file) if one.exists()]
+        why = f"the log cannot be used: {error}"
+        if "locked" in str(error):
+            why = f"others have used the log for {WAIT:g} s; try again later"
+        elif left and not writing:
+            why = (
+                f"a program was killed while it wrote to the log. What it left, {' and '.join(left)}, is put "
+                f"right where file and folder may be written: copy both files to a folder of your own, and "
+                f"read the log there ({error})"
+            )
+        raise OutputError(f"{file}: {why}") from error
     except sqlite3.DatabaseError as error:
         raise UsageError(f"{file} is not a log of drops ({error}); name another file") from error
+    except OSError as error:
+        raise OutputError(f"{file}: the log cannot be used: {error.strerror}") from error
+
+
+def _left_by_killed(file: Path) -> tuple[Path, Path]:
+    """Where a killed program leaves its write-ahead log, if it is an older rotordrop, and its journal."""
+    return file.with_name(f"{file.name}-wal"), file.with_name(f"{file.name}-journal")
 
 
 def _connected(file: Path, writing: bool) -> sqlite3.Connection:
-    """Open a file; in a folder where SQLite cannot put its own files beside it as one that nobody changes."""
+    """Open a file; one that asks for a write-ahead log where none can be made as one that nobody changes."""
+    if "\0" in str(file):
+        raise ValueError("its name holds a NUL, where SQLite would end it")
+    if file.exists() and not file.is_file():
+        raise UsageError(f"{file} is no file; name another one for the log")
+    if not writing and not file.exists():
+        raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
+    wal, _ = _left_by_killed(file)
+    if wal.is_file() and not _is_whole(wal.read_bytes()):
+        raise DamagedFileError(
+            f"{wal} is damaged, and with it the drops that a program added last before it was killed. Take a "
+            f"copy of it and of {file.name}; to go on with what is whole: sqlite3 LOG 'PRAGMA journal_mode = "
+            "DELETE'. Then compare the drops with your estimates, and add what is missing"
+        )
     mode = "mode=rwc" if writing else "mode=rw"
-    waiting = file.with_name(f"{file.name}-wal")
-    if not writing and not os.access(file.parent, os.W_OK) and not waiting.exists():
-        mode = "immutable=1"
+    if not writing and not os.access(file.parent, os.W_OK) and not wal.exists():
+        with file.open("rb") as stream:
+            if stream.read(20)[18:] == b"\2\2":
+                mode = "immutable=1"
     return sqlite3.connect(f"{file.absolute().as_uri()}?{mode}", uri=True, timeout=WAIT, isolation_level=None)
 
 
-def _make_wal(connection: sqlite3.Connection) -> None:
-    """Let readers go on while somebody writes.
-
-    Making a new log so fails at once, whatever the timeout, while another one does the same or repairs what a
-    killed writer left.
-    """
+def _leave_wal(connection: sqlite3.Connection) -> None:
+    """Give a log of an older rotordrop a rollback journal; SQLite waits for nobody here by itself."""
     until = time.monotonic() + WAIT
     while True:
         try:
-            if connection.execute("PRAGMA journal_mode").fetchone()[0] != "wal":
-                connection.execute("PRAGMA journal_mode = WAL")
-            return
+            if connection.execute("PRAGMA journal_mode = DELETE").fetchone()[0] == "delete":
+                return
         except sqlite3.OperationalError as error:
-            if "locked" not in str(error) or time.monotonic() > until:
+            if "locked" not in str(error):
                 raise
+        if time.monotonic() > until:
+            raise sqlite3.OperationalError("database is locked")
         time.sleep(PAUSE)
+
+
+def _is_whole(wal: bytes) -> bool:
+    """Whether every page of a write-ahead log passes its checksum, but for one that was cut short.
+
+    Source: the file format of SQLite, section 4. What stands there from before the log was begun anew differs
+    in both of its salts.
+    """
+    if len(wal) < 32:
+        return True
+    order = ">" if wal[3] & 1 else "<"
+    size = struct.unpack(">I", wal[8:12])[0]
+
+    def summed(part: bytes, first: int, second: int) -> tuple[int, int]:
+        for one, other in struct.iter_unpack(f"{order}2I", part):
+            first = (first + one + second) & 0xFFFFFFFF
+            second = (second + other + first) & 0xFFFFFFFF
+        return first, second
+
+    sums = summed(wal[:24], 0, 0)
+    if sums != struct.unpack(">2I", wal[24:32]):
+        return False
+    for at in range(32, len(wal) - size - 23, size + 24):
+        head = wal[at : at + 24]
+        sums = summed(wal[at + 24 : at + 24 + size], *summed(head[:8], *sums))
+        if head[8:16] != wal[16:24] or sums != struct.unpack(">2I", head[16:]):
+            return head[8:12] != wal[16:20] and head[12:16] != wal[20:24]
+    return True
 
 
 @contextmanager

@@ -7,7 +7,8 @@ import json
 import math
 import secrets
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import astuple, dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -208,7 +209,7 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
     drop = _checked(drop)
     kept = replace(drop, sha256=drop.sha256 or f"{_NO_SHA256}{secrets.token_hex(8)}")
     values = [getattr(kept, name) for name in COLUMNS]
-    with transaction(where, writing=True) as log:
+    with _writing(where) as log:
         log.refuse_damaged(where)
         key = (kept.machine, kept.bearing_set, kept.sha256)
         there = log.run("SELECT id FROM drops WHERE machine = ? AND bearing_set = ? AND sha256 = ?", key)
@@ -218,7 +219,6 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
                 f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it",
                 there[0][0],
             )
-        _seal_what_has_none(log)
         number = int(
             log.run(
                 f"INSERT INTO drops ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(values))}) "
@@ -226,6 +226,8 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
                 values,
             )[0][0]
         )
+        # of a drop of this number that was not written to its end
+        log.run("DELETE FROM severity WHERE drop_id = ?", (number,))
         for one in kept.severity:
             log.run("INSERT INTO severity VALUES (?, ?, ?, ?, ?, ?, ?)", (number, *astuple(one)))
         log.seal(f"drop {number}", _of_drop(drop))
@@ -234,7 +236,7 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
 
 def remove_drop(where: str | Path, number: int) -> None:
     """Take a drop out of a log by its number, whether it is damaged or not."""
-    with transaction(where, writing=True) as log:
+    with _writing(where) as log:
         known = f"drop {number}" in log.seals
         possible = type(number) is int and 0 < number < 2**63
         if not known and not (possible and log.run("SELECT id FROM drops WHERE id = ?", (number,))):
@@ -252,8 +254,8 @@ class Log:
     """Drops by number, in the order they happened."""
     allowances: Mapping[tuple[str, str], tuple[int | None, float | None, str]]
     """Drops, seconds and source by machine and set of bearings."""
-    unsealed: tuple[str, ...]
-    """What has no digest: an older rotordrop added it."""
+    sealed: bool
+    """Whether it has digests; an older rotordrop gave it none."""
 
 
 def read_log(where: str | Path) -> Log:
@@ -261,17 +263,19 @@ def read_log(where: str | Path) -> Log:
     with transaction(where, writing=False) as log:
         found, seals = _read(log), log.seals
         there = _digests(found)
-        wrong = [
-            f"{what} is not what was logged" for what in there if seals.get(what, there[what]) != there[what]
-        ]
-        wrong += [f"{what} is gone" for what in seals.keys() - there]
+        wrong = [f"{what} is gone" for what in seals.keys() - there]
+        for what, digest in there.items() if log.sealed else ():
+            if what not in seals:
+                wrong.append(f"{what} has no digest: it was not written to its end, or by an older rotordrop")
+            elif seals[what] != digest:
+                wrong.append(f"{what} is not what was logged")
         if wrong:
             raise DamagedFileError(
                 f"{name_of(where)} is damaged: {', '.join(sorted(wrong))}. Take a damaged drop out with "
                 "'rotordrop log remove' and add its estimate again; state a damaged allowance again"
             )
         log.refuse_damaged(where)
-    return replace(found, unsealed=tuple(what for what in there if what not in seals))
+    return replace(found, sealed=log.sealed)
 
 
 def _read(log: Transaction) -> Log:
@@ -292,7 +296,7 @@ def _read(log: Transaction) -> Log:
     return Log(
         drops=dict(sorted(drops.items(), key=lambda e: (str(e[1].recorded or e[1].added), e[0]))),
         allowances={(row[0], row[1]): row[2:] for row in rows},
-        unsealed=(),
+        sealed=True,
     )
 
 
@@ -308,15 +312,17 @@ def _allowance(machine: str, bearing_set: str) -> str:
     return f"allowance of {machine}, bearings {bearing_set}"
 
 
-def _seal_what_has_none(log: Transaction) -> None:
-    """Give digests to what an older rotordrop added."""
-    named = {f"drop {number}" for (number,) in log.run("SELECT id FROM drops")}
-    named |= {_allowance(*key) for key in log.run("SELECT machine, bearing_set FROM allowances")}
-    if named <= log.seals.keys():
-        return  # nothing is read that need not be: a log of thousands of drops is added to often
-    for what, digest in _digests(_read(log)).items():
-        if what not in log.seals:
-            log.seal(what, digest)
+@contextmanager
+def _writing(where: str | Path) -> Iterator[Transaction]:
+    """A log to write to; one that an older rotordrop made is given digests, once.
+
+    What has none later was not written to its end.
+    """
+    with transaction(where, writing=True) as log:
+        if not log.sealed:
+            for what, digest in _digests(_read(log)).items():
+                log.seal(what, digest)
+        yield log
 
 
 def logged_drops(
@@ -348,8 +354,7 @@ def allow(
     if not _text("source", source).strip():
         raise UsageError("an allowance needs its source: who agreed on it, in which document")
     key = (_text("machine", machine), _text("bearing_set", bearing_set))
-    with transaction(where, writing=True) as log:
-        _seal_what_has_none(log)
+    with _writing(where) as log:
         log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", key)
         log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", (*key, drops, seconds, source))
         log.seal(_allowance(*key), _digest(drops, seconds, source))

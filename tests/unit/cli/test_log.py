@@ -106,7 +106,7 @@ def test_what_has_no_digest_and_what_is_damaged_is_said(tmp_path, estimate, caps
     with closing(sqlite3.connect(log)) as connection, connection:
         connection.execute("DROP TABLE seals")
     capsys.readouterr()
-    for note in ("an older rotordrop added drop 1 to this log, without a digest", ""):
+    for note in ("an older rotordrop made this log, without digests", ""):
         assert run(["log", "show", log]) == 0
         assert note in " ".join(capsys.readouterr().err.split())
         assert run(["log", "allow", log, "--machine", "LP-400", "--drops", "3", "--source", "x"]) == 0

@@ -16,12 +16,13 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.published import bearing, published, value
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
-from rotordrop.ledger import LoggedDrop, Severity, add_drop, allow, logged_drops, trends, used_shares
-from rotordrop.ledger._store import Transaction, _make_wal
+from rotordrop.ledger import LoggedDrop, Severity, _store, add_drop, allow, logged_drops, trends, used_shares
+from rotordrop.ledger._store import Transaction, _leave_wal
 from rotordrop.ledger.book import drop_of_estimate, read_log, remove_drop
 
 PEAK = Severity(bearing="NDE", quantity="peak_force_N", unit="N", value=3300.0, lower=3200.0, upper=3400.0)
@@ -238,18 +239,123 @@ def test_an_index_that_is_damaged_lets_no_drop_in_twice(log):
 
 
 def test_a_log_of_an_older_version_is_read_and_given_digests(log):
+    for digest in ("a" * 64, "b" * 64):
+        add_drop(log, replace(DROP, sha256=digest))
+    whole = log.read_bytes()
+    for write in (
+        lambda: add_drop(log, replace(DROP, sha256="c" * 64)),
+        lambda: remove_drop(log, 1),
+        lambda: allow(log, "LP-400", "2026", drops=12, source="contract"),
+    ):
+        log.write_bytes(whole)
+        with closing(sqlite3.connect(log)) as connection, connection:
+            connection.execute("DROP TABLE seals")
+        assert not read_log(log).sealed
+        write()
+        assert read_log(log).sealed
+
+
+def test_a_drop_without_digest_is_named(log):
+    """It was not written to its end, or by an older rotordrop: nobody knows whether all of it is there."""
     add_drop(log, DROP)
     with closing(sqlite3.connect(log)) as connection, connection:
-        connection.execute("DROP TABLE seals")
-    assert read_log(log).unsealed == ("drop 1",)
-    add_drop(log, replace(DROP, sha256="b" * 64))
-    assert read_log(log).unsealed == ()
-    with closing(sqlite3.connect(log)) as connection, connection:  # what the older one goes on to add
         connection.execute(
-            "INSERT INTO drops SELECT 3, machine, bearing_set, record, 'c', recorded, added, speed, "
+            "INSERT INTO drops SELECT 2, machine, bearing_set, record, 'c', recorded, added, speed, "
             "duration, cause, method, verdict, simulated, version, fingerprint FROM drops WHERE id = 1"
         )
-    assert read_log(log).unsealed == ("drop 3",)
+    with pytest.raises(DamagedFileError, match="drop 2 has no digest: it was not written to its end, or"):
+        read_log(log)
+    remove_drop(log, 2)
+    assert list(read_log(log).drops) == [1]
+
+
+LEFT_BY_A_KILLED_PROGRAM = """
+import os, signal, sqlite3, sys
+from dataclasses import replace
+from rotordrop.ledger import _store, add_drop
+from tests.unit.ledger.test_ledger import DROP
+log, left = sys.argv[1:]
+if left == "wal":
+    with sqlite3.connect(log) as reader:  # keeps open what an older rotordrop kept
+        reader.execute("PRAGMA journal_mode = WAL")
+        _store._leave_wal = lambda connection: None
+        reader.execute("SELECT * FROM drops").fetchall()
+    for number in range(3, 6):
+        add_drop(log, replace(DROP, sha256=str(number) * 64))
+    os.kill(os.getpid(), signal.SIGKILL)
+run = _store.Transaction.run
+def spilling(self, statement, values=()):
+    if statement.startswith("INSERT INTO drops"):
+        run(self, "PRAGMA cache_size = 1")  # pages are written before the end, as in a long transaction
+    return run(self, statement, values)
+def to_the_end(self, what, digest):
+    if what != "version":
+        run(self, "INSERT INTO seals (sealed, digest) VALUES (?, ?)", (what, digest))
+        run(self, "UPDATE drops SET cause = 'half written'")
+        run(self, "UPDATE severity SET upper = 0")
+        os.kill(os.getpid(), signal.SIGKILL)
+_store.Transaction.run, _store.Transaction.seal = spilling, to_the_end
+add_drop(log, replace(DROP, sha256="3" * 64))
+"""
+
+
+@pytest.fixture(scope="module")
+def left_behind(tmp_path_factory):
+    """Logs beside what a killed program left of its transaction, and how many drops were acknowledged."""
+    made = {}
+    for left, acknowledged in (("journal", 3), ("wal", 6)):
+        log = tmp_path_factory.mktemp(left) / "drops.db"
+        for number in range(3):
+            add_drop(log, replace(DROP, sha256=str(number) * 64))
+        before = log.read_bytes()
+        command = [sys.executable, "-c", LEFT_BY_A_KILLED_PROGRAM, str(log), left]
+        assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+        assert log.read_bytes() != before and log.with_name(f"drops.db-{left}").stat().st_size > 0
+        made[left] = (log, acknowledged)
+    return made
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+@pytest.mark.parametrize("left", ["journal", "wal"])
+@pytest.mark.parametrize("part", ["log", "left"])
+def test_no_bit_of_what_a_killed_program_left_loses_a_drop_without_a_word(left_behind, left, part, tmp_path):
+    """SQLite left out acknowledged drops of a write-ahead log with one bit changed, 100 times of 100."""
+    log, acknowledged = left_behind[left]
+    place = tmp_path / "drops.db"
+    damaged = place if part == "log" else tmp_path / f"drops.db-{left}"
+    promised = {f"{number}" * 64 for number in range(acknowledged)}
+    random, named = np.random.default_rng(26), 0
+    for bit in [None, *random.integers(0, 2**31, 60).tolist()]:
+        for file in tmp_path.glob("drops.db*"):
+            file.unlink()
+        for file in (log, log.with_name(f"drops.db-{left}")):
+            shutil.copy(file, tmp_path / file.name)
+        if bit is not None:
+            raw = bytearray(damaged.read_bytes())
+            raw[bit // 8 % len(raw)] ^= 1 << bit % 8
+            damaged.write_bytes(raw)
+        try:
+            found = list(logged_drops(place).values())
+        except RotordropError:
+            assert bit is not None
+            named += 1
+            continue
+        assert {drop.sha256 for drop in found} == promised
+        assert {drop.severity for drop in found} == {DROP.severity}
+        assert {drop.cause for drop in found} == {DROP.cause}
+    assert named > 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_a_log_with_a_write_ahead_log_gets_a_journal_when_it_is_written_to(left_behind, tmp_path):
+    log, acknowledged = left_behind["wal"]
+    for file in log.parent.glob("drops.db*"):
+        shutil.copy(file, tmp_path / file.name)
+    log = tmp_path / "drops.db"
+    add_drop(log, replace(DROP, sha256="f" * 64))
+    assert [file.name for file in tmp_path.iterdir()] == ["drops.db"]
+    assert len(logged_drops(log)) == acknowledged + 1
+    assert log.read_bytes()[18:20] == b"\1\1"
 
 
 def test_a_log_of_a_later_version_is_refused(log):
@@ -436,7 +542,9 @@ def test_a_postgresql_that_holds_other_tables_is_said(postgresql, damage):
     with psycopg.connect(other) as connection:
         connection.execute(damage)
     for use in (logged_drops, lambda log: add_drop(log, replace(DROP, sha256="b" * 64))):
-        with pytest.raises(RotordropError, match=r":\d+/other (cannot be used|holds no log)"):
+        with pytest.raises(
+            RotordropError, match=r":\d+/other (cannot be used|holds no log|is damaged: its \w+ are gone)"
+        ):
             use(other)
 
 
@@ -465,31 +573,42 @@ def test_a_postgresql_that_is_not_there_is_named():
 
 
 class Busy:
-    """A connection to a log that others are making: refused twice, then open."""
+    """A connection to a log that others use: refused, not changed, then changed."""
 
-    def __init__(self, refusal="database is locked", mode="delete"):
-        self.asked, self.refusal, self.mode = [], refusal, mode
+    def __init__(self, refusal="database is locked"):
+        self.asked, self.refusal = 0, refusal
 
     def execute(self, statement):
-        self.asked.append(statement)
-        if len(self.asked) <= 2:
+        self.asked += 1
+        if self.asked == 1:
             raise sqlite3.OperationalError(self.refusal)
         return self
 
     def fetchone(self):
-        return (self.mode,)
+        return ("wal" if self.asked == 2 else "delete",)
 
 
-def test_a_log_that_others_are_making_is_waited_for():
-    """Of writers that were killed and started again some were refused at once, whatever they would wait."""
+def test_a_log_that_others_use_is_waited_for(monkeypatch):
     busy = Busy()
-    _make_wal(busy)
-    assert busy.asked[-1] == "PRAGMA journal_mode = WAL" and len(busy.asked) == 4
-    there = Busy(mode="wal")
-    _make_wal(there)
-    assert there.asked[-1] == "PRAGMA journal_mode"
+    _leave_wal(busy)
+    assert busy.asked == 3
     with pytest.raises(sqlite3.OperationalError, match="disk"):
-        _make_wal(Busy("disk I/O error"))
+        _leave_wal(Busy("disk I/O error"))
+    monkeypatch.setattr(_store, "WAIT", 0.0)
+    with pytest.raises(sqlite3.OperationalError, match="locked"):
+        _leave_wal(Busy())
+
+
+def test_a_log_that_others_keep_is_said(log, monkeypatch):
+    add_drop(log, DROP)
+    monkeypatch.setattr(_store, "WAIT", 0.1)
+    with sqlite3.connect(log, isolation_level=None) as other:
+        other.execute("BEGIN EXCLUSIVE")
+        for use in (logged_drops, lambda log: add_drop(log, replace(DROP, sha256="b" * 64))):
+            with pytest.raises(OutputError, match=r"others have used the log for 0\.1 s; try again later"):
+                use(log)
+        other.execute("ROLLBACK")
+    assert len(logged_drops(log)) == 1
 
 
 def test_a_trend_is_told_and_chance_is_not(log):
