@@ -12,7 +12,8 @@ from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.known import Known
-from rotordrop.severity.numbers import fatigue_shares, static_safety_of_load, static_safety_of_stress
+from rotordrop.severity.fatigue import fatigue_shares
+from rotordrop.severity.numbers import static_safety_of_load, static_safety_of_stress
 
 Array = NDArray[np.float64]
 Factor = Callable[[float], float]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +14,12 @@ from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.machine.plausibility import doubts
-from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
-from rotordrop.rotor.statics import bearing_load_shares, levitated_sag
+from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rotor_on_race
 from rotordrop.rotor.suspension import stiffness_of
 from rotordrop.rotor.unknowns import prior
 from rotordrop.units import format_quantity
-
-if TYPE_CHECKING:
-    from rotordrop.machine import Machine, TouchdownBearing
 
 Array = NDArray[np.float64]
 
@@ -256,14 +251,3 @@ def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:
 
 def _warning(kind: str, bearing: str, value: float, limit: float, text: str) -> MachineWarning:
     return MachineWarning(kind=kind, bearing=bearing, value=value, limit=limit, message=f"{bearing}: {text}")
-
-
-def rotor_on_race(machine: Machine, bearing: TouchdownBearing) -> LineContact:
-    """Line contact of the rotor with the race of one touchdown bearing, over the width of the race.
-
-    The rotor is of the material of the shaft at the bearing's node, the race of that of the rings.
-    """
-    beside = machine.rotor.elements[max(0, bearing.node - 2)]
-    eta = compliance(beside.youngs_modulus, beside.poisson_ratio, *numbers_of(bearing).ring_material)
-    bore = float(bearing.bore_radius)
-    return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)

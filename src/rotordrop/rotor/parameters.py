@@ -23,7 +23,7 @@ from rotordrop.physics.linear_algebra import product
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.rotor.statics import bearing_load_shares, rotor_on_race
 
 Array = NDArray[np.float64]
 
@@ -140,8 +140,6 @@ def _kernel_parameters(
 
 def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:
     """The kernel arrays that change with the values of a machine whose rotor stays."""
-    from rotordrop.rotor.machine_summary import rotor_on_race  # which builds on this module
-
     bearings = machine.touchdown_bearings
     rows = np.array([bearing_row(bearing, load) for bearing, load in zip(bearings, shares, strict=True)])
     for row, bearing in zip(rows, bearings, strict=True):

@@ -1,4 +1,4 @@
-"""The rotor at rest under its weight: load shares of the touchdown bearings, sag levitated and settled."""
+"""The rotor at rest under its weight: load shares, its contact with a race, sag levitated and settled."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
+from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 from rotordrop.physics.linear_algebra import product, solve
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 
 if TYPE_CHECKING:
-    from rotordrop.machine import Machine
+    from rotordrop.machine import Machine, TouchdownBearing
 
 Array = NDArray[np.float64]
 
@@ -63,6 +65,17 @@ def bearing_load_shares(machine: Machine, fe: RotorFE | None = None) -> Array:
     if len(nodes) == 1:
         return np.array([fe.total_mass * gravity])
     return rest_on(fe, nodes, gravity)[1]
+
+
+def rotor_on_race(machine: Machine, bearing: TouchdownBearing) -> LineContact:
+    """Line contact of the rotor with the race of one touchdown bearing, over the width of the race.
+
+    The rotor is of the material of the shaft at the bearing's node, the race of that of the rings.
+    """
+    beside = machine.rotor.elements[max(0, bearing.node - 2)]
+    eta = compliance(beside.youngs_modulus, beside.poisson_ratio, *numbers_of(bearing).ring_material)
+    bore = float(bearing.bore_radius)
+    return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)
 
 
 def levitated_sag(fe: RotorFE, machine: Machine) -> Array:

@@ -12,6 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.elements.race_bearing import Ratings
+
 Array = NDArray[np.float64]
 
 LIFE = 1e6
@@ -172,3 +174,25 @@ def rainflow(values: Array) -> Array:
                 del stack[-3:-1]
     found += [(abs(b - a), 0.5) for a, b in pairwise(stack)]
     return np.array(found).reshape(-1, 2)
+
+
+def fatigue_shares(ratings: Ratings, time: Array, loads: Array, spin: Array) -> tuple[float, float, float]:
+    """Shares of the rating life that a drop uses: by segments, by ISO/TS 16281, by rainflow [1].
+
+    Time (T,) [s] rises; ball loads (T, rows, Z) [N] are those at equal steps of azimuth, spin (T,) [rad/s]
+    that of the inner ring.
+    """
+    row = ball_row(
+        ratings.dynamic,
+        ratings.balls,
+        ratings.gamma,
+        ratings.cosine,
+        ratings.conformity_inner,
+        ratings.conformity_outer,
+    )
+    each = [loads[:, k] for k in range(loads.shape[1])]
+    return (
+        joined(np.array([share_by_segments(row, time, one, spin) for one in each])),
+        joined(np.array([share_by_16281(row, time, one, spin) for one in each])),
+        joined(np.array([share_by_rainflow(row, one.max(axis=1)) for one in each])),
+    )

@@ -4,20 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.elements.race_bearing import Ratings
-from rotordrop.severity.fatigue import (
-    ball_row,
-    joined,
-    share_by_16281,
-    share_by_rainflow,
-    share_by_segments,
-)
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,25 +61,3 @@ def static_safety_of_load(rating: float, force: float) -> float:
     preload counts in the stress, not here.
     """
     return rating / force
-
-
-def fatigue_shares(ratings: Ratings, time: Array, loads: Array, spin: Array) -> tuple[float, float, float]:
-    """Shares of the rating life that a drop uses: by segments, by ISO/TS 16281, by rainflow [1].
-
-    Time (T,) [s] rises; ball loads (T, rows, Z) [N] are those at equal steps of azimuth, spin (T,) [rad/s]
-    that of the inner ring.
-    """
-    row = ball_row(
-        ratings.dynamic,
-        ratings.balls,
-        ratings.gamma,
-        ratings.cosine,
-        ratings.conformity_inner,
-        ratings.conformity_outer,
-    )
-    each = [loads[:, k] for k in range(loads.shape[1])]
-    return (
-        joined(np.array([share_by_segments(row, time, one, spin) for one in each])),
-        joined(np.array([share_by_16281(row, time, one, spin) for one in each])),
-        joined(np.array([share_by_rainflow(row, one.max(axis=1)) for one in each])),
-    )

@@ -13,9 +13,9 @@ from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import magnitude, sine_cosine
-from rotordrop.rotor.machine_summary import rotor_on_race
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.statics import rotor_on_race
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate._rhs import N_PLACES

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics.contact import contact_tangent
-from rotordrop.rotor.machine_summary import BearingSummary, summarise_machine
+from rotordrop.rotor.statics import bearing_load_shares
 
 STABLE = 3.3
 """Largest rate times step of the fifth-order pairs on the negative real axis [1]; Hairer & Wanner, II.4."""
@@ -51,13 +51,8 @@ def expected_steps(machine: Machine, duration: float) -> ExpectedSteps:
     duration : float
         Length of the drop [s].
     """
-    summary = summarise_machine(machine)
-    rates = [
-        found
-        for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True)
-        for found in _rates(bearing, rest)
-    ]
-    rate, cause = max(rates)
+    pairs = zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True)
+    rate, cause = max(found for bearing, load in pairs for found in _rates(bearing, abs(float(load))))
     return ExpectedSteps(steps=duration * rate / STABLE, rate=rate, cause=cause)
 
 
@@ -82,10 +77,11 @@ def long_run(machine: Machine, duration: float, most_steps: int) -> str | None:
     return f"this will take long: {expected}{unfinished}; Ctrl-C stops it"
 
 
-def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[float, str]]:
-    """Rates [1/s] of what a bearing is made of, at rest; under impacts they are somewhat higher."""
-    stiffness, name = rest.tangent_stiffness, bearing.name
-    damping = numbers_of(bearing).damping(float(bearing.damping_time), abs(rest.load))
+def _rates(bearing: TouchdownBearing, load: float) -> Iterator[tuple[float, str]]:
+    """Rates [1/s] of what a bearing is made of under a static load [N]; impacts make them somewhat higher."""
+    numbers, name = numbers_of(bearing), bearing.name
+    _, stiffness, _ = numbers.in_series(contact_tangent(bearing.contact.law, load), load)
+    damping = numbers.damping(float(bearing.damping_time), load)
     race, support, friction = bearing.race, bearing.support, bearing.friction
     for what, mass in bearing.masses.items():
         own = stiffness + (float(support.stiffness) if what == "support" else 0.0)
@@ -98,9 +94,9 @@ def _rates(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[tuple[fl
     if "race" not in bearing.masses:
         return
     if bearing.face is not None:
-        pressed = contact_tangent(bearing.face.law, max(abs(rest.load), 1.0)) / float(race.mass)
+        pressed = contact_tangent(bearing.face.law, max(load, 1.0)) / float(race.mass)
         yield math.sqrt(pressed), f"the mass of {name}'s race ({float(race.mass):.3g} kg) on its face"
-    grip = float(friction.static) * abs(rest.load) * float(bearing.bore_radius) ** 2
+    grip = float(friction.static) * load * float(bearing.bore_radius) ** 2
     yield (
         grip / (float(friction.smoothing_speed) * float(race.inertia)),
         f"friction on the inertia of {name}'s race ({float(race.inertia):.3g} kg m²)",

@@ -7,9 +7,9 @@ import pytest
 
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.machine import example_machine
+from rotordrop.severity.fatigue import fatigue_shares
 from rotordrop.severity.numbers import (
     SEVERITY,
-    fatigue_shares,
     static_safety_of_load,
     static_safety_of_stress,
 )
