@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
+from rotordrop.files import require_place
 
 WAIT = 60.0
 """How long a writer waits for others [s]; chosen, not measured."""
@@ -183,6 +184,12 @@ def _connected(file: Path, writing: bool) -> sqlite3.Connection:
         raise UsageError(f"{file} is no file; name another one for the log")
     if not writing and not file.exists():
         raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
+    if writing:
+        require_place(file)
+        if file.exists() and not os.access(file, os.W_OK):
+            raise OutputError(
+                f"{file} may only be read; copy it to where you may write, or ask for the right"
+            )
     wal, _ = _left_by_killed(file)
     if wal.is_file() and not _is_whole(wal.read_bytes()):
         raise DamagedFileError(

@@ -124,8 +124,11 @@ def test_what_is_no_log_is_named(tmp_path):
     (tmp_path / "text.db").write_text("no data base " * 100)
     with pytest.raises(UsageError, match=r"text\.db is not a log of drops"):
         add_drop(tmp_path / "text.db", DROP)
-    with pytest.raises(OutputError, match="the log cannot be used"):
+    with pytest.raises(OutputError, match="no folder does not exist; create it first"):
         add_drop(tmp_path / "no folder" / "drops.db", DROP)
+    for use in (logged_drops, lambda log: add_drop(log, DROP)):
+        with pytest.raises(UsageError, match="is no file; name another one for the log"):
+            use(tmp_path)
 
 
 def test_a_write_that_fails_leaves_nothing(log, monkeypatch):
@@ -370,28 +373,45 @@ def test_a_log_of_a_later_version_is_refused(log):
 READER = """
 import os, sys
 from dataclasses import replace
+from rotordrop.errors import OutputError
 from rotordrop.ledger import add_drop, logged_drops
 from tests.unit.ledger.test_ledger import DROP
 os.setgid(65534); os.setuid(65534)
-assert logged_drops(sys.argv[1])[1].severity == DROP.severity
-try:
-    add_drop(sys.argv[1], replace(DROP, sha256="z"))
-except Exception as error:
-    print(type(error).__name__, error)
+for use in (lambda log: len(logged_drops(log)), lambda log: add_drop(log, replace(DROP, sha256="f" * 64))):
+    try:
+        print(use(sys.argv[1]))
+    except OutputError as error:
+        print(error)
 """
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="another user is needed")
 @pytest.mark.parametrize("modes", [(0o555, 0o444), (0o777, 0o444), (0o555, 0o666)])
-def test_who_may_only_read_a_log_reads_it(modes):
+@pytest.mark.parametrize("left", ["", "journal", "wal", "wal that was closed"])
+def test_who_may_only_read_a_log_reads_all_of_it_or_learns_how(left_behind, left, modes):
     folder = Path(tempfile.mkdtemp(prefix="log"))  # the folders of pytest are closed to other users
+    source, acknowledged = left_behind[left.split()[0] if left else "journal"]
+    for file in source.parent.glob("drops.db*"):
+        shutil.copy(file, folder)
     log = folder / "drops.db"
-    add_drop(log, DROP)
-    for path, mode in zip((folder, log), modes, strict=True):
+    if left not in ("journal", "wal"):
+        with closing(sqlite3.connect(log)) as connection:
+            assert connection.execute("SELECT count(*) FROM drops").fetchone() == (acknowledged,)
+    for path, mode in [*((path, modes[1]) for path in folder.iterdir()), (folder, modes[0])]:
         path.chmod(mode)
     command = [sys.executable, "-c", READER, str(log)]
-    said = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert said.stdout.startswith("OutputError"), said.stderr
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    read, written = done.stdout.splitlines()
+    assert "read-only; choose another" in written or "drops.db may only be read; copy it" in written
+    if left == "journal":
+        assert "What it left, drops.db-journal, is put right where file and folder may be written" in read
+        log = Path(shutil.copytree(folder, f"{folder} copied")) / "drops.db"
+        for path in (log.parent, *log.parent.iterdir()):
+            path.chmod(0o777)
+        read = str(len(logged_drops(log)))
+        shutil.rmtree(log.parent)
+    assert read == str(acknowledged)
     shutil.rmtree(folder)
 
 
