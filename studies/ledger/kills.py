@@ -20,16 +20,15 @@ from pathlib import Path
 
 from rotordrop.errors import UsageError
 from rotordrop.ledger import LoggedDrop, Severity, add_drop, logged_drops
-
-NUMBERS = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "mean_stress_Pa")
+from rotordrop.ledger.book import QUANTITIES
 
 
 def entry(process: int, k: int) -> LoggedDrop:
     """One drop with eight numbers of two bearings, known from its place alone."""
     severity = tuple(
-        Severity(bearing=b, quantity=q, unit="N", value=float(k), lower=k - 1.0, upper=k + 1.0)
+        Severity(bearing=b, quantity=q, unit=unit, value=float(k), lower=k - 1.0, upper=k + 1.0)
         for b in ("NDE", "DE")
-        for q in NUMBERS
+        for q, unit in QUANTITIES.items()
     )
     return LoggedDrop(
         machine="m",

@@ -124,6 +124,8 @@ def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
 
     A SQLite file is made when it is written to first; a log that is only read must exist.
     """
+    if not isinstance(where, str | Path):
+        raise UsageError(f"{where!r} is no place for a log; expected a path, or an address postgresql://…")
     try:
         with _postgresql(str(where), writing) if is_url(where) else _sqlite(Path(where), writing) as opened:
             yield opened

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import secrets
 import sys
 from collections.abc import Iterator, Mapping
@@ -98,11 +99,27 @@ MOST_DROPS = 2**31 - 1
 """What PostgreSQL counts up to."""
 
 
-def _text(name: str, value: Any) -> str:
+LONGEST_NAME = 255
+"""Characters of a name: two with four bytes each and a digest fit into a row of an index of PostgreSQL, which
+takes 2,704 bytes."""
+LONGEST_TEXT = 10_000
+"""Characters of any other text; chosen, not measured."""
+
+
+def _text(name: str, value: Any, longest: int = LONGEST_TEXT) -> str:
     """A text that every data base takes."""
+    if isinstance(value, str) and len(value) > longest:
+        raise UsageError(f"{name} has {len(value)} characters ({value[:20]!r}…); expected at most {longest}")
     if not isinstance(value, str) or "\0" in value or any("\ud800" <= sign <= "\udfff" for sign in value):
         raise UsageError(f"{name} = {value!r}; expected a text without NUL and lone surrogates")
     return value
+
+
+def _name(name: str, value: Any) -> str:
+    """What a machine, a set of bearings or a bearing is called."""
+    if not _text(name, value, LONGEST_NAME).strip():
+        raise UsageError(f"{name} = {value!r}; expected a name")
+    return str(value)
 
 
 def _number(name: str, value: Any, least: float = -math.inf) -> float:
@@ -120,13 +137,17 @@ def _severity(given: Any) -> list[Severity]:
         raise UsageError(f"severity = {given!r}; expected a tuple of numbers of severity")
     severity = []
     for one in given:
-        who = f"{one.quantity} at {one.bearing}"
-        for name in ("bearing", "quantity", "unit"):
-            _text(name, getattr(one, name))
-        lower, upper = _number(f"{who}: lower", one.lower), _number(f"{who}: upper", one.upper)
+        bearing, quantity = _name("bearing", one.bearing), _text("quantity", one.quantity)
+        who = f"{quantity} at {bearing}"
+        if QUANTITIES.get(quantity) != one.unit:
+            known = ", ".join(f"{quantity} in {unit}" for quantity, unit in QUANTITIES.items())
+            raise UsageError(f"{who} in {one.unit!r}; expected one of {known}")
+        lower, upper = _number(f"{who}: lower", one.lower), _number(f"{who}: upper", one.upper, 0.0)
         value = None if one.value is None else _number(f"{who}: value", one.value)
         if lower > upper:
             raise UsageError(f"{who} runs from {lower:g} to {upper:g}; expected the smaller end first")
+        if value is not None and not lower <= value <= upper:
+            raise UsageError(f"{who} is {value:g}, outside of its interval from {lower:g} to {upper:g}")
         severity.append(replace(one, value=value, lower=lower, upper=upper))
     stated = [(one.bearing, one.quantity) for one in severity]
     for bearing, quantity in stated:
@@ -137,7 +158,15 @@ def _severity(given: Any) -> list[Severity]:
 
 def _checked(drop: LoggedDrop) -> LoggedDrop:
     """A drop whose values a log may hold; refuses others by name."""
+    if not isinstance(drop, LoggedDrop):
+        raise UsageError(f"{drop!r} is no drop; expected a LoggedDrop")
     texts = {name: _text(name, getattr(drop, name)) for name in COLUMNS if name not in _NO_TEXT}
+    _name("machine", drop.machine)
+    _name("bearing_set", drop.bearing_set)
+    if drop.sha256 and not re.fullmatch("[0-9a-f]{64}", drop.sha256):
+        raise UsageError(
+            f"sha256 = {drop.sha256!r}; expected the digest of the record, 64 hexadecimal digits, or nothing"
+        )
     for name in ("recorded", "added"):
         try:
             if texts[name]:
@@ -264,11 +293,13 @@ def read_log(where: str | Path) -> Log:
         found, seals = _read(log), log.seals
         there = _digests(found)
         wrong = [f"{what} is gone" for what in seals.keys() - there]
+        logged_as = {digest: what for what, digest in seals.items()}
         for what, digest in there.items() if log.sealed else ():
             if what not in seals:
                 wrong.append(f"{what} has no digest: it was not written to its end, or by an older rotordrop")
             elif seals[what] != digest:
-                wrong.append(f"{what} is not what was logged")
+                other = logged_as.get(digest)
+                wrong.append(f"{what} is not what was logged" + (f", but {other} was so" if other else ""))
         if wrong:
             raise DamagedFileError(
                 f"{name_of(where)} is damaged: {', '.join(sorted(wrong))}. Take a damaged drop out with "
@@ -353,7 +384,7 @@ def allow(
     seconds = None if seconds is None else _number("seconds", seconds, math.ulp(0.0))
     if not _text("source", source).strip():
         raise UsageError("an allowance needs its source: who agreed on it, in which document")
-    key = (_text("machine", machine), _text("bearing_set", bearing_set))
+    key = (_name("machine", machine), _name("bearing_set", bearing_set))
     with _writing(where) as log:
         log.run("DELETE FROM allowances WHERE machine = ? AND bearing_set = ?", key)
         log.run("INSERT INTO allowances VALUES (?, ?, ?, ?, ?)", (*key, drops, seconds, source))

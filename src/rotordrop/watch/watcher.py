@@ -120,10 +120,10 @@ class Watcher:
         return now >= self._later.get(number, (0.0, 0.0))[0]
 
     def _with_patience(self, number: str, work: Callable[[], bool]) -> bool:
-        """Do something that a full disk, a share that is away or a hook may refuse, now or later."""
+        """Do something that a full disk, a share that is away, a log or a hook may refuse, now or later."""
         try:
             done = work()
-        except (OutputError, OSError) as error:
+        except (RotordropError, OSError) as error:
             pause = min(2.0 * self._later.get(number, (0.0, AGAIN_S / 2.0))[1], LATEST_S)
             self._later[number] = (time.monotonic() + pause, pause)
             self.complain(f"{error}; tried again in {pause:.0f} s")

@@ -70,5 +70,6 @@ def row_of(drop: LoggedDrop) -> dict[str, Any]:
                 ),
             }
             for one in drop.severity
+            if one.quantity in _LOADS  # earlier versions let other ones into a log
         ],
     }

@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -84,15 +84,15 @@ def test_adding_a_drop_reads_no_other(log, monkeypatch):
 
 
 def test_drops_stand_in_the_order_they_happened(log):
-    for day, digest in (("2026-05-01", "x"), ("2026-01-01", "y"), ("2026-03-01", "z")):
-        add_drop(log, replace(DROP, recorded=day, sha256=digest))
-    assert [drop.sha256 for drop in logged_drops(log).values()] == ["y", "z", "x"]
+    for day, digest in (("2026-05-01", "a"), ("2026-01-01", "b"), ("2026-03-01", "c")):
+        add_drop(log, replace(DROP, recorded=day, sha256=64 * digest))
+    assert [drop.sha256[0] for drop in logged_drops(log).values()] == ["b", "c", "a"]
 
 
 def test_used_share_counts_drops_and_known_seconds(log):
     for digest, lasted in (("1", 51.5), ("2", 48.5), ("3", None)):
-        add_drop(log, replace(DROP, sha256=digest, duration=lasted))
-    add_drop(log, replace(DROP, machine="other", sha256="4"))
+        add_drop(log, replace(DROP, sha256=64 * digest, duration=lasted))
+    add_drop(log, replace(DROP, machine="other", sha256="4" * 64))
     allow(log, "LP-400", "2026", drops=12, seconds=400.0, source="contract 17, section 4")
     used, free = used_shares(log)
     assert (used.drops, used.seconds, used.untimed) == (3, 100.0, 1)
@@ -157,6 +157,29 @@ WRONG = [
     ({"severity": (PEAK, PEAK)}, "peak_force_N at NDE is stated twice"),
     ({"severity": (replace(PEAK, lower=math.nan),)}, "peak_force_N at NDE: lower = nan"),
     ({"severity": (replace(PEAK, lower=5000.0),)}, "runs from 5000 to 3400; expected the smaller end first"),
+    ({"severity": (replace(PEAK, value=3500.0),)}, "is 3500, outside of its interval from 3200 to 3400"),
+    (
+        {"severity": (replace(PEAK, lower=-9.0, value=-8.0, upper=-7.0),)},
+        "upper = -7.0; expected .* from 0 on",
+    ),
+    (
+        {"severity": (replace(PEAK, quantity="mass"),)},
+        "mass at NDE in 'N'; expected one of peak_force_N in N,",
+    ),
+    ({"severity": (replace(PEAK, unit="lbf"),)}, "peak_force_N at NDE in 'lbf'; expected one of"),
+    ({"severity": (replace(PEAK, bearing=" "),)}, "bearing = ' '; expected a name"),
+    ({"sha256": "none of these"}, "sha256 = 'none of these'; expected the digest of the record"),
+    ({"sha256": "A" * 64}, "sha256 = 'AAAA"),
+    ({"cause": "x" * 10_001}, r"cause has 10001 characters \('xxx.*; expected at most 10000"),
+    *(
+        case
+        for name in ("machine", "bearing_set")
+        for case in (
+            ({name: ""}, f"{name} = ''; expected a name"),
+            ({name: " \n"}, f"{name} = ' .n'; expected a name"),
+            ({name: "x" * 256}, f"{name} has 256 characters .*; expected at most 255"),
+        )
+    ),
 ]
 
 
@@ -165,6 +188,52 @@ def test_what_no_drop_can_have_is_refused_at_the_door(log, values, message):
     with pytest.raises(UsageError, match=message):
         add_drop(log, replace(DROP, **values))
     assert not log.exists()
+
+
+def test_every_field_of_a_drop_is_checked_at_the_door(log):
+    """What is of no kind that a log holds; a field that is new is tried too."""
+    for field in fields(LoggedDrop):
+        for odd in (object(), b"x", [], {}, math.nan, "\ud800", "x" * 10**6):
+            with pytest.raises(UsageError):
+                add_drop(log, replace(DROP, **{field.name: odd}))
+    for field in fields(Severity):
+        for odd in (object(), b"x", [], {}, math.nan, "\ud800", "x" * 10**6):
+            with pytest.raises(UsageError):
+                add_drop(log, replace(DROP, severity=(replace(PEAK, **{field.name: odd}),)))
+    for drop in (None, {}, "drop"):
+        with pytest.raises(UsageError, match="is no drop; expected a LoggedDrop"):
+            add_drop(log, drop)
+    for where in (None, 5, b"drops.db", ["drops.db"]):
+        for use in (logged_drops, lambda place: add_drop(place, DROP)):
+            with pytest.raises(UsageError, match="is no place for a log; expected a path, or an address"):
+                use(where)
+    assert not log.exists()
+
+
+@pytest.mark.parametrize("where", ["drops.db", "postgresql"])
+def test_the_longest_names_are_taken(tmp_path, where, request):
+    log = tmp_path / where if where == "drops.db" else request.getfixturevalue(where)
+    longest = "\N{OLD PERSIAN SIGN A}" * 255
+    drop = replace(
+        DROP, machine=longest, bearing_set=longest[::-1], severity=(replace(PEAK, bearing=longest),)
+    )
+    number = add_drop(log, drop)
+    allow(log, longest, longest, drops=3, source="contract")
+    assert logged_drops(log)[number] == drop
+    remove_drop(log, number)
+
+
+def test_drops_that_are_exchanged_are_both_named(log):
+    for digest in "abc":
+        add_drop(log, replace(DROP, sha256=64 * digest, severity=(replace(PEAK, lower=int(digest, 16)),)))
+    with closing(sqlite3.connect(log)) as connection, connection:
+        for table, column in (("severity", "drop_id"), ("drops", "id")):
+            for old, new in ((1, 99), (3, 1), (99, 3)):
+                connection.execute(f"UPDATE {table} SET {column} = {new} WHERE {column} = {old}")
+    with pytest.raises(
+        DamagedFileError, match=r"drop 1 is .*, but drop 3 was so, drop 3 is .*, but drop 1 was so"
+    ):
+        read_log(log)
 
 
 @pytest.mark.parametrize(
@@ -436,7 +505,7 @@ from dataclasses import replace
 from tests.unit.ledger.test_ledger import DROP
 from rotordrop.ledger import add_drop
 for i in range(int(sys.argv[3])):
-    add_drop(sys.argv[1], replace(DROP, sha256=f"{sys.argv[2]}-{i}"))
+    add_drop(sys.argv[1], replace(DROP, sha256=f"{sys.argv[2]}{i:063d}"))
     print(i, flush=True)
 """
 
@@ -458,8 +527,8 @@ def test_many_writers_and_a_killed_one_lose_nothing(log):
         writer.communicate(timeout=120)
     assert [writer.returncode for writer in writers[1:]] == [0, 0, 0]
     there = {drop.sha256 for drop in logged_drops(log).values()}
-    promised = {f"0-{i}" for i in range(5 + len(told.split()))}
-    promised |= {f"{k}-{i}" for k in (1, 2, 3) for i in range(40)}
+    promised = {f"0{i:063d}" for i in range(5 + len(told.split()))}
+    promised |= {f"{k}{i:063d}" for k in (1, 2, 3) for i in range(40)}
     assert promised <= there
     assert len(there - promised) <= 1  # added, and killed before it could say so
     assert all(len(drop.severity) == 1 for drop in logged_drops(log).values())
@@ -524,7 +593,7 @@ def test_the_same_log_in_postgresql(postgresql):
 def test_a_role_that_may_only_read_reads_and_writes_nothing(postgresql):
     import psycopg
 
-    number = add_drop(postgresql, replace(DROP, machine="other", sha256="r" * 64))
+    number = add_drop(postgresql, replace(DROP, machine="other", sha256="e" * 64))
     with psycopg.connect(postgresql) as connection:
         connection.execute("CREATE ROLE reader LOGIN")
         connection.execute("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
