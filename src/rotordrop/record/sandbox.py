@@ -12,9 +12,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.child import child_command, limit
 from rotordrop.errors import RecordError
 
 CPU_S = 4.0
@@ -81,12 +80,7 @@ def unpack(path: Path, kind: str) -> Content:
         "kind": kind,
         "cpu_s": cpu,
         "memory": MEMORY + MEMORY_PER_BYTE * size,
-        "sys_path": [entry for entry in sys.path if entry],
     }
-    program = (
-        "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
-        "from rotordrop.record.sandbox import child; child(order)"
-    )
     environment = os.environ | {
         "OPENBLAS_NUM_THREADS": "1",
         "OMP_NUM_THREADS": "1",
@@ -94,7 +88,7 @@ def unpack(path: Path, kind: str) -> Content:
     }
     try:
         done = subprocess.run(
-            [sys.executable, "-I", "-c", program, json.dumps(order)],
+            child_command(__name__, "child", order),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -148,19 +142,7 @@ def child(order: dict[str, Any]) -> None:
     """In the child: set its limits, read one file, write what it holds, or why not, to standard output."""
     answer = os.dup(1)
     os.dup2(2, 1)  # what a library prints must not land among the samples
-    if os.name == "posix":
-        import resource
-
-        seconds, memory = round(order["cpu_s"]), order["memory"]
-        # RLIMIT_AS would count what libraries map and never touch; only Linux bounds RLIMIT_DATA as needed
-        of_memory = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
-        for which, limits in (
-            (resource.RLIMIT_CPU, (seconds, seconds + 1)),
-            (of_memory, (memory, memory)),
-            (resource.RLIMIT_CORE, (0, 0)),
-        ):
-            with suppress(ValueError, OSError):
-                resource.setrlimit(which, limits)
+    limit(order["memory"], round(order["cpu_s"]))
     path, arrays = Path(order["path"]), []
     try:
         content = import_module(f"rotordrop.record.readers.{order['kind']}").unpacked(path)
@@ -182,8 +164,8 @@ def child(order: dict[str, Any]) -> None:
     except ModuleNotFoundError as error:
         head = {"missing": error.name}
     except MemoryError:
-        limit = order["memory"] / 1e6
-        head, arrays = {"refused": f"{path} needs more than {limit:.0f} MB to be read; it is damaged"}, []
+        most = order["memory"] / 1e6
+        head, arrays = {"refused": f"{path} needs more than {most:.0f} MB to be read; it is damaged"}, []
     with os.fdopen(answer, "wb") as stream:
         stream.write(json.dumps(head).encode() + b"\n")
         for array in arrays:

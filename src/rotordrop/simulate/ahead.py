@@ -5,25 +5,20 @@ After an installation the loop is the longest wait of a first drop, and it needs
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
+from rotordrop.child import child_command
 from rotordrop.physics._compile import cache_folder, compile_for
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate import _histories, _loop
 from rotordrop.simulate._tableau import tsit5
 
-COMMAND = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from rotordrop.simulate.ahead import compile_loop; compile_loop()"
-)
 _DIMENSIONS = {
     "bearing_shape": 2,
     "bearing": 2,
@@ -72,8 +67,7 @@ def loop_compiled_ahead(say: Callable[[str], None]) -> Iterator[Callable[[], Non
         yield lambda: None
         return
     say("The first drop after an installation compiles its kernels, once, for some ten seconds ...")
-    program = [sys.executable, "-I", "-c", COMMAND, json.dumps(sys.path)]  # as a bundled program takes it
-    beside = subprocess.Popen(program, stdin=subprocess.DEVNULL)
+    beside = subprocess.Popen(child_command(__name__, "compile_loop"), stdin=subprocess.DEVNULL)
 
     def wait() -> None:
         compile_histories()

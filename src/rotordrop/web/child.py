@@ -6,8 +6,6 @@ nobody, so that neither page nor server has to be there when it ends.
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotordrop.child import limit
 from rotordrop.document import parse_toml
 from rotordrop.errors import (
     DamagedFileError,
@@ -53,9 +52,9 @@ BETWEEN_WORDS_S = 0.3
 """Pause between two words on the progress [s]; chosen, not measured."""
 
 
-def main(order: dict[str, Any]) -> None:
-    """Do what was ordered and say how it ended."""
-    job, verb = Job(Path(order["job"])), order["verb"]
+def main(folder: str, verb: Verb) -> None:
+    """Do what was ordered of the job in a folder and say how it ended."""
+    job = Job(Path(folder))
     told = state_of(job, verb)
     assert told is not None
     try:
@@ -91,22 +90,6 @@ def _without_folder(message: str, job: Job) -> str:
         for entry in files:  # the longest first: record.csv is part of record.csv.gz
             message = message.replace(str(job.path / "files" / entry["stored"]), entry["name"])
     return message.replace(f"{job.path}/", "")
-
-
-def limit(memory: int, seconds: int) -> None:
-    """Limit memory [byte] and processor time [s] of this process, on POSIX systems."""
-    if os.name != "posix":
-        return
-    import resource
-
-    with suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
-    with suppress(ValueError, OSError):
-        resource.setrlimit(
-            resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS, (memory, memory)
-        )
-    with suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def machine_of(job: Job) -> Machine | None:

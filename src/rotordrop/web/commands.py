@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
+from rotordrop.child import child_command, limit
 from rotordrop.errors import UsageError
 
-_PROGRAM = (
-    "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
-    "from rotordrop.web.child import limit; limit(order['memory'], order['seconds']); "
-    "sys.argv[:] = ['rotordrop', *order['arguments']]; from rotordrop.__main__ import main; main()"
-)
+
+def run(arguments: list[str], memory: int, seconds: int) -> None:
+    """In the child: set its limits and run a command."""
+    limit(memory, seconds)
+    sys.argv[:] = ["rotordrop", *arguments]
+    import_module("rotordrop.__main__").main()  # the page asks for commands, and knows none of them
 
 
 def said_by_command(arguments: list[str], *, memory: int, seconds: int, folder: Path | None = None) -> str:
@@ -25,11 +27,9 @@ def said_by_command(arguments: list[str], *, memory: int, seconds: int, folder: 
     UsageError
         With its own words where it fails.
     """
-    order = {"arguments": arguments, "memory": memory, "seconds": seconds}
-    paths = [os.path.abspath(entry) for entry in sys.path if entry]  # noqa: PTH100 - entries stay texts
     try:
         done = subprocess.run(
-            [sys.executable, "-I", "-c", _PROGRAM, json.dumps({**order, "sys_path": paths})],
+            child_command(__name__, "run", arguments, memory, seconds),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=seconds,

@@ -6,13 +6,11 @@ lock as long as it lives, so that the next server, too, knows whether it still r
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
 import shutil
 import signal
 import subprocess
-import sys
 import threading
 import time
 from contextlib import suppress
@@ -20,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
+from rotordrop.child import child_command
 from rotordrop.errors import DamagedFileError
 from rotordrop.files import digest_at, read_sealed, write_json
 from rotordrop.web.workspace import Job, Workspace, digests_in
@@ -40,10 +39,6 @@ AT_ONCE: dict[Verb, int] = {
 }
 """Computations of one verb that run beside each other; others wait."""
 
-_PROGRAM = (
-    "import json, sys; order = json.loads(sys.argv[1]); sys.path[:] = order['sys_path']; "
-    "from rotordrop.web.child import main; main(order)"
-)
 _PATIENCE_S = 5.0
 """How long a killed child may take to end [s]; chosen, not measured."""
 
@@ -179,9 +174,8 @@ class Runner:
             if not take_lock(lock):
                 return
             write_state(job, verb, {**told, "state": "running", "started": time.time(), "fraction": 0.0})
-            order = {"job": str(job.path), "verb": verb, "sys_path": [entry for entry in sys.path if entry]}
             child = subprocess.Popen(
-                [sys.executable, "-I", "-c", _PROGRAM, json.dumps(order)],
+                child_command("rotordrop.web.child", "main", str(job.path), verb),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,10 @@ def test_what_is_compiled_ahead_is_what_a_drop_calls(drop: DropResult) -> None:
     assert [set(kernel.overloads) for kernel in KERNELS] == called
 
 
+def as_second_process(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
+    monkeypatch.setattr(ahead, "child_command", lambda *_: [sys.executable, "-c", code])
+
+
 @pytest.fixture
 def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """A cache without kernels on a computer of two cores; notes what the first process compiles."""
@@ -41,7 +46,7 @@ def test_the_wait_is_told_and_ends_with_the_second_process(
     tmp_path: Path, empty_cache: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
-    monkeypatch.setattr(ahead, "COMMAND", f"open({str(tmp_path / 'made')!r}, 'w').close()")
+    as_second_process(monkeypatch, f"open({str(tmp_path / 'made')!r}, 'w').close()")
     with ahead.loop_compiled_ahead(told.append) as compiled:
         compiled()
         assert (tmp_path / "made").exists()
@@ -53,7 +58,7 @@ def test_the_wait_is_told_and_ends_with_the_second_process(
 def test_the_second_process_ends_with_the_block(
     empty_cache: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ahead, "COMMAND", "import time; time.sleep(600)")
+    as_second_process(monkeypatch, "import time; time.sleep(600)")
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt), ahead.loop_compiled_ahead(lambda _text: None):
         raise KeyboardInterrupt
@@ -66,7 +71,7 @@ def test_nothing_is_told_where_the_cache_holds_the_loop(
 ) -> None:
     (tmp_path / "cache").mkdir()
     (tmp_path / "cache" / "_loop.integrate-1.py311.1.nbc").touch()
-    monkeypatch.setattr(ahead, "COMMAND", "raise SystemExit(1)")
+    as_second_process(monkeypatch, "raise SystemExit(1)")
     told: list[str] = []
     with ahead.loop_compiled_ahead(told.append) as compiled:
         compiled()
