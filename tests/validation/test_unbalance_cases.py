@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from cases import Compute, checks_of
 from test_rotor_cases import disc_rotor, rigid_rotor, rpm
 
-from rotordrop.rotor.campbell import Crossing, response_peaks, separations
+from rotordrop.rotor.campbell import Separation, response_peaks
 from rotordrop.rotor.suspension import Link, Support, spring
 from rotordrop.rotor.unbalanced import orbit_axis
 from rotordrop.rotor.whirl import unbalance_response
@@ -34,10 +33,8 @@ def amplification(inputs: Inputs) -> dict[str, float]:
         "amplitude of the peak": peak.amplitude,
         "amplification factor": peak.factor,
     }
-    crossing = Crossing(line=0, speed=peak.speed, damping_ratio=0.5 / peak.factor, direction="forward")
     for name, (low, high) in inputs["operating_rpm"].items():
-        diagram: Any = SimpleNamespace(crossings=(crossing,))
-        (one,) = separations(diagram, rpm(low), rpm(high))
+        one = Separation.of(peak.speed, peak.factor, rpm(low), rpm(high))
         found |= {f"{name}: margin": one.margin, f"{name}: required margin": one.required}
     return found
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.elements.description import Misfit, Name, Placed, Usual
+from rotordrop.elements.friction import SLIDING
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.values import ContactDamping, NonNegative, PositiveLength, Stiffness
@@ -47,15 +48,7 @@ class Clearance(Placed):
     radius: PositiveLength | None = None
     """With a stiffness: radius of the rotor there [m]; that of the shaft."""
 
-    usual: ClassVar[Mapping[str, Usual]] = {
-        "friction": Usual(
-            least=0.005,
-            most=0.8,
-            kind="dimensionless",
-            look="metals that rub have 0.05 to 0.4; is it in percent?",
-            label="friction",
-        ),
-    }
+    usual: ClassVar[Mapping[str, Usual]] = {"friction": SLIDING}
 
     def check(self) -> None:
         """Refuse a contact without a stiffness."""
@@ -90,10 +83,8 @@ class Clearance(Placed):
             if key not in given
         }
         if "radius" not in given:
-            beside = rotor.elements[max(self.node - 2, 0) : self.node]
-            most = max(one.layer_diameter or one.outer_diameter for one in beside)
-            why = "the radius of the shaft there"
-            values["radius"] = Known(value=0.5 * most, status="inferred", source=why, unit="m")
+            why, most = "the radius of the shaft there", max(rotor.radii_at(self.node))
+            values["radius"] = Known(value=most, status="inferred", source=why, unit="m")
         return values
 
     def touch(self) -> NDArray[np.float64]:

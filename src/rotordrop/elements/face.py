@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,6 +12,7 @@ from pydantic import Field
 
 from rotordrop.elements.contact import refuse_other_unit
 from rotordrop.elements.description import Description, Misfit, Usual
+from rotordrop.elements.friction import SLIDING
 from rotordrop.elements.values import (
     ContactDamping,
     ContactExponent,
@@ -55,15 +57,7 @@ class Face(Description):
 
     states_at: ClassVar[int] = L.FACE_STATES
 
-    usual: ClassVar[Mapping[str, Usual]] = {
-        "friction": Usual(
-            least=0.005,
-            most=0.8,
-            kind="dimensionless",
-            look="steel on steel has 0.05 to 0.4; is it in percent?",
-            label="friction of the face",
-        ),
-    }
+    usual: ClassVar[Mapping[str, Usual]] = {"friction": replace(SLIDING, label="friction of the face")}
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, cast
 
 from rotordrop.elements.description import Description, Usual
@@ -16,6 +17,16 @@ from rotordrop.physics.friction import SMOOTHING_SPEED
 _STATIC_OVER_DYNAMIC = 1.3
 _RATIO_ERROR = 0.15
 """Half width of the 90 % interval of static over dynamic coefficient, over it: chosen, not measured [1]."""
+
+
+SLIDING = Usual(
+    least=0.005,
+    most=0.8,
+    kind="dimensionless",
+    look="steel on steel has 0.05 to 0.4; is it in percent?",
+    label="friction",
+)
+"""Bounds of a coefficient of dry friction."""
 
 
 class Friction(Description):
@@ -39,13 +50,7 @@ class Friction(Description):
     }
 
     usual: ClassVar[Mapping[str, Usual]] = {
-        "dynamic": Usual(
-            least=0.005,
-            most=0.8,
-            kind="dimensionless",
-            look="steel on steel has 0.05 to 0.4; is it in percent?",
-            label="dynamic friction",
-        ),
+        "dynamic": replace(SLIDING, label="dynamic friction"),
         "static": Usual(
             least=0.005,
             most=1.2,

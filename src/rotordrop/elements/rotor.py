@@ -397,6 +397,11 @@ class Rotor(Description):
             found.append(element)
         return tuple(found)
 
+    def radii_at(self, node: int) -> list[float]:
+        """Outer radii [m] on both sides of a node, counted from 1, with laminations and sleeves."""
+        beside = self.elements[max(0, node - 2) : node]
+        return [0.5 * (one.layer_diameter or one.outer_diameter) for one in beside]
+
     @cached_property
     def mass(self) -> float:
         """Mass of shaft, layers and discs [kg]."""

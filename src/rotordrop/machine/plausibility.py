@@ -70,9 +70,7 @@ def _of_the_bearing(machine: Machine, bearing: TouchdownBearing) -> Iterator[Dou
     )
     yield from _beyond("air gap", name, gap, *USUAL_GAP, text)
     radius = bearing.bore_radius.value - gap
-    beside = machine.rotor.elements[max(0, bearing.node - 2) : bearing.node]
-    outer = [0.5 * (e.layer_diameter or e.outer_diameter) for e in beside]
-    nearest = min(outer, key=lambda value: abs(value - radius))
+    nearest = min(machine.rotor.radii_at(bearing.node), key=lambda value: abs(value - radius))
     # a beam that stands for a rotor has one diameter, and none of the rotor's seats
     if abs(nearest - radius) > RADIUS_DISTANCE and not machine.rotor.is_beam:
         text = (

@@ -138,7 +138,8 @@ def _verdict(
             speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
             text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
             said.append(Statement(f"{text}, up to the nominal speed."))
-        said += [_too_near(name, one, top) for one in separations(diagram, top, top) if not one.met]
+        judged = separations(diagram, top, top).items()
+        said += [_too_near(name, crossing, one, top) for crossing, one in judged if not one.met]
     if not any(one.level == "bad" for one in said):
         said.append(Statement(CLEAR, "good"))
     return tuple(sorted(said, key=lambda one: _WORST_FIRST.index(one.level)))
@@ -164,9 +165,8 @@ def _followed(found: CriticalSpeedMap) -> Iterator[Statement]:
             )
 
 
-def _too_near(name: str, one: Separation, nominal: float) -> Statement:
+def _too_near(name: str, crossing: Crossing, one: Separation, nominal: float) -> Statement:
     """A critical speed that is nearer to the nominal speed than API 617 asks for."""
-    crossing = one.crossing
     text = (
         f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
         f"{_speed_text(crossing.speed)}, {one.margin:.1%} from the nominal speed of {_speed_text(nominal)}, "
@@ -188,11 +188,11 @@ def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: floa
     """The lowest critical speeds of the rotor, a card for what holds it, forward and mixed ones first."""
     cards = []
     for name, diagram in diagrams.items():
-        judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
+        judged = separations(diagram, nominal, nominal)
         ordered = sorted(diagram.crossings, key=lambda one: (one.direction == "backward", one.speed))
         figures = []
         for number, crossing in enumerate(ordered[:ON_CARD], start=1):
-            one, hertz = judged.get(id(crossing)), crossing.speed / TURN
+            one, hertz = judged.get(crossing), crossing.speed / TURN
             margin = "" if one is None else f"; margin {one.margin:.1%}, API 617 {one.verdict}"
             note = f"{written(60.0 * hertz, 0)} rpm; damping ratio {crossing.damping_ratio:.2%}{margin}"
             label = f"Critical speed {number}, {crossing.direction}"
@@ -235,9 +235,9 @@ def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> T
 
     def rows() -> Iterable[tuple[str, Crossing, Separation | None]]:
         for name, diagram in diagrams.items():
-            judged = {id(one.crossing): one for one in separations(diagram, nominal, nominal)}
+            judged = separations(diagram, nominal, nominal)
             for crossing in diagram.crossings:
-                yield name, crossing, judged.get(id(crossing))
+                yield name, crossing, judged.get(crossing)
 
     columns = (
         Column("rotor held by", lambda row: row[0]),
@@ -246,7 +246,7 @@ def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> T
         Column("damping ratio", lambda row: f"{100.0 * row[1].damping_ratio:.2f} %"),
         Column("amplification", lambda row: f"{amplification_factor(row[1].damping_ratio):.1f}"),
         Column("margin", lambda row: f"{100.0 * row[2].margin:.1f} %" if row[2] else "–"),
-        Column("required", lambda row: f"{100.0 * row[2].required:.1f} %" if row[2] else "–"),
+        Column("required", lambda row: row[2].asked if row[2] else "–"),
         Column("API 617", lambda row: row[2].verdict if row[2] else "–"),
     )
     return table(rows(), columns, "Critical speeds with damping and separation margins", CROSSINGS_NOTE)

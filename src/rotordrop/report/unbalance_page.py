@@ -25,7 +25,7 @@ from rotordrop.report.style import (
     plain,
     upright,
 )
-from rotordrop.rotor.campbell import LEAST_FACTOR, ResponsePeak, required_margin, response_peaks
+from rotordrop.rotor.campbell import ResponsePeak, Separation, response_peaks
 from rotordrop.rotor.unbalanced import MachineResponse, orbit_axis
 
 if TYPE_CHECKING:
@@ -42,47 +42,21 @@ SPRINGS = "an AMB stands as one spring and one damper; a controller changes both
 
 
 class PlanePeak(NamedTuple):
-    """A peak of the response in one plane, judged by its distance from the nominal speed."""
+    """A peak of the response in one plane, set against the nominal speed."""
 
     plane: str
     node: int
     peak: ResponsePeak
-    apart: float
-    """Distance from the nominal speed as a share of it [1]."""
-    needed: float
-    """The distance that API 617 asks for [1]; 0 where the factor is not known."""
-
-    @property
-    def too_near(self) -> bool:
-        """Whether API 617 asks for more."""
-        return self.peak.factor >= LEAST_FACTOR and self.apart < self.needed
-
-    @property
-    def required(self) -> str:
-        """Margin required; a peak whose half power is not reached has no factor to ask one by."""
-        if math.isnan(self.peak.factor):
-            return "–"
-        return "none" if self.peak.factor < LEAST_FACTOR else f"{100.0 * self.needed:.1f} %"
-
-    @property
-    def verdict(self) -> str:
-        """What API 617 says of the peak."""
-        if math.isnan(self.peak.factor):
-            return "factor not known"
-        if self.peak.factor < LEAST_FACTOR:
-            return "critically damped"
-        return "met" if self.apart >= self.needed else "not met"
+    separation: Separation
 
 
 def plane_peaks(response: MachineResponse, nominal: float) -> list[PlanePeak]:
-    """Peaks of every plane, judged by their distance from the nominal speed [rad/s]."""
-    found = []
-    for name, node in response.places:
-        for peak in _peaks(response, node):
-            above = peak.speed > nominal
-            needed = 0.0 if math.isnan(peak.factor) else required_margin(peak.factor, above=above)
-            found.append(PlanePeak(name, node, peak, abs(peak.speed / nominal - 1.0), needed))
-    return found
+    """Peaks of every plane, set against the nominal speed [rad/s]."""
+    return [
+        PlanePeak(name, node, peak, Separation.of(peak.speed, peak.factor, nominal, nominal))
+        for name, node in response.places
+        for peak in _peaks(response, node)
+    ]
 
 
 def _peaks(response: MachineResponse, node: int) -> tuple[ResponsePeak, ...]:
@@ -146,12 +120,13 @@ def _verdict(
     said = [
         Statement(
             f"{', '.join(one.plane for one in seen)}: the peak at {shown(nearest.peak.speed, 'speed')} with "
-            f"an amplification factor of {nearest.peak.factor:.1f} is {100.0 * nearest.apart:.1f} % from the "
-            f"nominal speed; API 617 asks for {100.0 * nearest.needed:.1f} %",
+            f"an amplification factor of {nearest.peak.factor:.1f} is "
+            f"{100.0 * nearest.separation.margin:.1f} % from the nominal speed; API 617 asks for "
+            f"{nearest.separation.asked}",
             "bad",
         )
-        for seen in _modes([one for one in peaks if one.too_near])
-        for nearest in [min(seen, key=lambda one: one.apart)]
+        for seen in _modes([one for one in peaks if not one.separation.met])
+        for nearest in [min(seen, key=lambda one: one.separation.margin)]
     ]
     said = said or [Statement(CLEAR, "good")]
     if machine.balance_grade is not None:
@@ -198,9 +173,9 @@ def peak_table(peaks: Sequence[PlanePeak]) -> Table:
         Column("peak at", "peak.speed", "speed"),
         Column("0 to peak", "peak.amplitude", "length", 3),
         Column("amplification", lambda o: "–" if math.isnan(o.peak.factor) else f"{o.peak.factor:.2f}"),
-        Column("margin", lambda one: f"{100.0 * one.apart:.1f} %"),
-        Column("required", "required"),
-        Column("API 617", "verdict"),
+        Column("margin", lambda one: f"{100.0 * one.separation.margin:.1f} %"),
+        Column("required", "separation.asked"),
+        Column("API 617", "separation.verdict"),
     )
     note = "Amplification by the half-power width of the peak; margin from the nominal speed."
     return table(peaks, columns, "Peaks of the response", note)

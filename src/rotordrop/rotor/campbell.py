@@ -179,9 +179,9 @@ def required_margin(factor: float, *, above: bool) -> float:
 
     ``above``: the critical speed lies above the operating range, else below it.
     Source: API 617 (8th edition, part 1), ``17 (1 − 1/(AF − 1.5))`` % and at most 16 % below, 10 % more
-    above; none up to an amplification factor of 2.5.
+    above; none up to an amplification factor of 2.5, nor where it is not known (NaN).
     """
-    if factor < LEAST_FACTOR:
+    if not factor >= LEAST_FACTOR:
         return 0.0
     share = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MOST_MARGIN)
     return share + 0.10 if above else share
@@ -189,16 +189,22 @@ def required_margin(factor: float, *, above: bool) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Separation:
-    """A critical speed set against a range of operating speeds."""
+    """A critical speed, of a mode or of a response, set against a range of operating speeds."""
 
-    crossing: Crossing
-    """The critical speed."""
     factor: float
-    """Amplification factor [1]."""
+    """Amplification factor [1]; NaN where a response does not come down to half power."""
     margin: float
     """Distance from the nearer end of the range, as a share of that speed [1]; zero within the range."""
     required: float
-    """Margin that API 617 asks for [1]."""
+    """Margin that API 617 asks for [1]; zero where the factor is not known."""
+
+    @classmethod
+    def of(cls, speed: float, factor: float, lowest: float, highest: float) -> Separation:
+        """Set a critical speed with an amplification factor against operating speeds [rad/s]."""
+        above = speed > highest
+        edge = highest if above else lowest
+        margin = 0.0 if lowest <= speed <= highest else abs(speed - edge) / edge
+        return cls(factor=factor, margin=margin, required=required_margin(factor, above=above))
 
     @property
     def met(self) -> bool:
@@ -206,32 +212,34 @@ class Separation:
         return self.margin >= self.required
 
     @property
+    def asked(self) -> str:
+        """The margin required, in words."""
+        if math.isnan(self.factor):
+            return "–"
+        return "none" if self.factor < LEAST_FACTOR else f"{100.0 * self.required:.1f} %"
+
+    @property
     def verdict(self) -> str:
         """What follows, in words."""
+        if math.isnan(self.factor):
+            return "factor not known"
         if self.factor < LEAST_FACTOR:
             return "critically damped"
         return "met" if self.met else "not met"
 
 
-def separations(diagram: CampbellDiagram, lowest: float, highest: float) -> tuple[Separation, ...]:
+def separations(diagram: CampbellDiagram, lowest: float, highest: float) -> dict[Crossing, Separation]:
     """Set every forward or mixed critical speed of a diagram against operating speeds [rad/s].
 
     Critical speeds beyond the last speed of the diagram are not seen.
     Differs from the convention: the factor is that of the damped mode, not measured at half power of a
     response, which light damping makes the same.
     """
-    found = []
-    for crossing in diagram.crossings:
-        if crossing.direction == "backward":
-            continue
-        factor = amplification_factor(crossing.damping_ratio)
-        above = crossing.speed > highest
-        edge = highest if above else lowest
-        inside = lowest <= crossing.speed <= highest
-        margin = 0.0 if inside else abs(crossing.speed - edge) / edge
-        required = required_margin(factor, above=above)
-        found.append(Separation(crossing=crossing, factor=factor, margin=margin, required=required))
-    return tuple(found)
+    return {
+        one: Separation.of(one.speed, amplification_factor(one.damping_ratio), lowest, highest)
+        for one in diagram.crossings
+        if one.direction != "backward"
+    }
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.machine import Machine
 from rotordrop.rotor.layout import StateLayout
-from rotordrop.simulate.result import ContactLog, DropResult
+from rotordrop.simulate.result import ContactLog, DropResult, stop_of
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class ClearanceUse:
 
 def share_column(name: str, stop: bool) -> str:
     """Name of the column of a study that holds travel over gap."""
-    return f"{name}.mount.stop.travel_over_gap" if stop else f"{name}.travel_over_gap"
+    return f"{stop_of(name) if stop else name}.travel_over_gap"
 
 
 def stopped(machine: Machine) -> list[str]:
@@ -74,7 +74,7 @@ def clearance_uses(machine: Machine, result: DropResult) -> tuple[ClearanceUse, 
     uses = []
     for name, node, stop, gap, moved in places:
         radius = np.hypot(moved[:, 0], moved[:, 1])
-        contacts = result.contacts_at(f"{name}.mount.stop" if stop else name)
+        contacts = result.contacts_at(stop_of(name) if stop else name)
         latest = int(np.argmax(radius))
         uses.append(
             ClearanceUse(

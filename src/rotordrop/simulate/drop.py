@@ -23,7 +23,7 @@ from rotordrop.simulate._tableau import Tableau, dp5, tsit5
 from rotordrop.simulate.case import DropCase, StateStart, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
 from rotordrop.simulate.levitation import start_of_drop
-from rotordrop.simulate.result import ContactLog, DropResult
+from rotordrop.simulate.result import ContactLog, DropResult, stop_of
 
 Array = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def _race_stress(parameters: KernelParameters, histories: Array) -> Array | None
 
 
 def _further_names(model: DropModel) -> tuple[str, ...]:
-    stops = [f"{model.bearing_names[b]}.mount.stop" for b in model.parameters.stops]
+    stops = [stop_of(model.bearing_names[b]) for b in model.parameters.stops]
     rubs = [one.name for one in model.machine.clearances if one.stiffness is not None]
     return (*stops, *rubs, *(f"{model.bearing_names[b]}.face" for b in model.parameters.faces))
 

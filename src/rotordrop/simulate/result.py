@@ -237,6 +237,11 @@ class DropResult:
             _write(self, file)
 
 
+def stop_of(bearing: str) -> str:
+    """Name of the stop in the mount of a bearing."""
+    return f"{bearing}.mount.stop"
+
+
 HISTORIES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("displacement", ("time", "bearing", "axis"), "m", "rotor displacement at the bearing node"),
     ("race_displacement", ("time", "bearing", "axis"), "m", "race displacement"),

@@ -10,10 +10,9 @@ import pytest
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
-from rotordrop.report.unbalance_page import PlanePeak
 from rotordrop.rotor.campbell import (
     Crossing,
-    ResponsePeak,
+    Separation,
     amplification_factor,
     required_margin,
     response_peaks,
@@ -58,7 +57,7 @@ def test_a_critical_speed_is_set_against_the_nearer_end_of_the_range():
     below, inside, above = crossing(80.0), crossing(110.0), crossing(180.0)
     damped, backward = crossing(99.0, 0.3), crossing(100.0, direction="backward")
     diagram = SimpleNamespace(crossings=(below, inside, damped, backward, above))
-    found = separations(diagram, 100.0, 120.0)
+    found = separations(diagram, 100.0, 120.0).values()
     assert [one.margin for one in found] == pytest.approx([0.2, 0.0, 0.01, 0.5])
     assert [one.verdict for one in found] == ["met", "not met", "critically damped", "met"]
 
@@ -191,11 +190,10 @@ def test_a_sharp_peak_has_the_height_and_width_of_a_grid_thirty_times_finer():
 
 
 def test_a_peak_without_a_factor_is_not_called_met():
-    def judged(factor, apart, needed):
-        peak = ResponsePeak(speed=100.0, amplitude=1e-6, factor=factor)
-        one = PlanePeak("NDE", 3, peak, apart, needed)
-        return one.required, one.verdict
+    def judged(factor, speed):
+        one = Separation.of(speed, factor, 100.0, 100.0)
+        return one.asked, one.verdict
 
-    assert judged(math.nan, 0.01, 0.0) == ("–", "factor not known")
-    assert judged(2.0, 0.01, 0.0) == ("none", "critically damped")
-    assert judged(10.0, 0.10, 0.15) == ("15.0 %", "not met")
+    assert judged(math.nan, 101.0) == ("–", "factor not known")
+    assert judged(2.0, 101.0) == ("none", "critically damped")
+    assert judged(10.0, 90.0) == ("15.0 %", "not met")
