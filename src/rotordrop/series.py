@@ -17,6 +17,16 @@ def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int6
     return edges[::2], edges[1::2] - edges[::2]
 
 
+def closed(mask: NDArray[np.bool_], gap: int) -> NDArray[np.bool_]:
+    """A mask with its gaps shorter than so many samples filled: a morphological closing."""
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    filled = mask.copy()
+    for end, begin in zip(edges[1:-1:2], edges[2::2], strict=True):
+        if begin - end < gap:
+            filled[end:begin] = True
+    return filled
+
+
 def noise_by_differences(values: NDArray[np.float64], order: int) -> float:
     """Standard deviation of white noise on a smooth motion, in the unit of the values.
 

@@ -215,16 +215,12 @@ P = TypeVar("P", bound=Placed)
 def place_on_nodes(items: tuple[P, ...], nodes: tuple[float, ...], key: str) -> tuple[P, ...]:
     """Find the node of everything that sits on the rotor; refuse what lies outside."""
     for index, item in enumerate(items):
-        if item.position is None:
-            _refuse_outside(item.node, nodes, (key, index, "node"))
-        else:
+        if item.position is not None:
             item.__dict__["node"] = _node_at(item.position, nodes, (key, index, "position"))
+        elif not 1 <= item.node <= len(nodes):
+            told = f"node {item.node} is outside the rotor, whose nodes are 1 to {len(nodes)}"
+            raise Misfit(told, (key, index, "node"))
     return items
-
-
-def _refuse_outside(node: int, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> None:
-    if not 1 <= node <= len(nodes):
-        raise Misfit(f"node {node} is outside the rotor, whose nodes are 1 to {len(nodes)}", place)
 
 
 def _node_at(position: Known, nodes: tuple[float, ...], place: tuple[str | int, ...]) -> int:

@@ -86,7 +86,7 @@ def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float
     if len(planes) < 2:
         raise Misfit(
             f"the {len(sensors)} sensors sit in {len(planes)} plane "
-            f"({_plane_text(planes)}) and cannot tell a "
+            f"({', '.join(f'{z * 1e3:.4g} mm' for z in planes)}) and cannot tell a "
             "tilt of the rotor from its displacement; add sensors in a second plane",
             ("sensors",),
         )
@@ -95,10 +95,10 @@ def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float
         return  # a plane that lost a sensor: the twin goes on with the other plane and what is left
     if len(whole) < 2 and _rank(sensors, nodes) < 4:
         weak = next(z for z, plane in planes.items() if not _resolves_both(plane))
+        stated = ", ".join(f"{one.name} at {math.degrees(one.angle.value):.4g}°" for one in planes[weak])
         raise Misfit(
             f"the sensors resolve only {_rank(sensors, nodes)} of the 4 rigid motions: in the plane at "
-            f"{weak * 1e3:.4g} mm all look in the same direction "
-            f"({', '.join(_sensor_text(sensor) for sensor in planes[weak])}); turn one or add one",
+            f"{weak * 1e3:.4g} mm all look in the same direction ({stated}); turn one or add one",
             ("sensors", sensors.index(planes[weak][0]), "angle"),
         )
 
@@ -117,14 +117,6 @@ def _rank(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> int:
         for a, z in ((s.angle.value, nodes[s.node - 1] / span - 0.5) for s in sensors)
     ]
     return int(np.linalg.matrix_rank(np.array(rows), tol=1e-3))
-
-
-def _sensor_text(sensor: Sensor) -> str:
-    return f"{sensor.name} at {math.degrees(sensor.angle.value):.4g}°"
-
-
-def _plane_text(planes: dict[float, list[Sensor]]) -> str:
-    return ", ".join(f"{z * 1e3:.4g} mm" for z in planes)
 
 
 @dataclass(frozen=True, kw_only=True)

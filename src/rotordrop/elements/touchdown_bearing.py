@@ -151,17 +151,18 @@ class TouchdownBearing(Placed):
 
     def left_out(self) -> dict[str, Any]:
         """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
-        width = self.race.width if "width" in self.race.model_fields_set else self._race_width()
+        if "width" in self.race.model_fields_set:
+            width = self.race.width
+        elif self.contact.length is not None:
+            of_line = "the length of the line contact"
+            width = replace(self.contact.length, status="inferred", source=of_line)
+        else:
+            value, why = self.bearing.usual_race_width()
+            width = Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
         return {
             "race": self.bearing.race_of_size(self.race, width, self.bore_radius.value),
             "mount": self.mount.beside(self.support.stiffness),
         }
-
-    def _race_width(self) -> Known:
-        if self.contact.length is not None:
-            return replace(self.contact.length, status="inferred", source="the length of the line contact")
-        value, why = self.bearing.usual_race_width()
-        return Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
 
 
 MODEL_GAP_ERROR = 0.008

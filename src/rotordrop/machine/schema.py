@@ -105,22 +105,17 @@ def _refer(node: Any, kinds: set[str]) -> None:
         for entry in node:
             _refer(entry, kinds)
     elif isinstance(node, dict):
-        _drop_null(node)
+        choices = node.get("anyOf")
+        if isinstance(choices, list) and {"type": "null"} in choices:
+            choices.remove({"type": "null"})  # a TOML file leaves out what it does not give; it has no null
+            if len(choices) == 1:
+                node.update(node.pop("anyOf")[0])
         kind = node.pop(KIND_MARK, None)
         if kind is not None:
             kinds.add(kind)
             node["$ref"] = f"#/$defs/{kind}"
         for entry in node.values():
             _refer(entry, kinds)
-
-
-def _drop_null(node: dict[str, Any]) -> None:
-    """A TOML file leaves out what it does not give; it has no null."""
-    choices = node.get("anyOf")
-    if isinstance(choices, list) and {"type": "null"} in choices:
-        choices.remove({"type": "null"})
-        if len(choices) == 1:
-            node.update(node.pop("anyOf")[0])
 
 
 RANGE = "Holds the value with 90 % probability; the guess need not be its middle"

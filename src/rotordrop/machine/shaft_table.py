@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from rotordrop.elements.description import LARGEST_FILE, unknown_key
 from rotordrop.errors import MachineFileError, UsageError
@@ -66,7 +66,7 @@ def read_shaft_table(path: Path) -> dict[str, Any]:
         raise MachineFileError(
             "the shaft table holds no sections; give a heading and at least one row", file=path
         )
-    separator = _separator(rows[0][1])
+    separator = max(";\t,", key=rows[0][1].count)
     cells = [(number, next(csv.reader([line], delimiter=separator))) for number, line in rows]
     headings = [text.strip() for text in cells[0][1]]
     if _are_units(cells[1][1]):
@@ -188,26 +188,18 @@ def _text(path: Path) -> str:
         if path.stat().st_size > LARGEST_FILE:
             raise MachineFileError(f"more than {LARGEST_FILE} bytes are no shaft table", file=path)
         return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MachineFileError(
+            "the shaft table is not UTF-8 text; save it as CSV UTF-8",
+            file=path,
+            line=error.object.count(b"\n", 0, error.start) + 1,
+        ) from error
     except (OSError, ValueError) as error:
-        if isinstance(error, UnicodeDecodeError):
-            _refuse_encoding(path, error)
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise MachineFileError(
             f"cannot read the shaft table: {reason}; the path counts from the folder of the machine file",
             file=path,
         ) from error
-
-
-def _refuse_encoding(path: Path, error: UnicodeDecodeError) -> NoReturn:
-    raise MachineFileError(
-        "the shaft table is not UTF-8 text; save it as CSV UTF-8",
-        file=path,
-        line=error.object.count(b"\n", 0, error.start) + 1,
-    ) from error
-
-
-def _separator(heading: str) -> str:
-    return max(";\t,", key=heading.count)
 
 
 def _by_position(rows: list[dict[str, Any]], table: _Table) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rotordrop.errors import RecordError
 from rotordrop.record.recording import Array
+from rotordrop.series import SIGMA_OF_MEDIAN
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -203,7 +204,7 @@ def _robust(design: Array, values: Array, rounds: int = 12) -> tuple[Array, floa
         found = np.linalg.lstsq(design * weights[:, None], values * weights, rcond=None)[0]
         solution = np.asarray(found, dtype=np.float64)
         rest = values - design @ solution
-        scatter = float(1.4826 * np.median(np.abs(rest)))
+        scatter = float(SIGMA_OF_MEDIAN * np.median(np.abs(rest)))
         limit = 1.5 * max(scatter, 1e-9)
         weights = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(rest), limit)))
     weighted = design * weights[:, None]
@@ -215,5 +216,5 @@ def _without_outliers(readings: Array) -> Array:
 
     middle = median_filter(readings, size=5, mode="nearest")
     rest = readings - middle
-    limit = 6.0 * 1.4826 * float(np.median(np.abs(rest))) + 1e-6 * float(np.max(np.abs(readings)))
+    limit = 6.0 * SIGMA_OF_MEDIAN * float(np.median(np.abs(rest))) + 1e-6 * float(np.max(np.abs(readings)))
     return np.where(np.abs(rest) > limit, middle, readings)

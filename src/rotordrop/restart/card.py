@@ -409,9 +409,10 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         )
     else:
         said.append("None of the checks pays: none can change the answer at its cost.")
-    said += [
-        f"The answer becomes “{one.answer}” where {one.of} is {_times(one.factor)}." for one in card.flips[:3]
-    ]
+    for one in card.flips[:3]:
+        more = one.factor > 1.0
+        times = f"{one.factor:.2g} times as large" if more else f"{1.0 / one.factor:.2g} times smaller"
+        said.append(f"The answer becomes “{one.answer}” where {one.of} is {times}.")
     if not card.flips:
         said.append(f"No cost and no prior within a factor of {FLIPS_WITHIN:g} changes the answer.")
     if not drop.consistent:
@@ -426,7 +427,3 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
 def _beside(card: RestartCard) -> str:
     others = ", ".join(f"{name} {cost:.2g}" for name, cost in card.costs.items() if name != card.answer)
     return f" ({others})"
-
-
-def _times(factor: float) -> str:
-    return f"{factor:.2g} times as large" if factor > 1.0 else f"{1.0 / factor:.2g} times smaller"

@@ -153,16 +153,13 @@ def machine_warnings(
     omega = float(machine.speed.nominal) if speed is None else speed
     found = [MachineWarning(**vars(doubt), doubtful=True) for doubt in doubts(machine)]
     for bearing, rest in zip(machine.touchdown_bearings, summary.bearings, strict=True):
-        found += [*_excesses(bearing, rest, omega), *_landing(machine, bearing)]
+        for one in numbers_of(bearing).excesses(omega, abs(rest.load)):
+            told = _warning(one.kind, bearing.name, one.value, one.limit, one.text)
+            found.append(replace(told, doubtful=one.doubtful))
+        found += _landing(machine, bearing)
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
         found += _guesses_aside(bearing)
     return tuple(found)
-
-
-def _excesses(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
-    for excess in numbers_of(bearing).excesses(omega, abs(rest.load)):
-        told = _warning(excess.kind, bearing.name, excess.value, excess.limit, excess.text)
-        yield replace(told, doubtful=excess.doubtful)
 
 
 def _landing(machine: Machine, bearing: TouchdownBearing) -> Iterator[MachineWarning]:

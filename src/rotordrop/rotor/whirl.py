@@ -89,11 +89,14 @@ def whirl_modes(
     kept = kept[np.argsort(values[kept].imag, kind="stable")][:count]
     values, vectors = values[kept], vectors[:, kept]
     vectors = vectors / np.sqrt(np.einsum("ik,ij,jk->k", vectors.conj(), system.mass, vectors).real)
+    shapes = _at_nodes(rotor, system, vectors)
+    flat = shapes.reshape(len(shapes), 2 * shapes.shape[1])
+    largest = flat[np.arange(len(flat)), np.argmax(np.abs(flat), axis=1)]
     return WhirlModes(
         speed=speed,
         eigenvalue=values,
         whirl=_whirl_index(system, vectors) * (1.0 if speed >= 0.0 else -1.0),
-        shapes=_node_shapes(rotor, system, vectors),
+        shapes=np.asarray(shapes / largest[:, None, None]),
         vectors=vectors,
     )
 
@@ -216,10 +219,3 @@ def _at_nodes(rotor: RotorFE | RotorBasis, system: PlanarMatrices, vectors: Comp
     if isinstance(rotor, RotorBasis):
         planes = [rotor.shapes @ plane for plane in planes]
     return np.stack([plane[0::2].T for plane in planes], axis=-1)
-
-
-def _node_shapes(rotor: RotorFE | RotorBasis, system: PlanarMatrices, vectors: ComplexArray) -> ComplexArray:
-    shapes = _at_nodes(rotor, system, vectors)
-    flat = shapes.reshape(len(shapes), 2 * shapes.shape[1])
-    largest = flat[np.arange(len(flat)), np.argmax(np.abs(flat), axis=1)]
-    return np.asarray(shapes / largest[:, None, None])

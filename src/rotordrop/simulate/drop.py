@@ -143,6 +143,7 @@ def _result(
     owner, further = _loop.bearings_logged(log, parameters), _further_names(model)
     others = log[owner < 0]
     contacts = _contact_log(log[owner >= 0], owner[owner >= 0])
+    stresses = [H.H_INNER_STRESS, H.H_OUTER_STRESS]  # they differ where balls have inertia
     return DropResult(
         time=times,
         displacement=displacement,
@@ -154,7 +155,7 @@ def _result(
         bearing_force=force,
         max_ball_load=histories[..., H.H_BALL_LOAD],
         max_stress=histories[..., H.H_STRESS],
-        race_stress=_race_stress(parameters, histories),
+        race_stress=histories[..., stresses] if len(parameters.ball_table) else None,
         face_force=H.face_forces(states, parameters) if layout.moves_axially else None,
         line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
         speed=states[:, layout.rotor_speed],
@@ -180,13 +181,6 @@ def _result(
         finished=outcome == _loop.FINISHED,
         certificate=_energy_certificate(model, parameters, times, states, force),
     )
-
-
-def _race_stress(parameters: KernelParameters, histories: Array) -> Array | None:
-    """Stress on inner and outer race [Pa], (T, B, 2), where a ball presses them by different loads."""
-    if not len(parameters.ball_table):
-        return None
-    return histories[..., [H.H_INNER_STRESS, H.H_OUTER_STRESS]]
 
 
 def _further_names(model: DropModel) -> tuple[str, ...]:

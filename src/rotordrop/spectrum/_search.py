@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from rotordrop.series import closed
 from rotordrop.spectrum._clock import BESIDE, TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
@@ -509,16 +510,6 @@ class LineSearch:
 
 
 def _connected(clear: Mask, spoken: Mask, gap: int) -> Mask:
-    """Stretches of samples, joined over short gaps, that touch the part in which a line was detected."""
-    stretch, _ = label(_closed(clear, gap) | spoken)
+    """Stretches of samples that touch the part in which a line was detected, joined over shorter gaps."""
+    stretch, _ = label(closed(clear, gap) | spoken)
     return np.asarray(np.isin(stretch, np.unique(stretch[spoken])))
-
-
-def _closed(mask: Mask, gap: int) -> Mask:
-    """The mask with its gaps shorter than so many samples filled: a closing, in one pass over its edges."""
-    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
-    filled = mask.copy()
-    for end, begin in zip(edges[1:-1:2], edges[2::2], strict=True):
-        if begin - end < gap:
-            filled[end:begin] = True
-    return filled

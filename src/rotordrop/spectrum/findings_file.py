@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.files import new_hdf5
 
 if TYPE_CHECKING:
-    from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis
     from rotordrop.spectrum.waterfall import Waterfall
 
 FORMAT = "rotordrop frequencies 1"
@@ -31,8 +31,12 @@ def write_findings(analysis: CoastDownAnalysis, path: Path) -> None:
         if time is not None and speed is not None:
             _put(file, "speed/time", time, "s")
             _put(file, "speed/speed", speed, "rad/s")
-            if analysis.speed_law is not None:
-                _write_law(file, time, analysis.speed_law)
+            law = analysis.speed_law
+            for name, fit in () if law is None else (("exponential", law.exponential), ("drag", law.drag)):
+                inside = (time >= fit.start) & (time <= fit.end)
+                fitted = np.full(len(time), np.nan)
+                fitted[inside] = fit.speed_at(time[inside])
+                _put(file, f"speed/{name}_fit", fitted, "rad/s")
 
 
 def _put(group: Any, name: str, values: Any, unit: str) -> None:
@@ -69,11 +73,3 @@ def _write_waterfall(group: Any, fall: Waterfall) -> None:
     group["amplitude"].attrs["amplitude_kind"] = fall.amplitude_kind
     if fall.speed is not None:
         _put(group, "speed", fall.speed, "rad/s")
-
-
-def _write_law(file: Any, time: Any, law: SpeedLaw) -> None:
-    for name, fit in (("exponential_fit", law.exponential), ("drag_fit", law.drag)):
-        fitted = np.full(len(time), np.nan)
-        inside = (time >= fit.start) & (time <= fit.end)
-        fitted[inside] = fit.speed_at(time[inside])
-        _put(file, f"speed/{name}", fitted, "rad/s")

@@ -106,7 +106,8 @@ def displacement_history(
         cut = min(max(boundary - start, 0), radius.size)
         early = max(early, _peak(radius[:cut], start))
         late = max(late, _peak(radius[cut:], start + cut))
-        noise.append(_block_noise(xy))
+        # from third differences, which a smooth motion leaves near zero
+        noise.append(noise_by_differences(xy, 3) if len(xy) >= 8 else 0.0)
     largest, at = max(early, late)
     largest_time = start_time + at / sampling_rate
     later_time = start_time + late[1] / sampling_rate
@@ -208,13 +209,6 @@ def _peak(radius: Array, start: int) -> tuple[float, int]:
         return -np.inf, start
     at = int(radius.argmax())
     return float(radius[at]), start + at
-
-
-def _block_noise(xy: Array) -> float:
-    """Noise of one direction [m], from third differences, which a smooth motion leaves near zero."""
-    if len(xy) < 8:
-        return 0.0
-    return noise_by_differences(xy, 3)
 
 
 def _window_statement(

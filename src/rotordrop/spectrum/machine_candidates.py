@@ -71,7 +71,12 @@ def machine_candidates(machine: Machine, planes: dict[str, str] | None = None) -
         )
         for swing in swing_ranges(machine)
     ]
-    defects = [candidate for b in machine.touchdown_bearings for candidate in _defects(b)]
+    defects = [
+        candidate
+        for bearing in machine.touchdown_bearings
+        if (elements := numbers_of(bearing).rolling_elements()) is not None
+        for candidate in bearing_defect_candidates(bearing.name, **vars(elements))
+    ]
     return (*order_candidates(), *swings, *settled_modes(machine), *mains_candidates(), *defects)
 
 
@@ -139,8 +144,3 @@ def settled_modes(machine: Machine) -> tuple[Candidate, ...]:
             )
         )
     return tuple(found)
-
-
-def _defects(bearing: TouchdownBearing) -> tuple[Candidate, ...]:
-    elements = numbers_of(bearing).rolling_elements()
-    return () if elements is None else bearing_defect_candidates(bearing.name, **vars(elements))

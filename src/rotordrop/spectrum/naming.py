@@ -94,15 +94,21 @@ def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: f
     if whirl is not None:
         return whirl
     weighed = [(c, _density(line, c)) for c in candidates if _possible(line, c)]
-    nothing = _nothing(line)
+    nothing = UNKNOWN_WEIGHT / (line.order_band if line.kind == "order" else line.band)
     total = nothing + sum(density for _, density in weighed)
     matches = sorted(
-        (Match(candidate=c, probability=d / total, deviation=_deviation(line, c)) for c, d in weighed),
+        (
+            Match(candidate=c, probability=d / total, deviation=_found(line, c)[0] - c.value)
+            for c, d in weighed
+        ),
         key=lambda match: -match.probability,
     )
     listed = tuple(match for match in matches if match.probability >= WORTH_LISTING)
     if not listed:
-        return Name(label="unnamed", named=False, confidence=0.0, reason=_why_none(line), matches=())
+        why = f"{_place(line)}: no candidate fits"
+        if line.kind == "undecided":
+            why += "; the speed changes too little to say if the line follows it"
+        return Name(label="unnamed", named=False, confidence=0.0, reason=why, matches=())
     family = listed[0].candidate.family
     together = [match for match in listed if match.candidate.family == family]
     share = sum(match.probability for match in together)
@@ -162,10 +168,6 @@ def _found(line: LineEvidence, candidate: Candidate) -> tuple[float, float]:
     return line.frequency, line.frequency_error
 
 
-def _deviation(line: LineEvidence, candidate: Candidate) -> float:
-    return _found(line, candidate)[0] - candidate.value
-
-
 def _density(line: LineEvidence, candidate: Candidate) -> float:
     """Weighted probability density that the candidate puts a line here [1/Hz or 1/order]."""
     value, error = _found(line, candidate)
@@ -177,10 +179,6 @@ def _density(line: LineEvidence, candidate: Candidate) -> float:
     if line.kind == "undecided" and candidate.kind == "order":
         density *= line.order / max(line.frequency, 1e-9)
     return candidate.weight * density
-
-
-def _nothing(line: LineEvidence) -> float:
-    return UNKNOWN_WEIGHT / (line.order_band if line.kind == "order" else line.band)
 
 
 def _place(line: LineEvidence) -> str:
@@ -196,11 +194,3 @@ def _label(together: Sequence[Match]) -> str:
 def _why(line: LineEvidence, match: Match) -> str:
     unit = "" if match.candidate.kind == "order" else " Hz"
     return f"{_place(line)}, {match.deviation:+.3g}{unit} from expected: {match.candidate.reason}"
-
-
-def _why_none(line: LineEvidence) -> str:
-    if line.kind == "undecided":
-        return (
-            f"{_place(line)}: no candidate fits; the speed changes too little to say if the line follows it"
-        )
-    return f"{_place(line)}: no candidate fits"

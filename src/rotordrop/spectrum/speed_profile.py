@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
 from rotordrop.errors import RecordError
+from rotordrop.series import SIGMA_OF_MEDIAN
 from rotordrop.units import format_moment
 
 Array = NDArray[np.float64]
@@ -98,7 +99,8 @@ def fit_speed_profile(
     blocks, _, _ = _block_means(log_time, omega[after])
     knots = np.unique(np.concatenate([log_time[:1], blocks, np.linspace(0.0, log_time[-1], 400)]))
     knot_time = start + LOG_TIME_UNIT * np.expm1(knots)
-    knot_speed = _not_through_zero(smooth(knots), float(omega[after][0]))
+    knot_speed = smooth(knots)  # a rotor that coasts down stops; it does not turn back
+    knot_speed = np.maximum(knot_speed, 0.0) if omega[after][0] >= 0.0 else np.minimum(knot_speed, 0.0)
     if before.any():
         level = float(np.median(omega[before]))
         lead = np.linspace(t[0], start, 20, endpoint=False)
@@ -163,10 +165,5 @@ def _smooth_without_outliers(log_time: Array, speed: Array, limit: float) -> tup
 
 def _spread(values: Array) -> float:
     """Standard deviation [unit of the values], by the median so that outliers do not count."""
-    scaled = 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    scaled = SIGMA_OF_MEDIAN * float(np.median(np.abs(values - np.median(values))))
     return scaled if scaled > 0.0 else float(np.std(values))
-
-
-def _not_through_zero(speed: Array, first: float) -> Array:
-    """A rotor that coasts down stops; it does not turn back."""
-    return np.maximum(speed, 0.0) if first >= 0.0 else np.minimum(speed, 0.0)

@@ -11,8 +11,8 @@ from scipy.ndimage import binary_closing
 from tests.unit.spectrum.synthetic import CoastDown
 
 from rotordrop.errors import RecordError
+from rotordrop.series import closed
 from rotordrop.spectrum._found_line import FoundLine, path_range
-from rotordrop.spectrum._search import _closed
 from rotordrop.spectrum.candidates import (
     Candidate,
     mains_candidates,
@@ -259,4 +259,4 @@ def test_gaps_are_closed_as_a_morphological_closing_does(gap):
     for share in (0.02, 0.3, 0.7, 0.98):
         mask = random.random(500) < share
         padded = binary_closing(np.pad(mask, gap), np.ones(gap, dtype=np.bool_))[gap:-gap] | mask
-        np.testing.assert_array_equal(_closed(mask, gap), padded)
+        np.testing.assert_array_equal(closed(mask, gap), padded)
