@@ -271,6 +271,14 @@ DIGEST = "document_sha256"
 """Member of a table that holds the digest of the others."""
 
 
+def clear_of_no_file(path: Path) -> None:
+    """Remove what is no file in the place of one that is written anew: a folder, a pipe, a link."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    elif path.is_symlink() or not path.is_file():
+        path.unlink(missing_ok=True)
+
+
 def digest_of_values(content: Mapping[str, Any]) -> str:
     """SHA-256 of what a JSON table says; layout, order and the spelling of numbers do not count."""
 
@@ -285,6 +293,8 @@ def digest_of_values(content: Mapping[str, Any]) -> str:
 
 def read_sealed(path: str | os.PathLike[str], remedy: str) -> dict[str, Any]:
     """Read a sealed JSON table; one that holds other values than were written is refused with the way out."""
+    if os.path.lexists(path) and not Path(path).is_file():  # a pipe would keep its reader waiting for ever
+        raise DamagedFileError(f"{path} is damaged: it is no file; {remedy}")
     try:
         content = json.loads(Path(path).read_bytes())
     except (ValueError, RecursionError):
@@ -301,7 +311,7 @@ def digest_of_file(path: str | os.PathLike[str]) -> str:
 def digest_at(file: Path) -> str:
     """Digest of a file, computed again when the file has changed; empty where there is none."""
     try:
-        return _digest(file, *_state_of(file))
+        return _digest(file, *_state_of(file)) if file.is_file() else ""
     except OSError:
         return ""
 

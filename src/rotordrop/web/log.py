@@ -30,7 +30,7 @@ def log_told(log: str, own: bool) -> dict[str, Any]:
         "statement": book.STATEMENT,
         "units": shown_units(),
     }
-    if own and not Path(log).is_file():
+    if own and not Path(log).exists():
         return told
     try:
         for number, drop in book.logged_drops(log).items():

@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from rotordrop.child import child_command
 from rotordrop.errors import DamagedFileError
-from rotordrop.files import digest_at, read_sealed, write_json
+from rotordrop.files import clear_of_no_file, digest_at, read_sealed, write_json
 from rotordrop.web.workspace import Job, Workspace, digests_in
 
 Verb: TypeAlias = Literal[
@@ -50,6 +50,7 @@ def state_file(job: Job, verb: Verb) -> Path:
 
 def write_state(job: Job, verb: Verb, told: dict[str, Any]) -> None:
     """Keep what a computation is at."""
+    clear_of_no_file(state_file(job, verb))
     write_json(state_file(job, verb), told, sealed=True)
 
 
@@ -111,6 +112,7 @@ def publish(job: Job, verb: Verb, run: str, made: Path, of: dict[str, str] | Non
     digests = digests_in(made)
     made.rename(job.path / f"{verb}.{run}")
     told = {"run": run, "of": job.digests() if of is None else of, "files": digests}
+    clear_of_no_file(job.path / f"{verb}.result.json")
     write_json(job.path / f"{verb}.result.json", told, sealed=True)
 
 
@@ -169,6 +171,7 @@ class Runner:
                     self._begin(self._open[number, verb], verb, told)
 
     def _begin(self, job: Job, verb: Verb, told: dict[str, Any]) -> None:
+        clear_of_no_file(_lock_file(job, verb))
         lock = os.open(_lock_file(job, verb), os.O_RDWR | os.O_CREAT, 0o600)
         try:
             if not take_lock(lock):
@@ -186,7 +189,8 @@ class Runner:
             )
             self._children[job.number, verb] = child
             with suppress(OSError):
-                (job.path / f"{verb}.process").write_text(str(child.pid), encoding="ascii")
+                clear_of_no_file(_process_file(job, verb))
+                _process_file(job, verb).write_text(str(child.pid), encoding="ascii")
         finally:
             os.close(lock)
 
@@ -209,7 +213,8 @@ class Runner:
         until = time.monotonic() + _PATIENCE_S
         while (child is not None and child.poll() is None) or _locked(job, verb):
             with suppress(OSError, ValueError):
-                number = child.pid if child else (job.path / f"{verb}.process").read_text(encoding="ascii")
+                kept = _process_file(job, verb)
+                number = child.pid if child else kept.read_text(encoding="ascii") if kept.is_file() else ""
                 if os.name == "posix":
                     os.killpg(int(number), signal.SIGKILL)
                 else:
@@ -225,8 +230,9 @@ class Runner:
             for verb in VERBS:
                 self.cancel(job, verb)
                 self._open.pop((job.number, verb), None)
-                (job.path / f"{verb}.result.json").unlink(missing_ok=True)
-                state_file(job, verb).unlink(missing_ok=True)
+                for file in (job.path / f"{verb}.result.json", state_file(job, verb)):
+                    clear_of_no_file(file)
+                    file.unlink(missing_ok=True)
                 clear(job, verb)
 
     def remove(self, job: Job) -> None:
@@ -263,6 +269,10 @@ def clear(job: Job, verb: Verb) -> None:
 
 def _lock_file(job: Job, verb: Verb) -> Path:
     return job.path / f"{verb}.lock"
+
+
+def _process_file(job: Job, verb: Verb) -> Path:
+    return job.path / f"{verb}.process"
 
 
 def take_lock(descriptor: int) -> bool:

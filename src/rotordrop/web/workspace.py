@@ -26,6 +26,7 @@ from rotordrop.files import (
     atomic_folder,
     atomic_path,
     clear_after_killed_runs,
+    clear_of_no_file,
     digest_at,
     digest_of_file,
     read_sealed,
@@ -118,7 +119,7 @@ class Workspace:
         mark = self.path / "jobs have digests"
         if mark.exists():
             return
-        for file in self.jobs_folder.glob("*/*.json"):
+        for file in filter(Path.is_file, self.jobs_folder.glob("*/*.json")):
             with suppress(ValueError, RecursionError):
                 told = json.loads(file.read_bytes())
                 if isinstance(told, dict) and DIGEST not in told:
@@ -136,6 +137,8 @@ class Workspace:
     def token(self) -> str:
         """Secret of the page, kept so that a page that is open outlives its server."""
         file = self.path / "token"
+        if file.exists() and not file.is_file():
+            raise OutputError(f"{file} is no file; remove it, and start the page again")
         with suppress(OSError, ValueError):  # whatever is no token is replaced by one
             kept = file.read_text(encoding="ascii").strip()
             if re.fullmatch(r"[\w-]{43}", kept):
@@ -292,6 +295,7 @@ async def receive(
 
     try:
         claim(declared or 0)
+        clear_of_no_file(job.path / "files" / stored)
         with atomic_path(job.path / "files" / stored) as place, place.open("wb") as stream:
             async for part in in_time(body, label):
                 counted += len(part)
@@ -311,6 +315,7 @@ async def receive(
     told["files"][key] = entry
     job.write(told)
     if before is not None and before["stored"] != stored:
+        clear_of_no_file(job.path / "files" / before["stored"])
         (job.path / "files" / before["stored"]).unlink(missing_ok=True)
     return entry
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from tests.unit.web.serving import Served
 
+from rotordrop.errors import RotordropError
 from rotordrop.files import DIGEST
 from rotordrop.web import commands, numbers, running
 from rotordrop.web.running import Runner, result_folder
@@ -97,6 +98,83 @@ def test_a_damaged_state_is_a_failure_that_is_asked_again(served, looked):
         assert (state["state"], "look.state.json is damaged" in state["error"]) == ("failed", True)
     served.order(f"/api/jobs/{looked}/look", {"gap": "300 um"})
     assert served.settled(looked, "look")["state"] == "done"
+
+
+NO_FILE = {
+    "folder": lambda place: (place / "in it").mkdir(parents=True),
+    "pipe": os.mkfifo if os.name == "posix" else None,
+    "dangling link": lambda place: place.symlink_to("nowhere"),
+}
+"""What stands where a file of the page should be."""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
+@pytest.mark.parametrize("kind", NO_FILE)
+def test_what_is_no_file_is_named_where_one_should_be_and_the_rest_works(served, looked, tmp_path, kind):
+    """Whatever the page reads of its folder; a file that is new is tried too."""
+    space = Workspace(tmp_path / "served")
+    space.prepare()
+    job = Job(space.jobs_folder / looked)
+    shutil.copytree(served.space.jobs_folder / looked, job.path)
+    written = sorted(str(file.relative_to(job.path)) for file in job.path.rglob("*") if file.is_file())
+    server = Served(space)
+    whole = server.new_job({})
+    for name in written:
+        shutil.rmtree(job.path)
+        shutil.copytree(served.space.jobs_folder / looked, job.path)
+        (job.path / name).unlink()
+        NO_FILE[kind](job.path / name)
+        listed = {one["id"]: one for one in server.ask("GET", "/api/jobs").told["jobs"]}
+        assert listed.keys() == {looked, whole}
+        told = server.ask("GET", f"/api/jobs/{looked}").told
+        answers = ask_all(server, looked)
+        said = [told.get("damaged", ""), told["states"].get("look", {}).get("error") or ""]
+        said += [words for _, words in answers.values()]
+        if not name.endswith((".lock", ".process")):
+            outside = "drop_060.h5 lies outside the folder of this drop"
+            label = "drop_060.h5" if name == "files/record.h5" else Path(name).name
+            assert any(
+                f"{label} is damaged" in words or f"{label} of 'look' is damaged" in words or outside in words
+                for words in said
+            ), (name, said)
+        assert str(space.path) not in " ".join(said)
+        asked = [
+            server.order(f"/api/jobs/{looked}/look"),
+            server.order(f"/api/jobs/{looked}/options", {"gap": "1 mm"}),
+            server.ask("PUT", f"/api/jobs/{looked}/files/tail?name=a.csv", b"x"),
+            server.ask("PUT", f"/api/jobs/{looked}/files/record?name=a.h5", b"x"),
+        ]
+        assert asked[-1].status == (409 if name == "job.json" else 201)
+        statuses = [status for status, _ in answers.values()] + [answer.status for answer in asked]
+        assert max(statuses) < 500, (name, statuses, [answer.text for answer in asked])
+        again = Served(Workspace(space.path))
+        assert {one["id"] for one in again.ask("GET", "/api/jobs").told["jobs"]} == {looked, whole}
+        again.stop()
+        assert server.ask("DELETE", f"/api/jobs/{looked}").status == 204
+        assert not job.path.exists()
+        job.path.mkdir()
+    server.stop()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
+@pytest.mark.parametrize("kind", NO_FILE)
+@pytest.mark.parametrize("name", ["token", "jobs have digests", "drops.db", "jobs/0123456789abcdef"])
+def test_what_is_no_file_beside_the_jobs_keeps_no_page_from_being_served(tmp_path, kind, name):
+    space = Workspace(tmp_path / "served")
+    space.prepare()
+    space.token()
+    (space.path / name).unlink(missing_ok=True)
+    NO_FILE[kind](space.path / name)
+    try:
+        server = Served(Workspace(space.path))
+    except RotordropError as refusal:
+        assert name == "token" and "token is no file" in str(refusal)
+        return
+    asked = [server.ask("GET", path) for path in ("/api/jobs", "/api/log")]
+    asked.append(server.order("/api/jobs", {"name": "drop"}))
+    server.stop()
+    assert [answer.status for answer in asked] == [200, 200, 201]
+    assert ("drops.db is no file" in asked[1].text) == (name == "drops.db" and kind != "dangling link")
 
 
 def test_a_record_that_leads_out_of_its_folder_is_not_served(served, files, tmp_path):
