@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from hashlib import sha256
 from itertools import product
 from pathlib import Path
 
@@ -352,7 +353,7 @@ def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimat
     places = {}
     for name, stress in (("first", 2e9), ("hard", 6e9), ("now", 2e9)):
         places[name] = tmp_path / f"{name}.json"
-        one = drop(stress=stress, machine=machine.name, record_sha256=name.ljust(64, "0"))
+        one = drop(stress=stress, machine=machine.name, record_sha256=sha256(name.encode()).hexdigest())
         write_json(places[name], one.as_json(), sealed=True)
     file, log, out = (str(tmp_path / name) for name in ("m.toml", "drops.db", "card.json"))
     save_machine(machine, Path(file))
