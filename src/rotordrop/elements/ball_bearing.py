@@ -20,7 +20,7 @@ from rotordrop.elements.catalog.boundary import (
     clearance_range,
 )
 from rotordrop.elements.description import Misfit, Text, Usual
-from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries
+from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries, stated_only
 from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
@@ -567,40 +567,26 @@ PARAMETERS: tuple[Parameter, ...] = (
 """Unknowns of a ball bearing."""
 
 STATED: tuple[Parameter, ...] = (
-    Parameter(
-        path="bearing.fit_friction",
-        label="friction of the outer rings in their housing",
-        kind="dimensionless",
+    stated_only(
+        "bearing.fit_friction",
+        "friction of the outer rings in their housing",
+        "dimensionless",
+        0.1,
+        L.RING + ring.FRICTION,
         logarithmic=False,
-        guess_sigma=0.1,
-        given_sigma=1e-4,
         lower=0.0,
-        entries=bearing_entries(L.RING + ring.FRICTION),
     ),
-    Parameter(
-        path="bearing.spring_rate",
-        label="rate of the preload springs",
-        kind="stiffness",
-        guess_sigma=0.7,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.RING + ring.RATE),
-    ),
-    Parameter(
-        path="bearing.ring_mass",
-        label="mass of an outer ring",
-        kind="mass",
+    stated_only("bearing.spring_rate", "rate of the preload springs", "stiffness", 0.7, L.RING + ring.RATE),
+    stated_only(
+        "bearing.ring_mass",
+        "mass of an outer ring",
+        "mass",
+        0.2,
+        L.RING + ring.MASS,
         measured_by="an outer ring of {owner}, weighed",
-        guess_sigma=0.2,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.RING + ring.MASS),
     ),
-    Parameter(
-        path="bearing.ring_travel",
-        label="way of the outer rings up to their stop",
-        kind="length",
-        guess_sigma=0.4,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.RING + ring.TRAVEL),
+    stated_only(
+        "bearing.ring_travel", "way of the outer rings up to their stop", "length", 0.4, L.RING + ring.TRAVEL
     ),
 )
 """Unknowns of rings that springs press on."""

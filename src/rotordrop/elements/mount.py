@@ -6,7 +6,7 @@ Spring and damper themselves are those of the support, `rotordrop.elements.suppo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit
-from rotordrop.elements.parameter import Parameter, bearing_entries
+from rotordrop.elements.parameter import Parameter, stated_only
 from rotordrop.elements.values import default, follows, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -205,61 +205,36 @@ def _element(element: Any, place: tuple[str | int, ...]) -> tuple[str, dict[str,
 
 
 STATED: tuple[Parameter, ...] = (
-    Parameter(
-        path="mount.stop.gap",
-        label="travel up to the stop of the mount",
-        kind="length",
+    stated_only(
+        "mount.stop.gap",
+        "travel up to the stop of the mount",
+        "length",
+        0.2,
+        L.MOUNT + law.GAP,
         way_of="support",
         measured_by="a push of the bearing in its housing at {owner} until it stops",
-        guess_sigma=0.2,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + law.GAP),
     ),
-    Parameter(
-        path="mount.stop.stiffness",
-        label="stiffness of the stop of the mount",
-        kind="stiffness",
-        guess_sigma=0.7,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + law.STOP),
+    stated_only(
+        "mount.stop.stiffness", "stiffness of the stop of the mount", "stiffness", 0.7, L.MOUNT + law.STOP
     ),
-    Parameter(
-        path="mount.ribbon.friction_stiffness",
-        label="stiffness of the ribbon's friction",
-        kind="stiffness",
-        guess_sigma=0.5,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + law.RIBBON),
+    stated_only(
+        "mount.ribbon.friction_stiffness",
+        "stiffness of the ribbon's friction",
+        "stiffness",
+        0.5,
+        L.MOUNT + law.RIBBON,
     ),
-    Parameter(
-        path="mount.ribbon.slip_force",
-        label="force at which the ribbon slips",
-        kind="force",
-        guess_sigma=0.7,
-        given_sigma=1e-4,
-        entries=bearing_entries(L.MOUNT + law.SLIP),
+    stated_only(
+        "mount.ribbon.slip_force", "force at which the ribbon slips", "force", 0.7, L.MOUNT + law.SLIP
     ),
-    *chain.from_iterable(
-        (
-            Parameter(
-                path=f"mount.maxwell.{k}.stiffness",
-                label=f"stiffness of branch {k + 1} of the mount",
-                kind="stiffness",
-                guess_sigma=0.5,
-                given_sigma=1e-4,
-                entries=bearing_entries(L.MOUNT + _branch_at(k)),
-            ),
-            Parameter(
-                path=f"mount.maxwell.{k}.time",
-                label=f"relaxation time of branch {k + 1} of the mount",
-                kind="time",
-                shown_as="short_time",
-                guess_sigma=0.7,
-                given_sigma=1e-4,
-                entries=bearing_entries(L.MOUNT + _branch_at(k) + 1),
-            ),
+    *(
+        row
+        for k, at in enumerate(L.MOUNT + _branch_at(k) for k in range(law.MOST_BRANCHES))
+        for path, of in ((f"mount.maxwell.{k}", f"of branch {k + 1} of the mount"),)
+        for row in (
+            stated_only(f"{path}.stiffness", f"stiffness {of}", "stiffness", 0.5, at),
+            stated_only(f"{path}.time", f"relaxation time {of}", "time", 0.7, at + 1, shown_as="short_time"),
         )
-        for k in range(law.MOST_BRANCHES)
     ),
 )
 """Unknowns of a mount, of a bearing that has it."""

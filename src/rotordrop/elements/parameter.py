@@ -262,6 +262,14 @@ class Parameter:
         return value
 
 
+def stated_only(path: str, label: str, kind: str, sigma: float, *columns: int, **more: Any) -> Parameter:
+    """An unknown of a bearing that a description names or that is none; without a range it is as given."""
+    entries = bearing_entries(*columns)
+    return Parameter(
+        path=path, label=label, kind=kind, guess_sigma=sigma, given_sigma=1e-4, entries=entries, **more
+    )
+
+
 def _at(part: Any, path: str) -> Any:
     for name in path.split("."):
         if name.isdecimal():  # one of several parts of a kind, of which there may be fewer
