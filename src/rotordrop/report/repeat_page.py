@@ -47,6 +47,8 @@ def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent
 
 def _verdict(results: StudyResults, found: Sequence[Repeat]) -> tuple[Statement, ...]:
     said = []
+    if results.taken_over:
+        said.append(Statement(results.taken_over, "warning"))
     failed = sum(results.failed.values())
     if failed:
         said.append(Statement(f"{failed} drops could not be computed.", "warning"))
@@ -132,6 +134,8 @@ def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, 
         return made
 
     made = study_numbers_of(results.study)
+    if results.taken_over:
+        made["taken_over"] = results.taken_over
     del made["digest"]
     return made | {
         "drops": len(results),

@@ -102,6 +102,8 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         said.append(Statement(_what_is_missing(results)))
     if results.study.design == "sensitivity":
         said.append(Statement(SENSITIVITY))
+    if results.taken_over:
+        said.append(Statement(results.taken_over, "warning"))
     failed = sum(results.failed.values())
     if failed:
         reasons = "; ".join(f"{count} ×: {reason}" for reason, count in results.failed.items())
@@ -320,6 +322,7 @@ def study_numbers(
     return study_numbers_of(results.study) | {
         "drops": len(results),
         "failed": dict(results.failed),
+        **({"taken_over": results.taken_over} if results.taken_over else {}),
         "quantiles": {
             q.name: {
                 "unit": q.unit,

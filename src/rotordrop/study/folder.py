@@ -44,6 +44,8 @@ Array = NDArray[np.float64]
 
 FORMAT = "rotordrop study 3"
 WITHOUT_DIGESTS = "rotordrop study 2"
+TAKEN_OVER = "taken over"
+"""Member of a plan: shards that were given digests after they were written."""
 REASON = 160
 """Characters kept of why a drop failed; chosen, not measured."""
 LEASE = 120.0
@@ -96,16 +98,22 @@ class StudyFolder:
         """Names of the damaged shards that were kept."""
         return sorted(file.name for file in self.shards.glob("*.damaged"))
 
+    def taken_over(self) -> set[int]:
+        """Numbers of the shards that were given digests after they were written, not computed again since."""
+        again = {int(name.partition(".")[0]) for name in self.aside() if _SHARD.fullmatch(name.split(".")[0])}
+        return set(read_plan(self.path).get(TAKEN_OVER, ())) - again
+
 
 def open_folder(study: Study, path: str | Path) -> StudyFolder:
     """Make the folder of a study, or continue in one that holds the same study.
 
-    A folder without digests, as older versions made them, is given some. One of another version is refused
-    unless all its drops are there: numbers may differ between versions.
+    A folder without digests, as older versions made them, is given some; its plan says of which shards nobody
+    knows whether they are as they were computed. One of another version is refused unless all its drops are
+    there: numbers may differ between versions.
     """
     folder = StudyFolder(Path(path))
     existing = folder.path / "plan.json"
-    plan = {
+    plan: dict[str, Any] = {
         "format": FORMAT,
         "rotordrop": __version__,
         "digest": study.digest,
@@ -126,6 +134,8 @@ def open_folder(study: Study, path: str | Path) -> StudyFolder:
             require_same_version(there, folder.path)
         if there["format"] == FORMAT:
             return folder
+        plan["rotordrop"] = there["rotordrop"]
+        plan[TAKEN_OVER] = folder.finished()
         for shard in folder.finished():
             raw = folder.shard_path(shard).read_bytes()
             if raw[-_SEAL:] != _seal(study, raw[:-_SEAL]):

@@ -46,6 +46,8 @@ class StudyResults:
     """Why a drop failed; empty where it did not."""
     aside: tuple[str, ...] = ()
     """Files of damaged shards that were kept and computed again."""
+    taken_over: str = ""
+    """What nobody knows of drops that were given digests later; empty where all had them from the start."""
 
     def __len__(self) -> int:
         return len(self.drop)
@@ -169,11 +171,12 @@ def load_results(folder: str | Path) -> StudyResults:
 
     Of a study that ended early only the drops that ended it: which others were finished by then is chance.
     """
-    study, place = study_of(folder), StudyFolder(Path(folder))
-    if (written := read_plan(folder)["format"]) != FORMAT:
+    study, place, plan = study_of(folder), StudyFolder(Path(folder)), read_plan(folder)
+    if plan["format"] != FORMAT:
         raise UsageError(
-            f"{place.path} has format {written!r}, which has no digests; 'rotordrop study run {place.path}' "
-            "gives it some"
+            f"{place.path} has format {plan['format']!r}, which has no digests; 'rotordrop study run "
+            f"{place.path}' gives it some, and draws the values that vary again. Whether its results are "
+            "those that were computed, nobody can tell"
         )
     enough = EarlyEnd(study, place).shards()
     shards = place.finished() if enough is None else list(range(enough))
@@ -183,6 +186,7 @@ def load_results(folder: str | Path) -> StudyResults:
         more = f" (and {len(damaged) - 1} more)" if len(damaged) > 1 else ""
         raise DamagedFileError(f"{damaged[0]}{more}")
     tables = [table for table in found if not isinstance(table, DamagedFileError)]
+    taken_over = sum(len(study.drops_of(shard)) for shard in place.taken_over().intersection(shards))
     varied = [table["varied"] for table in tables] or [np.zeros((0, len(study.varied)))]
     columns = columns_of(study.machine)
     numbers = [table["numbers"] for table in tables] or [np.zeros((0, len(columns)))]
@@ -194,6 +198,11 @@ def load_results(folder: str | Path) -> StudyResults:
         numbers={q.name: together[:, j] for j, q in enumerate(columns)},
         reasons=tuple(text.decode() for table in tables for text in table["reason"]),
         aside=tuple(place.aside()),
+        taken_over=""
+        if not taken_over
+        else f"{taken_over} drops were computed by rotordrop {plan['rotordrop']}, which kept no digests. "
+        "Their varied values are those that are drawn for them; whether their results are those that were "
+        "computed, nobody can tell. To know, compute the study again in another folder, and compare.",
     )
 
 
@@ -245,6 +254,8 @@ def save_results(results: StudyResults, path: str | Path) -> None:
         file.attrs["format"] = "rotordrop study results 1"
         file.attrs["study"] = results.study.name
         file.attrs["digest"] = results.study.digest
+        if results.taken_over:
+            file.attrs["taken_over"] = results.taken_over
         file["drop"] = results.drop
         file["drop"].make_scale("drop")
         units = {q.name: (q.unit, q.meaning) for q in results.columns}
@@ -273,5 +284,7 @@ def _save_parquet(results: StudyResults, path: Path) -> None:
     columns = {"drop": results.drop, **results.varied, **results.numbers, "failure": list(results.reasons)}
     units = {q.name: q.unit for q in results.columns}
     metadata = {"study": results.study.name, "digest": results.study.digest, "units": json.dumps(units)}
+    if results.taken_over:
+        metadata["taken_over"] = results.taken_over
     with atomic_path(path) as temporary:
         parquet.write_table(pyarrow.table(columns).replace_schema_metadata(metadata), temporary)

@@ -12,12 +12,15 @@ import sys
 import time
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
 from rotordrop import DropCase, example_machine, simulate_drop
+from rotordrop._version import __version__
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import DIGEST, write_json
+from rotordrop.report.study_page import study_numbers, study_page
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shards, study_of
 from rotordrop.study.plan import Study, load_study, read_study
@@ -194,17 +197,58 @@ def test_a_damaged_shard_is_computed_again_and_kept(serial, tmp_path):
     same_shards(serial[0], place)
 
 
-def test_a_folder_without_digests_is_given_some_by_the_next_run(serial, tmp_path):
-    place = shutil.copytree(serial[0], tmp_path / "study")
+def without_digests(whole, place):
+    """A folder as an older version made it."""
+    shutil.copytree(whole, place)
     plan = json.loads((place / "plan.json").read_text())
     del plan[DIGEST], plan["machine_sha256"]
-    (place / "plan.json").write_text(json.dumps(plan | {"format": "rotordrop study 2"}))
+    plan |= {"format": "rotordrop study 2", "rotordrop": "0.0.9"}
+    (place / "plan.json").write_text(json.dumps(plan))
     for file in (place / "shards").iterdir():
         file.write_bytes(file.read_bytes()[:-32])
+    return place
+
+
+def test_a_folder_without_digests_is_given_some_by_the_next_run(serial, tmp_path):
+    place = without_digests(serial[0], tmp_path / "study")
     with pytest.raises(UsageError, match=r"has format 'rotordrop study 2', which has no digests; .* gives"):
         load_results(place)
     run_study(study_of(place), place, threads=1)
     same_shards(serial[0], place)
+
+
+def test_of_drops_that_were_given_digests_later_it_is_said_that_nobody_checked_them(serial, tmp_path):
+    """One number of a shard without digest changed: it used to be sealed, and passed for computed."""
+    place = without_digests(serial[0], tmp_path / "study")
+    bit_flipped(place / "shards" / "000001.npy", 8 * 400)
+    run_study(study_of(place), place, threads=1)
+    results = load_results(place)
+    assert "12 drops were computed by rotordrop 0.0.9, which kept no digests" in results.taken_over
+    assert results.taken_over in str(study_page(results).verdict)
+    assert study_numbers(results)["taken_over"] == results.taken_over
+    save_results(results, tmp_path / "drops.h5")
+    with h5py.File(tmp_path / "drops.h5") as file:
+        assert file.attrs["taken_over"] == results.taken_over
+    pytest.importorskip("pyarrow.parquet")
+    save_results(results, tmp_path / "drops.parquet")
+    from pyarrow import parquet
+
+    metadata = parquet.read_schema(tmp_path / "drops.parquet").metadata
+    assert metadata[b"taken_over"].decode() == results.taken_over
+    assert load_results(serial[0]).taken_over == ""
+
+
+def test_a_shard_without_digest_whose_values_are_not_those_drawn_is_computed_again(serial, tmp_path):
+    place = without_digests(serial[0], tmp_path / "study")
+    plan = json.loads((place / "plan.json").read_text())
+    (place / "plan.json").write_text(json.dumps(plan | {"rotordrop": __version__}))
+    file = place / "shards" / "000001.npy"
+    table = np.load(file)
+    table["varied"][2, 1] *= 1.0 + 1e-12
+    np.save(file, table)
+    results = run_study(study_of(place), place, threads=1)
+    assert len(results.aside) == 1
+    assert results.taken_over.startswith("7 drops were computed by rotordrop")
 
 
 def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_path):
