@@ -69,6 +69,9 @@ KINDS: dict[str, Kind] = {
     "voltage": Kind(unit="V", example="5 V", scales=_metric("V", "k", "", "m", "µ")),
     "voltage_sensitivity": Kind(unit="V/m", example="8 mV/um", scales=((1e3, "mV/µm"),)),
     "temperature": Kind(unit="K", example="20 degC", scales=((1.0, "K"),)),
+    "heat_capacity": Kind(unit="J/K", example="130 J/K", scales=_metric("J/K", "k", "")),
+    "heat_conductance": Kind(unit="W/K", example="4 W/K", scales=_metric("W/K", "k", "", "m")),
+    "expansion": Kind(unit="1/K", example="12e-6 1/K", scales=((1e-6, "µm/(m K)"),)),
     "dimensionless": Kind(unit="", example="0.15", scales=((1.0, ""),)),
 }
 

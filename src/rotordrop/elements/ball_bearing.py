@@ -346,10 +346,7 @@ class BallBearing(RaceBearing):
             raise Misfit(f'{told}, or preload_kind = "rigid"', ("preload_kind",))
         whole = SimpleNamespace(**{name: getattr(self, name) for name in type(self).model_fields} | given)
         rate = 0.2 * row_rigidity(bearing_constants(whole))
-        ball, pitch = whole.ball_diameter.value, whole.pitch_diameter.value
-        bore = 0.5 * whole.bore_diameter.value if whole.bore_diameter else 0.5 * pitch - ball / _BALL_HEIGHT
-        width = whole.width.value if whole.width else 1.6 * ball
-        mass = STEEL_DENSITY * math.pi * ((pitch - bore) ** 2 - 0.25 * (pitch + 0.6 * ball) ** 2) * width
+        mass, _, _ = outer_ring(whole)
         rows = (
             ("spring_rate", rate, 3.0, "a tenth of the rigidity of the pair, chosen and not measured", "N/m"),
             ("ring_mass", mass, 1.3, "a steel ring from 0.6 ball diameters outside the pitch circle", "kg"),
@@ -501,6 +498,15 @@ class BallBearing(RaceBearing):
             listed = f"{entry.maker} catalogue" if entry.listed else "the designation"
             return entry.complement.basis if name == "ball_count" else listed
         return super().reason(name)
+
+
+def outer_ring(balls: Any) -> tuple[float, float, float]:
+    """Mass [kg], outer radius and width [m] of a steel ring around the balls of a row."""
+    ball, pitch = balls.ball_diameter.value, balls.pitch_diameter.value
+    bore = 0.5 * balls.bore_diameter.value if balls.bore_diameter else 0.5 * pitch - ball / _BALL_HEIGHT
+    width = balls.width.value if balls.width else 1.6 * ball
+    mass = STEEL_DENSITY * math.pi * ((pitch - bore) ** 2 - 0.25 * (pitch + 0.6 * ball) ** 2) * width
+    return mass, pitch - bore, width
 
 
 def _check_play(values: dict[str, Any]) -> None:

@@ -21,6 +21,7 @@ from rotordrop.elements import (
     rotor,
     sensor,
     support,
+    thermal,
     touchdown_bearing,
     unbalance,
 )
@@ -57,6 +58,7 @@ _ELEMENTS = (
     touchdown_bearing,
     ball_bearing,
     mount,
+    thermal,
     air,
 )
 

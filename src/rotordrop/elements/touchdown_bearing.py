@@ -21,6 +21,7 @@ from rotordrop.elements.race import Race
 from rotordrop.elements.race_bearing import RaceBearing
 from rotordrop.elements.sleeve import Sleeve
 from rotordrop.elements.support import Support
+from rotordrop.elements.thermal import Thermal
 from rotordrop.elements.values import PositiveLength, Time, default, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -71,10 +72,8 @@ class TouchdownBearing(Placed):
     """What lies in parallel to spring and damper of the support: ribbon, branches that relax, stop."""
     face: Face | None = None
     """Faces of the race, on which the rotor lands when it moves along its axis."""
-
-    reserved: ClassVar[Mapping[str, str]] = {
-        "thermal": "the heat of the bearing",
-    }
+    thermal: Thermal | None = None
+    """Heat of the bearing; without this table its race stays cold."""
 
     columns: ClassVar[Mapping[str, int]] = {"air_gap": L.AIR_GAP, "bore_radius": L.BORE_RADIUS}
 
@@ -87,8 +86,8 @@ class TouchdownBearing(Placed):
     @property
     def parts(self) -> tuple[Description, ...]:
         """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
-        faces = () if self.face is None else (self.face,)
-        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support, *faces
+        others = (part for part in (self.face, self.thermal) if part is not None)
+        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support, *others
 
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of clearance and parts."""
@@ -97,6 +96,8 @@ class TouchdownBearing(Placed):
         row[L.ROTOR_RADIUS] = row[L.BORE_RADIUS] - row[L.AIR_GAP]
         for part in self.parts:
             part.fill(row)
+        if self.thermal is not None:
+            self.thermal.fill_arms(row, self.bearing)
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
@@ -118,6 +119,12 @@ class TouchdownBearing(Placed):
                 ("air_gap",),
             )
         self.bearing.check_bore(bore)
+        if self.thermal is not None and self.bearing.no_race:
+            raise Misfit(
+                f"the touchdown bearing {self.name} cannot have a table 'thermal': heat is computed of a "
+                "race and its balls, of which it has none; leave the table out",
+                ("thermal",),
+            )
         if self.face is not None and self.bearing.no_face:
             raise Misfit(
                 f"the touchdown bearing {self.name} cannot have a face: {self.bearing.no_face}, which is not "
@@ -159,10 +166,9 @@ class TouchdownBearing(Placed):
         else:
             value, why = self.bearing.usual_race_width()
             width = Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
-        return {
-            "race": self.bearing.race_of_size(self.race, width, self.bore_radius.value),
-            "mount": self.mount.beside(self.support.stiffness),
-        }
+        race = self.bearing.race_of_size(self.race, width, self.bore_radius.value)
+        heat = {} if self.thermal is None else {"thermal": self.thermal.beside(self, race)}
+        return {"race": race, "mount": self.mount.beside(self.support.stiffness), **heat}
 
 
 MODEL_GAP_ERROR = 0.008

@@ -61,7 +61,9 @@ def _content(part: Description) -> dict[str, Any]:
             physical = part.physical(name)
             content[name] = _Written(_value_text(value, physical.kind if physical else "dimensionless"))
         elif isinstance(value, Description):
-            content[name] = _content(value)
+            # a table that is there or not says something even when it is empty
+            optional = type(part).model_fields[name].default is None
+            content[name] = _content(value) or (_Written("{}") if optional else {})
         elif isinstance(value, dict):
             content[name] = {key: _content(item) for key, item in value.items()}
         elif isinstance(value, tuple) and value and isinstance(value[0], Description):

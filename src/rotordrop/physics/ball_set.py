@@ -31,12 +31,14 @@ AXIAL_OFFSET = 3
 STRESS_COEFFICIENT = 4
 N_ENTRIES = 5
 
-# Entries of a rolling bearing: its ball set, then its drag and damping; SI units.
+# Entries of a rolling bearing: its ball set, then its drag and damping, then the axial force of its rows that
+# brakes the race beside the radial one (zero unless the bearing warms); SI units.
 DRAG_COEFFICIENT = N_ENTRIES
 DRAG_SPEED = N_ENTRIES + 1
 PITCH_DIAMETER = N_ENTRIES + 2
 DAMPING = N_ENTRIES + 3
-ROLLING_N_ENTRIES = N_ENTRIES + 4
+PRESSED = N_ENTRIES + 4
+ROLLING_N_ENTRIES = N_ENTRIES + 5
 
 LEAST_DAMPING = 1e-9
 """Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""
@@ -145,8 +147,8 @@ def bearing_reaction(
 
     Parameters
     ----------
-    numbers : ndarray, shape (9,)
-        Ball set, drag, pitch diameter [m] and damping [N s/m].
+    numbers : ndarray, shape (10,)
+        Ball set, drag, pitch diameter [m], damping [N s/m] and axial force of the rows [N].
     F_x, F_y : float
         Force of the balls [N], from `ball_set_force`.
     vx, vy : float
@@ -166,7 +168,7 @@ def bearing_reaction(
     velocity.
     """
     drag = race_drag_torque(
-        math.sqrt(F_x * F_x + F_y * F_y),
+        math.sqrt(F_x * F_x + F_y * F_y) + numbers[PRESSED],
         spin,
         numbers[DRAG_COEFFICIENT],
         numbers[PITCH_DIAMETER],
@@ -174,6 +176,18 @@ def bearing_reaction(
     )
     C_b = numbers[DAMPING]
     return F_x + C_b * vx, F_y + C_b * vy, drag, C_b * (vx * vx + vy * vy), drag * spin
+
+
+def centred_row(entries: Array, ring: float, ball_count: float) -> tuple[float, float]:
+    """Axial force of a row [N] with the race in the middle, and the loads of all its balls together [N].
+
+    ``ring`` [m] is the way of the outer ring from its balls. Source: Neisi 2020, eqs. (3)–(6).
+    """
+    radial, axial = float(entries[RADIAL_OFFSET]), float(entries[AXIAL_OFFSET]) - ring
+    A = math.sqrt(radial * radial + axial * axial)
+    delta = max(A - float(entries[GROOVE_DISTANCE]), 0.0)
+    load = ball_count * float(entries[BALL_STIFFNESS]) * delta * math.sqrt(delta)
+    return load * axial / A, load
 
 
 @inner_kernel

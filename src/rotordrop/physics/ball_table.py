@@ -255,3 +255,15 @@ def fast_loads(
             inner = max(inner, _looked_up(table, j, i, INNER, _weights(v), _weights(u)))
             outer = max(outer, _looked_up(table, j, i, OUTER, _weights(v), _weights(u)))
     return inner, outer
+
+
+def fast_centred_row(grid: Array, table: Array, spin: float, ball_count: float) -> tuple[float, float]:
+    """Axial force of a row [N] whose race turns centred [rad/s], and all loads on its inner race [N].
+
+    Source: `ball_equilibrium`; the load of a ball less its radial part.
+    """
+    j, v = _speed_cell(grid, table, spin)
+    i, u, _ = _place_cell(grid, table, 0.0)
+    load = max(_looked_up(table, j, i, INNER, _weights(v), _weights(u)), 0.0)
+    radial = _looked_up(table, j, i, FORCE, _weights(v), _weights(u))
+    return ball_count * math.sqrt(max(load * load - radial * radial, 0.0)), ball_count * load

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.physics import ball_set, ball_table, contact, face, mount, ring, support, touch
+from rotordrop.physics import ball_set, ball_table, contact, face, mount, ring, support, thermal, touch
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -46,6 +46,7 @@ DRAG_COEFFICIENT = ROLLING + ball_set.DRAG_COEFFICIENT
 DRAG_SPEED = ROLLING + ball_set.DRAG_SPEED
 PITCH_DIAMETER = ROLLING + ball_set.PITCH_DIAMETER
 BEARING_DAMPING = ROLLING + ball_set.DAMPING
+PRESSED = ROLLING + ball_set.PRESSED
 SUPPORT_MASS_X = ROLLING_END
 SUPPORT_MASS_Y = ROLLING_END + 1
 SUPPORT_STIFFNESS_X = ROLLING_END + 2
@@ -63,7 +64,9 @@ FAST_END = FAST + ball_table.N_ENTRIES
 FAST_SPEED_STEP = FAST + ball_table.SPEED_STEP
 FACE = FAST_END
 FACE_END = FACE + face.N_ENTRIES
-N_BEARING_COLUMNS = FACE_END
+THERMAL = FACE_END
+THERMAL_END = THERMAL + thermal.N_ENTRIES
+N_BEARING_COLUMNS = THERMAL_END
 FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns and what holds it along its axis.
@@ -177,7 +180,8 @@ class KernelParameters(NamedTuple):
     the rotor with its housing, numbers of `physics.touch` and then shape, ``stops`` (S,) the bearings whose
     mount has a stop, ``faces`` (F,) those with an axial face; the log has all three behind the contacts with
     races. ``memory`` is what is remembered beside the state: a right-hand side reads it, an accepted step
-    alone writes it (`simulate._loop.remember`). No element of today has any; its length is zero.
+    alone writes it (`simulate._loop.remember`). Bearings that warm have their temperatures first in it, which
+    `simulate.heat` writes between stretches of time.
     """
 
     eigenvalue: Array

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.elements.face import Face
 from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
+from rotordrop.elements.thermal import heat_figures, runaway
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.machine.plausibility import doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
@@ -94,6 +95,7 @@ def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> Bearin
     figures = numbers.figures(abs(load))
     if face is not None:
         figures += tuple(numbers.axial_figures(face.law, float(face.gap), _push(machine, face)))
+    figures += heat_figures(bearing, float(machine.speed.nominal))
     return BearingSummary(
         name=bearing.name,
         load=load,
@@ -132,7 +134,7 @@ class MachineWarning:
 
     kind: str
     """"limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
-    "shoulder of the race", "guess", or one of the doubts about the description itself."""
+    "shoulder of the race", "thermal runaway", "guess", or one of the doubts about the description itself."""
     bearing: str
     """Name of the touchdown bearing, or of the part of the machine."""
     value: float
@@ -184,9 +186,11 @@ def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[Machin
 
 
 def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iterator[MachineWarning]:
+    if (hot := runaway(bearing, omega)) is not None:
+        yield _warning(hot.kind, bearing.name, hot.value, hot.limit, hot.text)
     race, radius, numbers = bearing.race, float(bearing.bore_radius), numbers_of(bearing)
     room, against = numbers.room_to_grow()
-    if room == math.inf:
+    if room == math.inf or bearing.thermal is not None:
         return
     sliding, rolling = friction_heat(
         F_r=max(rest.load, 0.0),
@@ -208,8 +212,8 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
     )
     text = (
         f"after a drop at {speed} friction heats the race by about {warming:.2g} K in {HEAT_WINDOW:g} s; "
-        f"it grows by {grown}, not small against {against.format(room=small)}; the drop model has no heat in "
-        "it"
+        f"it grows by {grown}, not small against {against.format(room=small)}; a table 'thermal' "
+        "puts its heat into the drop model"
     )
     yield _warning("frictional heat", bearing.name, growth, room, text)
 

@@ -133,9 +133,15 @@ def _kernel_parameters(
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
         departure=np.zeros((0, departure.N_COLUMNS)),
-        memory=np.zeros(sum(amb.remembered for amb in machine.ambs)),
+        memory=np.zeros(_remembered(machine)),
         **_of_values(machine, fe, basis, shares),
     )
+
+
+def _remembered(machine: Machine) -> int:
+    """Length of the discrete memory: parts of bearings first, then AMBs."""
+    parts = [part for bearing in machine.touchdown_bearings for part in bearing.parts]
+    return sum(one.remembered for one in (*parts, *machine.ambs))
 
 
 def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:

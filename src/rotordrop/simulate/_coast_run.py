@@ -23,6 +23,7 @@ from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_result import QUANTILES
 from rotordrop.simulate.drop import FIRST_STEP, LOG_ROWS_PER_SECOND, error_scale, tableau_of
+from rotordrop.simulate.heat import Warming, warmed, warms
 from rotordrop.simulate.levitation import start_of_drop
 
 Array = NDArray[np.float64]
@@ -37,8 +38,11 @@ WINDOW_ROWS = (
     "window_share",
     "window_race",
     "window_method",
+    "heat_rows",
 )
-"""Names of what is kept of every window."""
+"""Names of what is kept of every window, and of every instant at which bearings that warm were looked at."""
+HEAT_STEP = 0.01
+"""Least distance of these instants [s]."""
 SETTLED_STEP = 0.92
 CHECKED = 2e-3
 """Part of every settled window [s] that is also done with the Runge–Kutta pair."""
@@ -58,6 +62,8 @@ class Setup:
     sensor_rows: Array
     sensor_nodes: tuple[int, ...]
     settled_parts: int
+    warming: Warming | None
+    """What goes on beside the time loop where bearings warm."""
 
 
 @dataclass(frozen=True)
@@ -89,10 +95,12 @@ def prepare(model: DropModel, case: CoastDownCase) -> Setup:
     _, parameters = start_of_drop(model, case.as_drop())
     nodes = tuple(sorted({sensor.node for sensor in model.machine.sensors}))
     rows = np.array([model.basis.node_row(node) for node in nodes]).reshape(len(nodes), model.layout.n_modes)
+    parameters = _with_drag(parameters, model, case)
     return Setup(
         model=model,
         case=case,
-        parameters=_with_drag(parameters, model, case),
+        parameters=parameters,
+        warming=Warming(cold=parameters) if warms(parameters).size else None,
         scale=error_scale(model),
         sensor_rows=rows,
         sensor_nodes=nodes,
@@ -143,7 +151,12 @@ def begin(setup: Setup) -> Run:
     status = np.zeros(8)
     status[STOPPED_AT] = np.nan
     status[LAST_SAMPLE] = math.ceil(setup.case.last_time / setup.case.output_step - 1e-9)
-    status[ENERGY_AT_START] = stored_energy_of(setup, 0.0, start) - start[setup.model.layout.work_in]
+    now = warmed(setup.parameters, setup.parameters.memory, start)
+    stored = float(H.stored_energy(0.0, start, now, True))
+    status[ENERGY_AT_START] = stored - start[setup.model.layout.work_in]
+    windows: dict[str, list[Array]] = {name: [] for name in WINDOW_ROWS}
+    if setup.warming is not None:
+        windows["heat_rows"].append(setup.warming.row(setup.parameters.memory, 0.0, start, now))
     return Run(
         state=start,
         progress=progress,
@@ -154,21 +167,23 @@ def begin(setup: Setup) -> Run:
         totals=np.zeros((n_b, 2)),
         status=status,
         memory=setup.parameters.memory.copy(),
-        windows={name: [] for name in WINDOW_ROWS},
+        windows=windows,
     )
 
 
-def stored_energy_of(setup: Setup, time: float, state: Array) -> float:
-    return float(H.stored_energy(time, state, setup.parameters, True))
+def stored_energy_of(setup: Setup, run: Run) -> float:
+    """Energy [J] of the state that a run has got to."""
+    now = warmed(setup.parameters, run.memory, run.state)
+    return float(H.stored_energy(float(run.progress[_loop.TIME]), run.state, now, True))
 
 
 def relative_displacement(setup: Setup, states: Array) -> Array:
     """Displacement of the rotor relative to the races, shape (T, B, 2) [m]."""
-    moved = displacement_at(setup, states, setup.parameters.bearing_shape)
+    moved = displacement_at(states, setup.parameters.bearing_shape)
     return moved - setup.model.layout.bore(states)
 
 
-def displacement_at(setup: Setup, states: Array, rows: Array) -> Array:
+def displacement_at(states: Array, rows: Array) -> Array:
     return H.node_displacements(np.ascontiguousarray(states), np.ascontiguousarray(rows))
 
 
@@ -180,9 +195,8 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     states = np.empty((rows, len(run.state)))
     histories = np.empty((rows, len(run.whirl), H.N_HISTORIES))
     states[0] = run.state
-    H.bearing_histories(
-        _grid(first, first + 1, case.output_step), states[:1], setup.parameters, histories[:1]
-    )
+    _, now = present_drive(setup, run)
+    H.bearing_histories(_grid(first, first + 1, case.output_step), states[:1], now, histories[:1])
     before = (float(run.progress[_loop.TIME]), float(run.state[setup.model.layout.dissipated]))
     already_open, opened = (
         int(run.progress[_loop.LOGGED]),
@@ -193,21 +207,33 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     # the scheme for settled rotors does not hold axial motion back
     settles = case.settled_scheme and setup.model.layout.axial < 0
     method, filled, try_settled = np.zeros(3), 1, settles and may_be_settled(run)
+    whole = min(window_end, int(status[LAST_SAMPLE])) - first
     while status[PHASE] == RUNNING:
         last = min(window_end, int(status[LAST_SAMPLE]))
+        if setup.warming is not None:
+            stretch = setup.warming.stretch(run.memory) / case.output_step
+            last = min(last, first + filled - 1 + max(1, int(stretch)))
         wanted = slice(filled, last - first + 1)
         if first + filled > last:
             break
+        (_, now), books = present_drive(setup, run), np.zeros((len(run.whirl) + 1, N_PLACES))
+        begun = float(run.progress[_loop.TIME]), float(run.state[setup.model.layout.dissipated])
         if try_settled:
-            got, method = settled_piece(setup, run, states[wanted], histories[wanted], log)
-            try_settled, outcome = False, _loop.FINISHED
+            got, error = settled_piece(setup, run, states[wanted], histories[wanted], log, books)
+            outcome = _loop.FINISHED
+            if got:
+                method = np.array([method[0] + got / whole, *np.maximum(method[1:], error)])
+            # a stretch of constant temperatures is not the whole window
+            try_settled = setup.warming is not None and got == wanted.stop - wanted.start
         else:
             times = _grid(first + filled, last + 1, case.output_step)
-            outcome = integrate(setup, run, times, states[wanted], log)
+            outcome = integrate(setup, run, times, states[wanted], log, books)
             got = int(run.progress[_loop.SAMPLES])
             fresh = slice(filled, filled + got)
-            H.bearing_histories(times[:got], states[fresh], setup.parameters, histories[fresh])
+            H.bearing_histories(times[:got], states[fresh], now, histories[fresh])
         filled += got
+        if setup.warming is not None and run.progress[_loop.TIME] > begun[0]:
+            _warm(setup.warming, run, begun, now, books)
         _after(setup, run, outcome, first + filled - 1)
     ended, began = _ended_contacts(run, log, already_open, setup.parameters)
     kept = filled if status[PHASE] != RUNNING else filled - 1
@@ -220,12 +246,34 @@ def advance(setup: Setup, run: Run) -> tuple[dict[str, Single], Array]:
     return samples_of(setup, states[:kept], histories[:kept]), ended
 
 
+def _warm(
+    warming: Warming, run: Run, begun: tuple[float, float], now: KernelParameters, books: Array
+) -> None:
+    """Warm the nodes by what a stretch lost, and let preload and gap follow.
+
+    ``begun`` is its first instant [s] with the energy dissipated by then [J].
+    """
+    t, total = float(run.progress[_loop.TIME]), float(np.sum(books))
+    # the scheme for settled rotors books by the powers at its samples: what it lost in all is exact
+    if total > 0.0:
+        books *= (float(run.state[now.rotor_at[L.DISSIPATED]]) - begun[1]) / total
+    warming.take(run.memory, books, t - begun[0])
+    grown = warming.grow(run.memory, t, run.state, now)
+    run.peaks[:, _loop.PEAK_TRAVEL] = 0.0  # the same travel makes another force now
+    rows = run.windows["heat_rows"]
+    if t >= rows[-1][0] + HEAT_STEP:
+        rows.append(warming.row(run.memory, t, run.state, grown))
+
+
 def _grid(first: int, last: int, step: float) -> Array:
     return np.asarray(np.arange(first, last, dtype=np.float64) * step)
 
 
-def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -> int:
-    """One call of the compiled loop: until the last of the times, or until the rotor stands."""
+def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array, books: Array) -> int:
+    """One call of the compiled loop: until the last of the times, or until the rotor stands.
+
+    What it loses by place is added to ``books`` (B + 1, 5) [J].
+    """
     spinning, parameters = present_drive(setup, run)
     case = setup.case
     control = _loop.Control(
@@ -248,7 +296,7 @@ def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -
             states[: len(times)],
             log,
             run.running,
-            np.zeros((len(run.whirl) + 1, N_PLACES)),
+            books,
             run.peaks,
             run.progress,
         )
@@ -256,9 +304,9 @@ def integrate(setup: Setup, run: Run, times: Array, states: Array, log: Array) -
 
 
 def present_drive(setup: Setup, run: Run) -> tuple[bool, KernelParameters]:
-    """Whether the rotor still turns, and the kernel parameters that go with it."""
-    spinning = math.isnan(run.status[STOPPED_AT])
-    return spinning, setup.parameters if spinning else held(setup.parameters)
+    """Whether the rotor still turns, and the kernel parameters that go with it and with the temperatures."""
+    spinning, now = math.isnan(run.status[STOPPED_AT]), warmed(setup.parameters, run.memory, run.state)
+    return spinning, now if spinning else held(now)
 
 
 def held(parameters: KernelParameters) -> KernelParameters:
@@ -320,7 +368,7 @@ def keep_statistics(
     force = magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y])
     depth = histories[..., H.H_DELTA]
     values = np.stack([depth, force, histories[..., H.H_STRESS]], axis=-1)
-    stored = stored_energy_of(setup, float(run.progress[_loop.TIME]), run.state)
+    stored = stored_energy_of(setup, run)
     balance = stored + run.state[layout.dissipated] - run.state[layout.work_in]
     residual = balance - run.status[ENERGY_AT_START]
     run.status[WORST_BALANCE] = max(run.status[WORST_BALANCE], abs(residual))
@@ -337,9 +385,9 @@ def keep_statistics(
 def samples_of(setup: Setup, states: Array, histories: Array) -> dict[str, NDArray[np.float32]]:
     layout = setup.model.layout
     columns = {
-        "displacement": displacement_at(setup, states, setup.parameters.bearing_shape),
+        "displacement": displacement_at(states, setup.parameters.bearing_shape),
         "race_displacement": layout.bore(states),
-        "sensor_displacement": displacement_at(setup, states, setup.sensor_rows),
+        "sensor_displacement": displacement_at(states, setup.sensor_rows),
         "indentation": histories[..., H.H_DELTA],
         "contact_force": histories[..., H.H_CONTACT_FORCE],
         "bearing_force": magnitude(histories[..., H.H_BEARING_FORCE_X], histories[..., H.H_BEARING_FORCE_Y]),
@@ -357,8 +405,10 @@ def may_be_settled(run: Run) -> bool:
     return len(shares) > 1 and bool(np.all(shares[-1] == 1.0))
 
 
-def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: Array) -> tuple[int, Array]:
-    """Try a stretch with the scheme for settled rotors; returns samples done, and share and errors.
+def settled_piece(
+    setup: Setup, run: Run, states: Array, histories: Array, log: Array, books: Array
+) -> tuple[int, tuple[float, float]]:
+    """Try a stretch with the scheme for settled rotors; returns samples done, and its errors.
 
     The first 2 ms are done with the Runge–Kutta pair too, and the stretch is given up, nothing changed, if
     the two differ by more than the case allows or if any bearing loses contact.
@@ -375,19 +425,20 @@ def settled_piece(setup: Setup, run: Run, states: Array, histories: Array, log: 
         parameters,
         case.stop_speed if spinning else -1.0,
         states,
+        books,
     )
     sample = round(begun / case.output_step) + 1
     times = _grid(sample, sample + len(states), case.output_step)
-    H.bearing_histories(times[:got], states[:got], setup.parameters, histories[:got])
+    H.bearing_histories(times[:got], states[:got], parameters, histories[:got])
     done = histories[:got]
-    error = _difference(setup, times, states[:got], done, reference)
+    error = _difference(parameters, times, states[:got], done, reference)
     lost = not np.all(np.isfinite(states[:got])) or bool(np.any(done[..., H.H_DELTA] <= 0.0))
     if got == 0 or lost or not error[0] <= case.settled_error:
-        run.state[:] = start
-        return 0, np.zeros(3)
+        run.state[:], books[:] = start, 0.0
+        return 0, (0.0, 0.0)
     run.progress[_loop.TIME] = (sample - 1 + got) * case.output_step
     _carry_contacts(run, done, begun, case.output_step, log)
-    return got, np.array([got / len(states), *error])
+    return got, error
 
 
 def _reference(setup: Setup, run: Run, begun: float, available: int) -> Array:
@@ -398,21 +449,22 @@ def _reference(setup: Setup, run: Run, begun: float, available: int) -> Array:
     times = _grid(sample, sample + count, case.output_step)
     states = np.full((count, len(run.state)), np.nan)
     copy = Run.of({name: array.copy() for name, array in run.arrays().items()})
-    integrate(setup, copy, times, states, np.zeros((100, _loop.N_LOG_COLUMNS)))
+    books = np.zeros((len(run.whirl) + 1, N_PLACES))
+    integrate(setup, copy, times, states, np.zeros((100, _loop.N_LOG_COLUMNS)), books)
     return states
 
 
 def _difference(
-    setup: Setup, times: Array, states: Array, histories: Array, reference: Array
+    parameters: KernelParameters, times: Array, states: Array, histories: Array, reference: Array
 ) -> tuple[float, float]:
     """Largest difference of displacement at the bearings [m] and of ball force [N] over the checked time."""
     count = min(len(reference), len(states))
     if count == 0:
         return math.inf, math.inf
-    rows = setup.parameters.bearing_shape
-    moved = displacement_at(setup, states[:count], rows) - displacement_at(setup, reference[:count], rows)
+    rows = parameters.bearing_shape
+    moved = displacement_at(states[:count], rows) - displacement_at(reference[:count], rows)
     exact = np.empty((count, *histories.shape[1:]))
-    H.bearing_histories(times[:count], np.ascontiguousarray(reference[:count]), setup.parameters, exact)
+    H.bearing_histories(times[:count], np.ascontiguousarray(reference[:count]), parameters, exact)
     force = slice(H.H_BEARING_FORCE_X, H.H_BEARING_FORCE_Y + 1)
     return float(np.max(np.abs(moved))), float(
         np.max(np.abs(histories[:count, :, force] - exact[..., force]))

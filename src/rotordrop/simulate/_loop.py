@@ -8,6 +8,8 @@ windows and taken up again takes the very same steps.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +40,10 @@ from rotordrop.simulate._rhs import (
 from rotordrop.simulate._tableau import Tableau
 
 Array = NDArray[np.float64]
+Window = tuple[float, KernelParameters]
+"""End of a window of time [s] and its parameters."""
+Stretches = Callable[[float, float, KernelParameters, Array, Array], Iterable[Window]]
+"""Windows from a time to an end [s] with parameters, given the state and the books that the loop moves on."""
 
 # Outcome of the loop.
 FINISHED = 0
@@ -620,10 +626,12 @@ def integrate_drop(
     counters: Array,
     books: Array | None = None,
     change: tuple[float, KernelParameters] | None = None,
+    stretches: Stretches | None = None,
 ) -> int:
     """Integrate a drop; returns ``FINISHED`` or why it ended early.
 
-    A drop is one window, or two where a ``change`` says when [s] its parameters become others.
+    A drop is one window, or two where a ``change`` says when [s] its parameters become others; ``stretches``
+    divide each once more, for parameters that follow what the loop lost.
 
     ``states`` (T, n) are filled on the grid ``times`` (T,) from the start state ``y0`` (n,), NaN behind an
     early end; ``log`` (R, 9) with the contacts, ``counters`` (5,) with accepted steps, rejected steps, last
@@ -643,8 +651,13 @@ def integrate_drop(
     if change is not None and change[0] < times[-1]:
         before = [(change[0], p)] if change[0] > times[0] else []
         windows = [*before, (float(times[-1]), change[1]._replace(memory=p.memory))]
+    pieces: Iterable[Window] = windows
+    if stretches is not None:
+        starts = (float(times[0]), *(end for end, _ in windows))
+        divided = (stretches(t, *one, y, books) for t, one in zip(starts, windows, strict=False))
+        pieces = chain.from_iterable(divided)
     done, outcome = 1, FINISHED
-    for end, parameters in windows:
+    for end, parameters in pieces:
         control = Control(
             scale, float(tolerance), float(largest_step), most_steps, -1.0, float(end), 0.0, True
         )

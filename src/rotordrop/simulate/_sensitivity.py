@@ -141,7 +141,7 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
     F = math.sqrt(F_x * F_x + F_y * F_y)
     by_force, by_spin = race_drag_gradient(
-        F, y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+        F + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
     )
     J[spin, spin] -= by_spin / row[L.RACE_INERTIA]
     if F > 0.0:
@@ -184,7 +184,7 @@ def _ring_jacobian(
     along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
     elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
     by_drag, _by_spin = race_drag_gradient(
-        elastic, y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+        elastic + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
     )
     J[at, at + 1] = 1.0
     J[at + 1, at] -= (k_aa / rows + rate - by_force * (along_x * k_ax + along_y * k_ay)) / mass

@@ -75,7 +75,14 @@ def damp_races(
 
 @kernel
 def integrate_settled(
-    y: Array, t: float, output_step: float, parts: int, p: KernelParameters, stop_speed: float, states: Array
+    y: Array,
+    t: float,
+    output_step: float,
+    parts: int,
+    p: KernelParameters,
+    stop_speed: float,
+    states: Array,
+    books: Array,
 ) -> int:
     """Integrate a settled rotor over ``len(states)`` samples, ``parts`` equal steps to a sample.
 
@@ -89,6 +96,8 @@ def integrate_settled(
         The loop ends at the last sample before the rotor turns no faster than this [rad/s]; negative: never.
     states : ndarray, shape (T, n)
         Filled with the states one, two, … output steps after ``t``.
+    books : ndarray, shape (B + 1, 5)
+        Energy lost so far by place [J], by the powers at the samples.
 
     Returns
     -------
@@ -119,4 +128,7 @@ def integrate_settled(
         for i in range(n):
             y[i] = state[i]
             states[sample, i] = state[i]
+        for b in range(books.shape[0]):
+            for i in range(books.shape[1]):
+                books[b, i] += output_step * work.power[b, i]
     return int(states.shape[0])

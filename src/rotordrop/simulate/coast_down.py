@@ -184,10 +184,11 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         dissipated=float(run.state[layout.dissipated]),
         air_work=float(run.state[layout.work_in]),
         energy_residual=float(run.status[WORST_BALANCE]),
-        energy_scale=float(run.status[ENERGY_AT_START] - stored_energy_of(setup, end, run.state)),
+        energy_scale=float(run.status[ENERGY_AT_START] - stored_energy_of(setup, run)),
         steps=int(run.progress[_loop.ACCEPTED]),
         rejected_steps=int(run.progress[_loop.REJECTED]),
         path=output,
+        heat=None if setup.warming is None else setup.warming.heat_of(run.windows["heat_rows"], run.memory),
     )
     return replace(result, outcome=_sentence(setup, run, result))
 

@@ -15,6 +15,7 @@ from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.simulate.checkpoint import part_path
 from rotordrop.simulate.coast_down_result import CoastDownResult, WindowStatistics
 from rotordrop.simulate.fingerprint import fingerprint
+from rotordrop.simulate.heat import Heat
 
 Array = NDArray[np.float64]
 
@@ -93,6 +94,8 @@ def _write_head(file: Any, result: CoastDownResult, frame: Frame) -> None:
     file.create_dataset("bearing", data=np.array(result.bearing_names, dtype=object), dtype=text)
     file.create_dataset("sensor_node", data=np.array(frame.sensor_nodes, dtype=np.int64))
     file.create_dataset("air_gap", data=frame.air_gap)
+    if result.heat is not None:
+        result.heat.write(file)
     statistics = file.create_group("statistics")
     for name in _ARRAYS:
         statistics.create_dataset(name, data=getattr(result, name))
@@ -178,6 +181,7 @@ def _read_head(file: Any, path: Path) -> CoastDownResult:
         standstill_time=None if np.isnan(stopped) else stopped,
         windows=WindowStatistics(**{f.name: windows[f.name][()] for f in fields(WindowStatistics)}),
         path=path,
+        heat=Heat.read(file),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.simulate.coast_down_case import FIRST_WINDOW
+from rotordrop.simulate.heat import Heat
 from rotordrop.units import format_quantity
 
 Array = NDArray[np.float64]
@@ -142,6 +143,8 @@ class CoastDownResult:
     rejected_steps: int
     path: Path | None = None
     """Where the samples are."""
+    heat: Heat | None = None
+    """How the bearings warmed; None of a machine whose bearings stay cold."""
 
     def maxima(self) -> tuple[Maximum, ...]:
         """When the largest indentation, force and stress of every bearing came: does 0.2 s hold them?"""
@@ -200,4 +203,4 @@ class CoastDownResult:
             "quantities": list(QUANTITIES),
             "windows": windows,
             "samples": None if self.path is None else str(self.path),
-        }
+        } | ({} if self.heat is None else {"heat": self.heat.as_json(self.bearing_names)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +23,13 @@ from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
 from rotordrop.simulate.case import DropCase, StateStart, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
+from rotordrop.simulate.heat import WarmDrop, warms
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult, stop_of
 
 Array = NDArray[np.float64]
+Parts = Sequence[tuple[slice, KernelParameters]]
+"""Samples of a drop and the parameters they were integrated with, in order."""
 
 TYPICAL = np.full(L.N_KINDS, np.inf)
 """Typical size of a state by its kind, in its unit; angle and audit follow without control."""
@@ -91,6 +95,7 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
     states = np.empty((len(times), model.layout.size))
     log = np.zeros((100 + int(LOG_ROWS_PER_SECOND * case.duration), _loop.N_LOG_COLUMNS))
     counters, books = np.zeros(5), np.zeros((model.layout.n_bearings + 1, N_PLACES))
+    warming = WarmDrop(cold=parameters) if warms(parameters).size else None
     outcome = _loop.integrate_drop(
         start,
         times,
@@ -106,9 +111,11 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
         counters,
         books,
         None if case.jump is None else (case.jump.time, _with_jump(model, parameters, case.jump)),
+        None if warming is None else warming.stretches,
     )
-    result = _result(model, case, parameters, times, states, log[: int(counters[3])], counters, outcome)
-    return replace(result, lost=books)
+    parts = [(slice(None), parameters)] if warming is None else list(warming.of_times(times))
+    result = _result(model, case, parts, times, states, log[: int(counters[3])], counters, outcome)
+    return replace(result, lost=books, heat=None if warming is None else warming.heat)
 
 
 def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJump) -> KernelParameters:
@@ -126,18 +133,20 @@ def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJu
 def _result(
     model: DropModel,
     case: DropCase,
-    parameters: KernelParameters,
+    parts: Parts,
     times: Array,
     states: Array,
     log: Array,
     counters: Array,
     outcome: int,
 ) -> DropResult:
+    parameters = parts[0][1]
     layout, n_b = model.layout, model.layout.n_bearings
     reached = int(np.sum(times <= counters[4]))
     times, states = times[:reached], states[:reached]
     histories = np.empty((reached, n_b, H.N_HISTORIES))
-    H.bearing_histories(times, states, parameters, histories)
+    for part, one in parts:
+        H.bearing_histories(times[part], states[part], one, histories[part])
     displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
     owner, further = _loop.bearings_logged(log, parameters), _further_names(model)
@@ -179,7 +188,7 @@ def _result(
         rejected_steps=int(counters[1]),
         outcome=_sentence(outcome, case, counters, len(contacts), n_b),
         finished=outcome == _loop.FINISHED,
-        certificate=_energy_certificate(model, parameters, times, states, force),
+        certificate=_energy_certificate(model, parts, times, states, force),
     )
 
 
@@ -224,18 +233,27 @@ def _sentence(outcome: int, case: DropCase, counters: Array, contacts: int, n_be
 
 
 def _energy_certificate(
-    model: DropModel, parameters: KernelParameters, times: Array, states: Array, force: Array
+    model: DropModel, parts: Parts, times: Array, states: Array, force: Array
 ) -> Certificate:
     layout = model.layout
     chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
-    stored = np.empty(len(chosen))
-    H.stored_energies(times[chosen], states[chosen], parameters, True, stored)
+    stored = np.empty(len(states))
+    for part, one in parts:
+        there = chosen[np.isin(chosen, np.arange(len(states))[part])]
+        stored[there] = _stored(times[there], states[there], one)
+    stored = stored[chosen]
     balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),
         energy_scale=float(np.max(np.abs(stored - stored[0]))),
         peak_force=peaks_of(times, magnitude(force[..., 0], force[..., 1])),
     )
+
+
+def _stored(times: Array, states: Array, parameters: KernelParameters) -> Array:
+    stored = np.empty(len(states))
+    H.stored_energies(times, states, parameters, True, stored)
+    return stored
 
 
 def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certificate:

@@ -16,6 +16,7 @@ from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.physics.hertz import LineContact
 from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
+from rotordrop.simulate.heat import Heat
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -130,6 +131,8 @@ class DropResult:
     face_force: Array | None = field(default=None, repr=False)
     """Axial force of the rotor on the face of each race [N], positive towards higher nodes, shape (T, B);
     None where the rotor does not move along its axis."""
+    heat: Heat | None = field(default=None, repr=False)
+    """How the bearings warmed; None of a machine whose bearings stay cold."""
     further_names: tuple[str, ...] = ()
     further_contacts: ContactLog | None = field(default=None, repr=False)
     """Contacts of supports with their stops, such as "DE.mount.stop", of the rotor with its housing, by the
@@ -154,6 +157,11 @@ class DropResult:
     def ball_loads(self, machine: Machine, bearing: int | str) -> Array:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
         b = self.index_of(bearing)
+        if self.heat is not None and b in self.heat.warmed:
+            raise UsageError(
+                f"the balls of {self.bearing_names[b]} warm, and only those of a cold bearing can be told "
+                "one by one; max_ball_load has the largest load of each instant"
+            )
         moved = self.race_displacement[:, b] - self.support_displacement[:, b]
         numbers = numbers_of(machine.bearing(self.bearing_names[b]))
         return numbers.element_loads(moved, self.ring_travel(b), self.race_axial_displacement(b))
@@ -301,17 +309,26 @@ def _write(result: DropResult, file: Any) -> None:
         _scale(file, "loss_column", np.arange(result.lost.shape[1], dtype=np.int64))
         words = "energy lost by place; columns as in rotordrop.simulate.losses"
         _dataset(file, "lost", result.lost, ("owner", "loss_column"), "J", words)
+    _write_more(result, file)
+    for item in fields(Certificate):
+        value = getattr(result.certificate, item.name)
+        if value is not None:
+            file.attrs[f"certificate_{item.name}"] = value
+
+
+def _write_more(result: DropResult, file: Any) -> None:
+    """Write what only some machines have."""
+    import h5py
+
     if result.race_stress is not None:
-        _scale(file, "race", np.array(["inner", "outer"], dtype=text))
+        _scale(file, "race", np.array(["inner", "outer"], dtype=h5py.string_dtype()))
         words = "largest Hertz stress of a ball on each race"
         _dataset(file, "race_stress", result.race_stress, ("time", "bearing", "race"), "Pa", words)
     if result.face_force is not None:
         words = "axial force of the rotor on the face of the race"
         _dataset(file, "face_force", result.face_force, ("time", "bearing"), "N", words)
-    for item in fields(Certificate):
-        value = getattr(result.certificate, item.name)
-        if value is not None:
-            file.attrs[f"certificate_{item.name}"] = value
+    if result.heat is not None:
+        result.heat.write(file)
 
 
 def _write_log(file: Any, prefix: str, log: ContactLog) -> None:
@@ -376,7 +393,7 @@ def _read(file: Any) -> DropResult:
     values["certificate"] = Certificate(**certificate)
     for name in ("lost", "race_stress", "face_force"):
         values[name] = file[name][()] if name in file else None
-    return DropResult(**values)
+    return DropResult(**values, heat=Heat.read(file))
 
 
 def _read_log(file: Any, prefix: str) -> ContactLog:

@@ -105,7 +105,7 @@ def test_frictional_heat_matters_at_nominal_speed_and_not_in_the_papers_tests(ma
     found = warnings_of(machine, "frictional heat", 550.0)
     assert [warning.bearing for warning in found] == ["NDE", "DE"]
     assert all(warning.value > 0.1 * warning.limit for warning in found)
-    assert "the drop model has no heat in it" in found[0].message
+    assert "a table 'thermal' puts its heat into the drop model" in found[0].message
 
 
 def test_no_friction_no_heat_warning(machine):

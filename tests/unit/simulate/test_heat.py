@@ -1,0 +1,293 @@
+"""Bearings that warm: books of heat and energy, stretches, springs, fast balls, resumed runs, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotordrop.elements.table import row_of
+from rotordrop.errors import MachineFileError, RecordError, UsageError
+from rotordrop.evidence.evidence import insisted
+from rotordrop.machine import example_path, loads_machine
+from rotordrop.machine.saving import machine_text
+from rotordrop.physics import columns as L
+from rotordrop.physics import thermal
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.fast_balls import FastBalls, centred_balls
+from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate import _rhs as R
+from rotordrop.simulate import heat
+from rotordrop.simulate.case import DropCase, StateStart
+from rotordrop.simulate.coast_down import simulate_coast_down
+from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.coast_down_file import load_coast_down
+from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.result import load_result
+
+COLD = example_path("small").read_text(encoding="utf-8")
+NOMINAL = float(loads_machine(COLD).speed.nominal)
+
+
+def text_of(table: str = "", bearing: str = "") -> str:
+    """The small machine with bearings that warm, and more under 'bearing'."""
+    warm = COLD.replace(
+        "[touchdown_bearings.support]", f"[touchdown_bearings.thermal]\n{table}\n[touchdown_bearings.support]"
+    )
+    return warm.replace("preload = { guess", f"{bearing}\npreload = {{ guess")
+
+
+def model_of(table: str = "", bearing: str = ""):
+    return build_drop_model(loads_machine(text_of(table, bearing)), "quick")
+
+
+@pytest.fixture(scope="module")
+def warm():
+    return model_of()
+
+
+HOT = 'slip_share = 1.0\nrace_capacity = "5 J/K"'
+"""A race that warms eighteen times as fast."""
+
+
+def turning(model, duration=0.06, share=0.5):
+    """A drop that begins with its races turning."""
+    state = model.at_rest()
+    state[model.layout.rotor_speed], state[model.layout.race_spin] = NOMINAL, share * NOMINAL
+    case = DropCase(speed=NOMINAL, duration=duration, reduction="quick", start=StateStart(state=state))
+    return simulate_drop(model, case)
+
+
+@pytest.fixture(scope="module")
+def drop(warm):
+    return turning(warm)
+
+
+@pytest.mark.parametrize("parts", [1, 7, 400])
+def test_nodes_come_to_the_same_in_one_step_and_in_many(warm, parts):
+    network = thermal.HeatNetwork.of_entries(warm.parameters.bearing[0, L.THERMAL : L.THERMAL_END])
+    start, power = np.array([3.0, 40.0, 20.0, 8.0, 1.0, 0.2]), np.array([30.0, 90.0, 20.0, 15.0, 0.0, 2.0])
+    once, gone = network.after(start, power, 12.0)
+    warmth, total = start, 0.0
+    for _ in range(parts):
+        warmth, more = network.after(warmth, power, 12.0 / parts)
+        total += more
+    assert warmth == pytest.approx(once, rel=1e-9)
+    assert total == pytest.approx(gone, rel=1e-9)
+    held = float(np.sum(network.capacity * (once - start)))
+    assert held + gone == pytest.approx(12.0 * float(np.sum(power)), rel=1e-10)
+
+
+def test_without_the_way_outwards_all_heat_stays():
+    network = thermal.HeatNetwork.of(np.array([3.0, 5.0]), np.array([2.0]), np.zeros(2))
+    warmth, gone = network.after(np.zeros(2), np.array([8.0, 0.0]), 1e5)
+    assert gone == 0.0
+    assert warmth == pytest.approx(8.0e5 / 8.0 + np.array([1.5625, -0.9375]) * 1.0, rel=1e-6)
+
+
+def test_heat_is_what_was_lost_at_its_places_and_energy_closes(drop):
+    lost = drop.lost[:-1]
+    assert drop.heat.taken == pytest.approx(np.sum(lost, axis=1), rel=1e-9)
+    assert drop.heat.gone + drop.heat.held == pytest.approx(drop.heat.taken, rel=1e-9)
+    assert np.all(lost[:, R.SLIDING] > 1.0)
+    assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
+
+
+def test_the_work_of_growth_is_booked(monkeypatch):
+    model = model_of(HOT)
+    closed = turning(model).certificate
+    assert closed.energy_residual < 2e-6 * closed.energy_scale
+    monkeypatch.setattr(heat, "stored_energy", lambda *_: 0.0)
+    left_out = turning(model).certificate
+    assert left_out.energy_residual > 2e-5 * left_out.energy_scale
+
+
+def test_sliding_warms_race_and_sleeve_alike_and_the_preload_rises(drop):
+    warmth = drop.heat.temperature[-1, 0]
+    assert warmth[thermal.SKIN] > warmth[thermal.RACE] > warmth[thermal.OUTER] > 0.0
+    assert drop.heat.preload[0, 0] == pytest.approx(156.0, rel=1e-9)
+    assert np.all(np.diff(drop.heat.preload[:, 0]) > -1e-3)
+    assert drop.heat.preload[-1, 0] > 1.02 * drop.heat.preload[0, 0]
+    assert drop.heat.growth[-1, 0] > 0.0
+
+
+def test_stretches_half_as_long_change_next_to_nothing(warm, drop, monkeypatch):
+    monkeypatch.setattr(heat, "WARMED", 0.5 * heat.WARMED)
+    monkeypatch.setattr(heat, "SHORTEST", 0.5 * heat.SHORTEST)
+    finer = turning(warm)
+    assert len(finer.heat.time) > 1.2 * len(drop.heat.time)
+    assert finer.heat.preload[-1] == pytest.approx(drop.heat.preload[-1], rel=2e-3)
+    assert finer.peak_force(0)[0] == pytest.approx(drop.peak_force(0)[0], rel=1e-3)
+
+
+def test_parts_that_do_not_grow_leave_the_drop_as_it_is():
+    """But for the drag of the preload: without any drag all is as in a cold bearing."""
+    still = 'expansion = "0 1/K"\nball_expansion = "0 1/K"\n'
+    smooth = [
+        loads_machine(text).with_values({f"{b}.race.drag_coefficient": 0.0 for b in ("NDE", "DE")})
+        for text in (COLD, text_of(still))
+    ]
+    one, other = (turning(build_drop_model(machine, "quick"), 0.02) for machine in smooth)
+    assert one.heat is None
+    assert other.heat.taken[0] > 0.0
+    assert other.peak_force(0)[0] == pytest.approx(one.peak_force(0)[0], rel=1e-5)
+    assert other.race_speed[-1] == pytest.approx(one.race_speed[-1], rel=1e-6)
+
+
+def test_cold_bearings_have_no_part_in_it():
+    p = build_drop_model(loads_machine(COLD), "quick").parameters
+    assert heat.warmed(p, p.memory, np.zeros(1)) is p
+    assert len(p.memory) == 0
+    only = text_of().replace("[touchdown_bearings.thermal]\n\n", "", 1)
+    mixed = turning(build_drop_model(loads_machine(only), "quick"), 0.01)
+    assert mixed.heat.warmed == (1,)
+    assert np.all(np.isnan(mixed.heat.temperature[:, 0]))
+
+
+def test_springs_keep_the_preload():
+    sprung, rigid = (turning(model_of(HOT, f'preload_kind = "{kind}"')) for kind in ("spring", "rigid"))
+    risen = [one.heat.preload[-1, 0] - one.heat.preload[0, 0] for one in (sprung, rigid)]
+    assert risen[1] > 60.0
+    assert 0.0 < risen[0] < 0.25 * risen[1]
+    assert sprung.certificate.energy_residual < 2e-6 * sprung.certificate.energy_scale
+
+
+@pytest.mark.parametrize(("warmth", "share"), [(0.0, 0.0), (4.0, 0.0), (4.0, 0.8), (-2.0, 0.6)])
+def test_warm_fast_balls_are_those_of_shifted_grooves(warmth, share):
+    model = model_of(bearing="ball_inertia = true")
+    p = model.parameters._replace(memory=model.parameters.memory.copy())
+    kept = heat.remembered(p, p.memory)
+    kept[:, [thermal.SKIN, thermal.RACE]] = warmth
+    state = model.at_rest()
+    state[model.layout.race_spin] = share * NOMINAL
+    now = heat.warmed(p, p.memory, state)
+    described = model.machine.touchdown_bearings[0].bearing
+    constants = bearing_constants(described)
+    grown = thermal.growth(p.bearing[0, L.THERMAL : L.THERMAL_END], kept[0, : thermal.N_NODES])
+    balls = FastBalls.of(described, constants)
+    balls = replace(balls, radial_offset=balls.radial_offset + grown)
+    wanted = constants.ball_count * float(centred_balls(balls, share * NOMINAL)[0].axial_force[0])
+    # the orbit of the table is that of cold balls
+    assert heat.preload_of(0, now, state)[0] == pytest.approx(wanted, rel=2e-3)
+
+
+def test_a_drop_with_fast_balls_closes_its_energy():
+    fast = turning(model_of(bearing="ball_inertia = true"))
+    assert fast.certificate.energy_residual < 2e-6 * fast.certificate.energy_scale
+    assert fast.heat.preload[0, 0] == pytest.approx(164.7, rel=1e-3)
+
+
+def test_a_warm_sleeve_closes_the_gap_and_a_warm_race_opens_it(warm):
+    p = warm.parameters
+    entries, gap = p.bearing[0, L.THERMAL : L.THERMAL_END], p.bearing[0, L.AIR_GAP]
+    for nodes, change in (((thermal.SLEEVE,), -12e-6 * 10.0 * (0.02 - gap)), ((1, 2), 12e-6 * 10.0 * 0.02)):
+        warmth = np.zeros(thermal.N_NODES)
+        warmth[list(nodes)] = 10.0
+        assert thermal.gap_growth(entries, warmth, 0.02, 0.02 - gap) == pytest.approx(change, rel=1e-12)
+
+
+def test_a_bearing_that_is_warm_all_through_keeps_the_preload_of_steel_balls():
+    steel = model_of(bearing='ball_material = "steel"').parameters
+    even = np.full(thermal.N_NODES, 25.0)
+    assert thermal.growth(steel.bearing[0, L.THERMAL : L.THERMAL_END], even) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_it_is_kept_with_the_result(drop, tmp_path, warm):
+    drop.save(tmp_path / "drop.h5")
+    found = load_result(tmp_path / "drop.h5").heat
+    assert np.array_equal(found.temperature, drop.heat.temperature)
+    assert found.sentence(0, "NDE") == drop.heat.sentence(0, "NDE")
+    with pytest.raises(UsageError, match="the balls of NDE warm"):
+        drop.ball_loads(warm.machine, "NDE")
+
+
+COASTING = 'nominal = "500 Hz"\naero_time_constant = "8 s"'
+
+
+@pytest.fixture(scope="module")
+def coasting():
+    return build_drop_model(loads_machine(text_of().replace('nominal = "500 Hz"', COASTING)), "quick")
+
+
+CASE = CoastDownCase(speed=NOMINAL, duration=1.4)
+
+
+def test_a_coast_down_with_heat_is_resumed_to_the_last_bit(coasting, tmp_path):
+    whole = simulate_coast_down(coasting, CASE, output=tmp_path / "whole.h5")
+    assert simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", windows_at_most=2) is None
+    resumed = simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", resume=True)
+    assert np.array_equal(resumed.heat.temperature, whole.heat.temperature)
+    assert np.array_equal(resumed.windows.peak, whole.windows.peak)
+    assert resumed.heat.taken == pytest.approx(whole.heat.gone + whole.heat.held, rel=1e-9)
+    assert whole.energy_residual < 1e-6 * whole.energy_scale
+    assert np.array_equal(load_coast_down(tmp_path / "cut.h5").heat.preload, whole.heat.preload)
+    assert "preload of a row 156 N" in whole.as_json()["heat"]["NDE"]["statement"]
+
+
+def test_a_settled_rotor_warms_by_what_it_loses():
+    """The scheme for settled rotors books by places too, with all that is lost."""
+    slow = text_of().replace('nominal = "500 Hz"', COASTING)
+    model = build_drop_model(loads_machine(slow), "quick")
+    case = CoastDownCase(speed=0.02 * NOMINAL, duration=8.0)
+    result = simulate_coast_down(model, case)
+    assert np.any(result.windows.settled[:, 0] > 0.9)
+    assert float(np.sum(result.heat.taken)) == pytest.approx(result.dissipated, rel=2e-2)
+    assert result.energy_residual < 1e-5 * result.energy_scale
+
+
+def test_what_check_says_of_a_pair_without_a_steady_state():
+    machine = loads_machine(text_of())
+    summary = summarise_machine(machine)
+    figures = {one.field: one for one in summary.bearings[0].figures}
+    assert figures["steady_conductance_W_per_K"].value > 4.0
+    said = [one for one in machine_warnings(machine, summary) if one.kind == "thermal runaway"]
+    assert [one.bearing for one in said] == ["NDE", "DE"]
+    assert "no steady state" in said[0].message
+    better = loads_machine(text_of('ball_conductance = "40 W/K"'))
+    assert not [
+        one for one in machine_warnings(better, summarise_machine(better)) if one.kind == "thermal runaway"
+    ]
+    assert not [one for one in machine_warnings(machine, summary) if one.kind == "frictional heat"]
+
+
+def test_a_parameter_moves_its_columns_and_is_a_row_of_the_table():
+    machine = loads_machine(text_of())
+    changed = machine.with_values({"NDE.thermal.ball_conductance": 16.0, "NDE.thermal.race_capacity": 60.0})
+    row = build_drop_model(changed, "quick").parameters.bearing[0, L.THERMAL : L.THERMAL_END]
+    assert list(row[thermal.CONDUCTANCE + np.array([thermal.RACE, thermal.BALLS])]) == [16.0, 16.0]
+    assert list(row[[thermal.SKIN, thermal.RACE]]) == [15.0, 45.0]
+    assert row_of("NDE.thermal.ball_conductance").unit == "W/K"
+    assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ('race_capacity = "0 J/K"', r"race_capacity.*0 J/K.*must be positive"),
+        ('ball_conductance = "-4 W/K"', r"ball_conductance.*-4.*must not be negative"),
+        ("slip_share = 1.2", r"slip_share.*at most"),
+        ("expansion = 12e-6", r"expansion.*has no unit.*12e-6 1/K"),
+        ('race_capcity = "40 J/K"', r"did you mean 'race_capacity'"),
+    ],
+)
+def test_bad_input_is_named(table, told):
+    with pytest.raises(MachineFileError, match=told):
+        loads_machine(text_of(table))
+
+
+def test_a_sleeve_has_no_heat():
+    text = 'kind = "sleeve"\nthermal = {}'
+    head, _, rest = COLD.partition("[touchdown_bearings.bearing]")
+    contact = rest.index("[touchdown_bearings.contact]")
+    race, support = (rest.index(f"[touchdown_bearings.{one}]") for one in ("race", "support"))
+    with pytest.raises(MachineFileError, match=r"NDE cannot have a table 'thermal': heat"):
+        loads_machine(f"{head}{text}\n{rest[contact:race]}{rest[support:]}")
+
+
+def test_a_record_is_not_estimated_with_it(warm):
+    told = r"bearing 'NDE' of the machine .* warms, with which a record cannot be estimated yet: a drop"
+    with pytest.raises(RecordError, match=told):
+        insisted(SimpleNamespace(machine=warm.machine))
