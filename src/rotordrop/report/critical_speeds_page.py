@@ -476,7 +476,7 @@ def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
                 "tangent_N_m": part.tangent,
                 "simple_N_m": part.simple,
                 "support_N_m": part.support,
-                "contact_N_m": part.contact,
+                "contact_N_m": _finite(part.contact),
                 "equivalent_tangent_N_m": part.equivalent("tangent"),
                 "equivalent_simple_N_m": part.equivalent("simple"),
             }

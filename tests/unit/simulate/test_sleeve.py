@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from rotordrop.evidence.evidence import insisted
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
+from rotordrop.report.critical_speeds_page import critical_speeds_json
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.campbell import campbell_diagram
@@ -110,7 +112,11 @@ def test_what_holds_the_rotor_is_contact_and_support(model):
     assert part.tangent == part.simple and part.contact == np.inf
     assert 1.0 / part.equivalent() == pytest.approx(1.0 / part.tangent + 1.0 / part.support, rel=1e-12)
     assert sag_of_model(model).race[1] == 0.0 < sag_of_model(model).indentation[1]
-    assert len(campbell_diagram(machine, [0.0, 300.0]).speed) == 2
+    diagram = campbell_diagram(machine, [0.0, 300.0])
+    document = critical_speeds_json({"standstill": critical_speed_map(machine, [1e7])}, {"bearings": diagram})
+    held = document["maps"]["standstill"]["bearings"]["DE"]
+    assert held["contact_N_m"] is None and held["tangent_N_m"] == part.tangent
+    assert json.dumps(document, allow_nan=False)
     summary = summarise_machine(machine)
     assert summary.bearings[1].figures == () and summary.bearings[1].contact_pressure > 1e5
     assert not [
