@@ -251,7 +251,7 @@ def read_shards(
 
     The values that vary are drawn again, all at once: a Sobol sequence begins at its first point every time.
     """
-    begin = study.drops_of(min(shards, default=0)).start
+    begin, expected = study.drops_of(min(shards, default=0)).start, shard_type(study)
     drawn = study.values(begin, max(study.drops_of(max(shards, default=-1)).stop, begin))
     for shard in shards:
         file, drops, problem = folder.shard_path(shard), study.drops_of(shard), ""
@@ -264,7 +264,7 @@ def read_shards(
             problem = "is damaged: it is not what was computed"
         else:
             table = _table_in(content)
-            fits = table.dtype == shard_type(study) and np.array_equal(table["drop"], np.asarray(drops))
+            fits = table.dtype == expected and np.array_equal(table["drop"], np.asarray(drops))
             if not fits:
                 problem = f"does not hold drops {drops.start} to {drops.stop - 1} of this study"
             elif not np.array_equal(table["varied"], drawn[drops.start - begin : drops.stop - begin]):

@@ -37,7 +37,16 @@ def uniform(seed: int, drop: int, width: int, stream: int = 0) -> Array:
 
 def independent(seed: int, first: int, last: int, width: int) -> Array:
     """Shares of drops ``first`` to ``last - 1``, shape (n, width), each drop on its own."""
-    return np.array([uniform(seed, i, width) for i in range(first, last)]).reshape(-1, width)
+    bits = np.random.Philox(key=seed, counter=0)
+    generator, begin = np.random.Generator(bits), bits.state
+    shares = np.empty((last - first, width))
+    for row, drop in enumerate(
+        range(first, last)
+    ):  # as `uniform`, whose new generator takes six times as long
+        begin["state"]["counter"][2] = drop
+        bits.state = begin
+        generator.random(out=shares[row])
+    return shares
 
 
 def sobol(seed: int, first: int, last: int, width: int) -> Array:

@@ -26,7 +26,7 @@ from rotordrop.study.folder import StudyFolder, claimed, open_folder, read_shard
 from rotordrop.study.plan import Study, load_study, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
-from rotordrop.study.sampling import sobol
+from rotordrop.study.sampling import independent, sobol, uniform
 from rotordrop.study.summary import EarlyEnd, load_results, save_results
 
 MACHINE = example_machine("lp400")
@@ -85,6 +85,13 @@ def test_values_of_a_drop_do_not_depend_on_where_a_draw_begins(design):
     whole = study.values(0, 64)
     np.testing.assert_array_equal(study.values(17, 23), whole[17:23])
     assert len(np.unique(whole[:, 0])) == 64
+
+
+def test_shares_of_many_drops_are_those_of_each_alone():
+    for width in (1, 7):
+        alone = [uniform(2**70 + 26, drop, width) for drop in range(5, 25)]
+        np.testing.assert_array_equal(independent(2**70 + 26, 5, 25, width), alone)
+    assert independent(26, 4, 4, 3).shape == (0, 3)
 
 
 @pytest.mark.filterwarnings("error")
