@@ -7,12 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.record.record import Record
-
-Array = NDArray[np.float64]
 
 
 def _swapped_axes(signals: Array, nodes: list[int]) -> Array:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.simulate.levitation import levitated_orbit, levitated_static
 from rotordrop.simulate.result import DropResult
 from rotordrop_bench.event import DropConditions, HiddenMachine
-
-Array = NDArray[np.float64]
 
 
 def true_motion(

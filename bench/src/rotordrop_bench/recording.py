@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop._version import __version__
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.record.record import Record
 from rotordrop.simulate.case import DropCase, UnbalanceJump
@@ -29,8 +29,6 @@ from rotordrop_bench.sensor_chain import (
 )
 from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
 from rotordrop_bench.true_values import true_histories, true_values
-
-Array = NDArray[np.float64]
 
 TRUE_TOLERANCE = 1e-8
 """Tolerance of the true simulation, that of the reference [1]."""

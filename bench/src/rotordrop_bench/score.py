@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.document import read_json
 from rotordrop.errors import UsageError
 from rotordrop_bench.truth import Truth, read_truth, truth_of
 
-Array = NDArray[np.float64]
 Estimate = Mapping[str, Any]
 
 LARGE_IMPACT = 1.7

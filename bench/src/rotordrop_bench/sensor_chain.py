@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.reduction import RotorBasis
-
-Array = NDArray[np.float64]
 
 USUAL_FULL_SCALE = 600e-6
 """Largest reading of an eddy-current system [m]; chosen, not measured."""

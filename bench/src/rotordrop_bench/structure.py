@@ -8,15 +8,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop_bench.violations import BearingViolations, ContactViolation, Violations
-
-Array = NDArray[np.float64]
 
 TYPICAL_LOADS = 5.0
 """Force over the mean load of a bearing at which a contact with another exponent is as deep as before [1]."""

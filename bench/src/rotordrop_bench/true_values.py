@@ -8,8 +8,8 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
@@ -22,8 +22,6 @@ from rotordrop_bench.motion import true_motion
 from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places
 from rotordrop_bench.structure import support_matrices
 from rotordrop_bench.violations import BearingViolations, Violations
-
-Array = NDArray[np.float64]
 
 WHOLE, SETTLING = 0.2, (0.15, 0.2)
 HISTORY_BEFORE, CONTACT_WINDOW = 0.02, 0.25

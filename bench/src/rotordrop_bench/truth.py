@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.document import read_json
 from rotordrop.elements.table import LOADS, published
 from rotordrop.errors import UsageError
-
-Array = NDArray[np.float64]
 
 _NEEDED = ("air_gap_m", "peak_force_N")
 

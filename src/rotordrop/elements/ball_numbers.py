@@ -9,8 +9,8 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS, BallBearing
 from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
 from rotordrop.elements.race_bearing import (
@@ -49,8 +49,6 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.ball_bearing import BallBearing
-
-Array = NDArray[np.float64]
 
 CENTRIFUGAL_SHARE = 0.1
 """Ball centrifugal force over preload ball load from which it counts: chosen, not measured."""

@@ -8,9 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit, Usual
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, Values, bearing_entries
@@ -18,8 +16,6 @@ from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_law, depth_at
-
-Array = NDArray[np.float64]
 
 LINE_CONTACT = 10.0 / 9.0
 """Exponent of a line contact (Palmgren)."""

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from rotordrop.arrays import Array
 from rotordrop.elements.contact import refuse_other_unit
 from rotordrop.elements.description import Description, Misfit, Usual
 from rotordrop.elements.friction import SLIDING
@@ -24,8 +23,6 @@ from rotordrop.elements.values import (
 from rotordrop.physics import columns as L
 from rotordrop.physics import face as law
 from rotordrop.physics.contact import contact_law
-
-Array = NDArray[np.float64]
 
 SIDES: Mapping[str, float] = {"both": 0.0, "+z": 1.0, "-z": -1.0}
 """Side of a face as the kernels know it; +z points to higher nodes."""

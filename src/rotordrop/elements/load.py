@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import Description, Misfit, Placed
 from rotordrop.elements.values import Angle, Force, NonNegative, Physical, Time, default
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 
-Array = NDArray[np.float64]
 SignedAcceleration = Annotated[Known, Physical("acceleration")]
 Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 

@@ -9,9 +9,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit
 from rotordrop.elements.parameter import Parameter, stated_only
@@ -21,8 +19,6 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import mount as law
 from rotordrop.physics.contact import contact_law
 from rotordrop.units import format_quantity
-
-Array = NDArray[np.float64]
 
 FRICTION_SHARE = 1.573
 """Stiffness of a ribbon's friction over that of its spring [1] for a loss factor of 0.3 at 3.4 times the

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import Description, Text
 from rotordrop.known import Known
 from rotordrop.physics import ring
@@ -61,8 +61,6 @@ class RaceBearing(Description):
         """What looks odd in the description, which can be used all the same."""
         yield from ()
 
-
-Array = NDArray[np.float64]
 
 THROWN = "ball centrifugal force"
 """Kind of excess of rolling elements that turn fast."""

@@ -10,9 +10,9 @@ from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
+from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import (
     Description,
@@ -447,9 +447,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
     ),
 )
-
-
-Array = NDArray[np.float64]
 
 
 def _form(path: str, label: str, sigma: float) -> Parameter:

@@ -8,15 +8,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race import Race
 from rotordrop.elements.race_bearing import BearingFigure, BearingNumbers, Excess, RaceBearing
 from rotordrop.elements.values import PoissonRatio, PositiveLength, Pressure, default
 from rotordrop.known import Known
 from rotordrop.physics import ball_set
-
-Array = NDArray[np.float64]
 
 
 class Sleeve(RaceBearing):

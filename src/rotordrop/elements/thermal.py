@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.ball_bearing import BallBearing, outer_ring
 from rotordrop.elements.description import Description
@@ -24,8 +22,6 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
-
-Array = NDArray[np.float64]
 
 _STEEL_CONDUCTIVITY = 45.0
 """Of bearing steel [W/(m K)]."""

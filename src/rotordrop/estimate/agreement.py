@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.contacts import contact_intervals
-
-Array = NDArray[np.float64]
 
 AFTER_CONTACT = 2e-3
 """What of the flight after the first contacts belongs to the first window [s]."""

@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate import published
 from rotordrop.estimate.published import Value
 from rotordrop.known import Known
@@ -25,7 +25,6 @@ from rotordrop.simulate.certificate import refined_peak
 if TYPE_CHECKING:
     from rotordrop.simulate.result import DropResult
 
-Array = NDArray[np.float64]
 Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]
 
 LATE = (0.15, 0.2)

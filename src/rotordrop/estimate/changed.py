@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import fitted_row, row_of, rows
 from rotordrop.errors import UsageError
@@ -19,7 +19,6 @@ from rotordrop.known import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
 from rotordrop.units import format_chance
 
-Array = NDArray[np.float64]
 ByPath = Mapping[str, published.Parameter]
 """Parameters of one estimate by path."""
 

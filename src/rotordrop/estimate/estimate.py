@@ -15,9 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.agreement import Agreement
@@ -39,8 +37,6 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-Array = NDArray[np.float64]
 
 
 class Verdict(Enum):

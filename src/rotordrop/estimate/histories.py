@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimate.bearing_drop import BearingDrop
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from rotordrop.estimate.estimate import Estimate
     from rotordrop.machine import Machine
-
-Array = NDArray[np.float64]
 
 FORMATS = (".h5", ".nc", ".csv", ".mat", ".parquet")
 """Suffixes of the files that histories can be written to."""

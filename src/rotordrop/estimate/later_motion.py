@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.units import format_moment
-
-Array = NDArray[np.float64]
 
 RESOLVED = 4.0
 """Difference of two largest distances that counts, in standard deviations of the noise [1]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
@@ -24,8 +24,6 @@ from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.coast_down_law import fit_drag
 from rotordrop.spectrum.speed_profile import fit_speed_profile
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

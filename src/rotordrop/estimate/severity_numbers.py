@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
@@ -15,7 +15,6 @@ from rotordrop.known import Known
 from rotordrop.severity.fatigue import fatigue_shares
 from rotordrop.severity.numbers import static_safety_of_load, static_safety_of_stress
 
-Array = NDArray[np.float64]
 Factor = Callable[[float], float]
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import refuse_unusable
@@ -19,7 +20,6 @@ from rotordrop.evidence.rest import PUSH, of_few, sag_under, stay
 from rotordrop.known import NINETY
 from rotordrop.record.profile import Profile, rules_of
 from rotordrop.record.record import Record, open_record
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 
 if TYPE_CHECKING:

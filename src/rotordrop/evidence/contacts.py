@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.evidence.events import DropInstant

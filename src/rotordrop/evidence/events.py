@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.table import parameter
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
-from rotordrop.record.recording import Array
 from rotordrop.record.speed import require_speed
 from rotordrop.units import format_quantity
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.known import NINETY
 from rotordrop.record.impacts import SMOOTHING, peaks, slope
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY
 

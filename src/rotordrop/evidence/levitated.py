@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import NoDropError
-from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
@@ -14,7 +15,6 @@ from rotordrop.evidence.wall import Wall, find_wall
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.record.record import Record
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import GRAVITY
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, UnsettledError
 from rotordrop.known import NINETY
-from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:

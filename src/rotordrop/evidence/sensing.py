@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import parameter
 from rotordrop.errors import IdentificationError
 from rotordrop.record.axes import sensor_directions
-from rotordrop.record.recording import Array
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
 

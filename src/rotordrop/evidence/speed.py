@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.known import NINETY, Known
 from rotordrop.record.record import Record
-from rotordrop.record.recording import Array
 from rotordrop.record.speed import require_speed, speed_at_drop
 
 LONGEST = 2.0

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotordrop.record.recording import Array
+from rotordrop.arrays import Array
 
 FEWEST_TURNS = 4
 """Turns from which the scatter between them gives an interval [1] (chosen)."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rotordrop.record.recording import Array
+from rotordrop.arrays import Array
 from rotordrop.units import GRAVITY
 
 _NEAREST, _FARTHEST = 0.75, 1.08

@@ -16,10 +16,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
 from rotordrop.record.impacts import Impacts, find_impacts
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY
 

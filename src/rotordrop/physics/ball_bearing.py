@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.physics.ball_bearing_geometry import BallBearingDescription
 from rotordrop.physics.elementary import acos, asin, cos, cos_each, cube_root_each, magnitude, sin, sin_each
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 
-Array = NDArray[np.float64]
 ArrayLike = float | Array
 
 _AXIAL_SIGNS: dict[str, tuple[float, ...]] = {

@@ -10,11 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.physics.ball_bearing import BearingConstants
-
-Array = NDArray[np.float64]
 
 _PALMGREN_RADIAL = 4.36e-8
 """Palmgren's ``δ_r cos α = 4.36e-8 (Q²/D_w)^(1/3)`` for steel, in metre and newton."""

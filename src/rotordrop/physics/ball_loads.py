@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import BearingConstants
-
-Array = NDArray[np.float64]
 
 _STEPS = 60
 _LONGEST_STEP = 20e-6

@@ -11,8 +11,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.elementary import cos_each, cube_root, magnitude, sin_each
 from rotordrop.physics.spin import race_drag_torque
@@ -20,7 +20,6 @@ from rotordrop.physics.spin import race_drag_torque
 if TYPE_CHECKING:
     from rotordrop.physics.ball_bearing import BearingConstants
 
-Array = NDArray[np.float64]
 LANES = 8
 
 # Entries of a ball set; SI units.

@@ -13,15 +13,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.ball_set import COSINE, COUNT, SINE
 
 if TYPE_CHECKING:
     from rotordrop.physics.fast_balls import FastBalls
 
-Array = NDArray[np.float64]
 
 # Entries of a table of balls at speed; SI units. A step of the speed of zero is balls without inertia.
 SPEED_STEP = 0

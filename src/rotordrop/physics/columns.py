@@ -4,13 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array, Integers
 from rotordrop.physics import ball_set, ball_table, contact, face, mount, ring, support, thermal, touch
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
 # set are blocks of columns that only their own modules read.

@@ -8,12 +8,10 @@ back.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel, kernel
 from rotordrop.physics.elementary import power
-
-Array = NDArray[np.float64]
 
 # Entries of a contact law; SI units.
 STIFFNESS = 0

@@ -10,15 +10,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.contact import contact_energy
 from rotordrop.physics.elementary import exp, sine_cosine
-
-Array = NDArray[np.float64]
 
 # Columns of a departure, one row per bearing; SI units.
 AXIS_COSINE, AXIS_SINE = 0, 1  # of the angle from horizontal to the first principal axis of the support

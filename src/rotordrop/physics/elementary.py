@@ -18,12 +18,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.elementary_tables import ATAN, ATANH, COS, EXP, LOG2, LOGARITHMS, POWERS, SIN
-
-Array = NDArray[np.float64]
 
 _NEAREST = 6755399441055744.0
 """1.5 · 2^52: adding and subtracting it rounds to the nearest whole number."""

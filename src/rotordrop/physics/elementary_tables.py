@@ -11,9 +11,8 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
 
 EXP = (0.4999999999999906, 0.16666666666667068, 0.04166667686917585, 0.008333333819167055)
 LOG2 = (

@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
 
 _MEANS = 8
 """The arithmetic and the geometric mean agree to the last bit after six steps from 1 and 1e-6."""

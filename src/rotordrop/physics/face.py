@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics import contact
 from rotordrop.physics._compile import lean_kernel
 from rotordrop.physics.contact import contact_energy, contact_force
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.friction import SMOOTHING_SPEED, stribeck_coefficient
-
-Array = NDArray[np.float64]
 
 # Entries of an axial face; SI units. A side of zero is a face on both sides, of one and minus one a face that
 # stops the rotor towards +z and -z.

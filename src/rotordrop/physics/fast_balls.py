@@ -10,12 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.ball_bearing import BearingConstants
 from rotordrop.physics.ball_bearing_geometry import BallBearingDescription
-
-Array = NDArray[np.float64]
 
 _STEPS = 400
 _FLOOR = 1e-10

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.elementary import cos_each, cube_root_each, exp_each, ln_each
 from rotordrop.physics.elliptic import carlson_d, complete_second
 
-Array = NDArray[np.float64]
 ArrayLike = float | Array
 
 _SECANT_STEPS = 40

@@ -12,11 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-
-Array = NDArray[np.float64]
 
 _MOST_SWEEPS = 60
 _EPSILON = 2.220446049250313e-16

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import lean_kernel
 from rotordrop.physics.elementary import power, sine_cosine
-
-Array = NDArray[np.float64]
 
 
 @lean_kernel

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.elementary import power
 
-Array = NDArray[np.float64]
 Matrix = tuple[float, float, float, float]
 """Of x and y: xx, xy, yx, yy."""
 

@@ -10,10 +10,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ellipk
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
+
 ArrayLike = float | Array
 
 

@@ -11,8 +11,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.ball_set import AXIAL_OFFSET, BALL_STIFFNESS, GROOVE_DISTANCE, RADIAL_OFFSET
 from rotordrop.physics.elementary import tanh
@@ -20,7 +20,6 @@ from rotordrop.physics.elementary import tanh
 if TYPE_CHECKING:
     from rotordrop.physics.ball_bearing import BearingConstants
 
-Array = NDArray[np.float64]
 
 # Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers. GROWN is what
 # heat adds to the radial offset of the balls, and no part of what the springs were set to.

@@ -12,15 +12,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.elementary import exp
 from rotordrop.physics.whirl import race_spin_up_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-Array = NDArray[np.float64]
 
 # Nodes, in the row in which heat flows.
 SLEEVE, SKIN, RACE, BALLS, OUTER, HOUSING = range(6)

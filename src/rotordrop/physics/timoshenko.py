@@ -11,11 +11,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.linear_algebra import product
-
-Array = NDArray[np.float64]
 
 _INNER, _OUTER = (math.sqrt(3.0 / 7.0 + sign * 2.0 / 7.0 * math.sqrt(1.2)) for sign in (-1.0, 1.0))
 _GAUSS_POINTS = np.array([-_OUTER, -_INNER, _INNER, _OUTER])

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel, lean_kernel
 from rotordrop.physics.friction import stribeck_coefficient, stribeck_gradient
 from rotordrop.physics.spin import surface_speed
-
-Array = NDArray[np.float64]
 
 # Entries of a contact; SI units.
 AIR_GAP = 0

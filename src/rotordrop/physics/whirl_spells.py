@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.series import runs_of
-
-Array = NDArray[np.float64]
 
 LEAST_TURNS = 2.0
 """Turns without turning back from which circling counts as whirl [1]."""

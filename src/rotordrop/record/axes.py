@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array
 
 LEAST_RATIO = 0.026
 """Smaller ratios of the singular values of the sensor directions count as singular (about 3° apart)."""

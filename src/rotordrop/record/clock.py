@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel
+from rotordrop.record.recording import Channel
 from rotordrop.units import format_quantity
 
 MOST_DECIMALS = 9

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
+from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.record.arrangement import fitting, pairs_of, plain, sensors_of_planes
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Array, Channel, Recording, listed
+from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, listed
 from rotordrop.units import format_quantity, parse_quantity
 
 _SPEED_NAMES = re.compile(

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.units import GRAVITY
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 1e-3
 """Window of velocities [s]."""

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from rotordrop.arrays import Array
 from rotordrop.document import parse_toml
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.files import write_text
-from rotordrop.record.recording import Array, Channel, spelled
+from rotordrop.record.recording import Channel, spelled
 from rotordrop.record.tacho import Edge
 from rotordrop.units import parse_quantity
 

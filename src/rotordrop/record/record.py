@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.machine import Machine
@@ -29,7 +30,7 @@ from rotordrop.record.columns import displacement, find_pulses, find_speed, matc
 from rotordrop.record.examples import example_hashes
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
-from rotordrop.record.recording import MARKS, Array, Channel, Recording, recording_of, spelled, split_unit
+from rotordrop.record.recording import MARKS, Channel, Recording, recording_of, spelled, split_unit
 from rotordrop.record.speed import readings_of_held_signal
 from rotordrop.record.tacho import passages
 from rotordrop.record.writers import write_hdf5

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array
 from rotordrop.series import SIGMA_OF_MEDIAN
 
 if TYPE_CHECKING:

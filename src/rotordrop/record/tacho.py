@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array
 
 Edge: TypeAlias = Literal["rising", "falling"]
 

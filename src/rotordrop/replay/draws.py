@@ -13,8 +13,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.initial_state import covariance_root
 from rotordrop.known import NINETY, Known
@@ -25,8 +25,6 @@ from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
-
-Array = NDArray[np.float64]
 
 FEWEST_DRAWS = 64
 CANDIDATES = 4

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.evidence import Evidence, known
@@ -34,8 +34,6 @@ from rotordrop.rotor.unknowns import Unknown, bearing_unknowns
 from rotordrop.simulate import _loop
 from rotordrop.simulate._tableau import tsit5
 from rotordrop.simulate.drop import FIRST_STEP, error_scale
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-7
 LARGEST_STEP = 1e-3

@@ -14,12 +14,10 @@ from os import cpu_count
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Mask
 from rotordrop.errors import IdentificationError
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Progress = Callable[[str, float], None]
 
 # SciPy's least squares, with the priors as further residuals, was tried in place of `fit_window`: it has no

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.contacts import local_polynomial
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 2e-3
 """Width of the window from which displacement and velocity at power-off are taken [s]."""

@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
@@ -66,8 +66,6 @@ from rotordrop.replay.support_and_friction import (
 )
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.result import DropResult
-
-Array = NDArray[np.float64]
 
 DURATION = 0.2
 IDENTIFIED_UNTIL = 0.06

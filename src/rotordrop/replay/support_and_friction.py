@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate.agreement import TENFOLD, orbit_disagreement
 from rotordrop.estimate.estimate import FrictionSweep
 from rotordrop.known import NINETY, Correlation, Known, Status
@@ -29,8 +30,6 @@ from rotordrop.replay.least_squares import (
     search,
     sobol_starts,
 )
-
-Array = NDArray[np.float64]
 
 WINDOWS = (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3, 11e-3, 16e-3)
 """Ends of the windows after the later of the first contacts [s]; chosen, not measured."""

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
 from rotordrop._version import __version__
+from rotordrop.arrays import Array
 from rotordrop.report.content import (
     Card,
     Column,
@@ -53,8 +53,6 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.rotor.suspension import EquivalentStiffness
-
-Array = NDArray[np.float64]
 
 HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
 
 DRAWN_BLOCKS = 900
 """Blocks a history is cut into; each keeps its extremes, so a figure 900 pixels wide loses nothing."""

@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate.bearing_drop import History
 from rotordrop.estimate.estimate import Innovations
 from rotordrop.known import NINETY
@@ -24,8 +25,6 @@ from rotordrop.report.style import (
     label_time,
     panels,
 )
-
-Array = NDArray[np.float64]
 
 EXPECTED = "90 % expected by the filter"
 LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}

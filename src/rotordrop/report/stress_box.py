@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import SERIES, axis_title, curve, panels, plain
 from rotordrop.severity.statistics import StressStatistics
-
-Array = NDArray[np.float64]
 
 MEGA = 1e-6
 DRAWN_OUTLIERS = 300

@@ -12,12 +12,11 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from rotordrop.arrays import Array
 from rotordrop.report.decimation import block_envelope, peak_indices
 
 if TYPE_CHECKING:
     from rotordrop.estimate.bearing_drop import AirGap, Band, History, Role
-
-Array = NDArray[np.float64]
 
 INK = "#1c2733"
 MUTED = "#5b6875"

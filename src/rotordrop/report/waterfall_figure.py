@@ -11,6 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.estimate.bearing_drop import AirGap
 from rotordrop.report.style import (
@@ -36,8 +37,6 @@ from rotordrop.spectrum.waterfall import Waterfall
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
-
-Array = NDArray[np.float64]
 
 MOST_COLUMNS = 900
 LOWEST_SHARE = 1e-5

@@ -16,8 +16,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.restart.assumptions import Assumptions, Check
 from rotordrop.restart.evidence import (
@@ -33,7 +33,6 @@ from rotordrop.units import format_chance
 if TYPE_CHECKING:
     from rotordrop.restart.next_drop import NextDrop
 
-Array = NDArray[np.float64]
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]
 ANSWERS: tuple[Answer, ...] = ("restart", "restart with limits", "inspect first", "replace")
 

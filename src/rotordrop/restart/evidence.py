@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import Drop, Value
@@ -16,7 +16,6 @@ from rotordrop.known import NINETY
 from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
 from rotordrop.units import format_chance
 
-Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 """Gauss's rule for an expectation over a standard normal number."""

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.rotor import element_factors
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics import timoshenko
@@ -19,8 +19,6 @@ from rotordrop.physics.timoshenko import Section
 if TYPE_CHECKING:
     from rotordrop.elements.rotor import Rotor
     from rotordrop.machine import Machine
-
-Array = NDArray[np.float64]
 
 DEFAULT_MODAL_DAMPING = 0.005
 

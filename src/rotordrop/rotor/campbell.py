@@ -7,17 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.suspension import Support, spring, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 REDUCTION = Reduction(modes=16, attachment=True)
 _SPARE_MODES = 4

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
@@ -22,8 +23,6 @@ from rotordrop.rotor.suspension import (
     planar_matrices,
     spring,
 )
-
-Array = NDArray[np.float64]
 
 WHIRLS = {"standstill": 0, "forward": 1, "backward": -1}
 DEFAULT_STIFFNESS = (1e5, 1e10)

@@ -6,13 +6,10 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Integers
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True)

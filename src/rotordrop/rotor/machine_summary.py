@@ -6,9 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements.face import Face
 from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
@@ -21,8 +19,6 @@ from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rotor_on
 from rotordrop.rotor.suspension import stiffness_of
 from rotordrop.rotor.unknowns import prior
 from rotordrop.units import format_quantity
-
-Array = NDArray[np.float64]
 
 SHOWN_MODES = 4
 

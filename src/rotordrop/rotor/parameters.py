@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
@@ -24,8 +24,6 @@ from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.statics import bearing_load_shares, rotor_on_race
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.machine import Machine
@@ -29,8 +29,6 @@ from rotordrop.rotor.assembly import (
     with_positive_peak,
 )
 from rotordrop.rotor.statics import bearing_load_shares
-
-Array = NDArray[np.float64]
 
 _DEPENDENT = 1e-8
 

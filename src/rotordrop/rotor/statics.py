@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
@@ -16,8 +16,6 @@ from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine, TouchdownBearing
-
-Array = NDArray[np.float64]
 
 
 def weight_vector(fe: RotorFE, gravity: float) -> Array:

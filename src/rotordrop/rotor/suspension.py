@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.support import support_deflection
 from rotordrop.errors import UsageError
@@ -16,8 +17,6 @@ from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.statics import bearing_load_shares
-
-Array = NDArray[np.float64]
 
 SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
 FORMULAS = ("tangent", "simple")

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import build_rotor_fe
@@ -15,9 +16,6 @@ from rotordrop.rotor.campbell import response_peaks
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 from rotordrop.rotor.suspension import suspension_of
 from rotordrop.rotor.whirl import unbalance_response, unbalance_run_up
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 REDUCTION = Reduction(modes=16, attachment=True)
 

@@ -9,8 +9,8 @@ from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.air import PARAMETERS as AERO
 from rotordrop.elements.magnet import REMANENCE, REMANENCE_TIME
 from rotordrop.elements.parameter import (
@@ -319,9 +319,6 @@ def all_unknowns(model: DropModel) -> tuple[Unknown, ...]:
     bearings = range(len(model.machine.touchdown_bearings))
     of_bearings = chain.from_iterable(bearing_unknowns(model, index) for index in bearings)
     return (*of_bearings, *structure_unknowns(model), *drop_unknowns(model))
-
-
-Array = NDArray[np.float64]
 
 
 def file_path(path: str) -> str:

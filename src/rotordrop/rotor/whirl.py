@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import SimulationError
 from rotordrop.rotor.assembly import RotorFE, modal_damping_matrix
 from rotordrop.rotor.reduction import RotorBasis
 from rotordrop.rotor.suspension import PlanarMatrices, Support, planar_matrices
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LOWEST_FREQUENCY = 0.05  # [Hz]; slower motion is rigid drift of a free rotor
 CLEAR_DIRECTION = 0.05

@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import Ratings
-
-Array = NDArray[np.float64]
 
 LIFE = 1e6
 """Revolutions of the basic rating life at the basic dynamic load rating, its definition in ISO 281."""

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
 from rotordrop.units import format_chance
-
-Array = NDArray[np.float64]
 
 CLEAR = 0.9
 """Probability from which one drop is called the worst [1]; chosen, not measured."""

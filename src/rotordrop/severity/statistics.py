@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 
-Array = NDArray[np.float64]
 QuartileRule = Literal["hazen", "linear"]
 
 QUARTILE_RULES: dict[str, str] = {

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.elementary import atan2
 from rotordrop.simulate._loop import RUN_IN_CONTACT
-
-Array = NDArray[np.float64]
 
 # Columns of the whirl of each bearing: the present sweep of the azimuth, and the time spent in whole turns.
 AZIMUTH = 0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
@@ -26,7 +27,6 @@ from rotordrop.simulate.drop import FIRST_STEP, LOG_ROWS_PER_SECOND, error_scale
 from rotordrop.simulate.heat import Warming, warmed, warms
 from rotordrop.simulate.levitation import start_of_drop
 
-Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
 MOST_STEPS_PER_WINDOW = 5_000_000

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import ball_table, departure, face, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
@@ -27,8 +27,6 @@ from rotordrop.simulate._rhs import (
     scratch_of,
     support_deflection,
 )
-
-Array = NDArray[np.float64]
 
 # Last axis of the history array.
 H_DELTA = 0

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import ball_set, ball_table, mount
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
@@ -39,7 +40,6 @@ from rotordrop.simulate._rhs import (
 )
 from rotordrop.simulate._tableau import Tableau
 
-Array = NDArray[np.float64]
 Window = tuple[float, KernelParameters]
 """End of a window of time [s] and its parameters."""
 Stretches = Callable[[float, float, KernelParameters, Array, Array], Iterable[Window]]

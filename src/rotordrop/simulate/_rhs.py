@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import aerodynamics, ball_table, departure, face, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
@@ -29,7 +29,6 @@ from rotordrop.physics.load import load_now
 from rotordrop.physics.remanence import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque
 
-Array = NDArray[np.float64]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 IN_TIME = aerodynamics.EXPONENTIAL_IN_TIME
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED

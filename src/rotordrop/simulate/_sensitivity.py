@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Integers
 from rotordrop.physics import aerodynamics, ball_table, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
@@ -28,8 +28,6 @@ from rotordrop.simulate._rhs import (
     support_deflection,
 )
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Slopes = tuple[float, float, float]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
@@ -302,7 +300,7 @@ def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) ->
 
 @lean_kernel
 def drop_jacobian_parts(
-    t: float, y: Array, p: KernelParameters, J: Array, g: Array, touching: IntArray
+    t: float, y: Array, p: KernelParameters, J: Array, g: Array, touching: Integers
 ) -> None:
     """`drop_jacobian` with the contacts apart, because a contact fills the rows and columns of all modes.
 

@@ -9,15 +9,13 @@ order shifts a line at 250 Hz by less than 0.01 %.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate._loop import remember
 from rotordrop.simulate._rhs import Scratch, drop_derivative, scratch_of
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -8,12 +8,12 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import SimulationError
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.units import InSI
 
-Array = NDArray[np.float64]
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
 IntegratorName: TypeAlias = Literal["tsit5", "dp5"]
 

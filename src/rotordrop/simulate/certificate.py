@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
 
 COMPARABLE_WINDOW = 0.02
 """Window [s] over which histories are compared point by point; later the drop is chaotic."""

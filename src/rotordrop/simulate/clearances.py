@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.machine import Machine
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.simulate.result import ContactLog, DropResult, stop_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop.errors import OutputError
 from rotordrop.machine import Machine
@@ -48,7 +47,6 @@ from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_file import Frame, ended_run, write_coast_down, write_part
 from rotordrop.simulate.coast_down_result import QUANTITIES, CoastDownResult, WindowStatistics
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.coast_down import simulate_coast_down
 from rotordrop.simulate.coast_down_case import FIRST_WINDOW, CoastDownCase
 from rotordrop.simulate.coast_down_result import QUANTILES, CoastDownResult
-
-Array = NDArray[np.float64]
 
 TIGHTER = 0.1
 _MEDIAN = QUANTILES.index(0.5)

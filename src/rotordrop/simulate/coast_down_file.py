@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.simulate.checkpoint import part_path
 from rotordrop.simulate.coast_down_result import CoastDownResult, WindowStatistics
 from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.simulate.heat import Heat
-
-Array = NDArray[np.float64]
 
 FORMAT = "rotordrop coast-down 1"
 SAMPLES: Mapping[str, tuple[str, str]] = {

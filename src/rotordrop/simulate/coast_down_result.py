@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.simulate.coast_down_case import FIRST_WINDOW
 from rotordrop.simulate.heat import Heat
 from rotordrop.units import format_quantity
-
-Array = NDArray[np.float64]
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 QUANTITIES: Mapping[str, tuple[str, str]] = {

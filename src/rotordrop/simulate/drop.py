@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
@@ -27,7 +28,6 @@ from rotordrop.simulate.heat import WarmDrop, warms
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.result import ContactLog, DropResult, stop_of
 
-Array = NDArray[np.float64]
 Parts = Sequence[tuple[slice, KernelParameters]]
 """Samples of a drop and the parameters they were integrated with, in order."""
 

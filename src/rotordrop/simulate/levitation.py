@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
@@ -15,8 +16,6 @@ from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import FASTEST, DropModel
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 from rotordrop.units import format_quantity
-
-Array = NDArray[np.float64]
 
 _SPIN_MODES = {
     "dynamic": aerodynamics.EXPONENTIAL_IN_TIME,

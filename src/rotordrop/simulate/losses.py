@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate import _rhs as R
 from rotordrop.simulate.result import DropResult
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     import xarray
 
     from rotordrop.machine import Machine
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,13 +9,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Mask
 from rotordrop.spectrum.line_extraction import Envelope, Near, extract, near_path
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower, frame_power, order_power
 from rotordrop.spectrum.speed_profile import SpeedProfile
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 TURN = 2.0 * math.pi
 BESIDE = 25.0
 """Band [Hz] on either side of a moving path whose power is its floor."""

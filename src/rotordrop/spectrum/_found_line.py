@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.naming import LineKind
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

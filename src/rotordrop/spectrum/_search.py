@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from rotordrop.arrays import Array, Mask
 from rotordrop.series import closed
 from rotordrop.spectrum._clock import BESIDE, TURN, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
@@ -27,9 +28,6 @@ from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import frame_power
 from rotordrop.spectrum.naming import LineKind
 from rotordrop.spectrum.speed_profile import SpeedProfile
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LASTING = 4
 """Fewest frames [1] in which a line must be seen."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import Known
 from rotordrop.spectrum.candidates import Candidate
@@ -43,7 +43,6 @@ from rotordrop.spectrum.waterfall import (
     waterfalls,
 )
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.series import noise_by_differences
 from rotordrop.units import format_moment
 
-Array = NDArray[np.float64]
 Model = Callable[[Array], Array]
 
 MOST_VALUES = 2000

@@ -10,10 +10,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Mask
 from rotordrop.spectrum.line_spectra import FramePower
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 MEDIAN_OF_NOISE = math.log(2.0)
 """Median over mean of the power of noise in one frame [1]."""

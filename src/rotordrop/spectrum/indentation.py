@@ -6,16 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import NINETY
 from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 from rotordrop.units import format_moment
-
-Array = NDArray[np.float64]
 
 BLOCK = 65536
 LONGEST_FLIGHT = 0.1

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import firwin, upfirdn
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotordrop.arrays import Array, ComplexArray
 
 TURN = 2.0 * math.pi
 SHARPENING = 3

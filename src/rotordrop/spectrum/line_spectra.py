@@ -13,9 +13,8 @@ from scipy.fft import fft, next_fast_len, rfft
 from scipy.ndimage import map_coordinates, spline_filter1d
 from scipy.signal import resample_poly
 
+from rotordrop.arrays import Array
 from rotordrop.spectrum.waterfall import hann_window
-
-Array = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
 UPSAMPLING = 3

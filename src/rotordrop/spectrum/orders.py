@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.rate import PASSED, reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import PlanarSignal
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 TURN = 2.0 * math.pi
 LEAST_APART = 3.0

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import firwin, upfirdn
 
+from rotordrop.arrays import Array
 from rotordrop.spectrum.waterfall import PlanarSignal
-
-Array = NDArray[np.float64]
 
 TAPS_PER_FACTOR = 40
 BLOCK = 1024

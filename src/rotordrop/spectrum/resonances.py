@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 from scipy.signal import find_peaks, peak_widths
 
+from rotordrop.arrays import Array
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.orders import OrderTrack
 
-Array = NDArray[np.float64]
 TURN = 2.0 * math.pi
 
 

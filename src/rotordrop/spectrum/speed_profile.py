@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.series import SIGMA_OF_MEDIAN
 from rotordrop.units import format_moment
-
-Array = NDArray[np.float64]
 
 LOG_TIME_UNIT = 0.3
 """Time [s] after power-off below which the speed may bend fast (the races spin up); later it bends ever

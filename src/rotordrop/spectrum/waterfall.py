@@ -9,9 +9,9 @@ from typing import Literal, Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, UsageError
 
-Array = NDArray[np.float64]
 Component = Literal["x", "y", "full"]
 AmplitudeKind = Literal["zero-to-peak", "peak-to-peak"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
@@ -22,8 +23,6 @@ from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import Report, run_study
 from rotordrop.study.summary import StudyResults, exceedance, quantile
 from rotordrop.units import parse_quantity
-
-Array = NDArray[np.float64]
 
 _ROUNDS = (TypeAdapter(Annotated[int, Field(strict=True, ge=0)]), "a whole number from 0 on")
 FRESH = 0x5EED

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.elementary import exp_each, ln, ln_each
 
-Array = NDArray[np.float64]
 Number = Callable[[Any], float]
 """Reads what stands in a study file, such as ``"60 Hz"``, to SI."""
 

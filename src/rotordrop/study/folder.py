@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop._version import __version__
+from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import (
     DIGEST,
@@ -39,8 +40,6 @@ from rotordrop.machine import load_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.plan import Study, planned_study
 from rotordrop.study.quantities import columns_of
-
-Array = NDArray[np.float64]
 
 FORMAT = "rotordrop study 3"
 WITHOUT_DIGESTS = "rotordrop study 2"

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass as checked_dataclass
 
+from rotordrop.arrays import Array
 from rotordrop.document import read_toml
 from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
@@ -38,7 +38,6 @@ from rotordrop.study.distributions import (
 )
 from rotordrop.units import parse_quantity
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 CASE_KINDS: Mapping[str, str] = {

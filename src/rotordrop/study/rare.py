@@ -9,17 +9,16 @@ from dataclasses import dataclass, replace
 from os import cpu_count
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 from scipy.stats import t as student
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import column_of, columns_of
 from rotordrop.study.run import one_drop
 
-Array = NDArray[np.float64]
 Performance = Callable[[Array], Array]
 """Gives the quantity of interest, shape (n,), at points of the standard normal space, shape (n, d)."""
 Progress = Callable[[str, float], None]

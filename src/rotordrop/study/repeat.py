@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
 from rotordrop.elements.magnet import FORCES, REMANENCE, REMANENCE_TIME
@@ -25,8 +25,6 @@ from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
 from rotordrop.study.summary import COVER, StudyResults, quantile, share_of
-
-Array = NDArray[np.float64]
 
 COMPARED: Mapping[str, str] = {
     "peak_force_N": "peak_force",

@@ -15,6 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
@@ -22,8 +23,6 @@ from rotordrop.machine.machine import value_of_path
 from rotordrop.physics.elementary import exp_each, ln_each
 from rotordrop.physics.linear_algebra import product, symmetric_eigen
 from rotordrop.study.distributions import Distribution, normal_score
-
-Array = NDArray[np.float64]
 
 Design = Literal["random", "latin hypercube", "sobol", "grid", "sensitivity", "candidates"]
 DESIGNS: tuple[str, ...] = get_args(Design)

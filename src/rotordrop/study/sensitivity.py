@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.study.summary import COVER, StudyResults, cells_of
-
-Array = NDArray[np.float64]
 
 RESAMPLED = 300
 """Bootstrap samples behind an interval; chosen, not measured."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.known import Known
@@ -23,8 +24,6 @@ from rotordrop.study.quantities import Quantity, columns_of
 
 if TYPE_CHECKING:
     import pandas
-
-Array = NDArray[np.float64]
 
 COVER = 0.90
 """Probability with which every interval here holds [1], the standard of the package."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import lean_kernel
 
-Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 
 LARGEST_VARIANCE = 1e30

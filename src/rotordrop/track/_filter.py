@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Integers
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
@@ -28,9 +29,7 @@ from rotordrop.track._propagation import (
 )
 from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row
 
-Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
-IntArray = NDArray[np.int64]
 
 
 LARGEST_DEFLECTION = 4.0
@@ -262,7 +261,7 @@ def backward_pass(
     innovations: Array,
     innovation_variances: Array,
     watched: Array,
-    kept: IntArray,
+    kept: Integers,
     smoothed: Array,
     blocks: Array,
     filtered: Array,

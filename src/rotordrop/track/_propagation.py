@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Integers
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
@@ -22,8 +23,6 @@ from rotordrop.simulate._rhs import (
 )
 from rotordrop.simulate._sensitivity import drop_jacobian_parts
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 # What a parameter acts on.
@@ -50,12 +49,12 @@ class ParameterTargets(NamedTuple):
     writes, in their order: what has to be written again when it alone changes.
     """
 
-    target: IntArray
+    target: Integers
     acts: Flags
-    together: IntArray
-    starts: IntArray
+    together: Integers
+    starts: Integers
     factor: Array
-    logarithmic: IntArray
+    logarithmic: Integers
     step: Array
     drift: Array
     late_drift: Array
@@ -103,7 +102,7 @@ def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameter
 
 
 @lean_kernel
-def update_powers(which: IntArray, values: Array, targets: ParameterTargets, powers: Array) -> None:
+def update_powers(which: Integers, values: Array, targets: ParameterTargets, powers: Array) -> None:
     """Factors on entries that follow a parameter as a power of a typical depth, for some of the targets."""
     for i in which:
         if targets.target[i, 1] == AT_TYPICAL_DEPTH:
@@ -121,7 +120,7 @@ def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) 
 
 @lean_kernel
 def write_values(
-    which: IntArray, values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters
+    which: Integers, values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters
 ) -> None:
     """Write some of the targets into the kernel arrays; logarithmic ones come as the values themselves."""
     cleared = False
@@ -226,7 +225,7 @@ def parameter_jacobian(
 
 
 @lean_kernel
-def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray) -> None:
+def gather_entries(J: Array, entries: Array, columns: Integers, starts: Integers) -> None:
     """List the entries of a mostly empty square matrix row by row, for fast products."""
     n = J.shape[0]
     count = 0
@@ -241,7 +240,7 @@ def gather_entries(J: Array, entries: Array, columns: IntArray, starts: IntArray
 
 
 @lean_kernel
-def sparse_product(entries: Array, columns: IntArray, starts: IntArray, V: Array, out: Array) -> None:
+def sparse_product(entries: Array, columns: Integers, starts: Integers, V: Array, out: Array) -> None:
     """Product of a listed matrix (see `gather_entries`) with a full one; rows of ``V`` are contiguous."""
     c = V.shape[1]
     for i in range(starts.shape[0] - 1):
@@ -308,9 +307,9 @@ def add_row(weight: float, source: Array, target: Array) -> None:
 @lean_kernel
 def jacobian_product(
     entries: Array,
-    columns: IntArray,
-    starts: IntArray,
-    touching: IntArray,
+    columns: Integers,
+    starts: Integers,
+    touching: Integers,
     g: Array,
     p: KernelParameters,
     V: Array,

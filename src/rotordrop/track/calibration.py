@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import (
@@ -28,7 +28,6 @@ from rotordrop.track.smoother import (
 )
 from rotordrop.units import GRAVITY
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 

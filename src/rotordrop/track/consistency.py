@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.magnet import FORCES, REMANENCE
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
-
-Array = NDArray[np.float64]
 
 NIS_RANGE = (0.6, FITTING_NIS)
 DIRECTIONS = "directions"

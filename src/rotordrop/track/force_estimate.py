@@ -13,8 +13,9 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -33,8 +34,6 @@ from rotordrop.track.input_state import (
     transition,
 )
 from rotordrop.track.problem import NOISE_FLOOR, USUAL_NOISE, rough_noise
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 20_000
 """Samples taken at once: each keeps some 10 kB for the way back; chosen, not measured."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
@@ -18,8 +18,6 @@ from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
 from rotordrop.track.problem import DropProblem, private_copy
 from rotordrop.track.smoother import Smoothed, parameter_sample
-
-Array = NDArray[np.float64]
 
 FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
 N_VALUES = 4

@@ -16,11 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.track.forces import stress_at_force
 from rotordrop.track.problem import DropProblem
-
-Array = NDArray[np.float64]
 
 GATE_MARGIN = 0.12
 """Part of the air gap by which a rotor is clear of a race, at least, where its force is held at zero [1].

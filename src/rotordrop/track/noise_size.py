@@ -11,9 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.track.calibration import (
     THREADS,
     Stage,
@@ -23,8 +21,6 @@ from rotordrop.track.calibration import (
 )
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, forward
-
-Array = NDArray[np.float64]
 
 SMALLEST, LARGEST = 0.125, 64.0
 """Limits of the size, over the usual one [1]. Below the smaller one the sensors' noise and the machine's

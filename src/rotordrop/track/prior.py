@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.table import parameter
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
@@ -14,8 +14,6 @@ from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import levitated_sag
 from rotordrop.rotor.unknowns import Unknown, correlate, inferred_together, sensor_prior, smallest_gap
 from rotordrop.track.sensor_form import begin_caught_up, share_in_groups
-
-Array = NDArray[np.float64]
 
 RUNOUT_SIGMA = 0.5e-6
 START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 4e-4

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
@@ -20,8 +21,6 @@ from rotordrop.track import _propagation as P
 from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
 from rotordrop.track.sensor_form import SensorForm, rest_terms, sensor_form
 from rotordrop.track.unknowns import parameter_targets
-
-Array = NDArray[np.float64]
 
 FIRST_READINGS = 0.07
 """Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""

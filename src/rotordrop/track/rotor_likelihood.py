@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.input_state import USUAL_PEAK, corrections_by_record, forward_pass, rotor_of
 from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

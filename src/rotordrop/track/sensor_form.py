@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array, Integers
 from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
 from rotordrop.physics._compile import kernel, lean_kernel
@@ -15,9 +15,6 @@ from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import Unknown
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 CATCHING_UP_SIGMA = 1e-6
 """How far [m] a sensor may lag behind at power-off."""
@@ -32,9 +29,9 @@ class SensorForm(NamedTuple):
     ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
     """
 
-    term: IntArray
+    term: Integers
     term_row: Array
-    lag: IntArray
+    lag: Integers
     lag_row: Array
     shortest: Array
     longest: Array

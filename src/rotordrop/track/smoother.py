@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track._covariance import unpack
 from rotordrop.track.problem import DropProblem, private_copy
 
-Array = NDArray[np.float64]
 Compact = NDArray[np.float32]
 """What a pass stores of covariances and transitions for the smoother: seven digits of them are plenty."""
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.track.problem import DropProblem
-
-Array = NDArray[np.float64]
 
 
 def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:

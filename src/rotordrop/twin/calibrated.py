@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.magnet import FORCES
 from rotordrop.elements.parameter import below
 from rotordrop.elements.table import row_of, rows, separating_measurement
@@ -31,7 +31,6 @@ from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 CONFOUNDED = 0.9

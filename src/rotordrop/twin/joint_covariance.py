@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import JointSpread
 from rotordrop.rotor.unknowns import (
@@ -18,8 +18,6 @@ from rotordrop.rotor.unknowns import (
     slope_signs,
 )
 from rotordrop.track.problem import DropProblem
-
-Array = NDArray[np.float64]
 
 
 def joint_covariance(

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import RotordropError
 from rotordrop.known import NINETY, Known
@@ -24,8 +24,6 @@ from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import prior
 from rotordrop.track.problem import RecordedDrop, build_problem
 from rotordrop.track.rotor_likelihood import Readings, readings_of, rotor_likelihood_of
-
-Array = NDArray[np.float64]
 
 BASIS = Reduction(modes=6, attachment=False)
 """Modes of the search: it asks for the motion of the sensor planes, which four bending modes hold."""

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Extension, Values
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
@@ -51,7 +51,6 @@ from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_parameters import parameters
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 CALIBRATION_STAGE = Stage(until=0.06, force=0.07, share=0.01, passes=1)

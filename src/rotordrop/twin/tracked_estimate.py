@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError
@@ -54,8 +54,6 @@ from rotordrop.twin.tracked_parameters import (
 )
 from rotordrop.twin.tracked_unbalance import plane_unbalances
 from rotordrop.twin.value_of_information import DRAWING, value_of_information
-
-Array = NDArray[np.float64]
 
 QUICK = (
     "Quick estimate: one pass over the record, {}without the search for the size of the process noise. "

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.estimate.allowances import (
     MODEL_FORCE_SIGMA,
@@ -39,8 +39,6 @@ from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.track.problem import DropProblem
 from rotordrop.twin.mixture import mixed
-
-Array = NDArray[np.float64]
 
 INCONSISTENT_WIDENING = 2.0
 """Factor on intervals when the model is not consistent with the record [1]; those of force and stress grow

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
@@ -20,8 +20,6 @@ from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.mixture import mixed
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
-
-Array = NDArray[np.float64]
 
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
 from rotordrop.known import NINETY, Known
@@ -14,8 +14,6 @@ from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.tracked_loads import INCONSISTENT
 from rotordrop.twin.tracked_parameters import determination, parameter_widening
-
-Array = NDArray[np.float64]
 
 NO_MARK = "not determined against a mark (the record carries no pulses of a tacho or keyphasor)"
 NO_PASSAGE = "not determined against a mark (its pulses end before power-off, or are too few)"

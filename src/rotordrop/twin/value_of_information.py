@@ -6,16 +6,14 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA
 from rotordrop.known import NINETY
 from rotordrop.track.forces import ForceHistory, force_gradient
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, smooth
-
-Array = NDArray[np.float64]
 
 DRAWING = "the rotor by its sections, from a drawing,"
 MOST_NAMED = 3

@@ -29,11 +29,11 @@ from rotordrop.web.running import OF_MACHINE, Verb, clear, publish, result_folde
 from rotordrop.web.workspace import Job, Workspace, beside, is_path
 
 if TYPE_CHECKING:
+    from rotordrop.arrays import Array
     from rotordrop.estimate.published import Drop
     from rotordrop.machine import Machine
     from rotordrop.record.profile import Profile
     from rotordrop.record.record import Record
-    from rotordrop.record.recording import Array
 
 MEMORY: dict[str, int] = {
     "channels": 2 * 2**30,

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotordrop._version import __version__
+from rotordrop.arrays import Array
 from rotordrop.files import write_json
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
     from rotordrop.spectrum.orders import OrderTrack
 
-Array = NDArray[np.float64]
 MOST_PLACES = 200
 """Places of a line, and of the centre of the shaft, that are drawn [1]; chosen, not measured."""
 MOST_ROWS, MOST_MARKS = 1500, 20_000

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.files import atomic_path
 from rotordrop.report.decimation import block_extremes
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FACTOR = 8

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.axes import Plane, along_sensors
-from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine

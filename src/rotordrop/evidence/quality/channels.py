@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.quality.motion import first_motion
 from rotordrop.evidence.quality.recorder import bridged
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import format_quantity
 

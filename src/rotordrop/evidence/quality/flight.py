@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.evidence.events import planes_at_bearings
 from rotordrop.evidence.levitated import LevitatedModel
@@ -22,7 +23,6 @@ from rotordrop.evidence.quality.fall import WRONG_GAIN
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY
 from rotordrop.record.axes import planar_of
-from rotordrop.record.recording import Array
 from rotordrop.series import runs_of
 
 if TYPE_CHECKING:

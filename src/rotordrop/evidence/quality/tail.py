@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.support import PEAK_LOADS
 from rotordrop.errors import RecordError, UnsettledError
 from rotordrop.evidence.events import nominal_gaps, planes_at_bearings
@@ -14,7 +15,6 @@ from rotordrop.evidence.evidence import Missing
 from rotordrop.evidence.levitated import MAINS, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.axes import Plane, along_sensors, planar_of
-from rotordrop.record.recording import Array
 from rotordrop.series import noise_by_differences
 from rotordrop.units import format_quantity
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers import refuse_large
-from rotordrop.record.recording import Array, Recording, spelled, split_unit
+from rotordrop.record.recording import Recording, spelled, split_unit
 
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
 """How an analogue sample is stored and what stands for a missing one (IEEE C37.111)."""

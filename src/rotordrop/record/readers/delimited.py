@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers.head import TIME_NAMES, Head, read_head
@@ -20,7 +21,7 @@ from rotordrop.record.readers.text import (
     read_lines,
     stamp_parts,
 )
-from rotordrop.record.recording import Array, Recording, listed, split_unit
+from rotordrop.record.recording import Recording, listed, split_unit
 from rotordrop.units import parse_quantity
 
 _UNEVEN = 0.1

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, RecordError
 from rotordrop.files import HDF5_SEALED, hdf5_is_sealed
-from rotordrop.record.recording import Array, Recording
+from rotordrop.record.recording import Recording
 from rotordrop.record.sandbox import MOST_SERIES, Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:

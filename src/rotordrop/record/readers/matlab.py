@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel, Recording, known_unit, listed, spelled, split_unit
+from rotordrop.record.recording import Channel, Recording, known_unit, listed, spelled, split_unit
 from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:

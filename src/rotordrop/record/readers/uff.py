@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Array, Channel, Recording, listed, split_unit
+from rotordrop.record.recording import Channel, Recording, listed, split_unit
 from rotordrop.record.sandbox import refuse_bomb
 
 if TYPE_CHECKING:

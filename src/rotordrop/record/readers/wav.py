@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Array, Recording
+from rotordrop.record.recording import FULL_SCALE, Recording
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
