@@ -20,6 +20,7 @@ from rotordrop.report.content import (
     fact,
     table,
 )
+from rotordrop.report.heat_section import heat_sections
 from rotordrop.report.machine_sections import machine_sections
 from rotordrop.report.quantity import Quantity, shown, written
 from rotordrop.report.style import (
@@ -96,6 +97,7 @@ def coast_down_page(
         sections=(
             Section("Second by second", figures=(seconds,)),
             Section("Speed", figures=(turning,)),
+            *heat_sections(result.heat, result.bearing_names),
             *(() if analysis is None else frequency_sections(analysis)),
             *(() if machine is None else machine_sections(machine)),
         ),
@@ -109,6 +111,8 @@ def _verdict(
     said = [Statement(result.outcome, "good" if result.finished else "warning")]
     later = [maximum for maximum in result.maxima() if not maximum.in_first_window]
     said += [Statement(maximum.sentence(), "warning") for maximum in later] or [Statement(HELD, "good")]
+    if result.heat is not None:
+        said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
     missing, scale = shown(result.energy_residual, "energy", 3), shown(abs(result.energy_scale), "energy", 3)
     text = (
         f"Energy balanced to {missing} of {scale} over the whole coast-down. After about 50 ms a drop is "

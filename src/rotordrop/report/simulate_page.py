@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rotordrop.estimate.bearing_drop import History, simulated_bearings
 from rotordrop.report.content import Column, Figure, ReportContent, Section, table
 from rotordrop.report.drop_sections import drop_sections, speed_figure
+from rotordrop.report.heat_section import heat_sections
 from rotordrop.report.machine_sections import machine_sections, weight_shares
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.time_panels import Panel, time_panels
@@ -65,6 +66,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
             *drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine)),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
             *((_landing(result, landed),) if landed else ()),
+            *heat_sections(result.heat, result.bearing_names),
             Section("Speed", figures=(turning,)),
             *(() if machine is None else machine_sections(machine)),
         ),

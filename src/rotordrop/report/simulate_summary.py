@@ -86,6 +86,8 @@ def _verdict(
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
         said += [*_springs(result, machine), *_thrown(result, machine), *_landed(result, machine)]
+    if result.heat is not None:
+        said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
     said += [_certificate(result), Statement(NO_INTERVAL)]
     known = () if machine is None else machine.touchdown_bearings
     unrated = [one.name for one in known if numbers_of(one).rolling_elements() is None]

@@ -69,6 +69,8 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
             "time_s": float(result.time[latest]),
             "faces": {one.name: _landed(one) for one in landings(machine, result)},
         }
+    if result.heat is not None:
+        numbers["heat"] = result.heat.as_json(result.bearing_names)
     return numbers
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ SHORTEST, LONGEST = 5e-4, 1.0
 """Bounds of a stretch [s]: half a millisecond is an impact."""
 CALMED = 0.7
 """What is left of a rate of warming after a stretch, at least [1]: a rotor in flight comes back."""
+Grade = Literal["good", "warning", "bad"]
 NODES = ("landing sleeve", "skin of the race", "race", "balls", "outer race", "housing")
 SOFTENS = 130.0
 """Warming [K] of a race from which bearing steel, tempered at 150 to 200 °C, loses hardness."""
@@ -79,30 +80,34 @@ class Heat:
         over = float(race[at] - self.temperature[at, b, thermal.HOUSING])
         return float(race[at]), float(self.time[at]), over
 
-    def sentence(self, b: int, name: str) -> tuple[str, str]:
-        """What the heat of one bearing did, and how it is to be taken: good, warning or bad."""
-        _, when, over = self.hottest(b)
+    def sentence(self, b: int, name: str) -> tuple[str, Grade]:
+        """What the heat of one bearing did, and how it is to be taken."""
+        race, when, over = self.hottest(b)
         start, end = float(self.preload[0, b]), float(self.preload[-1, b])
         most = int(np.argmax(self.preload[:, b]))
-        largest = float(self.preload[most, b])
+        least, largest = float(np.min(self.preload[:, b])), float(self.preload[most, b])
         hot, instant = format_quantity(over, "temperature"), format_quantity(when, "time")
         text = f"{name}: the race reaches {hot} above the housing {instant} after power-off"
-        grade = "good" if over < SOFTENS else "bad"
-        if largest == 0.0:
-            return f"{text}; no ball is pressed by it.", grade
-        first, last = (format_quantity(one, "force") for one in (start, end))
-        text += f"; preload of a row {first} → {last}"
+        grade: Grade = "good"
+        if largest > 0.0:
+            first, last = (format_quantity(one, "force") for one in (start, end))
+            text += f"; preload of a row {first} → {last}"
+            if not start / SHIFTED <= least <= largest <= SHIFTED * start:
+                grade = "warning"
         if largest > SHIFTED * max(start, end):
             peak, at = format_quantity(largest, "force"), format_quantity(self.time[most], "time")
             text += f", {peak} at {at}"
         if start > 0.0 and (loose := np.flatnonzero(self.preload[:, b] < LOOSE * start)).size:
             text += f"; without any from {format_quantity(self.time[loose[0]], 'time')} on: balls lie loose"
             grade = "bad"
-        elif grade == "good" and not start / SHIFTED <= min(end, largest) <= largest <= SHIFTED * start:
-            grade = "warning"
-        if over >= SOFTENS:
-            text += "; bearing steel begins to lose hardness there"
+        if race >= SOFTENS:
+            text += f"; at {format_quantity(race, 'temperature')} above the start its steel loses hardness"
+            grade = "bad"
         return f"{text}.", grade
+
+    def sentences(self, names: tuple[str, ...]) -> Iterator[tuple[str, Grade]]:
+        """What the heat of each bearing did, by the names of all."""
+        return (self.sentence(b, names[b]) for b in self.warmed)
 
     def as_json(self, names: tuple[str, ...]) -> dict[str, Any]:
         """Numbers of every bearing that warms, SI units."""

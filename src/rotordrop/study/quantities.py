@@ -105,6 +105,11 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
                 f"{b}: angle of the edge of a ball's contact over that of the shoulder: cut off from one on",
             ),
         ]
+    for b in (one.name for one in machine.touchdown_bearings if one.thermal is not None):
+        of_parts += [
+            (f"{b}.heat.race", "temperature", f"{b}: largest mean temperature of the race above the start"),
+            (f"{b}.heat.preload", "force", f"{b}: axial force of a row at the end, race in the middle"),
+        ]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 
@@ -136,6 +141,9 @@ def row_of(model: DropModel, result: DropResult) -> Array:
     values += [use.share for use in clearance_uses(machine, result)]
     for one in landings(machine, result):
         values += [one.contacts.peak[0], one.edge_angle / one.climb.shoulder]
+    if result.heat is not None:
+        for b in result.heat.warmed:
+            values += [result.heat.hottest(b)[0], float(result.heat.preload[-1, b])]
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +18,9 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import thermal
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.fast_balls import FastBalls, centred_balls
+from rotordrop.report.coast_down_page import coast_down_page
+from rotordrop.report.simulate_page import simulate_page
+from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate import _rhs as R
@@ -27,6 +31,8 @@ from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_file import load_coast_down
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import load_result
+from rotordrop.study.quantities import columns_of
+from rotordrop.study.quantities import row_of as row_of_drop
 
 COLD = example_path("small").read_text(encoding="utf-8")
 NOMINAL = float(loads_machine(COLD).speed.nominal)
@@ -291,3 +297,50 @@ def test_a_record_is_not_estimated_with_it(warm):
     told = r"bearing 'NDE' of the machine .* warms, with which a record cannot be estimated yet: a drop"
     with pytest.raises(RecordError, match=told):
         insisted(SimpleNamespace(machine=warm.machine))
+
+
+def test_what_is_said_of_a_drop(drop, warm):
+    page = simulate_page(drop, warm.machine)
+    (section,) = [one for one in page.sections if one.heading == "Heat"]
+    assert len(section.figures[0].chart.data) == 2 * (thermal.N_NODES + 1)
+    numbers = simulation_numbers(drop, warm.machine)["heat"]["NDE"]
+    assert numbers["race_K"]["largest"] == pytest.approx(np.max(drop.heat.race(0)), rel=1e-12)
+    assert numbers["preload_N"]["end"] == drop.heat.preload[-1, 0]
+    assert numbers["heat_J"]["taken"] == pytest.approx(np.sum(drop.lost[0]), rel=1e-9)
+    (said,) = [one for one in page.verdict if one.text.startswith("NDE: the race reaches")]
+    assert said.text == numbers["statement"]
+    assert said.level == "good"
+    kept = dict(zip((one.name for one in columns_of(warm.machine)), row_of_drop(warm, drop), strict=True))
+    assert kept["DE.heat.preload"] == drop.heat.preload[-1, 1]
+    assert kept["NDE.heat.race"] == numbers["race_K"]["largest"]
+
+
+@pytest.mark.parametrize(
+    ("preload", "race", "grade", "told"),
+    [
+        ([500.0, 620.0, 600.0], 8.0, "good", "500 N → 600 N."),
+        ([500.0, 1900.0, 1800.0], 64.0, "warning", r"64.0 K above the housing 1.00 s .*500 N → 1.80 kN."),
+        ([500.0, 2900.0, 600.0], 8.0, "warning", r"500 N → 600 N, 2.90 kN at 1.00 s."),
+        ([500.0, 200.0, 0.0], 8.0, "bad", r"without any from 2.00 s on: balls lie loose"),
+        ([500.0, 510.0, 505.0], 140.0, "bad", r"140 K above the start its steel loses hardness"),
+        ([0.0, 0.0, 0.0], 8.0, "good", r"after power-off.$"),
+    ],
+)
+def test_the_verdict_on_a_race(preload, race, grade, told):
+    warmth = np.zeros((3, 1, thermal.N_NODES))
+    warmth[1, 0, [thermal.SKIN, thermal.RACE]] = race
+    rows, one = np.zeros((3, 1)), np.zeros(1)
+    found = heat.Heat(
+        time=np.arange(3.0), temperature=warmth, growth=rows, gap=rows, preload=np.array([preload]).T,
+        taken=one, gone=one, held=one,
+    )  # fmt: skip
+    ((text, said),) = found.sentences(("NDE",))
+    assert said == grade
+    assert re.search(told, text), text
+
+
+def test_what_is_said_of_a_coast_down(coasting):
+    result = simulate_coast_down(coasting, replace(CASE, duration=0.1))
+    page = coast_down_page(result, coasting.machine)
+    assert [one.heading for one in page.sections].count("Heat") == 1
+    assert any(one.text.startswith("DE: the race reaches") for one in page.verdict)
