@@ -78,7 +78,7 @@ async function body(jobs) {
   const failed = told?.state === "failed" ? [make("p", { class: "state bad", text: told.error })] : [];
   if (!told?.result) { return [make("p", { text: words }), ...failed, ...(field ? [field] : []), compute]; }
   const [page, source] = await Promise.all([server.page(job.id, verb), server.reportAddress(job.id, verb)]);
-  const report = async () => { const opened = window.open("about:blank"), where = await server.reportAddress(job.id, verb); if (opened) { opened.opener = null; opened.location = where; } };
+  const report = () => server.openReport(job.id, verb);
   const saved = Object.entries(page.files).map(([file, text]) => [`Save ${file}`, () => keep(new Blob([text], { type: "text/plain" }), file)]);
   return [make("div", { class: "tools", of: [compute, make("span", { class: "right" }), menu("⋯", `${title}: open, save, as Python`, [["Open the report", () => tried(report())], ["Save as JSON", async () => keep(new Blob([await server.documentText(job.id, verb)], { type: "application/json" }), `${verb}.json`)],
     ["As Python", () => showLines(page.python)], ["As command", () => showLines(page.command, "As command")], ...saved])] }), ...failed, ...(field ? [field] : []),

@@ -306,12 +306,7 @@ click("tomachine", () => chooseFiles([], sent));
 click("aboutdrop", () => askAbout(state.job, (job) => { state.job = job; by("dropname").textContent = by("dropname").title = job.name; }));
 click("tothelog", () => addToLog(state.job));
 click("estimate", async () => { state.job = await server.begin(state.job.id, "estimate", { method: by("method").value }); await refresh(); });
-async function openReport(verb) {
-  const opened = window.open("about:blank");
-  const address = await server.reportAddress(state.job.id, verb);
-  if (opened) { opened.opener = null; opened.location = address; } else { location.assign(address); }
-}
-click("report", () => openReport("estimate"));
+click("report", () => server.openReport(state.job.id, "estimate"));
 let wantsFall = "";
 async function showFall() {
   const { id } = state.job, page = await server.page(id, "waterfall");
@@ -340,7 +335,7 @@ async function waterfall() {
 }
 click("waterfall", waterfall);
 click("fallback", leaveFall);
-click("fallreport", () => openReport("waterfall"));
+click("fallreport", () => server.openReport(state.job.id, "waterfall"));
 by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => showLines(fallFiles.Python()), command: () => showLines(fallFiles.Command(), "As command") }));
 by("cutfiles").replaceChildren(files("Cuts", { csv: cutFiles.CSV, svg: cutFiles.SVG, png: cutFiles.PNG, python: () => showLines(cutFiles.Python()) }));
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
