@@ -11,7 +11,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.ball_bearing import BallBearing, outer_ring
 from rotordrop.elements.description import Description
-from rotordrop.elements.parameter import Entry, Parameter, Rule, bearing_entries
+from rotordrop.elements.parameter import Parameter, Rule, stated_only
 from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.race_bearing import BearingFigure, Excess, numbers_of
 from rotordrop.elements.values import default, follows
@@ -226,20 +226,11 @@ def runaway(bearing: TouchdownBearing, omega: float) -> Excess | None:
     return Excess(kind=RUNAWAY, value=has, limit=limit[0], text=text)
 
 
-def _row(path: str, label: str, kind: str, sigma: float, column: int, *others: int) -> Parameter:
-    entries = bearing_entries(L.THERMAL + column)
-    if others:  # two columns that share a value
-        entries = tuple(
-            Entry(array="bearing", column=L.THERMAL + one, rule=Rule.RATIO) for one in (column, *others)
-        )
-    return Parameter(
-        path=f"thermal.{path}",
-        label=label,
-        kind=kind,
-        guess_sigma=sigma,
-        given_sigma=1e-4,
-        entries=entries,
-    )
+def _row(path: str, label: str, kind: str, sigma: float, *columns: int) -> Parameter:
+    row = stated_only(f"thermal.{path}", label, kind, sigma, *(L.THERMAL + one for one in columns))
+    if len(columns) == 1:
+        return row
+    return replace(row, entries=tuple(replace(one, rule=Rule.RATIO) for one in row.entries))  # they share it
 
 
 _CAPACITY, _CONDUCTANCE = law.CAPACITY, law.CONDUCTANCE

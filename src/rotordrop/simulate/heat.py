@@ -14,14 +14,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics import ball_set, ball_table, ring, thermal
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate import _rhs as R
 from rotordrop.simulate._histories import stored_energy
 from rotordrop.units import format_quantity
-
-Array = NDArray[np.float64]
 
 WARMED = 0.05
 """Kelvins by which a node may warm within a stretch, by the stretch before: a hundredth of the preload of a

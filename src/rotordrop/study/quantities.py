@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import unknown_key
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
@@ -18,8 +18,6 @@ from rotordrop.simulate.landing import landings
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
-
-Array = NDArray[np.float64]
 
 SPUN_UP = 0.95
 """Share of the rotor's surface speed from which a race counts as spun up [1]; chosen, not measured."""
