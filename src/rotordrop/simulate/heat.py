@@ -35,6 +35,9 @@ SOFTENS = 130.0
 """Warming [K] of a race from which bearing steel, tempered at 150 to 200 °C, loses hardness."""
 SHIFTED = 1.5
 """Factor on a preload, either way, from which it is a warning [1]; chosen, not measured."""
+STIFFEST = 1e4
+"""Rate [1/s] at which the drag of a preload stops a race at most: that of a runaway would be stiff, and the
+scheme for settled rotors lost its balance of energy at 5e4. Below some tenths of a rad/s a race creeps."""
 LOOSE = 0.02
 """Share of the preload of the start below which balls count as loose [1]; chosen, not measured."""
 
@@ -197,6 +200,8 @@ def warmed(p: KernelParameters, memory: Array, y: Array) -> KernelParameters:
         row[L.RING + ring.GROWN] = grown
         row[L.AIR_GAP] += thermal.gap_growth(heat, nodes, row[L.BORE_RADIUS], row[L.ROTOR_RADIUS])
         row[L.PRESSED] = preload_of(int(b), now, y)[1]
+        stops = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] * row[L.PRESSED] / row[L.RACE_INERTIA]
+        row[L.DRAG_SPEED] = max(row[L.DRAG_SPEED], stops / STIFFEST)
     return now
 
 

@@ -186,6 +186,19 @@ def test_a_drop_with_fast_balls_closes_its_energy():
     assert fast.heat.preload[0, 0] == pytest.approx(164.7, rel=1e-3)
 
 
+@pytest.mark.parametrize("warmth", [0.0, 80.0])
+def test_no_preload_stops_a_race_at_once(warm, warmth):
+    """The drag of a pair that runs away builds up over so much speed that it is not stiff."""
+    bearing = warm.parameters.bearing.copy()
+    bearing[:, L.DRAG_SPEED] = 1e-3
+    p = warm.parameters._replace(bearing=bearing, memory=warm.parameters.memory.copy())
+    heat.remembered(p, p.memory)[:, [thermal.SKIN, thermal.RACE]] = warmth
+    row = heat.warmed(p, p.memory, warm.at_rest()).bearing[0]
+    torque = 0.5 * row[L.DRAG_COEFFICIENT] * row[L.PITCH_DIAMETER] * row[L.PRESSED]
+    assert torque / row[L.RACE_INERTIA] / row[L.DRAG_SPEED] == pytest.approx(heat.STIFFEST, rel=1e-12)
+    assert row[L.DRAG_SPEED] < (1.0 if warmth else 0.03)
+
+
 def test_a_warm_sleeve_closes_the_gap_and_a_warm_race_opens_it(warm):
     p = warm.parameters
     entries, gap = p.bearing[0, L.THERMAL : L.THERMAL_END], p.bearing[0, L.AIR_GAP]
