@@ -167,10 +167,10 @@ def _stepped(system: ComplexArray, start: Array, span: float) -> ComplexArray:
 
 
 def response_at(table: ComplexArray | Array, since: Array) -> ComplexArray:
-    """Look up a tabulated response at times since the release [s], shape (T,): zero before it."""
-    place = np.clip(since / GRID, 0.0, len(table) - 1.001)
+    """Look up a tabulated response (K, ...) at times since the release [s], shape (T,): zero before it."""
+    place = np.minimum(np.maximum(since / GRID, 0.0), len(table) - 1.001)
     low = place.astype(np.int64)
-    share = (place - low)[:, None, None]
+    share = (place - low).reshape(-1, *[1] * (table.ndim - 1))
     return np.asarray(table[low] * (1.0 - share) + table[low + 1] * share)
 
 
@@ -178,11 +178,9 @@ def response_at(table: ComplexArray | Array, since: Array) -> ComplexArray:
 class Responses:
     """What a released rotor answers to forces that stay, turn with it or fade, tabulated once for a span."""
 
-    fixed: tuple[ComplexArray, ...]
-    """Responses to a force that stays, turns with the shaft and against it [m/N], shape (K, P, A)."""
-    free: ComplexArray
-    """Displacement of the planes left to themselves, by displacements and velocities of the modes, shape (K,
-    P, 2m)."""
+    table: ComplexArray
+    """Displacement of the planes (K, P, 3A + 2m): by forces that stay, turn with the shaft and against it
+    [m/N], then left to themselves, by displacements and velocities of the modes."""
     system: ComplexArray
     inputs: Array
     """Derivative of those by themselves and by unit forces at the places of the rotor."""
@@ -190,23 +188,35 @@ class Responses:
     @classmethod
     def of(cls, rotor: FreeRotor, speed: float, span: float) -> Responses:
         """Tabulate a rotor at a speed [rad/s] over a time from the release on [s]."""
+        fixed = [rotor.table(speed, s, span) for s in (0.0, -1j * speed, 1j * speed)]
         return cls(
-            fixed=tuple(rotor.table(speed, s, span) for s in (0.0, -1j * speed, 1j * speed)),
-            free=rotor.table_of_start(speed, span),
+            table=np.concatenate([*fixed, rotor.table_of_start(speed, span)], axis=-1),
             system=motion_of(rotor.basis, speed),
             inputs=np.vstack([np.zeros_like(rotor.force_rows.T), rotor.force_rows.T]),
         )
 
-    def fading(self, decay: float, since: Array) -> ComplexArray:
+    def reaches(self, span: float) -> bool:
+        """Whether the table goes as far as a time from the release on [s]."""
+        return (len(self.table) - 1) * GRID >= span
+
+    def at(self, since: Array) -> tuple[ComplexArray, ComplexArray]:
+        """Displacement of the planes left to themselves, shape (T, P, 2m), and by forces that stay, turn with
+        the shaft and against it, shape (T, P, 3A), at times from the release on [s].
+        """
+        response, forces = response_at(self.table, since), 3 * self.inputs.shape[1]
+        return response[..., forces:], response[..., :forces]
+
+    def fading(self, decay: float, since: Array, free: ComplexArray) -> ComplexArray:
         """Response (T, P, A) to forces that fade with a time constant [s], at times from the release [s].
 
-        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B. Only the rows that
-        are asked for are multiplied: the whole table is ten times as long, and a product of that size is
-        handed to several threads, which on a busy computer cost ten times the work.
+        With x' = A x + B exp(−t/τ) and x(0) = 0, x = (exp(A t) − exp(−t/τ)) (A + 1/τ)⁻¹ B; `free` is what the
+        table says of those times for a rotor left to itself. Only the rows that are asked for are multiplied:
+        the whole table is ten times as long, and a product of that size is handed to several threads, which
+        on a busy computer cost ten times the work.
         """
         rate = 1.0 / decay
         share = np.linalg.solve(self.system + rate * np.eye(len(self.system)), self.inputs)
-        fades = np.exp(-rate * GRID * np.arange(len(self.free)))[:, None, None]
-        free = response_at(self.free, since)
+        fades = np.exp(-rate * GRID * np.arange(len(self.table)))
         released = (free.reshape(-1, free.shape[-1]) @ share).reshape(*free.shape[:2], -1)
-        return np.asarray(released - response_at(fades, since) * (self.free[0] @ share))
+        begun = self.table[0, :, -len(share) :] @ share
+        return np.asarray(released - response_at(fades, since)[:, None, None] * begun)

@@ -20,7 +20,7 @@ from rotordrop.errors import IdentificationError
 from rotordrop.evidence.contacts import local_polynomial
 from rotordrop.evidence.events import RINGING, DropInstant, PowerOff
 from rotordrop.evidence.fall import REMANENT_TIME
-from rotordrop.evidence.free_rotor import ComplexArray, Held, held_by, motion_of, response_at
+from rotordrop.evidence.free_rotor import ComplexArray, Held, held_by, motion_of
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.rest import AirGap, Rest
 from rotordrop.evidence.sensing import Sensing
@@ -496,7 +496,7 @@ class _Levitated:
         sigma[self.rest] = _rest_sigma(self.model, sensing)
         bend = range(self.bend.start, self.bend.stop)
         # the samples of the fall once more, to first order, with the bending beside what was sought
-        free = problem.seen(response_at(problem.responses.free, problem.time - fall.instant))
+        free = problem.seen(problem.responses.at(problem.time - fall.instant)[0])
         parts = np.split(free, [2, free.shape[-1] // 2, free.shape[-1] // 2 + 2], axis=-1)
         added = np.concatenate([c for part in parts[1::2] for c in (part.real, -part.imag)], axis=-1)
         added = (added / problem.noise[None, :, None]).reshape(-1, added.shape[-1])

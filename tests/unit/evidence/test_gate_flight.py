@@ -78,7 +78,8 @@ def test_a_fading_force_is_answered_as_by_stepping(hopping, machine):
         stepped = rotor.table(600.0, 1.0 / decay, 0.02)
         stepped = stepped[:-1]  # what lies beyond the table is held at its end
         since = np.arange(len(stepped)) * GRID
-        closed = Responses.of(rotor, 600.0, 0.02).fading(decay, since)
+        responses = Responses.of(rotor, 600.0, 0.02)
+        closed = responses.fading(decay, since, responses.at(since)[0])
         np.testing.assert_allclose(closed, stepped, rtol=0.0, atol=1e-9 * np.max(np.abs(stepped)))
 
 

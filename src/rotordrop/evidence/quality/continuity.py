@@ -113,24 +113,65 @@ and at most [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Sides:
-    """How parabolas of some samples read a motion at their ends."""
+class _Windows:
+    """Sums over all stretches of so many samples, by which parabolas read the motion at their ends."""
 
     count: int
-    """Samples."""
-    at_end: Array
-    slope: Array
-    """Weights of the value half a sample beyond the last one, and of the slope per sample there."""
-    explained: Array
-    """Orthonormal weights of what a parabola explains, shape (count, 3)."""
+    """Samples of a stretch, a power of two."""
+    sums: tuple[Array, Array, Array]
+    """Sums of readings times the zeroth to second power of the sample, counted from the middle, (N, S)."""
+    squares: Array
+    """Sum of their squares [m²], shape (N, S)."""
 
     @classmethod
-    def of(cls, count: int) -> _Sides:
-        """Parabolas through a number of samples."""
-        design = np.vander(np.arange(count) + 0.5, 3)
-        slope, begin = np.linalg.pinv(design)[1:]
-        explained = np.linalg.qr(design)[0]
-        return cls(count=count, at_end=begin[::-1].copy(), slope=-slope[::-1].copy(), explained=explained)
+    def of(cls, readings: Array) -> _Windows:
+        """Stretches of one sample."""
+        nothing = np.zeros_like(readings)
+        return cls(count=1, sums=(readings, nothing, nothing), squares=readings**2)
+
+    def doubled(self) -> _Windows:
+        """Stretches twice as long, from the sums of their halves: no sample is added up again."""
+        half = self.count
+        (early, early_1, early_2), (late, late_1, late_2) = (
+            [part[own] for part in self.sums] for own in (slice(-half), slice(half, None))
+        )
+        first = early_1 + late_1 + 0.5 * half * (late - early)
+        second = early_2 + late_2 + half * (late_1 - early_1) + 0.25 * half**2 * (early + late)
+        squares = self.squares[:-half] + self.squares[half:]
+        return _Windows(count=2 * half, sums=(early + late, first, second), squares=squares)
+
+    @property
+    def bend(self) -> Array:
+        """Second power beside its mean, times the readings, summed."""
+        return np.asarray(self.sums[2] - (self.count**2 - 1) / 12.0 * self.sums[0])
+
+    @property
+    def norms(self) -> tuple[float, float, float]:
+        """Sums of the squares of the first three Legendre polynomials over the samples."""
+        squared = self.count**2
+        line = self.count * (squared - 1) / 12.0
+        return float(self.count), line, line * (squared - 4) / 15.0
+
+    @property
+    def left(self) -> Array:
+        """Sum of the squares that parabolas leave [m²]."""
+        pairs = zip((self.sums[0], self.sums[1], self.bend), self.norms, strict=True)
+        return np.asarray(self.squares - sum(part**2 / norm for part, norm in pairs))
+
+    def at_ends(self) -> tuple[Array, Array, Array, Array]:
+        """Parabolas half a sample before the first and beyond the last one, and their slopes per sample."""
+        ahead, (flat, line, bow) = 0.5 * self.count, self.norms
+        high = (ahead**2 - (self.count**2 - 1) / 12.0) / bow
+        even, odd = self.sums[0] / flat + high * self.bend, ahead / line * self.sums[1]
+        slope, turn = self.sums[1] / line, 2.0 * ahead / bow * self.bend
+        return even - odd, even + odd, slope - turn, slope + turn
+
+    @property
+    def error_at_end(self) -> float:
+        """Standard error of what they read there, over that of a sample [1]."""
+        ahead, (flat, line, bow) = 0.5 * self.count, self.norms
+        high = ahead**2 - (self.count**2 - 1) / 12.0
+        return math.sqrt(1.0 / flat + ahead**2 / line + high**2 / bow)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,18 +211,24 @@ def check_continuity(record: Record) -> list[Finding]:
     if uneven:
         return uneven  # readings that are early or late jump by themselves
     torn, lost, exchanged = _Worst(), _Worst(), _Exchanged()
-    for sides in map(_Sides.of, counts):
-        reach = 2 * (sides.count + _BLOCK + _BESIDE)
-        for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
-            part = signals[begin : begin + _PART + reach]
-            if len(part) > 2 * sides.count:
-                seen = _jumps_of(part, sides, noise)
-                short = sides.count <= _LONGEST * record.sampling_rate
-                if sides.count == _FEWEST or short:
-                    torn.keep(_size_of_jump(seen), seen, begin + sides.count)
-                if short:
-                    exchanged.keep(seen, begin, sides.count)
-                lost.keep(_size_of_loss(seen), seen, begin + sides.count)
+    reach = 2 * (counts[-1] + _BLOCK + _BESIDE)
+    for begin in range(0, len(signals), _PART):  # a coast-down of a minute must not be held eight times
+        part = signals[begin : begin + _PART + reach]
+        # about their middle: the difference of two sums of squares loses what an offset takes up of them
+        windows = _Windows.of(part - np.median(part, axis=0))
+        # where a channel holds one reading it is stuck, which has its own name
+        same = np.cumsum(np.vstack([np.zeros(part.shape[1]), part[1:] == part[:-1]]), axis=0)
+        while windows.count < counts[-1] and len(part) > 4 * windows.count:
+            windows = windows.doubled()
+            if windows.count < _FEWEST:
+                continue
+            seen = _jumps_of(windows, same, noise)
+            short = windows.count <= _LONGEST * record.sampling_rate
+            if windows.count == _FEWEST or short:
+                torn.keep(_size_of_jump(seen), seen, begin + windows.count)
+            if short:
+                exchanged.keep(seen, begin, windows.count)
+            lost.keep(_size_of_loss(seen), seen, begin + windows.count)
     if lost.size >= _LOST:
         return [_lost(lost, record)]
     if torn.size >= _TORN:
@@ -189,18 +236,12 @@ def check_continuity(record: Record) -> list[Finding]:
     return [exchanged.finding(record)] if exchanged.size >= _EXCHANGED else []
 
 
-def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
-    count = sides.count
-    # about their middle: the difference of two sums of squares loses what an offset takes up of them
-    windows = np.lib.stride_tricks.sliding_window_view(part - np.median(part, axis=0), count, axis=0)
-    left = np.einsum("...k,...k", windows, windows) - np.sum((windows @ sides.explained) ** 2, axis=-1)
-    free = count - 3
+def _jumps_of(windows: _Windows, same: Array, noise: Array) -> _Jumps:
+    """Jumps between stretches; `same` counts, from the first sample on, how often a channel read as before."""
+    count, free, left = windows.count, windows.count - 3, windows.left
     smooth = left < (free + _SMOOTH * math.sqrt(2.0 * free)) * noise**2
-    # where a channel holds one reading it is stuck, which has its own name
-    same = np.cumsum(np.vstack([np.zeros(part.shape[1]), part[1:] == part[:-1]]), axis=0)
     smooth &= same[count - 1 :] - same[: len(smooth)] < count // 2
-    ends, begins = windows @ sides.at_end, windows @ sides.at_end[::-1]
-    out, into = windows @ sides.slope, windows @ -sides.slope[::-1]
+    begins, ends, into, out = windows.at_ends()
     excess = left / noise**2 - free
     return _Jumps(
         end=ends[:-count],
@@ -211,7 +252,7 @@ def _jumps_of(part: Array, sides: _Sides, noise: Array) -> _Jumps:
         smooth=smooth[count:] & smooth[:-count],
         excess=excess[count:] + excess[:-count],
         free=free,
-        error=np.sqrt(2.0) * np.linalg.norm(sides.at_end) * noise,
+        error=np.sqrt(2.0) * windows.error_at_end * noise,
     )
 
 
