@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
     from rotordrop.evidence.free_rotor import FreeRotor
     from rotordrop.evidence.initial_state import InitialState
+    from rotordrop.evidence.paths import Motion
     from rotordrop.evidence.quality.flight import Weighed
     from rotordrop.evidence.rest import AirGap, Rest
     from rotordrop.evidence.sensing import Sensing
@@ -140,6 +141,14 @@ class Evidence:
     def still(self) -> Record | Missing:
         """The settled part of the tail, or of a record that reaches standstill."""
         return sought(lambda: resting_record(self.record, self.tail, self.machine))
+
+    @cached_property
+    def motion(self) -> Motion | Missing:
+        """The paths in the clearance circles that the record shows without the machine file."""
+        from rotordrop.evidence.paths import motion_of
+
+        whole = self.record.whole
+        return sought(lambda: motion_of(whole, gaps=(None,) * len(whole.planes), angles_known=True))
 
     @cached_property
     def power_off(self) -> DropInstant | PowerOff:

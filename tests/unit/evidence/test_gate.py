@@ -580,6 +580,29 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
     assert found.remedy.startswith("use the machine file from before that estimate")
 
 
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("recorded", ["alone", "with its tail"])
+def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_named(
+    drop, tail, machine, factor, recorded
+):
+    """Half and double of the gap lie within what units leave open; the range of the guess goes with it."""
+
+    def other(gap):
+        return replace(gap, value=factor * float(gap), range=tuple(factor * end for end in gap.range))
+
+    values = {f"{bearing.name}.air_gap": other(bearing.air_gap) for bearing in machine.touchdown_bearings}
+    wrong = machine.with_values(values)
+    found = check_record(drop, wrong, tail if recorded == "with its tail" else None)
+    assert {one.kind for one in found if "air gap" in one.message} == {"wrong air gap"}
+    message = next(one.message for one in found if one.message.startswith("where the rotor turns back"))
+    shown, low, high, stated = map(
+        float, re.findall(r"(\d+) µm \((\d+) to (\d+)\).*? says (\d+) µm", message)[0]
+    )
+    true = float(machine.touchdown_bearings[0].air_gap)
+    assert low < 1e6 * true < high
+    assert abs(shown - 1e6 * true) < abs(stated - 1e6 * true)
+
+
 @pytest.mark.parametrize(("kind", "severity"), [("turned sensors", "stop"), ("ends", "warning")])
 def test_a_fall_that_leans_stops_only_where_sensors_look_elsewhere(kind, severity):
     """A free fall that deviates from the rotor model by itself refuses no drop that friction drove aside."""

@@ -33,6 +33,7 @@ from rotordrop.evidence.quality.finding import (
 )
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
 from rotordrop.evidence.quality.motion import (
+    check_gaps,
     check_length,
     check_levitated,
     check_rotation_line,
@@ -115,6 +116,15 @@ def _tail_as_read(evidence: Evidence) -> list[Finding]:
     return [replace(one, message=f"tail: {one.message}") for one in found]
 
 
+def _units(evidence: Evidence) -> list[Finding]:
+    return check_units(evidence.record.whole, evidence.machine, _gaps(evidence))
+
+
+def _gaps(evidence: Evidence) -> list[Finding]:
+    motion = evidence.motion
+    return [] if isinstance(motion, Missing) else check_gaps(motion, evidence.record.whole, evidence.machine)
+
+
 def _speed(evidence: Evidence) -> list[Finding]:
     return check_speed_signal(evidence.record) or check_speed(evidence.record, evidence.machine)
 
@@ -167,7 +177,9 @@ def _recorder(evidence: Evidence) -> list[Finding]:
     whole = evidence.record.whole
     instant = known(evidence.beginning).coarse.instant
     bounces = _bounces(evidence) / (2.0 * np.pi)
-    found = check_filters(whole, evidence.floating, instant, bounces) + check_again(whole)
+    found = check_filters(whole, evidence.floating, instant, bounces)
+    if not isinstance(evidence.motion, Missing):
+        found += check_again(evidence.motion)
     return found or check_rail(whole, first_motion(whole)[0])
 
 
@@ -220,7 +232,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
     },
     {
         "blocks": lambda e: check_blocks(e.record),
-        "units": lambda e: check_units(e.record.whole, e.machine),
+        "units": _units,
         "speed": _speed,
     },
     {"line": _line},
@@ -233,6 +245,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
         "length": _length,
         "fall": _fall,
         "flights": _flights,
+        "gaps": _gaps,
     },
     {"rest": _tail_at_rest},
 )
@@ -259,10 +272,18 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
         lagging = (Kind.LATE_CHANNEL, Kind.SATURATION)
         fall = [one for one in fall if one.kind not in lagging or one.channel not in named]
         flights = [one for one in flights if one.kind not in {other.kind for other in fall}]
-        every |= {"fall": fall, "flights": flights}
+        # A gain that is off moves the gap that is seen with it.
+        off = any(one.kind == Kind.WRONG_GAIN and one.severity != "note" for one in fall + flights)
+        every |= {"fall": fall, "flights": flights, "gaps": [] if off else every.get("gaps", [])}
         # Readings of the drop that are doubted themselves say nothing against the tail.
         if any(one.severity != "note" for one in (*every.get("levitated", ()), *fall, *flights)):
             every["rest"] = [one for one in every.get("rest", ()) if one.kind != Kind.TAIL_OFFSET]
+        # A record that shows another gap than the file speaks for the tail that does so too.
+        if every["gaps"]:
+            every["rest"] = [
+                replace(one, kind=Kind.WRONG_AIR_GAP) if one.kind == Kind.WRONG_UNIT else one
+                for one in every.get("rest", ())
+            ]
         # A fall that leans stops only when the sensors look in other directions before the first contact too.
         # That it deviates there from a free rotor is not enough: two of eight drops of small rotors at 500 Hz
         # did, and leant because of friction. Where the fall before the first contact is that of the rotor as

@@ -237,7 +237,7 @@ def check_continuity(record: Record) -> list[Finding]:
 
 
 def _jumps_of(windows: _Windows, same: Array, noise: Array) -> _Jumps:
-    """Jumps between stretches; `same` counts, from the first sample on, how often a channel read as before."""
+    """Jumps between stretches; `same` counts from the first sample on how often a channel reads as before."""
     count, free, left = windows.count, windows.count - 3, windows.left
     smooth = left < (free + _SMOOTH * math.sqrt(2.0 * free)) * noise**2
     smooth &= same[count - 1 :] - same[: len(smooth)] < count // 2

@@ -55,8 +55,8 @@ explain it [1]: the fall is too short to tell, or the rotor touched before."""
 _ANY_GAIN = (0.2, 1.8)
 
 _HOPELESS = 12.0
-"""Mean square over the noise that the newest samples, searched once from the release as described, may have for
-another reading to be fitted in full [1]: of 43 that then fell freely, to 4, none had more than 4.2."""
+"""Mean square over the noise that the newest samples, searched once from the release as described, may have
+for another reading to be fitted in full [1]: of 43 that then fell freely, to 4, none had more than 4.2."""
 
 
 @dataclass(frozen=True, kw_only=True)

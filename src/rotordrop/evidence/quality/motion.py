@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.errors import NoDropError
-from rotordrop.evidence.events import fall_accelerations, nominal_gaps
+from rotordrop.evidence.events import expected_gap, fall_accelerations, nominal_gaps, planes_at_bearings
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.known import NINETY
 from rotordrop.record.recording import Array
 from rotordrop.units import GRAVITY, format_quantity
 
 if TYPE_CHECKING:
+    from rotordrop.evidence.paths import Motion
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -30,6 +34,11 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
+_GAP_ERROR, _OTHER_GAP = 0.08, 2.5
+"""Standard deviation of a gap that a record shows by itself, over it, at least; and in how many of them, with
+the doubt of the machine file, it lies off that to be named [1]. Of 500 planes in clean drops of all rotors
+the root mean square of the error is 6.4 %, and one in a hundred is off by 20 % or more."""
+
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
 
@@ -64,8 +73,11 @@ channels over the sum of their amplitudes, from which hum hides a drop [1]: an o
 that are 90° apart."""
 
 
-def check_units(record: Record, machine: Machine) -> list[Finding]:
-    """Compare how far every channel moves with the air gap."""
+def check_units(record: Record, machine: Machine, other_gaps: Sequence[Finding] = ()) -> list[Finding]:
+    """Compare how far every channel moves with the air gap.
+
+    What no unit explains is a gap of the machine file that is wrong, where the record shows other ones.
+    """
     suspects: dict[int, list[tuple[str, float]]] = {}
     for plane, gap in zip(record.planes, nominal_gaps(machine, record).tolist(), strict=True):
         for name in plane.names:
@@ -74,7 +86,39 @@ def check_units(record: Record, machine: Machine) -> list[Finding]:
                 suspects.setdefault(round(math.log10(ratio / 1.5)), []).append((name, ratio))
     if suspects and not _sinks(record):
         return []  # nothing falls: the search for the drop says so
-    return [_unit_finding(found, machine) for found in suspects.values()]
+    findings = [_unit_finding(found, machine) for found in suspects.values()]
+    explained = any(_nearest(ratio) for found in suspects.values() for _, ratio in found)
+    if explained or not other_gaps or any(one.kind == Kind.WRONG_AIR_GAP for one in findings):
+        return findings
+    return [replace(one, severity="stop") for one in other_gaps if suspects]
+
+
+def check_gaps(motion: Motion, record: Record, machine: Machine) -> list[Finding]:
+    """Compare the air gaps that the record shows by itself with those of the machine file."""
+    found = []
+    for number in sorted(planes_at_bearings(machine, record)):
+        wall, (expected, doubt) = motion.paths[number].wall, expected_gap(machine, record.planes[number])
+        error = max(wall.gap_error, _GAP_ERROR * wall.gap)
+        if abs(wall.gap - expected) > _OTHER_GAP * math.hypot(error, doubt):
+            shown, stated = (
+                f"{1e6 * gap:.0f} µm ({1e6 * (gap - NINETY * off):.0f} to {1e6 * (gap + NINETY * off):.0f})"
+                for gap, off in ((wall.gap, error), (expected, doubt))
+            )
+            found.append((record.planes[number], shown, stated))
+    if not found:
+        return []
+    words = (f"{shown} at {plane.bearing}, the machine file says {stated}" for plane, shown, stated in found)
+    return [
+        Finding(
+            kind=Kind.WRONG_AIR_GAP,
+            message="where the rotor turns back and rests, the record shows an air gap of "
+            f"{'; of '.join(words)}; 90 % intervals",
+            remedy="correct air_gap in the machine file, after a lift check where in doubt; if it is right, "
+            "correct unit or sensitivity of the sensors",
+            severity="warning",
+            channel=", ".join(name for plane, *_ in found for name in plane.names),
+        )
+    ]
 
 
 def _sinks(record: Record) -> bool:

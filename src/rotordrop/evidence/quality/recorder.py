@@ -19,6 +19,7 @@ from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.evidence.levitated import LevitatedModel
+    from rotordrop.evidence.paths import Motion
     from rotordrop.record.record import Record
 
 SLOWEST = 2000.0
@@ -378,16 +379,11 @@ def _coupling(record: Record, drop: float) -> list[Finding]:
     ]
 
 
-def check_again(record: Record) -> list[Finding]:
+def check_again(motion: Motion) -> list[Finding]:
     """Find further drops in the record, without knowing the machine."""
-    from rotordrop.errors import RecordError
-    from rotordrop.evidence.paths import drops_of, motion_of
+    from rotordrop.evidence.paths import drops_of
 
-    try:
-        gaps = (None,) * len(record.planes)
-        drops = drops_of(motion_of(record, gaps=gaps, angles_known=True))
-    except RecordError:
-        return []  # who looks for the drop says why there is none
+    drops = drops_of(motion)
     if len(drops) < 2:
         return []
     return [
