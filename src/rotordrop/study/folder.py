@@ -166,7 +166,7 @@ def read_plan(path: str | Path) -> dict[str, Any]:
     except DamagedFileError:
         plan = None
         with suppress(ValueError, RecursionError):
-            plan = json.loads(file.read_bytes())
+            plan = json.loads(file.read_bytes()) if file.is_file() else None
         # what has a digest was not written without one
         if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or DIGEST in plan:
             raise
@@ -255,7 +255,7 @@ def read_shards(
     for shard in shards:
         file, drops, problem = folder.shard_path(shard), study.drops_of(shard), ""
         try:
-            raw = file.read_bytes()
+            raw = file.read_bytes() if file.is_file() else b""  # a pipe would keep its reader for ever
         except OSError as error:
             raise OutputError(f"{file} cannot be read: {error.strerror}") from error
         content = raw[:-_SEAL]

@@ -273,6 +273,20 @@ def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_pa
         study_of(place)
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
+@pytest.mark.parametrize("kind", [os.mkdir, os.mkfifo, lambda place: os.symlink("nowhere", place)])
+@pytest.mark.parametrize("part", ["shards/000001.npy", "plan.json", "machine.toml"])
+def test_what_is_no_file_in_a_study_is_named_and_put_aside(serial, tmp_path, part, kind):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    (place / part).unlink()
+    kind(place / part)
+    with pytest.raises(DamagedFileError, match=rf"{part.split('/')[-1]} is (damaged|gone)"):
+        load_results(place)
+    if part.startswith("shards"):
+        assert len(run_study(study_with(), place, threads=1).aside) == 1
+        assert (place / part).read_bytes() == (serial[0] / part).read_bytes()
+
+
 @pytest.mark.parametrize("content", [b"[]", b"{}", b'{"format": "rotordrop study 3", "study": 1}'])
 def test_a_plan_that_is_none_is_named(serial, tmp_path, content):
     place = shutil.copytree(serial[0], tmp_path / "study")
