@@ -36,6 +36,9 @@ from rotordrop.physics import support as law
 Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
+REFERENCE_MASS = 60.0
+"""Mass of the rotor for which the usual mass and stiffness of a support hold [kg]: that of the reference machine.
+The mass goes with it, the stiffness with its length, by the third root."""
 
 _PRESENT = L.SUPPORT_FORM + law.PRESENT
 _COUPLING = L.SUPPORT_FORM + law.COUPLING
@@ -43,9 +46,11 @@ _CUBIC = L.SUPPORT_FORM + law.CUBIC
 _SHARE = L.SUPPORT_FORM + law.FOUNDATION_SHARE
 _SPEED = L.SUPPORT_FORM + law.FOUNDATION_SPEED
 _DAMPING = L.SUPPORT_FORM + law.FOUNDATION_DAMPING
+_FRICTION = L.SUPPORT_FORM + law.FRICTION
 _STOP_GAP, _STOP = L.MOUNT + mount_law.GAP, L.MOUNT + mount_law.STOP
 
-_FORM = ("coupling", "cubic", "foundation_share", "foundation_frequency", "foundation_damping_ratio")
+_FOUNDATION = ("foundation_share", "foundation_frequency", "foundation_damping_ratio")
+_FORM = ("coupling", "cubic", "friction", *_FOUNDATION)
 """What a support may have beyond a spring and a damper on two axes."""
 
 TURNED_ANISOTROPY = 0.4
@@ -59,9 +64,11 @@ class Support(Description):
     """What carries the outer ring: mass on a spring and a damper, vertical (y) and horizontal (x)."""
 
     mass: V.PositiveMass = default(
-        40.0, "the housing parts around the bearing of the reference machine", (4.0, 400.0)
+        40.0, "the housing parts around a bearing go with the mass of the rotor: 40 kg of 60 kg", (4.0, 400.0)
     )
-    stiffness: V.Stiffness = default(1e8, "a first guess for a bearing housing", (1e7, 2e9))
+    stiffness: V.Stiffness = default(
+        1e8, "a bearing housing of a rotor of 60 kg, with the length of others", (1e7, 2e9)
+    )
     damping: V.Damping = follows("2.5 % of critical, or from the damping ratio")
     """Vertical support mass [kg], stiffness [N/m] and damping [N s/m]."""
     damping_ratio: V.NonNegative | None = None
@@ -77,6 +84,8 @@ class Support(Description):
     that are turned."""
     cubic: V.CubicTerm | None = None
     """Cubic term k₃ of the spring, F = K h (1 + k₃ h²) along x and along y [1/m²]."""
+    friction: V.Force | None = None
+    """Coulomb friction of the support, such as of a housing that slides on its seat [N]."""
     foundation_share: V.NonNegative | None = None
     """Support mass over modal mass of a foundation that gives way under the support [1]."""
     foundation_frequency: V.PositiveSpeed | None = None
@@ -93,6 +102,7 @@ class Support(Description):
         "damping": L.SUPPORT_DAMPING_Y,
         "coupling": _COUPLING,
         "cubic": _CUBIC,
+        "friction": _FRICTION,
         "foundation_share": _SHARE,
         "foundation_frequency": _SPEED,
         "foundation_damping_ratio": _DAMPING,
@@ -113,12 +123,11 @@ class Support(Description):
                     f"the support has both 'damping{end}' and 'damping_ratio{end}'; keep one of them",
                     (f"damping_ratio{end}",),
                 )
-        parts = _FORM[2:]
-        given = [name for name in parts if getattr(self, name) is not None]
-        if given and len(given) < len(parts):
-            missing = next(name for name in parts if name not in given)
+        given = [name for name in _FOUNDATION if getattr(self, name) is not None]
+        if given and len(given) < len(_FOUNDATION):
+            missing = next(name for name in _FOUNDATION if name not in given)
             raise Misfit(
-                f"the support has {given[0]!r} but no {missing!r}; a foundation needs {', '.join(parts)}",
+                f"the support has {given[0]!r} but no {missing!r}; a foundation needs {', '.join(_FOUNDATION)}",
                 (given[0],),
             )
 
@@ -143,6 +152,18 @@ class Support(Description):
             why = "the damping ratio of the vertical direction"
             damping = replace(_from_ratio(self.damping_ratio, mass, stiffness), status="default", source=why)
         return values | {"damping_horizontal": damping}
+
+    def under(self, rotor_mass: float) -> Support:
+        """The support under a rotor of a mass [kg], for a mass and a stiffness that were left out."""
+        size, values = rotor_mass / REFERENCE_MASS, {}
+        for name, factor in (("mass", size), ("stiffness", size ** (1.0 / 3.0))):
+            if name not in self.model_fields_set:
+                usual: Known = type(self).model_fields[name].default
+                values[name] = scaled(usual, factor, str(usual.source), usual.unit)
+        if not values:
+            return self
+        copy = self.completed_with(values)
+        return copy.completed_with(copy.left_out())
 
     states_at: ClassVar[int] = L.BEARING_OWN
 
@@ -236,6 +257,10 @@ def _growth(bearing: Any, found: Values, load: float) -> str:
     deflection = PEAK_LOADS * load / found["support.stiffness"].value
     growth = derived(lambda k_3: k_3 * deflection * deflection, found["support.cubic"])
     return f"{bearing.name} {in_words(growth, '%', 0.01)}"
+
+
+def _rubbing(bearing: Any, found: Values, _load: float) -> str:
+    return f"{bearing.name} {in_words(itself(found['support.friction']), 'N')}"
 
 
 PARAMETERS: tuple[Parameter, ...] = (
@@ -378,6 +403,30 @@ EXTENSIONS: tuple[Extension, ...] = (
                 scale="one over the deflection under ten mean loads, squared",
                 scaled=_cubic_scale,
                 entries=bearing_entries(_CUBIC),
+            ),
+        ),
+    ),
+    Extension(
+        name="hysteretic support",
+        owner="bearing",
+        names=("support.friction",),
+        neutral=lambda _: {"support.friction": guess(0.0)},
+        nothing={"support.friction": 0.0},
+        sentence=_rubbing,
+        joined=", ",
+        frame="friction in the supports: {}",
+        rows=(
+            Parameter(
+                path="support.friction",
+                label="friction in the support",
+                kind="force",
+                logarithmic=False,
+                guess_sigma=0.3,
+                given_sigma=0.1,
+                lower=0.0,
+                scale="mean load of a bearing",
+                scaled=lambda _, load: (load, (0.0, 3.0 * load)),
+                entries=bearing_entries(_FRICTION),
             ),
         ),
     ),

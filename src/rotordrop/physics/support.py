@@ -1,4 +1,4 @@
-"""A support beyond mass on two springs: turned axes, a cubic term, a foundation that gives way.
+"""A support beyond mass on two springs: turned axes, a cubic term, friction, a foundation that gives way.
 
 A form is a short array of numbers that only this module reads; a row of `rotordrop.physics.columns` holds
 it. It says how the force of a support differs from the plain one, ``k_x x + c_x ẋ`` and ``k_y y + c_y ẏ``.
@@ -22,8 +22,12 @@ CUBIC = 2
 FOUNDATION_SHARE = 3
 FOUNDATION_SPEED = 4
 FOUNDATION_DAMPING = 5
-N_ENTRIES = 6
+FRICTION = 6
+N_ENTRIES = 7
 
+SLOW = 1e-3
+"""Speed [m/s] below which friction in a support gives way like a damper: small against the 10 to 100 mm/s of a
+support under impacts, which follow from the speed of a fall through the air gap (chosen)."""
 
 LARGEST_SOFTENING = 0.3
 """Part of the linear force that a softening cubic term may take away [1]: the slope stays positive."""
@@ -37,9 +41,9 @@ def support_force(
 
     Parameters
     ----------
-    form : ndarray, shape (6,)
+    form : ndarray, shape (7,)
         Whether there is one, coupling κ [1], cubic term [1/m²], support mass over foundation mass [1],
-        natural frequency [rad/s] and damping ratio [1] of the foundation.
+        natural frequency [rad/s] and damping ratio [1] of the foundation, friction [N].
     k_x, k_y, c_x, c_y : float
         Stiffness [N/m] and damping [N s/m] along x and y.
     x, y, v_x, v_y : float
@@ -53,12 +57,15 @@ def support_force(
     Notes
     -----
     Source: linear elasticity, ``k_xy = κ √(k_x k_y)``, which is positive for every ``|κ| < 1``; the cubic
-    term is the first one of a symmetric spring, Duffing 1918. Not validated.
+    term is the first one of a symmetric spring, Duffing 1918; friction is Coulomb's against the direction of
+    motion, smoothed by ``v/√(v² + SLOW²)``. Not validated.
     """
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
-    f_x = k_x * x * (1.0 + cubic_share(form[CUBIC], x)) + k_c * y + c_x * v_x
-    f_y = k_y * y * (1.0 + cubic_share(form[CUBIC], y)) + k_c * x + c_y * v_y
-    return f_x, f_y, c_x * v_x * v_x + c_y * v_y * v_y
+    rubbing = form[FRICTION] / math.sqrt(v_x * v_x + v_y * v_y + SLOW * SLOW)
+    d_x, d_y = (c_x + rubbing) * v_x, (c_y + rubbing) * v_y
+    f_x = k_x * x * (1.0 + cubic_share(form[CUBIC], x)) + k_c * y + d_x
+    f_y = k_y * y * (1.0 + cubic_share(form[CUBIC], y)) + k_c * x + d_y
+    return f_x, f_y, d_x * v_x + d_y * v_y
 
 
 @inner_kernel
@@ -80,7 +87,11 @@ def support_tangent(
     """
     k_c = form[COUPLING] * math.sqrt(k_x * k_y)
     stiffness = k_x * _cubic_slope(form[CUBIC], x), k_c, k_y * _cubic_slope(form[CUBIC], y)
-    return stiffness, (c_x, 0.0, c_y)
+    square = v_x * v_x + v_y * v_y + SLOW * SLOW
+    rubbing = form[FRICTION] / math.sqrt(square)
+    turned = rubbing / square
+    damping = c_x + rubbing - turned * v_x * v_x, -turned * v_x * v_y, c_y + rubbing - turned * v_y * v_y
+    return stiffness, damping
 
 
 @inner_kernel

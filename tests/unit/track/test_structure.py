@@ -33,6 +33,7 @@ from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 STRUCTURE = {
     "support.coupling": 0.2,
     "support.cubic": 5e7,
+    "support.friction": 40.0,
     "support.foundation_share": 0.1,
     "support.foundation_frequency": 600.0,
     "support.foundation_damping_ratio": 0.03,
@@ -97,14 +98,21 @@ def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(entries)
 
 
 def test_a_support_loses_what_its_force_does_beyond_that_of_its_springs():
-    springs, rate = (form_of(COUPLING=0.4, CUBIC=4e8), 0.7e8, 1e8), np.array([0.02, -0.05])
+    form = form_of(COUPLING=0.4, CUBIC=4e8, FRICTION=600.0)
+    springs, rate = (form, 0.7e8, 1e8), np.array([0.02, -0.05])
     place, dampers = (21e-6, -33e-6), (3e3, 5e3)
     *still, lost_at_rest = support.support_force(*springs, *dampers, *place, 0.0, 0.0)
     *moving, lost = support.support_force(*springs, *dampers, *place, *rate)
     assert lost_at_rest == 0.0
     assert lost == pytest.approx((np.array(moving) - still) @ rate, rel=1e-9)
+    rubbing = (np.array(moving) - still) - np.array(dampers) * rate
+    assert np.linalg.norm(rubbing) == pytest.approx(600.0, rel=1e-3)  # at a hundred times the slow speed
+    assert rubbing / np.linalg.norm(rubbing) == pytest.approx(rate / np.linalg.norm(rate), rel=1e-9)
     _, (c_xx, c_xy, c_yy) = support.support_tangent(*springs, *dampers, *place, *rate)
-    assert np.array([[c_xx, c_xy], [c_xy, c_yy]]) @ rate == pytest.approx(np.array(moving) - still, rel=1e-9)
+    for axis, slope in enumerate(((c_xx, c_xy), (c_xy, c_yy))):
+        ends = [rate + sign * 1e-7 * np.eye(2)[axis] for sign in (1.0, -1.0)]
+        forces = [support.support_force(*springs, *dampers, *place, *end)[:2] for end in ends]
+        assert (np.array(forces[0]) - forces[1]) / 2e-7 == pytest.approx(slope, rel=1e-6)
 
 
 def test_a_softening_spring_never_pulls():

@@ -62,6 +62,7 @@ def has(machine: Machine) -> frozenset[str]:
     marks = {
         "turned support axes": bearing.coupling,
         "cubic support": bearing.cubic,
+        "hysteretic support": bearing.friction,
         "foundation mode": bearing.foundation_share,
         "sensor lag": sensor.time_constant,
         "cross-axis sensitivity": sensor.cross_axis,
