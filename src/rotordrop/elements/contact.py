@@ -20,6 +20,11 @@ from rotordrop.physics.contact import contact_law, depth_at
 LINE_CONTACT = 10.0 / 9.0
 """Exponent of a line contact (Palmgren)."""
 
+WITH_LENGTH = 0.8 * LINE_CONTACT
+"""Exponent by which the stiffness of a line contact grows with its length (Palmgren)."""
+REFERENCE_WIDTH = 0.032
+"""Width of the race of the reference machine [m] (Neisi 2020)."""
+
 TYPICAL_LOADS = 5.0
 """Contact force at whose indentation the stiffness keeps its meaning when the exponent differs, over the mean
 static load of a bearing [1]: impacts that say something of the contact have it and more."""
@@ -31,7 +36,7 @@ class Contact(Description):
     """Contact between rotor and inner race, F = K δⁿ (1 + 1.5 λ δ̇)."""
 
     stiffness: V.ContactStiffness = follows(
-        "8e8 N/m^1.11, or Palmgren's line contact where 'length' is given"
+        "a fifth of Palmgren's line contact over the width of the race, or all of it over 'length'"
     )
     """Contact stiffness K [N/m^n]."""
     exponent: V.ContactExponent = default(LINE_CONTACT, "line contact (Palmgren), as in Neisi 2020")
@@ -93,9 +98,22 @@ class Contact(Description):
             value = palmgren_stiffness(self.length.value)
             why = f"Palmgren line contact over {self.length.value * 1e3:.4g} mm"
             return {"stiffness": Known(value=value, status="inferred", source=why, unit="N/m^n")}
-        why = "about a fifth of Palmgren's value for 32 mm: edges and waviness leave part of the length"
-        bounds = (2e8, 4e9)
-        return {"stiffness": Known(value=8e8, status="default", range=bounds, source=why, unit="N/m^n")}
+        return {"stiffness": _usual_stiffness(REFERENCE_WIDTH)}
+
+    def over(self, width: float) -> Contact:
+        """The contact over the width of a race [m], for a stiffness that was left out."""
+        if "stiffness" in self.model_fields_set or self.length is not None:
+            return self
+        return self.completed_with({"stiffness": _usual_stiffness(width)})
+
+
+def _usual_stiffness(width: float) -> Known:
+    value, low, high = ((width / REFERENCE_WIDTH) ** WITH_LENGTH * one for one in (8e8, 2e8, 4e9))
+    why = (
+        f"about a fifth of Palmgren's value for {width * 1e3:.3g} mm: edges and waviness leave part of the "
+        "length"
+    )
+    return Known(value=value, status="default", range=(low, high), source=why, unit="N/m^n")
 
 
 def refuse_other_unit(raw: Mapping[str, Any], usual: float) -> None:
@@ -114,7 +132,7 @@ def refuse_other_unit(raw: Mapping[str, Any], usual: float) -> None:
 
 def palmgren_stiffness(length: float) -> float:
     """Contact stiffness [N/m^(10/9)] of a line contact [m]: δ = 3.84e-5 Q^0.9 / l^0.8 in mm and N."""
-    per_mm = math.pow(3.84e-5, -LINE_CONTACT) * math.pow(1e3 * length, 0.8 * LINE_CONTACT)
+    per_mm = math.pow(3.84e-5, -LINE_CONTACT) * math.pow(1e3 * length, WITH_LENGTH)
     return per_mm * math.pow(1e3, LINE_CONTACT)
 
 

@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
 REFERENCE_MASS = 60.0
-"""Mass of the rotor for which the usual mass and stiffness of a support hold [kg]: that of the reference machine.
-The mass goes with it, the stiffness with its length, by the third root."""
+"""Mass of the rotor for which the usual mass and stiffness of a support hold [kg]: that of the reference
+machine. The mass goes with it, the stiffness with its length, by the third root."""
 
 _PRESENT = L.SUPPORT_FORM + law.PRESENT
 _COUPLING = L.SUPPORT_FORM + law.COUPLING
@@ -127,7 +127,8 @@ class Support(Description):
         if given and len(given) < len(_FOUNDATION):
             missing = next(name for name in _FOUNDATION if name not in given)
             raise Misfit(
-                f"the support has {given[0]!r} but no {missing!r}; a foundation needs {', '.join(_FOUNDATION)}",
+                f"the support has {given[0]!r} but no {missing!r}; a foundation needs "
+                f"{', '.join(_FOUNDATION)}",
                 (given[0],),
             )
 

@@ -157,7 +157,7 @@ class TouchdownBearing(Placed):
         return self.changed(bearing=inside, race=Race.model_validate(race))
 
     def left_out(self) -> dict[str, Any]:
-        """Give the race a width, mass and inertia that were left out, from the size of the bearing."""
+        """Give race and contact what was left out, from the size of the bearing."""
         if "width" in self.race.model_fields_set:
             width = self.race.width
         elif self.contact.length is not None:
@@ -168,7 +168,15 @@ class TouchdownBearing(Placed):
             width = Known(value=value, status="default", source=f"{why}; a sleeve differs", unit="m")
         race = self.bearing.race_of_size(self.race, width, self.bore_radius.value)
         heat = {} if self.thermal is None else {"thermal": self.thermal.beside(self, race)}
-        return {"race": race, "mount": self.mount.beside(self.support.stiffness), **heat}
+        contact, mount = self.contact.over(width.value), self.mount.beside(self.support.stiffness)
+        return {"race": race, "contact": contact, "mount": mount, **heat}
+
+    def under(self, rotor_mass: float) -> TouchdownBearing:
+        """The bearing under a rotor of a mass [kg], for values of its support that were left out."""
+        support = self.support.under(rotor_mass)
+        if support is self.support:
+            return self
+        return self.completed_with({"support": support, "mount": self.mount.beside(support.stiffness)})
 
 
 MODEL_GAP_ERROR = 0.008

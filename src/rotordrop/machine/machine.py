@@ -176,7 +176,7 @@ class Machine(Description):
                 )
 
     def left_out(self) -> dict[str, Any]:
-        """Share out the balance grade, complete the AMBs, assign the sensors to bearings."""
+        """Share out the balance grade, complete supports and AMBs, assign the sensors to bearings."""
         rotor, nodes = self.rotor, self.rotor.node_positions
         carried = rotor.mass / max(1, len(self.ambs))
 
@@ -188,6 +188,7 @@ class Machine(Description):
             return sensor.completed_with({"bearing": nearest.name})
 
         values: dict[str, Any] = {
+            "touchdown_bearings": tuple(one.under(rotor.mass) for one in self.touchdown_bearings),
             "clearances": tuple(one.completed_with(one.completed(rotor)) for one in self.clearances),
             "ambs": tuple(amb.completed_with(amb.completed(carried)) for amb in self.ambs),
             "sensors": tuple(assigned(sensor) for sensor in self.sensors if not sensor.lost),
@@ -257,7 +258,7 @@ class Machine(Description):
                 raise UsageError(f"cannot set {stated} (SI units): {_reasons(error)}") from error
         copy = self.completed_with(parts)
         copy.__pydantic_fields_set__.update(parts)
-        if parts.keys() - {"touchdown_bearings", "speed"}:
+        if parts.keys() - {"speed"}:
             copy.__dict__.update(copy.left_out())
         return copy
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from rotordrop.elements.catalog.lookup import find_bearing
 from rotordrop.elements.rotor import Rotor
+from rotordrop.elements.support import REFERENCE_MASS
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.schema import field_meanings
@@ -245,7 +246,7 @@ def _supports(said: str, mass: float, ends: int) -> list[dict[str, Any]]:
     supports = []
     for text in texts * (ends // len(texts)):
         if text in _SUPPORTS:
-            guess, factor = _SUPPORTS[text] * (mass / 60.0) ** (1.0 / 3.0), _SUPPORT_REACH
+            guess, factor = _SUPPORTS[text] * (mass / REFERENCE_MASS) ** (1.0 / 3.0), _SUPPORT_REACH
         else:
             guess = in_si(text, "stiffness", "support")
             factor = _ONE_FOR_BOTH if len(texts) < ends else _SUPPORT_RANGE

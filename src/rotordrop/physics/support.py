@@ -26,8 +26,8 @@ FRICTION = 6
 N_ENTRIES = 7
 
 SLOW = 1e-3
-"""Speed [m/s] below which friction in a support gives way like a damper: small against the 10 to 100 mm/s of a
-support under impacts, which follow from the speed of a fall through the air gap (chosen)."""
+"""Speed [m/s] below which friction in a support gives way like a damper: small against the 10 to 100 mm/s of
+a support under impacts, which follow from the speed of a fall through the air gap (chosen)."""
 
 LARGEST_SOFTENING = 0.3
 """Part of the linear force that a softening cubic term may take away [1]: the slope stays positive."""

@@ -160,3 +160,38 @@ def test_another_node_is_another_place_whether_node_or_position_was_given(descri
     moved = described.changed(touchdown_bearings=(first.changed(node=last.node - 2), last))
     assert [bearing.node for bearing in moved.touchdown_bearings] == [last.node - 2, last.node]
     assert first.changed(air_gap="300 um").node == first.node
+
+
+def test_what_is_left_out_of_a_support_goes_with_the_rotor(small_text, changed):
+    light = loads_machine(small_text)
+    heavy = loads_machine(changed(('mass = "5 kg"', 'mass = "5000 kg"')))
+    size = heavy.rotor.mass / light.rotor.mass
+    assert size > 100.0
+    one, other = (machine.bearing("DE").support for machine in (light, heavy))
+    assert other.mass.value == pytest.approx(size * one.mass.value, rel=1e-12)
+    assert other.stiffness.value == pytest.approx(size ** (1 / 3) * one.stiffness.value, rel=1e-12)
+    assert one.mass.value / light.rotor.mass == pytest.approx(40.0 / 60.0, rel=1e-12)
+    assert other.mass.range[1] / other.mass.value == pytest.approx(10.0)
+    for name in ("mass", "stiffness"):
+        assert getattr(other, f"{name}_horizontal").value == getattr(other, name).value
+    critical = 2.0 * math.sqrt(other.mass.value * other.stiffness.value)
+    assert other.damping.value == pytest.approx(0.025 * critical, rel=1e-12)
+
+
+def test_another_value_of_a_bearing_leaves_its_support_under_the_same_rotor(changed):
+    heavy = loads_machine(changed(('mass = "5 kg"', 'mass = "5000 kg"')))
+    other = heavy.with_values({"DE.air_gap": 3e-4, "NDE.support.stiffness": 3e8})
+    assert other.bearing("DE").support == heavy.bearing("DE").support
+    assert other.bearing("NDE").support.stiffness.value == 3e8
+    assert other.bearing("NDE").support.mass.value == heavy.bearing("NDE").support.mass.value
+
+
+def test_a_contact_left_out_goes_with_the_width_of_the_race(small_text, changed):
+    narrow = loads_machine(small_text).bearing("DE")
+    wide = loads_machine(
+        changed(('bearing = { designation = "XCB71914-E" }', 'bearing = { designation = "B71960-C" }'))
+    ).bearing("NDE")
+    ratio = wide.race.width.value / narrow.race.width.value
+    assert ratio > 2.0
+    found = wide.contact.stiffness.value / narrow.contact.stiffness.value
+    assert found == pytest.approx(ratio ** (8.0 / 9.0), rel=1e-9)
