@@ -580,6 +580,12 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
     assert found.remedy.startswith("use the machine file from before that estimate")
 
 
+def test_a_single_sensor_is_refused_in_words(drop, machine):
+    alone = replace(drop, signals=drop.signals[:, :1].copy(), sensors=drop.sensors[:1])
+    with pytest.raises(RecordError, match=r"has one sensor \(S_NDE_A at"):
+        check_record(alone, machine.model_copy(update={"sensors": machine.sensors[:1]}))
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("recorded", ["alone", "with its tail"])
 def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_named(

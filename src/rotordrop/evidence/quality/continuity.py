@@ -398,7 +398,8 @@ def _uneven(record: Record, noise: Array) -> list[Finding]:
     velocity = (signals[_ORDER - 1 : -1] - signals[1 : 1 - _ORDER]) / (_ORDER - 2)
     speed = np.linalg.norm(velocity, axis=1)
     fast = speed > np.median(speed[speed > 0.0]) if np.any(speed > 0.0) else speed > 0.0
-    if int(np.sum(fast)) < _MOVES:
+    freedom = signals.shape[1] - 1
+    if int(np.sum(fast)) < _MOVES or freedom == 0:  # a single channel has nothing across its motion
         return []
     # of the faster half the fastest, where a wrong time shows most
     fast &= speed >= np.sort(speed[fast])[-max(_MOVES, int(np.sum(fast)) // 4)]
@@ -406,7 +407,6 @@ def _uneven(record: Record, noise: Array) -> list[Finding]:
     along = np.sum(scatter[fast] * unit, axis=1)
     across = scatter[fast] - along[:, None] * unit
     with_motion = SIGMA_OF_MEDIAN * float(np.median(np.abs(along)))
-    freedom = signals.shape[1] - 1
     middle = freedom * (1.0 - 2.0 / (9.0 * freedom)) ** 3  # median of the chi square
     aside = float(np.sqrt(np.median(np.sum(across**2, axis=1)) / middle))
     if with_motion < _UNEVEN * aside:
