@@ -21,7 +21,7 @@ AT_LINES = {"tangent": np.array([100.0]), "with support mass": np.array([90.0])}
 
 
 def said(hertz, direction="forward", nominal=550.0):
-    crossing = SimpleNamespace(speed=2.0 * math.pi * hertz, direction=direction, damping_ratio=0.025)
+    crossing = Crossing(speed=2.0 * math.pi * hertz, line=0, direction=direction, damping_ratio=0.025)
     machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * nominal))
     found, diagrams = (
         SimpleNamespace(at_lines=AT_LINES, followed=False),
@@ -46,7 +46,7 @@ def test_a_mode_further_off_or_against_the_spin_is_none():
 
 
 def test_the_verdict_stands_first_and_says_that_nothing_is_too_near():
-    crossing = SimpleNamespace(speed=2.0 * math.pi * 455.0, direction="forward", damping_ratio=0.025)
+    crossing = Crossing(speed=2.0 * math.pi * 455.0, line=0, direction="forward", damping_ratio=0.025)
     machine = SimpleNamespace(speed=SimpleNamespace(nominal=2.0 * math.pi * 550.0))
     found, diagrams = (
         SimpleNamespace(at_lines=AT_LINES, followed=False),
@@ -55,7 +55,7 @@ def test_the_verdict_stands_first_and_says_that_nothing_is_too_near():
     first, *others = _verdict(machine, found, diagrams)
     assert first.level == "good" and "No critical speed of the held rotor is nearer" in first.text
     assert {one.level for one in others} == {"notice"}
-    near = SimpleNamespace(speed=2.0 * math.pi * 548.0, direction="forward", damping_ratio=0.025)
+    near = Crossing(speed=2.0 * math.pi * 548.0, line=0, direction="forward", damping_ratio=0.025)
     levels = [one.level for one in _verdict(machine, found, {"AMBs": SimpleNamespace(crossings=(near,))})]
     assert levels[0] == "bad" and "good" not in levels
 
