@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import RecordError
 from rotordrop.evidence.clearance import Clearance, measure_clearance, wear_between
@@ -31,7 +31,6 @@ from rotordrop.machine import Machine, example_machine
 from rotordrop.record.record import Record
 from rotordrop.rotor.statics import bearing_load_shares
 
-Array = NDArray[np.float64]
 RESULTS = Path(__file__).parent / "results" / "lifts.json"
 KINDS = ("few places", "few places, dirt", "few places, wear", "rolled, dirt, wear", "few places, dirt, wear")
 

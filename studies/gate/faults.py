@@ -10,15 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt
 
+from rotordrop.arrays import Array
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
 from rotordrop_bench.rotors import bench_rotor
 
-Array = NDArray[np.float64]
 Random = np.random.Generator
 Change = Callable[[Array, Record, Random], Array | None]
 

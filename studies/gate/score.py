@@ -41,12 +41,12 @@ from faults import FAULTS, Given
 from records import NAMES, kept, made, name_of, rotor_of
 
 from rotordrop import example_machine, read_record
+from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, RotordropError
 from rotordrop.estimation import estimate_drop
 from rotordrop.evidence import check_record
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.recorder import check_blocks
-from rotordrop.record.recording import Array
 
 LIGHT, HEAVY = (0, 1, 2, 3, 8), (4, 5, 6, 7, 9)
 """Places of the rotors up to 60 kg and of the heavier ones in `NAMES`."""

@@ -13,7 +13,6 @@ import time
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from common import (
     SUPPORT,
     WITHOUT_ZERO_AND_GAIN_ERRORS,
@@ -26,8 +25,8 @@ from common import (
     with_right_sensors,
     write,
 )
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
 from rotordrop.evidence.rest import identify_air_gap
@@ -42,8 +41,6 @@ from rotordrop.replay.support_and_friction import (
 )
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop_bench import hidden_machine, synthesize_drop
-
-Array = NDArray[np.float64]
 
 UNTIL = 0.06
 

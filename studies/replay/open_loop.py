@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 from common import informed, known_machine, radians, size_of, speed_of, value_of, write
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.evidence.evidence import known as present
 from rotordrop.evidence.initial_state import InitialState, initial_state_of
@@ -39,8 +39,6 @@ from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 from rotordrop_bench import HiddenMachine, hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
-
-Array = NDArray[np.float64]
 
 DURATION = 0.2
 EARLY = 0.02

@@ -24,8 +24,8 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
@@ -39,7 +39,6 @@ from rotordrop.twin.problems import drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.recording import SyntheticDrop
 
-Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 SPREAD = math.sqrt(3.0)
 """Distance of the sigma points in standard deviations: the right one for a normal distribution."""

@@ -27,6 +27,7 @@ for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine
@@ -38,7 +39,6 @@ from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.violations import Violations
 
-Array = NDArray[np.float64]
 HERE = Path(__file__).parent
 SAMPLED = (
     "air_gap",

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.whirl_spells import WhirlSpell, whirl_spells
 
-Array = NDArray[np.float64]
 RATE, GAP, NOISE, LENGTH = 20_000.0, 250e-6, 1e-6, 0.5
 
 

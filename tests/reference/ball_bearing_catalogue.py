@@ -8,12 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.physics.ball_bearing import row_approach, row_axial_force, row_axial_stiffness
 from rotordrop.physics.hertz import contacts_in_series, race_contact
-
-Array = NDArray[np.float64]
 
 _LOWEST_CONFORMITY, _HIGHEST_CONFORMITY = 0.5 + 1e-6, 1.0
 _BISECTIONS = 60

@@ -6,16 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import BearingConstants, row_axial_force
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.physics.elementary import power
 from rotordrop.physics.hertz import Contact, point_contact
 from rotordrop.physics.pendulum import period_ratio, small_frequency
-
-Array = NDArray[np.float64]
 
 _PALMGREN = 3.84e-5
 """Palmgren's line contact ``δ = 3.84e-5 Q^0.9 / l^0.8`` in millimetre and newton."""

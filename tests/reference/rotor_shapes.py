@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.physics.linear_algebra import product
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, free_free_modes, rigid_modes
 from rotordrop.rotor.reduction import RotorBasis
-
-Array = NDArray[np.float64]
 
 
 def elastic_flexibility(fe: RotorFE, nodes: Sequence[int], omega: float = 0.0) -> Array:

@@ -21,6 +21,7 @@ from tests.reference.ball_bearing_catalogue import (
 )
 from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 
+from rotordrop.arrays import Array
 from rotordrop.elements.catalog.lookup import CatalogueBearing, designations, find_bearing
 from rotordrop.physics import hertz
 from rotordrop.physics.ball_bearing import BearingConstants, axial_rigidity, bearing_constants
@@ -30,7 +31,6 @@ from rotordrop.severity.fatigue import ball_row, share_by_16281
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
-Array = NDArray[np.float64]
 CLASSES = ("light", "medium", "heavy")
 
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import Compute, check, checks_of, load_case
-from numpy.typing import NDArray
 from rigid_machine import rigid_model
 from scipy.integrate import solve_ivp
 from tests.reference import closed_forms, impact
 
+from rotordrop.arrays import Array
 from rotordrop.physics import whirl
 from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
@@ -27,7 +27,6 @@ from rotordrop.simulate.drop import simulate_drop
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
-Array = NDArray[np.float64]
 
 
 def hunt_crossley_force(delta: float, rate: float, K: float, n: float, lam: float) -> float:

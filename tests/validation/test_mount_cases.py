@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import Compute, checks_of
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rotordrop.arrays import Array
 from rotordrop.elements.mount import Mount
 from rotordrop.physics import columns as L
 from rotordrop.physics import mount
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
-Array = NDArray[np.float64]
 
 
 def numbers_of(**elements: Any) -> Array:

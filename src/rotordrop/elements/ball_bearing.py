@@ -237,6 +237,11 @@ class BallBearing(RaceBearing):
             )
 
     @property
+    def rows(self) -> int:
+        """Number of rows of balls."""
+        return 1 if self.arrangement == "single" else 2
+
+    @property
     def sprung(self) -> bool:
         """Whether springs press on the outer rings."""
         return self.preload_kind == "spring"
@@ -461,7 +466,7 @@ class BallBearing(RaceBearing):
 
     def usual_race_width(self) -> tuple[float, str]:
         """Width of all rows [m], and why."""
-        rows = 1 if self.arrangement == "single" else 2
+        rows = self.rows
         if self.width is not None:
             return rows * self.width.value, "width of all rows"
         return rows * 1.6 * self.ball_diameter.value, "1.6 ball diameters per row"

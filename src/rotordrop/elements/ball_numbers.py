@@ -204,7 +204,7 @@ class BallNumbers(BearingNumbers):
     def ratings(self) -> Ratings:
         """Load ratings as given, else by ISO 76 and ISO 281 from the balls."""
         b = self.balls
-        angle, rows = float(b.contact_angle), 1 if b.arrangement == "single" else 2
+        angle, rows = float(b.contact_angle), b.rows
         row = (b.ball_count, float(b.ball_diameter), float(b.pitch_diameter), angle)
         given = [b.static_load_rating, b.dynamic_load_rating]
         static, dynamic = (

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit
 from rotordrop.elements.parameter import (
@@ -32,8 +30,6 @@ from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.physics import mount as mount_law
 from rotordrop.physics import support as law
-
-Array = NDArray[np.float64]
 
 _DAMPING_RATIO = 0.025
 REFERENCE_MASS = 60.0

@@ -104,7 +104,7 @@ class Thermal(Description):
         """The table with what it leaves out, from the size of its bearing and race."""
         balls, given = bearing.bearing, self.model_fields_set
         radius, width, mass = bearing.bore_radius.value, race.width.value, race.mass.value
-        rows = 1 if balls.arrangement == "single" else 2
+        rows = balls.rows
         specific, expansion = _BALL_HEAT[balls.ball_material]
         ball = balls.ball_density.value * math.pi / 6.0 * balls.ball_diameter.value**3
         ring, ring_radius, ring_width = outer_ring(balls)
@@ -141,10 +141,15 @@ class Thermal(Description):
     def fill_arms(row: Array, balls: BallBearing) -> None:
         """Write what grows: radii of the contacts, and the rows of the bearing."""
         entries, pitch = row[L.THERMAL : L.THERMAL_END], float(balls.pitch_diameter)
-        across = float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
+        across = _across(balls)
         entries[law.INNER_RADIUS], entries[law.OUTER_RADIUS] = 0.5 * (pitch - across), 0.5 * (pitch + across)
         entries[law.BALL_REACH], entries[law.ROW_BALLS] = across, balls.ball_count
-        entries[law.ROWS] = 1 if balls.arrangement == "single" else 2
+        entries[law.ROWS] = balls.rows
+
+
+def _across(balls: BallBearing) -> float:
+    """Radial distance of the two contacts of a ball [m]."""
+    return float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
 
 
 def _force_at(bearing: TouchdownBearing, omega: float) -> Callable[[float], float]:
@@ -178,8 +183,7 @@ def steady_limit(bearing: TouchdownBearing, omega: float) -> tuple[float, float]
     if heat is None or balls.sprung or not numbers_of(bearing).held:
         return None
     arm = 0.5 * float(bearing.race.drag_coefficient) * float(balls.pitch_diameter)
-    across = float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
-    by_warmth = float(heat.expansion) * 0.5 * (float(balls.pitch_diameter) - across)
+    by_warmth = float(heat.expansion) * 0.5 * (float(balls.pitch_diameter) - _across(balls))
     share = 1.0 - float(heat.ball_share)
     if share * arm * omega * by_warmth == 0.0:
         return None

@@ -20,7 +20,7 @@ from rotordrop.evidence.rest import PUSH, of_few, sag_under, stay
 from rotordrop.known import NINETY
 from rotordrop.record.profile import Profile, rules_of
 from rotordrop.record.record import Record, open_record
-from rotordrop.series import noise_by_differences
+from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -346,7 +346,7 @@ def _circle(wall: Array) -> tuple[Array, float, float]:
         distance = np.hypot(*offset.T)
         jacobian = np.column_stack([offset / distance[:, None], np.ones(len(wall))])
         rest = distance - radius
-        scale = max(1.4826 * float(np.median(np.abs(rest))), 0.2e-6)
+        scale = max(SIGMA_OF_MEDIAN * float(np.median(np.abs(rest))), 0.2e-6)
         weights = np.minimum(1.0, 1.5 * scale / np.maximum(np.abs(rest), 1e-12))
         step = np.linalg.lstsq(jacobian * weights[:, None], rest * weights, rcond=None)[0]
         centre, radius = centre + step[:2], radius + float(step[2])

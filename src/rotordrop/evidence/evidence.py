@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, RecordError, RotordropError
 from rotordrop.evidence.events import (
     AFTER_FALL,
@@ -28,7 +29,6 @@ from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.rest import identify_air_gap, rest_of, resting_record
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
-from rotordrop.record.recording import Array
 from rotordrop.record.speed import RotorAngle, rotor_angle
 
 if TYPE_CHECKING:

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.evidence.free_rotor import ComplexArray, FreeRotor, Responses
+from rotordrop.evidence.free_rotor import FreeRotor, Responses
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.sensing import sensor_sigmas
-from rotordrop.record.recording import Array
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record

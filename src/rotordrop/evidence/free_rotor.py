@@ -11,15 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.machine import Machine
 from rotordrop.record.axes import Plane
-from rotordrop.record.recording import Array
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.statics import rest_on
 from rotordrop.units import GRAVITY
-
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 GRID = 1e-5
 """Step of the tabulated responses [s]: straight lines between them are off by 0.1 nm in a fall."""
@@ -31,7 +29,7 @@ _SAG = 1e-7
 """Deflection g/ω² of a mode [m] from which it is among them: a fifth of the noise of a good sensor.
 
 Source: with six modes the fall of a rotor of 5 t that bends at 39 Hz and more was dated 0.21 ms early, six of
-its standard errors, and another one 0.38 ms; with the modes of this limit by 0.001 and 0.003 ms.
+its standard errors, and another one 0.38 ms; with the modes of this limit by 0.001 and 0.004 ms.
 """
 
 

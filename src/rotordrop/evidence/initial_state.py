@@ -15,12 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.contacts import local_polynomial
 from rotordrop.evidence.events import RINGING, DropInstant, PowerOff
 from rotordrop.evidence.fall import REMANENT_TIME
-from rotordrop.evidence.free_rotor import ComplexArray, Held, held_by, motion_of
+from rotordrop.evidence.free_rotor import Held, held_by, motion_of
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.rest import AirGap, Rest
 from rotordrop.evidence.sensing import Sensing
@@ -28,7 +29,6 @@ from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
-from rotordrop.record.recording import Array
 from rotordrop.record.speed import RotorAngle
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import smallest_gap

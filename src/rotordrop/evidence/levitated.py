@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotordrop.arrays import Array
+from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import NoDropError
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
     from rotordrop.record.speed import RotorAngle
 
-ComplexArray = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 MAINS = (50.0, 60.0)
 """Public mains frequencies, one of which is always looked for [Hz]."""

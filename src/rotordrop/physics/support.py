@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel
-
-Array = NDArray[np.float64]
 
 # Entries of a form; SI units. All at zero is the plain support.
 PRESENT = 0

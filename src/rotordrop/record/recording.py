@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from rotordrop.arrays import Array
 
 SPEED_UNITS = ("Hz", "rpm", "rad/s")
 """Units by which a channel is known to be a shaft speed."""

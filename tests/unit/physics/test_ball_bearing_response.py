@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from tests.reference.closed_forms import bearing_equilibrium
 
+from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
@@ -17,7 +17,6 @@ from rotordrop.physics.ball_bearing_response import bearing_response, simple_rad
 from rotordrop.physics.ball_set import ball_set_entries, ball_set_force, ball_set_gradient
 from rotordrop.physics.hertz import compliance
 
-Array = NDArray[np.float64]
 Bearing = Callable[..., BallBearingGeometry]
 SPACING = 0.016
 ARRANGEMENTS = ("X", "O", "tandem", "single")

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.replay.least_squares import (
     Schedule,
@@ -19,7 +19,6 @@ from rotordrop.replay.least_squares import (
     sobol_starts,
 )
 
-Array = NDArray[np.float64]
 RNG = np.random.default_rng(4)
 
 

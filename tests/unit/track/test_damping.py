@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.track import calibration
 from rotordrop.track.calibration import MOST_REPEATS, Stage, converged, track
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import parameter_sample
-
-Array = NDArray[np.float64]
 
 
 def test_damping_holds_the_parameters_to_the_pass_before(impacts: DropProblem) -> None:

@@ -11,7 +11,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.quality.motion import first_motion
 from rotordrop.evidence.quality.recorder import bridged
-from rotordrop.series import noise_by_differences, runs_of
+from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences, runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def _spikes(record: Record, channel: str, values: Array) -> Finding | None:
 def _standing_out(values: Array) -> tuple[NDArray[np.intp], Array]:
     """Single samples off the line through their neighbours: their places less one, and by how much [m]."""
     middle = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-    limit = max(_SPIKE * 1.4826 * float(np.median(middle)), _SPIKE_LEAST)
+    limit = max(_SPIKE * SIGMA_OF_MEDIAN * float(np.median(middle)), _SPIKE_LEAST)
     spikes = np.flatnonzero((middle > limit) & (np.abs(values[2:] - values[:-2]) < 0.5 * middle))
     if len(spikes):  # the steps of a coarse converter are none
         spikes = spikes[middle[spikes] > _SPIKE_STEPS * _step_of(values)]

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
-from rotordrop.record.recording import Array
 from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
 
 if TYPE_CHECKING:

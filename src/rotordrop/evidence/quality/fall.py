@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.events import Beginning, CoarseDrop, find_fall
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import planar_of
-from rotordrop.record.recording import Array
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import NoDropError
 from rotordrop.evidence.events import expected_gap, fall_accelerations, nominal_gaps, planes_at_bearings
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY
-from rotordrop.record.recording import Array
 from rotordrop.units import GRAVITY, format_quantity
 
 if TYPE_CHECKING:

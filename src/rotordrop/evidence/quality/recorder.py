@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rotordrop.arrays import Array
 from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.finding import Finding, Kind
-from rotordrop.record.recording import Array
-from rotordrop.series import runs_of
+from rotordrop.series import SIGMA_OF_MEDIAN, runs_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def _jumps(record: Record) -> list[Finding]:
     # the median of four, several times faster than by sorting
     around = 0.5 * (np.sum(near, axis=0) - np.max(near, axis=0) - np.min(near, axis=0))
     kink = np.abs(step[2:-2] - around)
-    usual = np.maximum(1.4826 * np.median(kink, axis=0), 1e-12)
+    usual = np.maximum(SIGMA_OF_MEDIAN * np.median(kink, axis=0), 1e-12)
     finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])
     limit = np.maximum(np.maximum(12.0 * usual, 2e-6), 4.0 * np.where(np.isfinite(finest), finest, 0.0))
     enough = max(2, signals.shape[1] // 2 + 1)
