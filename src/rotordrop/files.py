@@ -198,6 +198,7 @@ def read_hdf5(path: Path, remedy: str, *, always_sealed: bool = False) -> Iterat
 
 def hdf5_is_sealed(path: Path, remedy: str) -> bool:
     """Whether a digest stands behind an HDF5 file; a file that it is not the digest of is refused."""
+    require_file(path, remedy)
     if (holds := _hdf5_seal(path, *_state_of(path))) is False:
         raise DamagedFileError(f"{path} is damaged: it is not what rotordrop wrote; {remedy}")
     return bool(holds)
@@ -271,6 +272,16 @@ DIGEST = "document_sha256"
 """Member of a table that holds the digest of the others."""
 
 
+def require_file(path: str | os.PathLike[str], remedy: str) -> None:
+    """Refuse what is no file where the program keeps one: a pipe would keep who opens it waiting for ever.
+
+    What stands there may be a folder, a pipe, a socket, a device or a link that leads nowhere; a place where
+    nothing stands is none of these.
+    """
+    if os.path.lexists(path) and not Path(path).is_file():
+        raise DamagedFileError(f"{path} is damaged: it is no file; {remedy}")
+
+
 def clear_of_no_file(path: Path) -> None:
     """Remove what is no file in the place of one that is written anew: a folder, a pipe, a link."""
     if path.is_dir() and not path.is_symlink():
@@ -293,8 +304,7 @@ def digest_of_values(content: Mapping[str, Any]) -> str:
 
 def read_sealed(path: str | os.PathLike[str], remedy: str) -> dict[str, Any]:
     """Read a sealed JSON table; one that holds other values than were written is refused with the way out."""
-    if os.path.lexists(path) and not Path(path).is_file():  # a pipe would keep its reader waiting for ever
-        raise DamagedFileError(f"{path} is damaged: it is no file; {remedy}")
+    require_file(path, remedy)
     try:
         content = json.loads(Path(path).read_bytes())
     except (ValueError, RecursionError):

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
-from rotordrop.files import require_place
+from rotordrop.files import require_file, require_place
 
 WAIT = 60.0
 """How long a writer waits for others [s]; chosen, not measured."""
@@ -192,7 +192,9 @@ def _connected(file: Path, writing: bool) -> sqlite3.Connection:
             raise OutputError(
                 f"{file} may only be read; copy it to where you may write, or ask for the right"
             )
-    wal, _ = _left_by_killed(file)
+    wal, journal = _left_by_killed(file)
+    for left in (wal, journal):
+        require_file(left, "remove it: no program leaves such a thing beside a log")
     if wal.is_file() and not _is_whole(wal.read_bytes()):
         raise DamagedFileError(
             f"{wal} is damaged, and with it the drops that a program added last before it was killed. Take a "

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.errors import OutputError, SimulationError
-from rotordrop.files import atomic_path
+from rotordrop.files import atomic_path, require_file
 from rotordrop.rotor.parameters import DropModel
 
 Arrays = dict[str, NDArray[np.float64]]
@@ -90,6 +90,7 @@ def load_checkpoint(folder: Path, digest: str) -> Arrays | None:
     A checkpoint of another machine, other settings or another version is refused.
     """
     path = folder / _CHECKPOINT
+    require_file(path, f"remove {folder} and start the run again")
     if not path.exists():
         return None
     try:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
-from rotordrop.files import new_hdf5, read_hdf5
+from rotordrop.files import new_hdf5, read_hdf5, require_file
 from rotordrop.simulate.checkpoint import part_path
 from rotordrop.simulate.coast_down_result import CoastDownResult, WindowStatistics
 from rotordrop.simulate.fingerprint import fingerprint
@@ -61,6 +61,7 @@ class Frame:
 
 def write_part(path: Path, samples: Mapping[str, NDArray[Any]], contact_log: Array) -> None:
     """Write the samples and the ended contacts of one window, complete or not at all."""
+    require_file(path, f"remove {path.parent} and start the run again")
     with new_hdf5(path) as file:
         for name, values in samples.items():
             file.create_dataset(name, data=values)

@@ -33,6 +33,7 @@ from rotordrop.files import (
     digest_of_file,
     process_runs,
     read_sealed,
+    require_file,
     write_json,
     write_text,
 )
@@ -136,6 +137,7 @@ def open_folder(study: Study, path: str | Path) -> StudyFolder:
         plan["rotordrop"] = there["rotordrop"]
         plan[TAKEN_OVER] = folder.finished()
         for shard in folder.finished():
+            require_file(folder.shard_path(shard), "remove it, and run the study again")
             raw = folder.shard_path(shard).read_bytes()
             if raw[-_SEAL:] != _seal(study, raw[:-_SEAL]):
                 _write_sealed(folder.shard_path(shard), study, raw)
@@ -145,6 +147,7 @@ def open_folder(study: Study, path: str | Path) -> StudyFolder:
                 part.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"{folder.path}: cannot make the study folder: {error.strerror}") from error
+        require_file(folder.path / "machine.toml", "remove it, and run the study again")
         write_text(folder.path / "machine.toml", machine_text(study.machine))
     plan["machine_sha256"] = digest_of_file(folder.path / "machine.toml")
     write_json(existing, plan, sealed=True)  # last: a folder with a plan is complete
@@ -352,6 +355,7 @@ def _made(file: Path) -> bool:
 
 def _abandoned(file: Path) -> bool:
     """Whether whoever made a claim is gone: a dead process of this computer, or no sign of life."""
+    require_file(file, "remove it, and run the study again: finished shards stay")
     try:
         age = time.time() - file.stat().st_mtime
         owner = json.loads(file.read_text(encoding="utf-8"))

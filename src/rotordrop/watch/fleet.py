@@ -15,6 +15,7 @@ from pathlib import Path
 
 from rotordrop.document import parse_toml, read_toml
 from rotordrop.errors import UsageError
+from rotordrop.files import require_file
 from rotordrop.machine import load_machine
 from rotordrop.record.profile import load_profile
 from rotordrop.report.limits import read_limits
@@ -85,6 +86,8 @@ def _within(one: Watched, other: Watched) -> bool:
 def head_of(record: Path) -> str:
     """The lines with a letter at the beginning of a record, whatever its encoding; empty where unreadable."""
     with suppress(OSError, EOFError):
+        if not record.is_file():
+            return ""
         with gzip.open(record) if record.suffix == ".gz" else record.open("rb") as stream:
             text = stream.read(HEAD).replace(b"\0", b"").decode("latin-1")
         lines = [line for line in text.splitlines() if any(sign.isalpha() for sign in line)]
@@ -107,6 +110,7 @@ def read_fleet(folder: Path) -> Fleet:
     files = {file.name: file for file in sorted(folder.glob("*.toml"))}
     machines = {}
     for name, file in files.items():
+        require_file(file, "put a machine file, a profile or limits there, or remove it")
         serial = name.removesuffix(".toml")
         if serial.endswith((".profile", ".limits")) or serial in ("profile", "limits"):
             continue

@@ -19,6 +19,7 @@ from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import (
     atomic_folder,
     atomic_path,
+    clear_of_no_file,
     digest_of_file,
     make_folder,
     read_sealed,
@@ -120,7 +121,8 @@ class Kept:
 
     def numbers(self) -> list[str]:
         """Numbers of all drops, those made on the page included."""
-        return [name for name in os.listdir(self.space.jobs_folder) if len(name) == DIGITS]  # noqa: PTH208
+        names = os.listdir(self.space.jobs_folder)  # noqa: PTH208
+        return [name for name in names if len(name) == DIGITS and self.job(name).path.is_dir()]
 
     def take(self, one: Arrived) -> str:
         """Copy a record under the number of its content, if nobody has; its number.
@@ -193,9 +195,10 @@ def put(job: Job, files: Mapping[str, Path]) -> dict[str, Any]:
             stored = stored_as(kind, name)
         except UsageError:
             stored = kind  # without a suffix: the reader says so
-        with atomic_path(job.path / "files" / stored) as place:
-            shutil.copyfile(file, place)
         kept = job.path / "files" / stored
+        clear_of_no_file(kept)
+        with atomic_path(kept) as place:
+            shutil.copyfile(file, place)
         entries[role] = {
             "name": labelled(name),
             "stored": stored,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import RotordropError
+from rotordrop.files import require_file
 from rotordrop.ledger.book import used_shares
 from rotordrop.report.content import Column, Link, ReportContent, Section, Statement, table
 from rotordrop.report.page import write_page
@@ -28,6 +29,7 @@ RANKS = ("failed", "estimated", "quarantined", "looked", "superseded")
 
 def write_overview(kept: Kept, fleet: Fleet, log: str, file: Path) -> bool:
     """Write the page, on which is every machine of the fleet; true when that is done."""
+    require_file(file, "remove it: the overview is written there")
     rows, counts = [], dict.fromkeys(RANKS, 0)
     last: dict[str, dict[str, Any]] = {}
     drops: dict[str, int] = {}

@@ -20,7 +20,7 @@ from typing import Any
 
 from rotordrop.errors import OutputError, RecordError, RotordropError, UsageError
 from rotordrop.estimate.published import read_drop
-from rotordrop.files import digest_of_file
+from rotordrop.files import clear_of_no_file, digest_of_file
 from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate
 from rotordrop.watch.fleet import Fleet, read_fleet
 from rotordrop.watch.kept import Arrived, Kept, arrived, keep_status, put, status_of
@@ -162,6 +162,7 @@ class Watcher:
 
     def _lock(self, job: Job) -> None:
         with suppress(FileNotFoundError):  # removed on the page
+            clear_of_no_file(job.path / "watch.lock")
             lock = os.open(job.path / "watch.lock", os.O_RDWR | os.O_CREAT, 0o600)
             if take_lock(lock):
                 self._mine[job.number] = lock

@@ -21,6 +21,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from tests.no_file import NO_FILE, in_time, on_posix
 from tests.published import bearing, published, value
 from tests.unit.ledger.test_ledger import DROP
 from tests.unit.study.test_study import study_with
@@ -31,7 +32,7 @@ from rotordrop.cli.app import run
 from rotordrop.document import read_document
 from rotordrop.errors import DamagedFileError, RotordropError
 from rotordrop.estimate.published import read_drop
-from rotordrop.files import new_hdf5, write_json
+from rotordrop.files import clear_of_no_file, new_hdf5, write_json
 from rotordrop.ledger import add_drop
 from rotordrop.ledger.book import allow, read_log
 from rotordrop.machine.ross_files import read_ross, write_ross
@@ -342,6 +343,48 @@ def _damaged(whole: bytes, kind: str) -> list[tuple[str, bytes]]:
     found += [("empty", b""), ("a list", b"[]"), ("a table", b"{}"), ("noise", random.bytes(3000))]
     found += [("other text", b"\xff\xfe" * 40), ("deep", b"[" * 100_000)]
     return found
+
+
+OF_A_PERSON = ("machine", "rotor of ROSS", "profile", "estimate")
+"""Texts that a person names and may give through a pipe, as in ``rotordrop check <(make-machine)``."""
+
+
+@on_posix
+@pytest.mark.parametrize("kind", [kind for kind in WRITTEN if kind not in OF_A_PERSON])
+def test_what_is_no_file_is_named_and_keeps_nobody_waiting(kind, tmp_path):
+    file = WRITTEN[kind].make(tmp_path)
+    file.unlink()
+    for thing in NO_FILE.values():
+        thing(file)
+        with in_time(), pytest.raises(RotordropError, match=re.escape(file.name)):
+            WRITTEN[kind].read(file)
+        clear_of_no_file(file)
+
+
+@on_posix
+@pytest.mark.parametrize("thing", NO_FILE)
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        ("part of a coast-down", "part-000000.h5"),
+        ("machine of a study", "study/machine.toml"),
+        ("plan", "study/plan.json"),
+        ("log", "drops.db"),
+        ("log", "drops.db-journal"),
+        ("log", "drops.db-wal"),
+    ],
+)
+def test_what_is_no_file_where_one_is_written_is_named(kind, place, thing, tmp_path):
+    file = tmp_path / place
+    file.parent.mkdir(exist_ok=True)
+    NO_FILE[thing](file)
+    with in_time():
+        try:
+            WRITTEN[kind].make(tmp_path)
+        except RotordropError as refusal:
+            assert file.name in str(refusal)
+        else:
+            assert thing == "link that leads nowhere" and file.is_file()
 
 
 @pytest.mark.parametrize("kind", ["drop", "coast-down", "estimate", "plan"])

@@ -15,6 +15,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from tests.no_file import NO_FILE, in_time, on_posix
 
 from rotordrop import DropCase, example_machine, simulate_drop
 from rotordrop._version import __version__
@@ -273,18 +274,26 @@ def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_pa
         study_of(place)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
-@pytest.mark.parametrize("kind", [os.mkdir, os.mkfifo, lambda place: os.symlink("nowhere", place)])
-@pytest.mark.parametrize("part", ["shards/000001.npy", "plan.json", "machine.toml"])
-def test_what_is_no_file_in_a_study_is_named_and_put_aside(serial, tmp_path, part, kind):
+@on_posix
+@pytest.mark.parametrize("thing", NO_FILE)
+def test_what_is_no_file_in_the_place_of_a_shard_is_put_aside(serial, tmp_path, thing):
     place = shutil.copytree(serial[0], tmp_path / "study")
-    (place / part).unlink()
-    kind(place / part)
-    with pytest.raises(DamagedFileError, match=rf"{part.split('/')[-1]} is (damaged|gone)"):
-        load_results(place)
-    if part.startswith("shards"):
+    shard = place / "shards" / "000001.npy"
+    shard.unlink()
+    NO_FILE[thing](shard)
+    with in_time():
         assert len(run_study(study_with(), place, threads=1).aside) == 1
-        assert (place / part).read_bytes() == (serial[0] / part).read_bytes()
+    assert shard.read_bytes() == (serial[0] / "shards" / shard.name).read_bytes()
+
+
+@on_posix
+@pytest.mark.parametrize("thing", NO_FILE)
+def test_what_is_no_claim_is_named(serial, tmp_path, thing):
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    (place / "shards" / "000001.npy").unlink()
+    NO_FILE[thing](place / "claims" / "000001.json")
+    with in_time(), pytest.raises(DamagedFileError, match=r"000001\.json is damaged: .*remove it, and run"):
+        run_study(study_with(), place, threads=1)
 
 
 @pytest.mark.parametrize("content", [b"[]", b"{}", b'{"format": "rotordrop study 3", "study": 1}'])

@@ -12,11 +12,12 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from tests.no_file import NO_FILE, in_time, on_posix
 from tests.published import bearing, published, value
 
 from rotordrop._version import __version__
 from rotordrop.cli.app import run
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.errors import OutputError, RotordropError, UsageError
 from rotordrop.files import write_json
 from rotordrop.ledger import logged_drops
 from rotordrop.watch import Kept, Watcher, read_fleet
@@ -251,6 +252,44 @@ def test_an_estimate_is_logged_once_and_judged_by_the_limits(
     assert "0 of 4 numbers" in capsys.readouterr().out
     os.rename(kept.job(estimated).path, tmp_path / "away")
     assert "is not in" in reestimate(log, kept).sentences()[-1]
+
+
+@on_posix
+@pytest.mark.parametrize("thing", ["folder", "pipe", "link that leads nowhere"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "machines/4712.toml",
+        "drops/b.csv",
+        "kept/overview.html",
+        "kept/jobs/0123456789abcdef",
+        "kept/jobs/{}/watch.json",
+        "kept/jobs/{}/watch.lock",
+        "kept/jobs/{}/job.json",
+        "kept/jobs/{}/estimate.result.json",
+        "kept/jobs/{}/estimate.state.json",
+        "kept/jobs/{}/estimate.abc/document.json",
+        "kept/quarantine/{}",
+    ],
+)
+def test_what_is_no_file_keeps_no_watcher_waiting(tmp_path, watcher, estimated, place, thing):
+    """Where the estimate can be logged it is; where it cannot, the thing is named."""
+    file = tmp_path / place.format(estimated)
+    shutil.rmtree(file) if file.is_dir() else file.unlink(missing_ok=True)
+    NO_FILE[thing](file)
+    complaints: list[str] = []
+    with in_time():
+        try:
+            one, said = watcher(complain=complaints.append)
+            one.turn()
+        except RotordropError as refusal:
+            complaints.append(str(refusal))
+            said = []
+    overview = tmp_path / "kept" / "overview.html"
+    complaints += [overview.read_text()] if overview.is_file() else []
+    named = any(file.name in one for one in complaints + said)
+    logged = (tmp_path / "drops.db").exists() and len(logged_drops(tmp_path / "drops.db")) == 1
+    assert named or logged, (complaints, said)
 
 
 def test_a_number_that_left_its_interval_is_named(tmp_path, kept, watcher, estimated):

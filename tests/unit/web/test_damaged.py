@@ -13,6 +13,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from tests.no_file import NO_FILE, on_posix
 from tests.unit.web.serving import Served
 
 from rotordrop.errors import RotordropError
@@ -100,15 +101,7 @@ def test_a_damaged_state_is_a_failure_that_is_asked_again(served, looked):
     assert served.settled(looked, "look")["state"] == "done"
 
 
-NO_FILE = {
-    "folder": lambda place: (place / "in it").mkdir(parents=True),
-    "pipe": os.mkfifo if os.name == "posix" else None,
-    "dangling link": lambda place: place.symlink_to("nowhere"),
-}
-"""What stands where a file of the page should be."""
-
-
-@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
+@on_posix
 @pytest.mark.parametrize("kind", NO_FILE)
 def test_what_is_no_file_is_named_where_one_should_be_and_the_rest_works(served, looked, tmp_path, kind):
     """Whatever the page reads of its folder; a file that is new is tried too."""
@@ -156,7 +149,7 @@ def test_what_is_no_file_is_named_where_one_should_be_and_the_rest_works(served,
     server.stop()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes and links as on POSIX")
+@on_posix
 @pytest.mark.parametrize("kind", NO_FILE)
 @pytest.mark.parametrize("name", ["token", "jobs have digests", "drops.db", "jobs/0123456789abcdef"])
 def test_what_is_no_file_beside_the_jobs_keeps_no_page_from_being_served(tmp_path, kind, name):
@@ -174,7 +167,8 @@ def test_what_is_no_file_beside_the_jobs_keeps_no_page_from_being_served(tmp_pat
     asked.append(server.order("/api/jobs", {"name": "drop"}))
     server.stop()
     assert [answer.status for answer in asked] == [200, 200, 201]
-    assert ("drops.db is no file" in asked[1].text) == (name == "drops.db" and kind != "dangling link")
+    no_log = name == "drops.db" and kind != "link that leads nowhere"
+    assert ("drops.db is no file" in asked[1].text) == no_log
 
 
 def test_a_record_that_leads_out_of_its_folder_is_not_served(served, files, tmp_path):
