@@ -139,7 +139,7 @@ def _look_on_the_page(record: str) -> int:
     asyncio.run(receive(space, job, "record", record, None, body()))
     options = {"gap": "300 um", "speed": "60 Hz"}
     write_state(job, "look", {"state": "running", "run": os.urandom(8).hex(), "options": options})
-    child.main({"job": str(job.path), "verb": "look"})
+    child.main(str(job.path), "look")
     return 0
 
 
@@ -181,9 +181,9 @@ def _estimated() -> Estimate:
 def _start(words: list[str], record: str) -> int:
     """Run a command in a copy of this process with a group of its own; its number."""
     number = os.fork()
+    os.setpgid(number, number)  # both do it: on a busy machine either may be the first to need the group
     if number:
         return number
-    os.setsid()
     quiet = os.open(os.devnull, os.O_WRONLY)
     os.dup2(quiet, 1)
     os.dup2(quiet, 2)
