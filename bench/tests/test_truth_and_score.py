@@ -9,9 +9,10 @@ import re
 import numpy as np
 import pytest
 
-from rotordrop.elements.table import LOADS, published
+from rotordrop.elements.table import published
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.record.record import read_record
+from rotordrop.severity.numbers import LOADS
 from rotordrop_bench import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
 from rotordrop_bench.score import LARGE_IMPACT
 from rotordrop_bench.truth import truth_of

@@ -5,6 +5,7 @@ A message names the thing, the value found, what was expected and the way out.
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar
 
@@ -123,3 +124,10 @@ class UsageError(RotordropError, ValueError):
     """A command or function was called with a value it does not accept."""
 
     exit_code: ClassVar[int] = 64
+
+
+def unknown_key(key: str, known: tuple[str, ...]) -> str:
+    """Say that a key is not known, with the nearest one."""
+    close = get_close_matches(key, known, 1, 0.6)
+    way_out = f"did you mean {close[0]!r}?" if close else f"known here are {', '.join(known)}"
+    return f"unknown key {key!r}; {way_out}"

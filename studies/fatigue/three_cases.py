@@ -14,7 +14,7 @@ import numpy as np
 
 from rotordrop import DropCase, example_machine, simulate_drop
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.severity.numbers import fatigue_shares
+from rotordrop.severity.fatigue import fatigue_shares
 from rotordrop.simulate.case import LevitatedStart
 
 HZ = 2.0 * math.pi

@@ -24,12 +24,12 @@ import numpy as np
 
 from rotordrop import estimate_drop
 from rotordrop.elements.catalog.lookup import find_bearing
-from rotordrop.elements.table import LOADS
 from rotordrop.errors import RotordropError
 from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.record.record import read_record
 from rotordrop.rotor.assembly import free_free_modes, rotor_fe
+from rotordrop.severity.numbers import LOADS
 from rotordrop_bench import SensorChain, SyntheticDrop, hidden_machine, synthesize_drop, write_synthetic
 from rotordrop_bench.make import happened
 from rotordrop_bench.truth import truth_of

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.elements.table import LOADS, published
+from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
+from rotordrop.severity.numbers import LOADS
 from rotordrop_bench.drops import VERSION
 from rotordrop_bench.make import chosen_drops, truth_path
 from rotordrop_bench.score import score_estimate

@@ -11,10 +11,13 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.document import read_json
-from rotordrop.elements.table import LOADS, published
+from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
+from rotordrop.severity.numbers import LOADS
 
 _NEEDED = ("air_gap_m", "peak_force_N")
+_STRESSES = {"peak_stress_Pa": ("max_stress_MPa", 1e6), "mean_stress_Pa": ("mean_stress_MPa", 1e6)}
+"""Field and unit of a truth file for the fields of an estimate that it calls otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +52,9 @@ class Truth:
     def of_bearing(self, bearing: str) -> dict[str, float]:
         """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
         found = {row.field: self._of_bearing(bearing, row.truth) for row in published().values() if row.truth}
-        found |= {load.field: self._of_bearing(bearing, (load.truth,), load.truth_unit) for load in LOADS}
+        for load in LOADS:
+            place, unit = _STRESSES.get(load.field, (load.field, 1.0))
+            found[load.field] = self._of_bearing(bearing, (place,), unit)
         return {path: value for path, value in found.items() if value is not None}
 
     @property

@@ -14,7 +14,7 @@ from typer import Argument, Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured
 from rotordrop.cli._output import Progress, console, deliver, progress_bar
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -116,7 +116,6 @@ def _deliver_results(
     json: Path | None,
 ) -> None:
     """Write what was asked for, and print how force, stress and whirl are spread."""
-    from rotordrop.elements.description import unknown_key
     from rotordrop.report.study_page import study_numbers, study_page
     from rotordrop.study.quantities import BEARING_QUANTITIES
     from rotordrop.study.summary import save_results

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, Strict, model_validator
 
 from rotordrop.elements.values import Length, Physical
+from rotordrop.errors import unknown_key
 from rotordrop.known import Known
 
 LARGEST_FILE = 16 * 2**20
@@ -239,10 +239,3 @@ def _node_at(position: Known, nodes: tuple[float, ...], place: tuple[str | int, 
             place,
         )
     return nearest + 1
-
-
-def unknown_key(key: str, known: tuple[str, ...]) -> str:
-    """Say that a key is not known, with the nearest one."""
-    close = get_close_matches(key, known, 1, 0.6)
-    way_out = f"did you mean {close[0]!r}?" if close else f"known here are {', '.join(known)}"
-    return f"unknown key {key!r}; {way_out}"

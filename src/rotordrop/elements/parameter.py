@@ -1,4 +1,4 @@
-"""What a row of the parameter table says of a parameter, and what is said of a load."""
+"""What a row of the parameter table says of a parameter."""
 
 from __future__ import annotations
 
@@ -283,22 +283,6 @@ def _at(part: Any, path: str) -> Any:
 def below(values: Values, prefix: str) -> dict[str, Known]:
     """The values whose path in the machine begins with a prefix, by the rest of it."""
     return {path[len(prefix) :]: one for path, one in values.items() if path.startswith(prefix)}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Load:
-    """A force or stress of one bearing that every estimate gives beside the parameters."""
-
-    field: str
-    """Field of the JSON document, unit included."""
-    label: str
-    """Name for people."""
-    kind: str
-    """Kind of quantity, a key of `rotordrop.units.KINDS`."""
-    truth: str
-    """Field of a truth file."""
-    truth_unit: float = 1.0
-    """SI value of one unit of that field."""
 
 
 M = TypeVar("M")  # a machine, which stands above the elements

@@ -22,11 +22,10 @@ from rotordrop.elements.description import (
     Text,
     Usual,
     place_on_nodes,
-    unknown_key,
 )
 from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, guess, in_words, itself
 from rotordrop.elements.values import default
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 
 BEAM_FORCE_SIGMA = 0.08
 """Relative standard deviation of a force by a beam in place of the rotor, its form from the record [1]."""

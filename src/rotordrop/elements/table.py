@@ -25,7 +25,7 @@ from rotordrop.elements import (
     touchdown_bearing,
     unbalance,
 )
-from rotordrop.elements.parameter import Extension, Load, Owner, Parameter
+from rotordrop.elements.parameter import Extension, Owner, Parameter
 from rotordrop.elements.rotor import FORM
 from rotordrop.known import Known
 
@@ -121,32 +121,6 @@ def fitted_row(path: str) -> Parameter | None:
 def published() -> dict[str, Parameter]:
     """Rows of bearings by their field in the JSON document."""
     return {row.field: row for row in rows("bearing") if row.field}
-
-
-LOADS: tuple[Load, ...] = (
-    Load(field="peak_force_N", label="peak bearing force", kind="force", truth="peak_force_N"),
-    Load(
-        field="peak_stress_Pa",
-        label="peak Hertz stress",
-        kind="pressure",
-        truth="max_stress_MPa",
-        truth_unit=1e6,
-    ),
-    Load(
-        field="mean_force_0p15_0p2_N",
-        label="mean force, 150 to 200 ms",
-        kind="force",
-        truth="mean_force_0p15_0p2_N",
-    ),
-    Load(
-        field="mean_stress_Pa",
-        label="mean Hertz stress",
-        kind="pressure",
-        truth="mean_stress_MPa",
-        truth_unit=1e6,
-    ),
-)
-"""What a drop did to a bearing, in the order in which it is shown."""
 
 
 def separating_measurement(first: Parameter, second: Parameter) -> str:

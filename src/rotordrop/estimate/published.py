@@ -17,11 +17,10 @@ from pydantic import (
 )
 
 from rotordrop.document import ABSENT, Document, Pair, Schema, read_json
-from rotordrop.elements.table import LOADS, published
 from rotordrop.errors import UsageError
 from rotordrop.json_schema import DIALECT, closed
 from rotordrop.known import Known
-from rotordrop.severity.numbers import SEVERITY
+from rotordrop.severity.numbers import NUMBERS
 from rotordrop.units import si_unit
 
 FORMAT = "rotordrop estimate 2"
@@ -104,9 +103,11 @@ class Statistics(Document):
 
 def described() -> dict[str, str]:
     """Every number that a bearing may have, by its path in the document, with label and unit."""
+    # the elements name their parameters; reading a document needs no elements
+    from rotordrop.elements.table import published
+
     found = {field: f"{row.label} [{row.unit}]" for field, row in published().items()}
-    found |= {load.field: f"{load.label} [{si_unit(load.kind)}]" for load in LOADS}
-    return found | {one.field: f"{one.label} [{si_unit(one.kind) or '1'}]" for one in SEVERITY}
+    return found | {one.field: f"{one.label} [{si_unit(one.kind) or '1'}]" for one in NUMBERS}
 
 
 class Bearing(Document):
@@ -127,24 +128,17 @@ class Bearing(Document):
     @model_validator(mode="wrap")
     @classmethod
     def _from_json(cls, content: Any, handler: ModelWrapValidatorHandler[Bearing]) -> Bearing:
-        if not isinstance(content, Mapping) or "numbers" in content:
-            return handler(content)
-        groups = {path.partition(".")[0] for path in described()}
-        numbers = {key: value for key, value in content.items() if key in groups}
-        return handler(
-            {key: value for key, value in content.items() if key not in groups}
-            | {"numbers": dict(_flat(numbers))}
-        )
-
-    @model_validator(mode="after")
-    def _known_numbers(self) -> Bearing:
-        unknown = self.numbers.keys() - described().keys()
-        missing = {"peak_force_N", "peak_stress_Pa"} - self.numbers.keys()
-        if unknown:
+        if isinstance(content, Mapping) and "numbers" not in content:
+            own = {key: value for key, value in content.items() if key in cls.model_fields}
+            numbers = {key: value for key, value in content.items() if key not in own}
+            content = own | {"numbers": dict(_flat(numbers))}
+        # whoever states a number has the elements loaded; whoever reads one takes the word of the digest
+        elif isinstance(content, Mapping) and (unknown := content["numbers"].keys() - described().keys()):
             raise ValueError(f"{min(unknown)} is no number of a bearing")
-        if missing:
+        found = handler(content)
+        if missing := {"peak_force_N", "peak_stress_Pa"} - found.numbers.keys():
             raise ValueError(f"{min(missing)} is missing")
-        return self
+        return found
 
     @model_serializer(mode="wrap")
     def _to_json(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -177,9 +171,8 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flat(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    known = described()
     for name, branch in tree.items():
-        if name in known or not isinstance(branch, Mapping):
+        if not isinstance(branch, Mapping) or "value" in branch:
             yield name, branch
         else:
             yield from ((f"{name}.{leaf}", value) for leaf, value in branch.items())

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.race_bearing import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.known import Known
 from rotordrop.severity.fatigue import fatigue_shares
-from rotordrop.severity.numbers import static_safety_of_load, static_safety_of_stress
 
 Factor = Callable[[float], float]
 
@@ -44,6 +44,24 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
     if ratings is not None and bearing.force_vector is not None and bearing.impacts:
         loads = numbers_of(estimate.machine.bearing(bearing.name)).element_loads_under(bearing.force_vector)
         yield from _fatigue(bearing, ratings, loads, estimate.speed)
+
+
+def static_safety_of_stress(stress: float) -> float:
+    """Static safety factor s0 of a largest Hertz stress [Pa], ``(4200 MPa / σ)³`` [1].
+
+    Source: ISO 76, which defines the static load rating of ball bearings by that stress at the most loaded
+    ball; its load goes with the cube of the stress.
+    """
+    return (STATIC_STRESS / stress) ** 3
+
+
+def static_safety_of_load(rating: float, force: float) -> float:
+    """Static safety factor s0 of a radial force [N] for a static load rating C0 [N], ``C0 / P0`` [1].
+
+    Source: ISO 76, with the radial force as equivalent load P0 where no axial one acts from outside. The
+    preload counts in the stress, not here.
+    """
+    return rating / force
 
 
 def _falling(known: Known, factor: Factor) -> Known:

@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rotordrop.elements.description import LARGEST_FILE, unknown_key
-from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.elements.description import LARGEST_FILE
+from rotordrop.errors import MachineFileError, UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.units import parse_quantity
 

@@ -11,13 +11,13 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.errors import UsageError
-from rotordrop.report.compared_drop import LOADS, NUMBERS, ComparedDrop, Number, left_out
+from rotordrop.report.compared_drop import ComparedDrop, left_out
 from rotordrop.report.content import Column, Figure, ReportContent, Section, Statement, Table, table
 from rotordrop.report.limits import limit_statement
 from rotordrop.report.quantity import Quantity, display_unit, shown
 from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table
 from rotordrop.report.style import axis_title, bars, curve, fit_legend, panels, plain
-from rotordrop.severity.numbers import NOTE
+from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
 from rotordrop.severity.statistics import StressStatistics
 

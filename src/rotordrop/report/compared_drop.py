@@ -5,33 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop
 from rotordrop.report.quantity import Quantity, shown
-from rotordrop.severity.numbers import SEVERITY
+from rotordrop.severity.numbers import Number
 from rotordrop.units import format_minute
-
-
-class Number(NamedTuple):
-    """A number of an estimate document that is compared: path, name for people, kind."""
-
-    field: str
-    label: str
-    kind: str
-    more_is_worse: bool = True
-
-
-LOADS = (
-    Number("peak_force_N", "peak bearing force", "force"),
-    Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
-    Number("peak_stress_Pa", "peak Hertz stress", "pressure"),
-    Number("mean_stress_Pa", "mean Hertz stress", "pressure"),
-)
-"""Force and stress, which every estimate states."""
-NUMBERS = (*LOADS, *(Number(one.field, one.label, one.kind, one.more_is_worse) for one in SEVERITY))
-"""Every number that is compared."""
 
 
 @dataclass(frozen=True)

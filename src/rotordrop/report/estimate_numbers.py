@@ -7,11 +7,12 @@ from pathlib import Path
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.parameter import Parameter, Role
-from rotordrop.elements.table import LOADS, published
+from rotordrop.elements.table import published
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.known import Known
 from rotordrop.report.content import Card, Column, KeyFigure, Statement, Table, table
 from rotordrop.report.quantity import Quantity, shown
+from rotordrop.severity.numbers import LOADS
 
 MEANS = (
     "A mean force is the mean of the magnitude; the magnitude of the mean force would be smaller where its "

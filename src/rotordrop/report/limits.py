@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from rotordrop.elements.description import unknown_key
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import NINETY
-from rotordrop.report.compared_drop import NUMBERS, ComparedDrop, Number
+from rotordrop.report.compared_drop import ComparedDrop
 from rotordrop.report.content import Level, Statement
 from rotordrop.report.quantity import Quantity, shown
+from rotordrop.severity.numbers import NUMBERS, Number
 from rotordrop.units import format_chance, parse_quantity
 
 SURE = 0.95

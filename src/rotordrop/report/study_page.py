@@ -9,9 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.elements.description import unknown_key
 from rotordrop.elements.table import fitted_row
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.machine import kind_of_path

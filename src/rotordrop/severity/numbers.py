@@ -1,40 +1,44 @@
-"""The numbers that say how severe a drop was at one bearing, beside force and stress themselves."""
+"""The numbers that say what a drop did to one bearing, declared once for documents, pages and limits."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rotordrop.elements.ball_bearing import STATIC_STRESS
-
 
 @dataclass(frozen=True)
-class SeverityNumber:
-    """A number of the table: key under ``severity``, name for people, kind, whether more is worse."""
+class Number:
+    """What a drop did to a bearing: field of a document, name for people, kind, whether more is worse."""
 
-    key: str
+    field: str
     label: str
     kind: str
     more_is_worse: bool = True
 
-    @property
-    def field(self) -> str:
-        """Its field in a document."""
-        return f"severity.{self.key}"
 
+LOADS = (
+    Number("peak_force_N", "peak bearing force", "force"),
+    Number("peak_stress_Pa", "peak Hertz stress", "pressure"),
+    Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
+    Number("mean_stress_Pa", "mean Hertz stress", "pressure"),
+)
+"""Force and stress, which every estimate states, in the order in which they are shown."""
 
 _PURE = "dimensionless"
-SEVERITY: tuple[SeverityNumber, ...] = (
-    SeverityNumber("static_safety", "static safety factor by the peak stress", _PURE, more_is_worse=False),
-    SeverityNumber("static_safety_of_rating", "static safety factor by C0", _PURE, more_is_worse=False),
-    SeverityNumber("impulse_N_s", "impulse of all impacts", "impulse"),
-    SeverityNumber("skid_energy_J", "energy lost in the contact", "energy"),
-    SeverityNumber("position_index", "position index (mean distance over gap)", _PURE),
-    SeverityNumber("velocity_index", "velocity index (velocity over speed times gap)", _PURE),
-    SeverityNumber("fatigue_by_segments", "share of rating life, segments", _PURE),
-    SeverityNumber("fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE),
-    SeverityNumber("fatigue_by_rainflow", "share of rating life, rainflow", _PURE),
+SEVERITY = (
+    Number("severity.static_safety", "static safety factor by the peak stress", _PURE, more_is_worse=False),
+    Number("severity.static_safety_of_rating", "static safety factor by C0", _PURE, more_is_worse=False),
+    Number("severity.impulse_N_s", "impulse of all impacts", "impulse"),
+    Number("severity.skid_energy_J", "energy lost in the contact", "energy"),
+    Number("severity.position_index", "position index (mean distance over gap)", _PURE),
+    Number("severity.velocity_index", "velocity index (velocity over speed times gap)", _PURE),
+    Number("severity.fatigue_by_segments", "share of rating life, segments", _PURE),
+    Number("severity.fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE),
+    Number("severity.fatigue_by_rainflow", "share of rating life, rainflow", _PURE),
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""
+
+NUMBERS = (*LOADS, *SEVERITY)
+"""Every number by which drops are compared."""
 
 NOTE = (
     "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
@@ -43,21 +47,3 @@ NOTE = (
     "first two as if the race turned with the rotor from the first impact on, as upper ends. None is a limit."
 )
 """What stands beneath a table of these numbers."""
-
-
-def static_safety_of_stress(stress: float) -> float:
-    """Static safety factor s0 of a largest Hertz stress [Pa], ``(4200 MPa / σ)³`` [1].
-
-    Source: ISO 76, which defines the static load rating of ball bearings by that stress at the most loaded
-    ball; its load goes with the cube of the stress.
-    """
-    return (STATIC_STRESS / stress) ** 3
-
-
-def static_safety_of_load(rating: float, force: float) -> float:
-    """Static safety factor s0 of a radial force [N] for a static load rating C0 [N], ``C0 / P0`` [1].
-
-    Source: ISO 76, with the radial force as equivalent load P0 where no axial one acts from outside. The
-    preload counts in the stress, not here.
-    """
-    return rating / force

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter
 
 from rotordrop.arrays import Array
-from rotordrop.elements.description import unknown_key
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.machine import value_of_path

@@ -18,10 +18,9 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 
 from rotordrop.arrays import Array
 from rotordrop.document import read_toml
-from rotordrop.elements.description import unknown_key
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.elements.table import following
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.machine import kind_of_path

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.description import unknown_key
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, unknown_key
 from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
 from rotordrop.arrays import Array
-from rotordrop.elements.description import unknown_key
-from rotordrop.errors import DamagedFileError, OutputError, UsageError
+from rotordrop.errors import DamagedFileError, OutputError, UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.study.folder import FORMAT, StudyFolder, read_plan, read_shards, study_of
 from rotordrop.study.plan import Study

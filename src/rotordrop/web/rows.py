@@ -6,10 +6,10 @@ import math
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from rotordrop.elements.table import LOADS
 from rotordrop.ledger.book import LoggedDrop
 from rotordrop.report.content import Figure, Statement
 from rotordrop.report.quantity import Quantity, System, display_unit
+from rotordrop.severity.numbers import LOADS
 
 SYSTEMS: tuple[System, ...] = ("SI", "US")
 SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")

@@ -13,8 +13,9 @@ from tests.published import bearing, published, value
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, Impact, Value
 from rotordrop.report.compare_page import compare_page, comparison_figure, rankings
-from rotordrop.report.compared_drop import LOADS, ComparedDrop, left_out
+from rotordrop.report.compared_drop import ComparedDrop, left_out
 from rotordrop.report.quantity import Quantity
+from rotordrop.severity.numbers import LOADS
 from rotordrop.severity.ranking import DropSeverity, rank_drops
 
 
@@ -97,7 +98,7 @@ def test_warnings_and_simulated_records_are_named() -> None:
 
 
 def test_points_and_intervals_of_the_figure_are_the_numbers() -> None:
-    values = {"NDE": [DROPS[0].number("NDE", LOADS[2]), Quantity(value=1.7e9, kind="pressure")]}
+    values = {"NDE": [DROPS[0].number("NDE", LOADS[1]), Quantity(value=1.7e9, kind="pressure")]}
     chart = comparison_figure(("a", "b"), values, "peak Hertz stress")
     assert_allclose(chart.data[0].y, (1500.0, 1700.0))
     assert_allclose(chart.data[0].error_y.array, (20.0, 0.0))

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.estimate.severity_numbers import static_safety_of_load, static_safety_of_stress
 from rotordrop.machine import example_machine
 from rotordrop.severity.fatigue import fatigue_shares
-from rotordrop.severity.numbers import (
-    SEVERITY,
-    static_safety_of_load,
-    static_safety_of_stress,
-)
+from rotordrop.severity.numbers import SEVERITY
 
 
 @pytest.fixture(scope="module")

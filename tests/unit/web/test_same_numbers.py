@@ -16,13 +16,14 @@ import pytest
 from tests.unit.report.conftest import estimate as estimate
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.elements.table import LOADS, published
+from rotordrop.elements.table import published
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.estimate_page import assumed_card
 from rotordrop.report.quantity import IN_OTHER_UNITS, display_unit
 from rotordrop.report.restart_page import restart_numbers
 from rotordrop.restart import RestartCard
+from rotordrop.severity.numbers import LOADS
 from rotordrop.web.drawn import write_estimate, write_look
 from rotordrop.web.python_lines import estimate_lines, look_lines
 from rotordrop.web.traces import open_traces

@@ -60,7 +60,8 @@ def score(
 
 def _scored(scores: dict[str, Any]) -> Table:
     """Table of one estimate: the drop, then bearing by bearing."""
-    from rotordrop.elements.table import LOADS, published
+    from rotordrop.elements.table import published
+    from rotordrop.severity.numbers import LOADS
     from rotordrop.units import format_quantity
 
     named = {field: (row.label, row.kind) for field, row in published().items()}
