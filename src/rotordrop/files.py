@@ -67,7 +67,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # a disk that has become read-only must not hide what went wrong
             temporary.unlink(missing_ok=True)
-    _sync_folder(target.parent)
+    if os.name == "posix":  # the rename itself is durable where the system allows to sync a folder
+        _sync(target.parent)
 
 
 @contextmanager
@@ -383,9 +384,3 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Make the rename itself durable where the system allows to sync a folder (not on Windows)."""
-    if os.name == "posix":
-        _sync(folder)

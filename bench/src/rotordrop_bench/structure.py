@@ -14,7 +14,7 @@ from rotordrop.known import Known
 from rotordrop.machine import Machine, TouchdownBearing
 from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
-from rotordrop_bench.violations import BearingViolations, ContactViolation, Violations
+from rotordrop_bench.violations import BearingViolations, Violations
 
 TYPICAL_LOADS = 5.0
 """Force over the mean load of a bearing at which a contact with another exponent is as deep as before [1]."""
@@ -33,19 +33,16 @@ def violated(machine: Machine, violations: Violations) -> Machine:
         for index, unbalance in enumerate(machine.unbalances):
             values[f"unbalance.{index}.amount"] = factor * float(unbalance.amount)
     machine = machine.with_values(values) if values else machine
-    return _with_youngs_modulus(machine, float(violations.rotor.youngs_modulus))
-
-
-def _with_youngs_modulus(machine: Machine, factor: float) -> Machine:
-    if factor == 1.0:
+    softer = float(violations.rotor.youngs_modulus)
+    if softer == 1.0:
         return machine
     rotor = machine.rotor
     materials = {name: rotor.material_named(name) for name in {e.material for e in rotor.elements}}
-    softer = {
-        name: material.changed(youngs_modulus=f"{factor * float(material.youngs_modulus)!r} Pa")
+    changed = {
+        name: material.changed(youngs_modulus=f"{softer * float(material.youngs_modulus)!r} Pa")
         for name, material in materials.items()
     }
-    return machine.completed_with({"rotor": rotor.changed(materials={**rotor.materials, **softer})})
+    return machine.completed_with({"rotor": rotor.changed(materials={**rotor.materials, **changed})})
 
 
 def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float) -> Mapping[str, float]:
@@ -121,8 +118,18 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
     if float(gap.closing) != 0.0:
         row[[D.GAP_CLOSING, D.GAP_HEAT]] = float(gap.closing), float(gap.heat)
     if v.balls.turn:
-        row[D.CAGE_RATIO] = _cage_ratio(bearing)
-    _put_law(row, v.contact, float(bearing.contact.damping))
+        balls = bearing.bearing
+        share = (
+            float(balls.ball_diameter) * math.cos(float(balls.contact_angle)) / float(balls.pitch_diameter)
+        )
+        row[D.CAGE_RATIO] = 0.5 * (1.0 - share)  # turn of the cage per turn of the inner race
+    law = [(float(p.depth), float(p.force)) for p in v.contact.law]
+    row[D.LAW_PIECES] = max(len(law) - 1, 0)
+    for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(law)):  # a power of the depth each
+        exponent = math.log(f2 / f1) / math.log(d2 / d1)
+        at = D.LAW + i * D.LAW_WIDTH
+        row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, float(bearing.contact.damping))
+        row[at + D.LAW_UNTIL] = d2
     return row
 
 
@@ -131,24 +138,6 @@ def _mode(compliance: float, across: float, upright: float, damping_ratio: Known
     wx, wy = 2.0 * math.pi * across, 2.0 * math.pi * upright
     twice = 2.0 * float(damping_ratio)
     return [compliance, wx * wx, wy * wy, twice * wx, twice * wy]
-
-
-def _cage_ratio(bearing: TouchdownBearing) -> float:
-    """Turn of the cage per turn of the inner race: half of 1 - D_w cos α / D_pw."""
-    balls = bearing.bearing
-    share = float(balls.ball_diameter) * math.cos(float(balls.contact_angle)) / float(balls.pitch_diameter)
-    return 0.5 * (1.0 - share)
-
-
-def _put_law(row: Array, contact: ContactViolation, damping: float) -> None:
-    """Write the pieces of a law, a power of the depth each, into the row of a bearing."""
-    points = [(float(p.depth), float(p.force)) for p in contact.law]
-    row[D.LAW_PIECES] = max(len(points) - 1, 0)
-    for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(points)):
-        exponent = math.log(f2 / f1) / math.log(d2 / d1)
-        at = D.LAW + i * D.LAW_WIDTH
-        row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, damping)
-        row[at + D.LAW_UNTIL] = d2
 
 
 def support_matrices(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, Any]:

@@ -87,12 +87,13 @@ def log(
     if action is Action.reestimate:
         _reestimate(where, keep, machine, json)
         return
-    found = book.logged_drops(where, machine=machine)
+    log = book.read_log(where)
+    found = book.logged_drops(log, machine=machine)
     if action is Action.export:
         _export(found, what)
         return
-    shares = [share for share in book.used_shares(where) if machine in (None, share.machine)]
-    rising = book.trends(where, machine=machine)
+    shares = [share for share in book.used_shares(log) if machine in (None, share.machine)]
+    rising = book.trends(log, machine=machine)
     content = {
         "drops": {str(number): asdict(drop) for number, drop in found.items()},
         "used": [asdict(share) | {"sentence": share.sentence()} for share in shares],

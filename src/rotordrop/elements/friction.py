@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 from rotordrop.elements.description import Description, Usual
 from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
@@ -84,14 +84,10 @@ class Friction(Description):
         )
 
 
-def _static(bearing: Any, dynamic: Known) -> Known:
-    return cast(Friction, bearing.friction).static_of(dynamic)
-
-
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="friction.static",
-        follows=("friction.dynamic", _static),
+        follows=("friction.dynamic", lambda bearing, dynamic: bearing.friction.static_of(dynamic)),
         label="static friction coefficient",
         kind="dimensionless",
         role=Role.DERIVED,

@@ -113,10 +113,6 @@ def _long(machine: Any) -> dict[str, Known]:
     return {"remanence_time_constant": Known(value=REMANENCE_TIME, status="guess", range=long)}
 
 
-def _as_in_the_base_model(machine: Any) -> dict[str, Known]:
-    return {"remanence_time_constant": guess(REMANENCE_TIME)} if machine.ambs else {}
-
-
 def _decay(_machine: Any, found: Values, _load: float) -> str:
     time = itself(found["remanence.time_constant"])
     usual = f"the usual {1e3 * REMANENCE_TIME:g} ms"
@@ -132,6 +128,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         neutral=_long,
         nothing={"remanence.time_constant": REMANENCE_TIME},
         sentence=_decay,
-        base=_as_in_the_base_model,
+        base=lambda machine: {"remanence_time_constant": guess(REMANENCE_TIME)} if machine.ambs else {},
     ),
 )

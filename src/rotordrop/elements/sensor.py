@@ -145,10 +145,6 @@ def _with_housing(sensor: Sensor) -> Seen:
     return Seen(of_housing=(-cosine, -sine))
 
 
-def _along_rotor(sensor: Sensor) -> Seen:
-    return Seen(of_slope=_direction(sensor))
-
-
 def _extension(
     row: Parameter,
     name: str,
@@ -258,7 +254,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         Parameter(
             path="plane_offset",
             owner="sensor",
-            seen=_along_rotor,
+            seen=lambda sensor: Seen(of_slope=_direction(sensor)),
             label="distance of the sensor from its node",
             kind="length",
             logarithmic=False,

@@ -256,10 +256,6 @@ def _growth(bearing: Any, found: Values, load: float) -> str:
     return f"{bearing.name} {in_words(growth, '%', 0.01)}"
 
 
-def _rubbing(bearing: Any, found: Values, _load: float) -> str:
-    return f"{bearing.name} {in_words(itself(found['support.friction']), 'N')}"
-
-
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="support.stiffness",
@@ -409,7 +405,9 @@ EXTENSIONS: tuple[Extension, ...] = (
         names=("support.friction",),
         neutral=lambda _: {"support.friction": guess(0.0)},
         nothing={"support.friction": 0.0},
-        sentence=_rubbing,
+        sentence=lambda bearing, found, _load: (
+            f"{bearing.name} {in_words(itself(found['support.friction']), 'N')}"
+        ),
         joined=", ",
         frame="friction in the supports: {}",
         rows=(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 from rotordrop.arrays import Array
@@ -174,10 +175,12 @@ def _force_at(bearing: TouchdownBearing, omega: float) -> Callable[[float], floa
     return fast if balls.ball_inertia else slow
 
 
+@lru_cache(maxsize=8)
 def steady_limit(bearing: TouchdownBearing, omega: float) -> tuple[float, float] | None:
     """Conductance [W/K] from race to outer race below which a pair has no steady state at ω [rad/s].
 
-    With the kelvins between the races there; None where springs keep the preload, or there is none.
+    With the kelvins between the races there; None where springs keep the preload, or there is none. Found
+    once for equal bearings: what is shown and what is warned of ask both.
     """
     heat, balls = bearing.thermal, bearing.bearing
     if heat is None or balls.sprung or not numbers_of(bearing).held:

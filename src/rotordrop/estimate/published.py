@@ -5,7 +5,7 @@ Times are from power-off, all numbers in SI units, the unit stands in the key.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -130,8 +130,15 @@ class Bearing(Document):
     def _from_json(cls, content: Any, handler: ModelWrapValidatorHandler[Bearing]) -> Bearing:
         if isinstance(content, Mapping) and "numbers" not in content:
             own = {key: value for key, value in content.items() if key in cls.model_fields}
-            numbers = {key: value for key, value in content.items() if key not in own}
-            content = own | {"numbers": dict(_flat(numbers))}
+            numbers: dict[str, Any] = {}
+            for key, part in content.items():
+                if key in own:
+                    continue
+                if isinstance(part, Mapping) and "value" not in part:
+                    numbers |= {f"{key}.{leaf}": value for leaf, value in part.items()}
+                else:
+                    numbers[key] = part
+            content = own | {"numbers": numbers}
         # whoever states a number has the elements loaded; whoever reads one takes the word of the digest
         elif isinstance(content, Mapping) and (unknown := content["numbers"].keys() - described().keys()):
             raise ValueError(f"{min(unknown)} is no number of a bearing")
@@ -168,14 +175,6 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
         group, _, leaf = path.rpartition(".")
         (tree.setdefault(group, {}) if group else tree)[leaf] = value
     return tree
-
-
-def _flat(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    for name, branch in tree.items():
-        if not isinstance(branch, Mapping) or "value" in branch:
-            yield name, branch
-        else:
-            yield from ((f"{name}.{leaf}", value) for leaf, value in branch.items())
 
 
 class Check(Document):

@@ -154,19 +154,14 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
         options={"xatol": 1e-5 * nominal},
     )
     found = _fit(time, signals, float(refined.x), hum)
-    stays = _stays_until(time, signals, found)
-    return found if stays >= found.end else fit_levitated(record, stays, speed=speed, start=start)
-
-
-def _stays_until(time: Array, signals: Array, model: LevitatedModel) -> float:
-    """Until when the last readings belong to the levitated motion [s]."""
-    # a slow clock leaves no sample to some stretches
-    count = min(round(float(time[-1] - time[0]) / _STRETCH), len(time) // 2)
-    rest = np.square((signals - model.readings(time)) / model.noise)
-    edges = np.linspace(0, len(time), max(count, 1) + 1).astype(int)
+    # the last readings may be of the fall already; a slow clock leaves no sample to some stretches
+    count = max(min(round(float(time[-1] - time[0]) / _STRETCH), len(time) // 2), 1)
+    rest = np.square((signals - found.readings(time)) / found.noise)
+    edges = np.linspace(0, len(time), count + 1).astype(int)
     scatter = np.sqrt([np.nanmean(rest[a:b]) for a, b in itertools.pairwise(edges)])
     stay = np.flatnonzero(scatter <= _LEFT * np.nanmedian(scatter))
-    return float(time[edges[stay[-1] + 1] - 1])
+    stays = float(time[edges[stay[-1] + 1] - 1])
+    return found if stays >= found.end else fit_levitated(record, stays, speed=speed, start=start)
 
 
 def _choose_hum(time: Array, signals: Array, frequency: float, span: float) -> float | None:

@@ -88,7 +88,9 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     """
     raw, rate = record.motion, record.sampling_rate
     begin, sunk = _first_fall(raw, rate)
-    rest = np.median(raw[_rest_from(raw, sunk, record) :], axis=0)
+    # where the rotor lies: the last quarter after the fall
+    rest_from = sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
+    rest = np.median(raw[rest_from:], axis=0)
     paths = []
     for number, plane in enumerate(record.planes):
         other = raw[:, 0 if number else -1]
@@ -194,11 +196,6 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
         )
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk
-
-
-def _rest_from(raw: Array, sunk: int, record: Record) -> int:
-    """First sample of the part that shows where the rotor lies: the last quarter after the fall."""
-    return sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
 
 
 def _upright(levitated: Array, fall: Array) -> Array:
@@ -415,16 +412,13 @@ def split_drops(record: Record) -> tuple[Record, ...]:
         raise RecordError(f"{record.name}: the rotor does not fall from where it floated; there is no drop")
     if len(drops) == 1:
         return (record,)
-    starts = [float(record.time[0]), *(_floats_again(motion, drop) for drop in drops[:-1])]
+    # the rotor is back where it floated, the controller calm, with the first sample after a drop
+    again = [float(motion.time[np.searchsorted(motion.time, drop.end) + 1]) for drop in drops[:-1]]
+    starts = [float(record.time[0]), *again]
     return tuple(
         _cut(record, number, start, _lifted(motion, drop), len(drops))
         for number, (start, drop) in enumerate(zip(starts, drops, strict=True), start=1)
     )
-
-
-def _floats_again(motion: Motion, drop: Drop) -> float:
-    """When the rotor is back where it floated, the controller calm: the first sample of the next drop."""
-    return float(motion.time[np.searchsorted(motion.time, drop.end) + 1])
 
 
 def _lifted(motion: Motion, drop: Drop) -> float:

@@ -287,8 +287,13 @@ class Log:
     """Whether it has digests; an older rotordrop gave it none."""
 
 
-def read_log(where: str | Path) -> Log:
-    """Everything in a log, compared with its digests; what is damaged or gone is named."""
+def read_log(where: str | Path | Log) -> Log:
+    """Everything in a log, compared with its digests; what is damaged or gone is named.
+
+    A log that is read already is given back, so that whoever asks it several things reads it once.
+    """
+    if isinstance(where, Log):
+        return where
     with transaction(where, writing=False) as log:
         found, seals = _read(log), log.seals
         there = _digests(found)
@@ -357,7 +362,7 @@ def _writing(where: str | Path) -> Iterator[Transaction]:
 
 
 def logged_drops(
-    where: str | Path, *, machine: str | None = None, bearing_set: str | None = None
+    where: str | Path | Log, *, machine: str | None = None, bearing_set: str | None = None
 ) -> dict[int, LoggedDrop]:
     """Drops of a log by number, in the order they happened."""
     return {
@@ -391,7 +396,7 @@ def allow(
         log.seal(_allowance(*key), _digest(drops, seconds, source))
 
 
-def used_shares(where: str | Path) -> tuple[UsedShare, ...]:
+def used_shares(where: str | Path | Log) -> tuple[UsedShare, ...]:
     """How much every machine and set of bearings has used of what it is allowed."""
     found = read_log(where)
     logged: dict[tuple[str, str], list[float | None]] = {key: [] for key in found.allowances}
@@ -471,7 +476,7 @@ class Trend:
         )
 
 
-def trends(where: str | Path, *, machine: str | None = None) -> tuple[Trend, ...]:
+def trends(where: str | Path | Log, *, machine: str | None = None) -> tuple[Trend, ...]:
     """Numbers that rise or fall from drop to drop beyond chance, of drops in the order they happened.
 
     Source: Kendall 1938; exact for few drops. Five drops at least, and one in a hundred by chance.

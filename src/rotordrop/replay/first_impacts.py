@@ -6,7 +6,6 @@ impacts: the fit of the supports follows those, and the draws of its uncertainty
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -264,6 +263,11 @@ def first_impacts(evidence: Evidence, model: DropModel, *, until: float) -> Firs
     start = max(initial.end - LEAD, 0.0)
     time = evidence.record.time - initial.drop_instant
     keep = (time > start + 1e-9) & (time <= until)
+    # what is sought, then what is not known exactly either, and one friction for all bearings
+    every = [u for b in range(len(model.machine.touchdown_bearings)) for u in bearing_unknowns(model, b)]
+    impacts = [one for one in every if one.parameter.step is Step.IMPACTS]
+    frictions = [one for one in every if one.parameter.step is Step.SWEEP]
+    friction = replace(frictions[0], owner="", targets=tuple(t for one in frictions for t in one.targets))
     return FirstImpacts(
         model=replace(model, parameters=drop_parameters(model, initial, start)),
         initial=initial,
@@ -272,18 +276,9 @@ def first_impacts(evidence: Evidence, model: DropModel, *, until: float) -> Firs
         start=start,
         time=time[keep],
         deviation=initial.deviation_of(evidence.record)[keep],
-        unknowns=tuple(_unknowns(model)),
+        unknowns=(*sorted(impacts, key=lambda one: one.parameter.role is not Role.SOUGHT), friction),
         directions=influential_directions(initial, start),
     )
-
-
-def _unknowns(model: DropModel) -> Iterator[Unknown]:
-    """What is sought in the first impacts, what is not known exactly either, and one friction for all."""
-    every = [u for b in range(len(model.machine.touchdown_bearings)) for u in bearing_unknowns(model, b)]
-    impacts = [one for one in every if one.parameter.step is Step.IMPACTS]
-    yield from sorted(impacts, key=lambda one: one.parameter.role is not Role.SOUGHT)
-    frictions = [one for one in every if one.parameter.step is Step.SWEEP]
-    yield replace(frictions[0], owner="", targets=tuple(t for one in frictions for t in one.targets))
 
 
 def with_bearing(parameters: KernelParameters, rows: Array) -> KernelParameters:

@@ -35,7 +35,11 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     # what hides a loss first, then what is a warning
     limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
     said = limits[: MOST_LIMITS if estimate.consistent else MOST_LIMITS - 1]
-    assumed = ", ".join(dict.fromkeys((*estimate.assumed.values(), _of_static(estimate))))
+    peaks = [Quantity.of(b.peak_stress.known, "pressure") for b in estimate.bearings]
+    stresses = [one.value if estimate.consistent else one.ends[1] for one in peaks]
+    shares = ", ".join(f"{100.0 * one / STATIC_STRESS:.0f}" for one in stresses)
+    rated = f"peak stress {shares} % of the {shown(STATIC_STRESS, 'pressure')} of C0 (ISO 76)"
+    assumed = ", ".join(dict.fromkeys((*estimate.assumed.values(), rated)))
     remedies = dict.fromkeys(check.remedy for check in estimate.checks if not check.passed and check.remedy)
     closing = (
         f"{len(limits) - len(said)} more with --all" if len(limits) > len(said) else "",
@@ -53,13 +57,6 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
         ),
         screen=_loads(estimate),
     )
-
-
-def _of_static(estimate: Estimate) -> str:
-    ends = [Quantity.of(b.peak_stress.known, "pressure").ends[1] for b in estimate.bearings]
-    values = ends if not estimate.consistent else [b.peak_stress.value for b in estimate.bearings]
-    shares = ", ".join(f"{100.0 * one / STATIC_STRESS:.0f}" for one in values)
-    return f"peak stress {shares} % of the {shown(STATIC_STRESS, 'pressure')} of C0 (ISO 76)"
 
 
 def _short(one: Statement, longest: int) -> Statement:

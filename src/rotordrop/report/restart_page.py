@@ -49,6 +49,14 @@ NO_DROPS = "Name the machine file, and a limit with --limit, to see the next dro
 
 def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
     """Build the page of a restart card."""
+    columns = (
+        Column("damage", "label"),
+        Column("chance by one drop", "prior", "probability", 2),
+        Column("risk of running on", "risk", "probability", 2),
+        Column("remedy", "remedy"),
+        Column("source", "source"),
+    )
+    kinds = table(card.assumptions.damages.values(), columns, "Kinds of damage as they are assumed")
     return ReportContent(
         title=f"Restart of {drop.machine}: {card.answer}",
         subtitle=f"after the drop {drop.record} at {format_quantity(2.0 * math.pi * drop.speed_Hz, 'speed')}",
@@ -59,7 +67,7 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
         facts=(("assumptions", card.assumptions.source), ("estimate", drop.verdict)),
         sections=(
             Section("What may be damaged", tables=(_suspected(card), _evidence(card))),
-            Section("On what the answer hangs", tables=(_flips(card), _costs(card), _kinds(card))),
+            Section("On what the answer hangs", tables=(_flips(card), _costs(card), kinds)),
             _next(card.next_drops),
         ),
     )
@@ -167,17 +175,6 @@ def _costs(card: RestartCard) -> Table:
     )
     columns = (Column("assumption", lambda row: row[0]), Column("value", lambda row: row[1]))
     return table(rows, columns, "Costs and chances", f"Source: {one.source}.")
-
-
-def _kinds(card: RestartCard) -> Table:
-    columns = (
-        Column("damage", "label"),
-        Column("chance by one drop", "prior", "probability", 2),
-        Column("risk of running on", "risk", "probability", 2),
-        Column("remedy", "remedy"),
-        Column("source", "source"),
-    )
-    return table(card.assumptions.damages.values(), columns, "Kinds of damage as they are assumed")
 
 
 def _next(drops: Sequence[NextDrop]) -> Section:

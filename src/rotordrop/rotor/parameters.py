@@ -117,6 +117,7 @@ def _kernel_parameters(
         rows = [basis.node_row(part.node) for part in parts]
         return np.ascontiguousarray(rows, dtype=np.float64) if rows else np.zeros((0, m))
 
+    parts = [part for bearing in machine.touchdown_bearings for part in bearing.parts]
     return KernelParameters(
         eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
         damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
@@ -131,15 +132,9 @@ def _kernel_parameters(
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(len(machine.ambs)),
         departure=np.zeros((0, departure.N_COLUMNS)),
-        memory=np.zeros(_remembered(machine)),
+        memory=np.zeros(sum(one.remembered for one in (*parts, *machine.ambs))),
         **_of_values(machine, fe, basis, shares),
     )
-
-
-def _remembered(machine: Machine) -> int:
-    """Length of the discrete memory: parts of bearings first, then AMBs."""
-    parts = [part for bearing in machine.touchdown_bearings for part in bearing.parts]
-    return sum(one.remembered for one in (*parts, *machine.ambs))
 
 
 def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:

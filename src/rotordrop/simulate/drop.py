@@ -149,7 +149,12 @@ def _result(
         H.bearing_histories(times[part], states[part], one, histories[part])
     displacement = H.node_displacements(states, parameters.bearing_shape)
     force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
-    owner, further = _loop.bearings_logged(log, parameters), _further_names(model)
+    owner = _loop.bearings_logged(log, parameters)
+    further = (
+        *(stop_of(model.bearing_names[b]) for b in parameters.stops),
+        *(one.name for one in model.machine.clearances if one.stiffness is not None),
+        *(f"{model.bearing_names[b]}.face" for b in parameters.faces),
+    )
     others = log[owner < 0]
     contacts = _contact_log(log[owner >= 0], owner[owner >= 0])
     stresses = [H.H_INNER_STRESS, H.H_OUTER_STRESS]  # they differ where balls have inertia
@@ -190,12 +195,6 @@ def _result(
         finished=outcome == _loop.FINISHED,
         certificate=_energy_certificate(model, parts, times, states, force),
     )
-
-
-def _further_names(model: DropModel) -> tuple[str, ...]:
-    stops = [stop_of(model.bearing_names[b]) for b in model.parameters.stops]
-    rubs = [one.name for one in model.machine.clearances if one.stiffness is not None]
-    return (*stops, *rubs, *(f"{model.bearing_names[b]}.face" for b in model.parameters.faces))
 
 
 def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
@@ -240,7 +239,9 @@ def _energy_certificate(
     stored = np.empty(len(states))
     for part, one in parts:
         there = chosen[np.isin(chosen, np.arange(len(states))[part])]
-        stored[there] = _stored(times[there], states[there], one)
+        of_part = np.empty(len(there))
+        H.stored_energies(times[there], states[there], one, True, of_part)
+        stored[there] = of_part
     stored = stored[chosen]
     balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
     return Certificate(
@@ -248,12 +249,6 @@ def _energy_certificate(
         energy_scale=float(np.max(np.abs(stored - stored[0]))),
         peak_force=peaks_of(times, magnitude(force[..., 0], force[..., 1])),
     )
-
-
-def _stored(times: Array, states: Array, parameters: KernelParameters) -> Array:
-    stored = np.empty(len(states))
-    H.stored_energies(times, states, parameters, True, stored)
-    return stored
 
 
 def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certificate:

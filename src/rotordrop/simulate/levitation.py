@@ -34,7 +34,13 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     _refuse_overspeed(model, case.speed)
     start = case.start
     if isinstance(start, StateStart):
-        return _given_state(model, start), parameters
+        state = np.array(start.state, dtype=np.float64)
+        if state.shape != (model.layout.size,):
+            raise SimulationError(
+                f"the start state has shape {state.shape}; this model expects ({model.layout.size},). "
+                "Use the layout of the same reduction."
+            )
+        return state, parameters
     state = model.at_rest()
     state[model.layout.rotor_speed] = case.speed
     if isinstance(start, CentredStart):
@@ -66,16 +72,6 @@ def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters
     flags = parameters.flags.copy()
     flags[L.SPIN_MODE] = _SPIN_MODES[case.spin]
     return parameters._replace(spin=spin, flags=flags)
-
-
-def _given_state(model: DropModel, start: StateStart) -> Array:
-    state = np.array(start.state, dtype=np.float64)
-    if state.shape != (model.layout.size,):
-        raise SimulationError(
-            f"the start state has shape {state.shape}; this model expects ({model.layout.size},). "
-            "Use the layout of the same reduction."
-        )
-    return state
 
 
 def rigid_amplitudes(model: DropModel, positions: Array, values: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -182,19 +182,28 @@ def analyse_coast_down(
         raise RecordError("coast-down: no plane given; at least one displacement (x, y) is needed")
     choice, tell = choice or WaterfallChoice(), progress or (lambda stage, fraction: None)
     tell("lines", 0.05)
-    read = signal.planes if signal.recorded else _as_read_by_a_sensor(signal.planes)
+    read = signal.planes
+    if not signal.recorded:  # as a sensor reads it
+        dice = np.random.default_rng(_SEED)
+        read = {
+            name: np.asarray(plane[0 : plane.shape[0]]) + SENSOR_NOISE * dice.standard_normal(plane.shape)
+            for name, plane in signal.planes.items()
+        }
     settled = {
         name: find_settling(
             moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
         )
         for name, moved in signal.planes.items()
     }
+    # how long the rotor bounces at the beginning; nothing if it does not settle soon
+    last = max((one.contact_from for one in settled.values() if one.contact_from is not None), default=0.0)
+    duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
     lines = find_lines(
         read,
         signal.sampling_rate,
         signal.profile,
         start_time=signal.start_time,
-        skip=_bouncing(signal, settled.values()),
+        skip=last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0,
         candidates=candidates,
         air_gap=float(np.mean(list(signal.air_gap.values()))),
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
@@ -208,21 +217,6 @@ def analyse_coast_down(
         planes = dict(zip(signal.planes, seen, strict=True))
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
-
-
-def _bouncing(signal: CoastDownSignal, settled: Iterable[Settling]) -> float:
-    """How long the rotor bounces at the beginning [s]; nothing if it does not settle soon."""
-    last = max((found.contact_from for found in settled if found.contact_from is not None), default=0.0)
-    duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
-    return last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0
-
-
-def _as_read_by_a_sensor(planes: Mapping[str, PlanarSignal]) -> dict[str, Array]:
-    dice = np.random.default_rng(_SEED)
-    return {
-        name: np.asarray(plane[0 : plane.shape[0]]) + SENSOR_NOISE * dice.standard_normal(plane.shape)
-        for name, plane in planes.items()
-    }
 
 
 def _plane(

@@ -148,7 +148,9 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
     """
     t, omega = _window(time, speed, start, end)
     expected = _reading(t, omega)
-    scale = _drag_scale(t, omega)
+    # each of the three drags alone would stop about half of the rotor's speed in the half time
+    half, first = max(_half_time(t, omega, float(t[0])), 1e-6), float(omega[0])
+    scale = np.array([first, 0.05 * first / half, 0.5 / half, 0.1 / (half * first)])
 
     def model(p: Array) -> Array:
         return expected(_drag_solution(p, t - start))
@@ -323,15 +325,6 @@ def _reading(time: Array, speed: Array) -> Model:
 def _half_time(time: Array, speed: Array, start: float) -> float:
     below = np.flatnonzero(speed <= 0.5 * speed[0])
     return float((time[below[0]] if below.size else time[-1]) - start)
-
-
-def _drag_scale(time: Array, speed: Array) -> Array:
-    """Start values: each of the three drags alone would stop about half of the rotor's speed in the half
-    time.
-    """
-    half = max(_half_time(time, speed, float(time[0])), 1e-6)
-    first = float(speed[0])
-    return np.array([first, 0.05 * first / half, 0.5 / half, 0.1 / (half * first)])
 
 
 def _drag_solution(parameters: Array, time: Array) -> Array:

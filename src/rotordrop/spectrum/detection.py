@@ -135,7 +135,11 @@ def _peak(
     last: int,
 ) -> Peak:
     used = np.isfinite(ratio[first:last, line, channel])
-    shape = _typical_shape(frames.power[first:last, :, channel][used])
+    # the typical form of the peak: the median over the frames, zero where no frame reaches
+    power = frames.power[first:last, :, channel][used]
+    reached = np.isfinite(power).any(axis=0)
+    shape = np.zeros(power.shape[1])
+    shape[reached] = median_of_known(power[:, reached])
     shift, height = _between_lines(shape, line)
     around = float(np.median(floor[first:last, line, channel][used])) / MEDIAN_OF_NOISE
     return Peak(
@@ -178,14 +182,6 @@ def median_of_known(values: Array) -> Array:
     low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis=0)
     high = np.take_along_axis(ordered, np.minimum(known // 2, len(values) - 1), axis=0)
     return cast(Array, 0.5 * (low + high)[0])
-
-
-def _typical_shape(power: Array) -> Array:
-    """Median over the frames of one channel, zero where no frame reaches, to measure a peak's form."""
-    reached = np.isfinite(power).any(axis=0)
-    shape = np.zeros(power.shape[1])
-    shape[reached] = median_of_known(power[:, reached])
-    return shape
 
 
 def _improbability(ratio: Array, frames: Array) -> Array:

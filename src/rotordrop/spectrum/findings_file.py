@@ -11,7 +11,6 @@ from rotordrop.files import new_hdf5
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis
-    from rotordrop.spectrum.waterfall import Waterfall
 
 FORMAT = "rotordrop frequencies 1"
 
@@ -55,7 +54,14 @@ def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
     ):
         _put(group, f"displacement/{name}", values, unit)
     for fall in plane.waterfalls:
-        _write_waterfall(group.create_group(f"waterfall_{fall.component}"), fall)
+        place = group.create_group(f"waterfall_{fall.component}")
+        place.attrs["points"], place.attrs["overlap"] = fall.settings.points, fall.settings.overlap
+        _put(place, "time", fall.time, "s")
+        _put(place, "frequency", fall.frequency, "Hz")
+        _put(place, "amplitude", fall.amplitude, "m")
+        place["amplitude"].attrs["amplitude_kind"] = fall.amplitude_kind
+        if fall.speed is not None:
+            _put(place, "speed", fall.speed, "rad/s")
     if track is not None:
         _put(group, "orders/time", track.time, "s")
         _put(group, "orders/speed", track.speed, "rad/s")
@@ -63,13 +69,3 @@ def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
         _put(group, "orders/major_axis", track.major_axis, "m")
         _put(group, "orders/separable", track.separable, "1")
         group["orders/major_axis"].attrs["amplitude_kind"] = "zero-to-peak"
-
-
-def _write_waterfall(group: Any, fall: Waterfall) -> None:
-    group.attrs["points"], group.attrs["overlap"] = fall.settings.points, fall.settings.overlap
-    _put(group, "time", fall.time, "s")
-    _put(group, "frequency", fall.frequency, "Hz")
-    _put(group, "amplitude", fall.amplitude, "m")
-    group["amplitude"].attrs["amplitude_kind"] = fall.amplitude_kind
-    if fall.speed is not None:
-        _put(group, "speed", fall.speed, "rad/s")

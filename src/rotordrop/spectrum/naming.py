@@ -113,11 +113,12 @@ def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: f
     together = [match for match in listed if match.candidate.family == family]
     share = sum(match.probability for match in together)
     if share >= SURE:
+        first, unit = together[0], "" if together[0].candidate.kind == "order" else " Hz"
         return Name(
             label=_label(together),
             named=True,
             confidence=share,
-            reason=_why(line, together[0]),
+            reason=f"{_place(line)}, {first.deviation:+.3g}{unit} from expected: {first.candidate.reason}",
             matches=listed,
         )
     options = " or ".join(dict.fromkeys(match.candidate.name for match in listed))
@@ -189,8 +190,3 @@ def _label(together: Sequence[Match]) -> str:
     first = together[0]
     rivals = [m for m in together[1:] if m.probability > 0.2 * first.probability]
     return " or ".join(dict.fromkeys([first.candidate.name, *(m.candidate.name for m in rivals)]))
-
-
-def _why(line: LineEvidence, match: Match) -> str:
-    unit = "" if match.candidate.kind == "order" else " Hz"
-    return f"{_place(line)}, {match.deviation:+.3g}{unit} from expected: {match.candidate.reason}"

@@ -72,17 +72,12 @@ def arrived(folder: Path, leave: Path) -> Iterator[Arrived]:
             if name.startswith((".", "~$")) or name.lower() in PASSED_OVER:
                 continue
             path = Path(place) / name
-            if path.suffix.lower() in UNFINISHED or _belongs_to_another(path, here):
+            if path.suffix.lower() in UNFINISHED or path.stem.lower().endswith(TAIL):
                 continue
+            if path.suffix.lower() == ".dat" and {f"{path.stem}.cfg", f"{path.stem}.CFG"} & here:
+                continue  # the samples of a COMTRADE configuration
             if (one := Arrived.at(path)) is not None:
                 yield one
-
-
-def _belongs_to_another(path: Path, here: set[str]) -> bool:
-    """Whether a file is the tail of a record, or holds the samples of a COMTRADE configuration."""
-    if path.suffix.lower() == ".dat" and {f"{path.stem}.cfg", f"{path.stem}.CFG"} & here:
-        return True
-    return path.stem.lower().endswith(TAIL)
 
 
 def parts_of(record: Path) -> dict[str, Path]:

@@ -33,7 +33,8 @@ def log_told(log: str, own: bool) -> dict[str, Any]:
     if own and not Path(log).exists():
         return told
     try:
-        for number, drop in book.logged_drops(log).items():
+        whole = book.read_log(log)
+        for number, drop in whole.drops.items():
             lines = (
                 f"from rotordrop.ledger.book import logged_drops\n\ndrop = logged_drops({name!r})[{number}]\n"
             )
@@ -54,9 +55,9 @@ def log_told(log: str, own: bool) -> dict[str, Any]:
                 "allowed": one.allowed_drops,
                 "sentence": one.sentence(),
             }
-            for one in book.used_shares(log)
+            for one in book.used_shares(whole)
         ]
-        told["trends"] = [one.sentence() for one in book.trends(log)]
+        told["trends"] = [one.sentence() for one in book.trends(whole)]
     except RotordropError as error:
         told["problem"] = str(error)
     return told

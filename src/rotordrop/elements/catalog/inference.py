@@ -163,7 +163,10 @@ def infer_balls(
     can be put between offset rings. A rigidity says of the grooves what size and ratings do not.
     """
     pitch, height = 0.5 * (bore + outside_diameter), 0.5 * (outside_diameter - bore)
-    share, fill = _priors(dimension_series, small_balls, bore)
+    share = _SMALL_SHARE if small_balls else _BALL_SHARE[dimension_series]
+    fill = _SMALL_FILL if small_balls else _FILL[dimension_series]
+    if 1e3 * bore < _SMALLEST_FILL[0]:
+        fill = (fill[0], max(fill[1], _SMALLEST_FILL[1]))
     ratings = (static_load_rating, dynamic_load_rating)
     told = rigidity is not None or (kind == "angular contact" and any(one is not None for one in ratings))
     grooves = _conformities(kind, told)
@@ -260,13 +263,6 @@ def _moments(weighted: list[tuple[float, float]]) -> tuple[float, float]:
     total = sum(weight for _, weight in weighted)
     mean = sum(value * weight for value, weight in weighted) / total
     return mean, math.sqrt(sum(_squared(value - mean) * weight for value, weight in weighted) / total)
-
-
-def _priors(series: str, small: bool, bore: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    share, fill = (_SMALL_SHARE, _SMALL_FILL) if small else (_BALL_SHARE[series], _FILL[series])
-    if 1e3 * bore < _SMALLEST_FILL[0]:
-        fill = (fill[0], max(fill[1], _SMALLEST_FILL[1]))
-    return share, fill
 
 
 def _filling_error(kind: Kind, ratio: float, count: int, fill: tuple[float, float]) -> float:
