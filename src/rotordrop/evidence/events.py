@@ -230,7 +230,7 @@ def _sooner(record: Record, machine: Machine, levitated: LevitatedModel, coarse:
     # the unbalance throws a widely circling plane further than it falls, but not before it was let go
     fallen = float(near.time[sunk]) - float(np.sqrt(2.0 * np.max(way[sunk]) / gravity))
     instant = max(fallen, levitated.end)
-    contact = first_sudden(near, gravity, instant, max(sunk, _first(way > NEAREST_CONTACT * gaps)))
+    contact = first_sudden(near, gravity, instant, max(sunk, first_sample(way > NEAREST_CONTACT * gaps)))
     return replace(coarse, instant=instant, sunk=float(near.time[sunk]), contact=contact)
 
 
@@ -256,7 +256,7 @@ def _coarse_drop(record: Record, gravity: float, gaps: Array, first: int) -> Coa
     speed = float(np.median(readings[before])) if before.any() else float(readings[0])
     away = record.motion - np.mean(record.motion[:first], axis=0)
     far = np.hypot(*np.moveaxis(away, -1, 0)) > NEAREST_CONTACT * gaps
-    contact = first_sudden(record, gravity, instant, max(sunk, _first(far)))
+    contact = first_sudden(record, gravity, instant, max(sunk, first_sample(far)))
     return CoarseDrop(instant=float(instant), sunk=float(record.time[sunk]), contact=contact, speed=speed)
 
 
@@ -298,7 +298,7 @@ def fall_accelerations(away: Array, reach: float, rate: float) -> Array:
     return found
 
 
-def _first(far: NDArray[np.bool_]) -> int:
+def first_sample(far: NDArray[np.bool_]) -> int:
     """First sample at which any plane (N, P) is far, or the last one."""
     at = np.flatnonzero(far.any(axis=1))
     return int(at[0]) if len(at) else len(far) - 1

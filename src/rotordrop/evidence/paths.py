@@ -119,7 +119,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
         time=record.time,
         rate=rate,
         paths=tuple(paths),
-        floats=_floating(paths, rate),
+        floats=where_floating(paths, rate),
         notes=tuple(notes),
     )
 
@@ -212,7 +212,7 @@ def _noise(position: Array) -> float:
     return noise_by_differences(position, 3)
 
 
-def _floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
+def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
     """Samples at which all planes stay near where they floated for longer than any flight between impacts."""
     near = np.ones(len(paths[0].position), dtype=np.bool_)
     for path in paths:

@@ -141,7 +141,7 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
         with closing(_connected(file, writing)) as connection:
             opened = Transaction(connection.cursor(), "?")
             if writing:
-                _leave_wal(connection)
+                leave_wal(connection)
                 # EXTRA: what was added survives a power cut
                 connection.execute("PRAGMA synchronous = EXTRA")
                 connection.execute("PRAGMA foreign_keys = ON")
@@ -209,7 +209,7 @@ def _connected(file: Path, writing: bool) -> sqlite3.Connection:
     return sqlite3.connect(f"{file.absolute().as_uri()}?{mode}", uri=True, timeout=WAIT, isolation_level=None)
 
 
-def _leave_wal(connection: sqlite3.Connection) -> None:
+def leave_wal(connection: sqlite3.Connection) -> None:
     """Give a log of an older rotordrop a rollback journal; SQLite waits for nobody here by itself."""
     until = time.monotonic() + WAIT
     while True:

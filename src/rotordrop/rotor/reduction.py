@@ -139,7 +139,7 @@ def reduce_rotor(
         )
     everything = free_free_modes(fe)
     kept = min(choice.modes, fe.size)
-    inner, eigenvalues, damping = _attachment_coordinates(fe, everything, kept, nodes)
+    inner, eigenvalues, damping = attachment_coordinates(fe, everything, kept, nodes)
     extra = with_positive_peak(product(everything.shapes[:, kept:], inner))
     signs = np.sign(np.sum(extra * product(fe.mass, product(everything.shapes[:, kept:], inner)), axis=0))
     shapes = np.column_stack([everything.shapes[:, :kept], extra])
@@ -150,7 +150,7 @@ def reduce_rotor(
     return _basis(fe, shapes, values, projected, choice, nodes)
 
 
-def _attachment_coordinates(
+def attachment_coordinates(
     fe: RotorFE, modes: PlanarModes, kept: int, nodes: tuple[int, ...]
 ) -> tuple[Array, Array, Array]:
     """Attachment modes from truncated ones: coefficients (t, a), eigenvalues (a,), damping (a, a)."""

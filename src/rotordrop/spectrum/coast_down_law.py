@@ -246,7 +246,7 @@ def _fit(model: Model, measured: Array, scale: Array, *, lower: Array, upper: Ar
     )
     residual = solution.fun
     freedom = max(residual.size - scale.size, 1)
-    variance = float(residual @ residual) / freedom * _inflation(residual)
+    variance = float(residual @ residual) / freedom * inflation(residual)
     covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
     deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return _Fit(
@@ -257,7 +257,7 @@ def _fit(model: Model, measured: Array, scale: Array, *, lower: Array, upper: Ar
     )
 
 
-def _inflation(residual: Array) -> float:
+def inflation(residual: Array) -> float:
     """How much fewer independent residuals there are than residuals [1]."""
     power = float(residual @ residual)
     if power == 0.0:

@@ -150,7 +150,7 @@ def _peak(
         amplitude=math.sqrt(height),
         floor=math.sqrt(around),
         score=score,
-        width=_half_power_width(shape, line) * frames.spacing,
+        width=half_power_width(shape, line) * frames.spacing,
     )
 
 
@@ -216,7 +216,8 @@ def _between_lines(power: Array, line: int) -> tuple[float, float]:
     return shift, float(np.exp(here - 0.25 * (left - right) * shift))
 
 
-def _half_power_width(power: Array, line: int) -> float:
+def half_power_width(power: Array, line: int) -> float:
+    """Width of a peak at half its power, in lines."""
     half = 0.5 * power[line]
     left, right = line, line
     while left > 0 and power[left - 1] > half:

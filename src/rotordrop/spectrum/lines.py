@@ -146,11 +146,11 @@ def find_lines(
     # One plane after the other: side by side they would hold twice the memory for a third less time.
     found = [(plane, line) for plane, moved in planes.items() for line in lines_of(moved)]
     bands = (highest, settings.highest_order)
-    lines = _joined(_named(found, candidates, air_gap, bands))
+    lines = _joined(name_lines(found, candidates, air_gap, bands))
     return tuple(sorted(lines, key=lambda line: -line.amplitude))
 
 
-def _named(
+def name_lines(
     found: Sequence[tuple[str, FoundLine]],
     candidates: Sequence[Candidate],
     air_gap: float | None,
@@ -168,7 +168,7 @@ def _named(
         for (_, line), name in zip(single, first, strict=True)
         if name.named and name.kind in ("steady", "undecided") and _swings(name)
     ]
-    lines = [named(plane, line, (*candidates, *_harmonics(line, swings))) for plane, line in single]
+    lines = [named(plane, line, (*candidates, *harmonics_of(line, swings))) for plane, line in single]
     label = {
         id(line): (result.label if result.named else f"{line.frequency:.1f} Hz")
         for (_, line), result in zip(single, lines, strict=True)
@@ -240,7 +240,7 @@ def _swings(line: Line) -> bool:
     return family in ("pendulum", "whirl")
 
 
-def _harmonics(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list[Candidate]:
+def harmonics_of(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list[Candidate]:
     """Where the multiples of each swing would be seen, as it wanders, while this line was there."""
     total = float(line.power.sum())
     if total == 0.0:

@@ -93,7 +93,7 @@ def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: f
     whirl = _whirl(line, air_gap)
     if whirl is not None:
         return whirl
-    weighed = [(c, _density(line, c)) for c in candidates if _possible(line, c)]
+    weighed = [(c, density_of(line, c)) for c in candidates if _possible(line, c)]
     nothing = UNKNOWN_WEIGHT / (line.order_band if line.kind == "order" else line.band)
     total = nothing + sum(density for _, density in weighed)
     matches = sorted(
@@ -169,7 +169,7 @@ def _found(line: LineEvidence, candidate: Candidate) -> tuple[float, float]:
     return line.frequency, line.frequency_error
 
 
-def _density(line: LineEvidence, candidate: Candidate) -> float:
+def density_of(line: LineEvidence, candidate: Candidate) -> float:
     """Weighted probability density that the candidate puts a line here [1/Hz or 1/order]."""
     value, error = _found(line, candidate)
     sigma = max(error, 1e-9)

@@ -72,7 +72,7 @@ def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forwa
 
 def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
     """Check innovations, sensor errors, parameters and process noise of a smoothed drop."""
-    innovations = _innovation_checks(problem, smoothed)
+    innovations = innovation_checks(problem, smoothed)
     white = all(check.passed for check in innovations)
     sensors, parameters = _sensor_departures(problem, smoothed), _departures(problem, smoothed, "machine")
     beyond = [one for one in (*sensors, *parameters) if one[0] >= DEPARTURE_LIMIT]
@@ -94,7 +94,7 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             by_path=True,
             remedy="measure that value of the machine, or widen its range in the machine file",
         ),
-        _nuisance_check(problem, smoothed, white),
+        nuisance_check(problem, smoothed, white),
         _remanence_check(problem, smoothed, white),
         Check(
             name="process noise",
@@ -127,7 +127,8 @@ def normalised_innovations(smoothed: Smoothed) -> Array:
     )
 
 
-def _innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
+def innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
+    """Whether innovations are as large as they say of themselves, and new at every sample."""
     e = normalised_innovations(smoothed)
     live = np.flatnonzero(np.isfinite(e).any(axis=0))
     e = e[:, live]
@@ -222,7 +223,7 @@ def direction_check(problem: DropProblem) -> Check:
     return Check(name=DIRECTIONS, passed=not blind, message=missing if blind else seen)
 
 
-def _nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
+def nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
     """What belongs to this drop alone (unbalance, remanent lift, drag of the air) against what is usual.
 
     Forces do not depend on how large these are, only on whether the filter has found them: as long as the

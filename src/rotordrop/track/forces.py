@@ -131,7 +131,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         contacts,
     )
     sigma = _standard_deviations(smoothed, gradients)
-    displacement, displacement_sigma = _displacements(problem, smoothed)
+    displacement, displacement_sigma = displacements_of(problem, smoothed)
     touching = contacts[..., 0] > 0.0
     return ForceHistory(
         time=problem.time[:count],
@@ -211,7 +211,8 @@ def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
     return np.sqrt(np.maximum(variances[places], 0.0))
 
 
-def _displacements(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:
+def displacements_of(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:
+    """Displacement at the bearings and its standard deviation [m]."""
     values, sigma = [], []
     for b, name in enumerate(problem.model.bearing_names):
         values.append(smoothed.means @ problem.watched_rows(name)[3:].T)

@@ -217,7 +217,7 @@ def build_problem(
     inside = (drop.time >= 0.0) & (drop.time <= until)
     readings = drop.readings[inside]
     rows = sensor_rows(model)
-    level = _first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall_time(model.machine))
+    level = first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall_time(model.machine))
     speed = drop.initial_speed, drop.initial_speed_error
     mean, covariance = prior_at_power_off(model, unknowns, rows, level, speed)
     problem = DropProblem(
@@ -308,7 +308,7 @@ def sensor_rows(model: DropModel) -> Array:
     return rows
 
 
-def _first_level(time: Array, readings: Array, until: float) -> Array:
+def first_level(time: Array, readings: Array, until: float) -> Array:
     """Mean of the first readings of every channel [m]; NaN where there is none."""
     first = readings[time[: len(readings)] < time[0] + until]
     known = np.isfinite(first)

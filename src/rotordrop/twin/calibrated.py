@@ -140,7 +140,7 @@ def calibrate_machine(
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
     widening = widening_of(check for one in checks.values() for check in one)
-    values = _values(problem, mean, covariance, widening)
+    values = values_of(problem, mean, covariance, widening)
     bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
     known = _as_known(as_filed(machine, values), identifiability)
@@ -157,10 +157,10 @@ def calibrate_machine(
     ]
     origin = CalibrationOrigin(drops=tuple(calibrated_on), consistent=consistent, joint=joint)
     return Calibration(
-        machine=_possible(_with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
+        machine=_possible(with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
         identifiability=identifiability,
-        confounded=_confounded(problem, covariance),
+        confounded=confounded_of(problem, covariance),
         checks=checks,
         consistent=consistent,
         nis={name: one.nis for name, one in zip(stems, found.usual, strict=True)},
@@ -199,7 +199,7 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     return tuple(lifts)
 
 
-def _with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:
+def with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:
     """The machine with an unbalance as large as the one found where that is beyond the described one.
 
     What was described then is the width of a prior, and no amount that a simulation could use.
@@ -227,7 +227,8 @@ def _possible(machine: Machine, fitted: dict[str, Known], drops: Sequence[str]) 
         ) from error
 
 
-def _values(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> dict[str, Known]:
+def values_of(problem: DropProblem, mean: Array, covariance: Array, widening: float) -> dict[str, Known]:
+    """Values for the machine file by their paths, with intervals."""
     fitted = zip(problem.unknowns, fitted_values(problem, mean, covariance, widening), strict=True)
     # a machine file states intervals, and not which part of them the model leaves out
     values = {u.path: replace(value, allowance_90=None) for u, value in fitted if u.scope == "machine"}
@@ -330,7 +331,8 @@ def _identifiability(
     )
 
 
-def _confounded(problem: DropProblem, covariance: Array) -> tuple[Confounded, ...]:
+def confounded_of(problem: DropProblem, covariance: Array) -> tuple[Confounded, ...]:
+    """Pairs of unknowns that the records tell apart badly."""
     start, n_p = problem.n_dynamic, len(problem.unknowns)
     known = [(u.parameter, u.owner) for u in problem.unknowns]
     known += [(row, s.name) for row in rows("sensor") for s in problem.model.machine.sensors]

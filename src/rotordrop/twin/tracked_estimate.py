@@ -92,7 +92,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         If the model does not fit the record and the sensors see too little for a cross-check: the errors of
         its numbers have no limit then.
     """
-    drop, check = _cross_checked(drop, method)
+    drop, check = cross_checked(drop, method)
     problem, evidence = drop.problem, drop.evidence
     judged = _judge(drop, check)
     later = _later(drop, judged)
@@ -184,7 +184,7 @@ def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
 
 
-def _cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
+def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
     """The drop with one check more, and the estimate without contact law, if one is made.
 
     A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor

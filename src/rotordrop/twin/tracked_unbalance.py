@@ -49,7 +49,7 @@ def plane_unbalances(
         largest = math.sqrt(max(0.5 * (a + d) + math.hypot(0.5 * (a - d), b), 0.0))  # in any direction
         factor = parameter_widening(first, largest, widening)
         joint = factor**2 * covariance[np.ix_(entries, entries)]
-        amount, phase = _polar(complex(*mean[entries]), joint, prior, turned, fits)
+        amount, phase = polar_of(complex(*mean[entries]), joint, prior, turned, fits)
         reason = NO_MARK if marks is None else NO_PASSAGE if turned is None else NO_DIRECTION
         found.append(
             PlaneUnbalance(
@@ -59,7 +59,7 @@ def plane_unbalances(
     return tuple(found)
 
 
-def _polar(
+def polar_of(
     vector: complex, covariance: Array, prior: float, turned: MarkAngle | None, fits: bool
 ) -> tuple[Known, Known | None]:
     """Amount and phase of a vector: its error along itself is that of the amount, the other of the phase."""

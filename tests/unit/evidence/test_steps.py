@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.events import _first
-from rotordrop.evidence.paths import _floating
-from rotordrop.evidence.quality.motion import _strongest_line
+from rotordrop.evidence.events import first_sample
+from rotordrop.evidence.paths import where_floating
+from rotordrop.evidence.quality.motion import strongest_line
 from rotordrop.record.sandbox import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
 
 RATE = 5000.0
@@ -19,10 +19,10 @@ RATE = 5000.0
 
 def test_a_rotor_is_far_where_any_plane_says_so() -> None:
     far = np.zeros((10, 2), dtype=np.bool_)
-    assert _first(far) == 9
+    assert first_sample(far) == 9
     far[6:, 0], far[8:, 1] = True, True
-    assert _first(far) == 6
-    assert _first(far[:, ::-1]) == 6
+    assert first_sample(far) == 6
+    assert first_sample(far[:, ::-1]) == 6
 
 
 @pytest.mark.parametrize(
@@ -37,11 +37,11 @@ def test_a_rotor_floats_within_half_the_gap_or_twice_its_own_height(
     position = np.tile(levitated, (4000, 1))
     position[2000:, 0] = away * gap
     path: Any = SimpleNamespace(gap=gap, levitated=levitated, position=position)
-    found = _floating([path], RATE)
+    found = where_floating([path], RATE)
     assert found[:2000].all() and found[2000:].all() == floating
     high: Any = SimpleNamespace(gap=gap, levitated=np.array([0.0, 0.6 * gap]), position=position.copy())
     high.position[:] = high.levitated + np.array([0.75 * gap, 0.0])
-    assert not _floating([high], RATE).any()
+    assert not where_floating([high], RATE).any()
 
 
 @pytest.mark.parametrize(("over_median", "found"), [(25.0, False), (90.0, True)])
@@ -63,7 +63,7 @@ def test_a_line_stands_out_at_fifty_times_the_median_power(over_median: float, f
     size = sizes[int(np.argmin([abs(ratio(s) - over_median) for s in sizes]))]
     assert ratio(size) == pytest.approx(over_median, rel=0.2)
     record: Any = SimpleNamespace(time=time, signals=noise + size * tone, sampling_rate=RATE)
-    line = _strongest_line(record, 2.0)
+    line = strongest_line(record, 2.0)
     assert (line is not None) == found
     if line is not None:
         assert line[0] == pytest.approx(300.3, abs=0.2) and line[1] == pytest.approx(1.0)

@@ -22,7 +22,7 @@ from tests.published import bearing, published, value
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
 from rotordrop.ledger import LoggedDrop, Severity, _store, add_drop, allow, logged_drops, trends, used_shares
-from rotordrop.ledger._store import Transaction, _leave_wal
+from rotordrop.ledger._store import Transaction, leave_wal
 from rotordrop.ledger.book import drop_of_estimate, read_log, remove_drop
 
 PEAK = Severity(bearing="NDE", quantity="peak_force_N", unit="N", value=3300.0, lower=3200.0, upper=3400.0)
@@ -679,13 +679,13 @@ class Busy:
 
 def test_a_log_that_others_use_is_waited_for(monkeypatch):
     busy = Busy()
-    _leave_wal(busy)
+    leave_wal(busy)
     assert busy.asked == 3
     with pytest.raises(sqlite3.OperationalError, match="disk"):
-        _leave_wal(Busy("disk I/O error"))
+        leave_wal(Busy("disk I/O error"))
     monkeypatch.setattr(_store, "WAIT", 0.0)
     with pytest.raises(sqlite3.OperationalError, match="locked"):
-        _leave_wal(Busy())
+        leave_wal(Busy())
 
 
 def test_a_log_that_others_keep_is_said(log, monkeypatch):

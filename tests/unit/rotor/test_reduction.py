@@ -11,7 +11,7 @@ from rotordrop.rotor.assembly import free_free_modes, modal_damping_matrix
 from rotordrop.rotor.reduction import (
     PRESETS,
     Reduction,
-    _attachment_coordinates,
+    attachment_coordinates,
     reduce_rotor,
     reduction_of,
 )
@@ -106,9 +106,9 @@ def test_more_attachments_than_modes_left_do_not_repeat_shapes(overhung):
 def test_a_direction_that_repeats_another_gives_no_shape(paper_fe):
     """Directions are compared at unit length, so that rounding is not taken for a second one."""
     modes = free_free_modes(paper_fe)
-    inner, eigenvalues, damping = _attachment_coordinates(paper_fe, modes, 6, (4, 26, 4))
+    inner, eigenvalues, damping = attachment_coordinates(paper_fe, modes, 6, (4, 26, 4))
     assert (inner.shape[1], eigenvalues.shape, damping.shape) == (2, (2,), (2, 2))
-    once = _attachment_coordinates(paper_fe, modes, 6, (4, 26))[1]
+    once = attachment_coordinates(paper_fe, modes, 6, (4, 26))[1]
     np.testing.assert_allclose(eigenvalues, once, rtol=1e-9)
 
 

@@ -22,13 +22,13 @@ from rotordrop.spectrum.candidates import (
     order_candidates,
     pendulum_candidate,
 )
-from rotordrop.spectrum.coast_down_law import _inflation
-from rotordrop.spectrum.detection import DetectionSettings, _half_power_width, clearest_peak
+from rotordrop.spectrum.coast_down_law import inflation
+from rotordrop.spectrum.detection import DetectionSettings, clearest_peak, half_power_width
 from rotordrop.spectrum.indentation import find_settling
 from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower
-from rotordrop.spectrum.lines import SWING_ERROR, _harmonics, _named, find_lines
-from rotordrop.spectrum.naming import LineEvidence, _density
+from rotordrop.spectrum.lines import SWING_ERROR, find_lines, harmonics_of, name_lines
+from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
 SETTINGS = LineSettings(highest_frequency=450.0)
@@ -169,19 +169,19 @@ def test_the_width_of_a_triangle_is_half_its_foot(line: int) -> None:
     """Linear between its lines, so exact wherever it stands; cut off at an edge, as wide as it is seen."""
     power = np.maximum(1.0 - np.abs(np.arange(20.0) - line) / 3.2, 0.0)
     left = min(1.6, line)
-    assert _half_power_width(power, line) == pytest.approx(left + 1.6)
-    assert _half_power_width(power[::-1], 19 - line) == pytest.approx(left + 1.6)
+    assert half_power_width(power, line) == pytest.approx(left + 1.6)
+    assert half_power_width(power[::-1], 19 - line) == pytest.approx(left + 1.6)
 
 
 def test_a_harmonic_is_looked_for_where_the_swing_was_while_the_line_was_strong() -> None:
     """Weighted by power: at 10 Hz with three times the amplitude, as long at 20 Hz."""
     swing: Any = SimpleNamespace(path=np.array([10.0] * 50 + [20.0] * 50), frequency_error=0.01)
     line: Any = SimpleNamespace(power=np.repeat(np.float32([9e-12, 1e-12]), 50))
-    first, *_ = _harmonics(line, [("pendulum", swing), ("itself", line)])
+    first, *_ = harmonics_of(line, [("pendulum", swing), ("itself", line)])
     assert first.value == pytest.approx(2.0 * 11.0)
     assert first.tolerance >= 2.0 * SWING_ERROR
     silent: Any = SimpleNamespace(power=np.zeros(100, dtype=np.float32))
-    assert _harmonics(silent, [("pendulum", swing)]) == []
+    assert harmonics_of(silent, [("pendulum", swing)]) == []
 
 
 def test_lines_of_another_plane_are_no_neighbours_of_an_order(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -253,10 +253,10 @@ def test_residuals_that_follow_each_other_count_for_fewer() -> None:
     following[0] = noise[0]
     for k in range(1, len(noise)):
         following[k] = 0.6 * following[k - 1] + noise[k]
-    assert _inflation(following) == pytest.approx((1.0 + 0.6) / (1.0 - 0.6), rel=0.05)
-    assert _inflation(noise) == pytest.approx(1.0, abs=0.02)
-    assert _inflation(noise * (-1.0) ** np.arange(len(noise)) * 0.1 + (-1.0) ** np.arange(len(noise))) == 1.0
-    assert _inflation(np.zeros(5)) == 1.0
+    assert inflation(following) == pytest.approx((1.0 + 0.6) / (1.0 - 0.6), rel=0.05)
+    assert inflation(noise) == pytest.approx(1.0, abs=0.02)
+    assert inflation(noise * (-1.0) ** np.arange(len(noise)) * 0.1 + (-1.0) ** np.arange(len(noise))) == 1.0
+    assert inflation(np.zeros(5)) == 1.0
 
 
 @pytest.mark.parametrize("offset", [-1.4, -0.9, 0.0, 0.3, 1.1])
@@ -275,7 +275,7 @@ def test_a_candidate_is_an_even_chance_within_its_tolerance_seen_through_the_err
         order_band=20.0,
     )
     expected = (norm.cdf((offset + 1.0) / 0.4) - norm.cdf((offset - 1.0) / 0.4)) / 2.0
-    assert _density(line, candidate) == pytest.approx(expected, rel=1e-9)
+    assert density_of(line, candidate) == pytest.approx(expected, rel=1e-9)
 
 
 def test_the_average_over_frames_is_that_of_the_power() -> None:
@@ -305,5 +305,5 @@ def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide() -> None
         for frequency in (28.7, 57.4)
     )
     known = (pendulum_candidate("pendulum", 28.3, 29.8),)
-    names = [line.label for line in _named([("DE", swing), ("DE", twice)], known, 285e-6, (450.0, 20.0))]
+    names = [line.label for line in name_lines([("DE", swing), ("DE", twice)], known, 285e-6, (450.0, 20.0))]
     assert names == ["pendulum", "pendulum, harmonic 2"]

@@ -12,9 +12,9 @@ import pytest
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.track.consistency import CORRELATION_LIMIT, _innovation_checks, _nuisance_check
-from rotordrop.track.forces import _displacements
-from rotordrop.track.problem import _first_level
+from rotordrop.track.consistency import CORRELATION_LIMIT, innovation_checks, nuisance_check
+from rotordrop.track.forces import displacements_of
+from rotordrop.track.problem import first_level
 from rotordrop.track.smoother import Forward
 
 
@@ -23,11 +23,11 @@ def test_the_first_level_of_a_channel_is_the_mean_of_what_it_read() -> None:
     readings = np.full((40, 3), 7.0)
     readings[:9] = [[1.0, 2.0, 3.0]]
     readings[:3] += 0.5
-    assert _first_level(time, readings, 0.49e-3)[1] == pytest.approx(readings[time < 0.49e-3, 1].mean())
+    assert first_level(time, readings, 0.49e-3)[1] == pytest.approx(readings[time < 0.49e-3, 1].mean())
     readings[:3, 0] = np.nan
     readings[:, 2] = np.nan
-    assert _first_level(time, readings, 0.49e-3)[0] == pytest.approx(readings[3:10, 0].mean())
-    assert np.isnan(_first_level(time, readings, 0.49e-3)[2])
+    assert first_level(time, readings, 0.49e-3)[0] == pytest.approx(readings[3:10, 0].mean())
+    assert np.isnan(first_level(time, readings, 0.49e-3)[2])
 
 
 def test_a_displacement_is_as_uncertain_as_its_covariance_says() -> None:
@@ -39,13 +39,13 @@ def test_a_displacement_is_as_uncertain_as_its_covariance_says() -> None:
         model=SimpleNamespace(bearing_names=("NDE", "DE")), watched_rows=lambda name: rows[name]
     )
     smoothed: Any = SimpleNamespace(means=dice.normal(size=(6, 4)), watched=watched)
-    values, sigma = _displacements(problem, smoothed)
+    values, sigma = displacements_of(problem, smoothed)
     for b, name in enumerate(rows):
         for axis in range(2):
             assert values[:, b, axis] == pytest.approx(smoothed.means @ rows[name][3 + axis])
             assert sigma[:, b, axis] ** 2 == pytest.approx(watched[:, 5 * b + 3 + axis, 5 * b + 3 + axis])
     smoothed.watched = -watched
-    assert np.all(_displacements(problem, smoothed)[1] == 0.0)  # below zero by rounding only
+    assert np.all(displacements_of(problem, smoothed)[1] == 0.0)  # below zero by rounding only
 
 
 @pytest.mark.parametrize("red", [0, 1, 2])
@@ -62,7 +62,7 @@ def test_the_channel_whose_innovations_follow_each_other_is_named(red: int) -> N
     names = ("A", "B", "C")
     sensors = tuple(SimpleNamespace(name=name) for name in names)
     problem: Any = SimpleNamespace(model=SimpleNamespace(machine=SimpleNamespace(sensors=sensors)))
-    size, whiteness = _innovation_checks(problem, smoothed)
+    size, whiteness = innovation_checks(problem, smoothed)
     assert size.passed
     assert not whiteness.passed and CORRELATION_LIMIT < 0.5
     assert re.search(rf"channel {names[red]} correlate by 0\.(5|6)", whiteness.message)
@@ -105,7 +105,7 @@ def test_what_is_unusual_in_one_drop_is_a_note_while_its_innovations_are_white(
     theta = np.array([u.mean + (sigmas * u.sigma if u.path == path else 0.0) for u in unknowns])
     problem: Any = SimpleNamespace(unknowns=unknowns, parameter_slice=slice(0, len(unknowns)))
     smoothed: Any = SimpleNamespace(means=theta[None], filtered=SimpleNamespace(parameter_sample=0))
-    found = _nuisance_check(problem, smoothed, white)
+    found = nuisance_check(problem, smoothed, white)
     assert found.passed is (white or sigmas < 5.0)
     assert found.path == path
     assert found.message.startswith(f"departs by {sigmas:.1f} prior standard deviations")

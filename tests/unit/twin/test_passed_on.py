@@ -20,7 +20,7 @@ from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.twin.calibrated import CONFOUNDED, _confounded, _values
+from rotordrop.twin.calibrated import CONFOUNDED, confounded_of, values_of
 from rotordrop.twin.tracked_parameters import (
     PARAMETER_WIDENING,
     determination,
@@ -129,7 +129,7 @@ def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
     errors, offsets = np.array([0.1, -0.2]), np.array([3e-6, -4e-6])
     sigma = np.array([1.0, 1.0, 1.0, 0.02, 0.01, 1e-6, 2e-6])
     mean = np.concatenate([np.zeros(3), errors, offsets])
-    found = _values(only, mean, np.diag(sigma**2), 1.5)
+    found = values_of(only, mean, np.diag(sigma**2), 1.5)
     for c, name in enumerate(names):
         gain, offset = found[f"sensors.{name}.gain"], found[f"sensors.{name}.offset"]
         assert gain.value * (1.0 + errors[c]) == pytest.approx(1.0)
@@ -153,7 +153,7 @@ def test_what_is_called_confounded_is_what_correlates(problem: Any) -> None:
     pairs = {(first, first + 3): -0.95, (first + 1, offset): 0.92, (first + 2, first + 4): 0.6}
     for (i, j), value in pairs.items():
         correlation[i, j] = correlation[j, i] = value
-    found = _confounded(problem, correlation * np.outer(sigma, sigma))
+    found = confounded_of(problem, correlation * np.outer(sigma, sigma))
     assert [(pair.first, pair.second) for pair in found] == [
         (unknowns[0].path, unknowns[3].path),
         (unknowns[1].path, f"sensors.{sensors[0].name}.offset"),

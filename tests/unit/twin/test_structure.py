@@ -25,7 +25,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.track.calibration import Stage, TrackedDrops, track
 from rotordrop.twin import search as search_module
-from rotordrop.twin.calibrated import _with_unbalance
+from rotordrop.twin.calibrated import with_unbalance
 from rotordrop.twin.problems import Drops
 from rotordrop.twin.search import (
     CALIBRATION_STAGE,
@@ -376,12 +376,12 @@ def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_fi
     assert float(back.unbalances[0].beyond_described) == 3.0
     assert extension.values(back) == {}
     said = {f"unbalance.{i}.{p}": Known(value=2e-5) for i in range(2) for p in ("cosine", "sine")}
-    found = _with_unbalance(back, said).unbalances[0]
+    found = with_unbalance(back, said).unbalances[0]
     assert float(found.amount) == pytest.approx(np.hypot(2e-5, 2e-5))
     assert float(found.beyond_described) == pytest.approx(
         float(found.amount) / float(lp400.unbalances[0].amount)
     )
-    assert _with_unbalance(lp400, said) == lp400
+    assert with_unbalance(lp400, said) == lp400
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ from rotordrop.track.smoother import parameter_sample
 from rotordrop.twin.problems import Drops, drop_problem, tail_first
 from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.tracked import TrackedDrop, followed_drops, tracked_drop
-from rotordrop.twin.tracked_estimate import _cross_checked, estimate_of
+from rotordrop.twin.tracked_estimate import cross_checked, estimate_of
 from rotordrop.twin.tracked_loads import (
     INCONSISTENT,
     INCONSISTENT_WIDENING,
@@ -409,16 +409,16 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
     magnitude[:, 0] *= 3.0
     wrong = replace(workshop, forces=replace(forces, magnitude=magnitude))
     assert wrong.consistent
-    drop, check = _cross_checked(wrong, Tracked())
+    drop, check = cross_checked(wrong, Tracked())
     assert check is not None
     assert not drop.consistent
     (failed,) = [one for one in drop.checks if not one.passed]
     assert failed.name == "cross-check"
     assert re.search(r"the peak force at NDE is \d+ N, without a contact law \d+ N", failed.message)
     assert "DE is" not in failed.message.replace("NDE is", "")
-    kept, check = _cross_checked(workshop, Tracked())
+    kept, check = cross_checked(workshop, Tracked())
     assert kept is workshop and check is not None
-    assert _cross_checked(wrong, Tracked(quick=True)) == (wrong, None)
+    assert cross_checked(wrong, Tracked(quick=True)) == (wrong, None)
 
 
 def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDrop) -> None:
@@ -429,8 +429,8 @@ def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDro
     loose = (first.model_copy(update={"bearing": ball}), *others)
     machine = model.machine.model_copy(update={"touchdown_bearings": loose})
     drop = replace(workshop, problem=replace(workshop.problem, model=replace(model, machine=machine)))
-    assert _cross_checked(drop, Tracked(quick=True))[1] is not None
-    assert _cross_checked(workshop, Tracked(quick=True))[1] is None
+    assert cross_checked(drop, Tracked(quick=True))[1] is not None
+    assert cross_checked(workshop, Tracked(quick=True))[1] is None
 
 
 def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop, tracked: Estimate) -> None:

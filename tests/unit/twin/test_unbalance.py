@@ -13,7 +13,7 @@ from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY
 from rotordrop.twin.tracked import TrackedDrop
-from rotordrop.twin.tracked_unbalance import _polar, plane_unbalances
+from rotordrop.twin.tracked_unbalance import plane_unbalances, polar_of
 from rotordrop_bench import HiddenMachine
 from rotordrop_bench.event import drop_conditions
 
@@ -62,13 +62,13 @@ def test_a_mark_that_passes_later_sees_the_heavy_spot_further_on(
 
 def test_the_error_across_is_that_of_the_phase_and_the_one_along_that_of_the_amount() -> None:
     covariance = np.diag([4.0, 1.0]) * 1e-14
-    amount, phase = _polar(3e-6 + 0.0j, covariance, 1e-5, MarkAngle(angle=0.3, error=0.0), True)
+    amount, phase = polar_of(3e-6 + 0.0j, covariance, 1e-5, MarkAngle(angle=0.3, error=0.0), True)
     assert amount.interval_90 == pytest.approx((3e-6 - NINETY * 2e-7, 3e-6 + NINETY * 2e-7))
     assert phase is not None
     assert phase.value == pytest.approx(-0.3 - 0.5 * math.pi)
     half = math.asin(NINETY * 1e-7 / 3e-6)
     assert phase.interval_90 == pytest.approx((phase.value - half, phase.value + half))
-    blurred = _polar(3e-6 + 0.0j, covariance, 1e-5, MarkAngle(angle=0.3, error=0.1), True)[1]
+    blurred = polar_of(3e-6 + 0.0j, covariance, 1e-5, MarkAngle(angle=0.3, error=0.1), True)[1]
     assert blurred is not None and blurred.interval_90 is not None
     assert 0.5 * np.ptp(blurred.interval_90) == pytest.approx(math.hypot(half, NINETY * 0.1))
 
@@ -76,8 +76,8 @@ def test_the_error_across_is_that_of_the_phase_and_the_one_along_that_of_the_amo
 def test_no_phase_is_told_of_what_may_be_nothing_or_does_not_fit() -> None:
     turned = MarkAngle(angle=0.0, error=0.0)
     wide = np.diag([1.0, 1.0]) * 1e-11
-    assert _polar(3e-6 + 0.0j, wide, 1e-5, turned, True)[1] is None
-    amount, phase = _polar(3e-6 + 0.0j, 1e-3 * wide, 1e-5, turned, False)
+    assert polar_of(3e-6 + 0.0j, wide, 1e-5, turned, True)[1] is None
+    amount, phase = polar_of(3e-6 + 0.0j, 1e-3 * wide, 1e-5, turned, False)
     assert phase is None
     assert amount.interval_90 is not None
     assert amount.interval_90[0] == 0.0 and amount.interval_90[1] > 1e-5
@@ -94,7 +94,7 @@ def test_without_a_mark_the_estimate_says_so(tracked: Estimate, workshop: Tracke
 
 
 def test_what_is_told_names_node_amount_and_direction() -> None:
-    amount, phase = _polar(
+    amount, phase = polar_of(
         3e-6 + 0.0j, np.diag([4.0, 1.0]) * 1e-14, 1e-5, MarkAngle(angle=math.pi, error=0.0), True
     )
     plane = PlaneUnbalance(node=5, amount=amount, phase=phase)

@@ -212,7 +212,7 @@ def _speed_finding(record: Record, words: str, at: int, severity: str) -> Findin
 
 def check_rotation_line(record: Record, end: float, speed: float) -> list[Finding]:
     """Compare the strongest line of the levitated readings with the shaft speed, the fall with gravity."""
-    line = _strongest_line(record, end)
+    line = strongest_line(record, end)
     if line is None:
         return []
     frequency, resolution, at_half = line
@@ -224,7 +224,7 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
         return []  # the second harmonic of a rotor whose first is there too
     mains = min((*MAINS, *OTHER_SUPPLIES), key=lambda supply: abs(frequency - supply))
     if abs(frequency - mains) < resolution and abs(2.0 * frequency - expected) > near:  # else 1X and its 2X
-        beside = _strongest_line(record, end, without=mains)
+        beside = strongest_line(record, end, without=mains)
         if beside is not None and min(abs(beside[0] - k * expected) for k in (1, 2)) <= near:
             return []  # hum, which has its own name, above the line of the rotor
     if frequency * (end - float(record.time[0])) < _FEWEST_TURNS:
@@ -274,7 +274,7 @@ def _fall_share(record: Record) -> float:
     return middle / GRAVITY
 
 
-def _strongest_line(
+def strongest_line(
     record: Record, end: float, without: float | None = None
 ) -> tuple[float, float, float] | None:
     """Strongest line before `end` and the resolution [Hz], and the power at half of it over that at it.
