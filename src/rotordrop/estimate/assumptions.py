@@ -21,7 +21,7 @@ from rotordrop.units import format_quantity
 
 def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
     """What every method takes where the record does not say."""
-    yield not_seen(tail=evidence.tail is not None)
+    yield not_seen(evidence)
     machine = evidence.model.machine
     if evidence.speed.note:
         yield f"speed: {evidence.speed.note}"

@@ -14,6 +14,7 @@ import numpy as np
 
 from rotordrop.errors import NothingFallsError, RecordError, UnpairedError
 from rotordrop.evidence.events import expected_gap
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
 from rotordrop.evidence.paths import (
     Drop,
@@ -29,7 +30,7 @@ from rotordrop.evidence.paths import (
     whirls_of,
     with_impacts,
 )
-from rotordrop.evidence.quality import Finding, Kind, check_record, stops
+from rotordrop.evidence.quality import Finding, Kind, checked, not_seen, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
@@ -114,6 +115,8 @@ class Look:
     """The path of the shaft in every plane."""
     findings: tuple[Finding, ...]
     """What the quality gate says, the worst first."""
+    not_seen: str
+    """What its checks cannot see of this record."""
     drops: tuple[Drop, ...]
     """Every fall in the record, with its impacts; empty where nothing falls."""
     contacts: tuple[HeldContact, ...] = ()
@@ -234,7 +237,8 @@ def look(
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
         return _look_at_channels(FilePath(str(record)), profile, str(error))
-    findings = _checked(read, machine)
+    evidence = None if machine is None else Evidence(record=read, machine=machine, name=read.name)
+    findings = _checked(read) if evidence is None else checked(evidence)
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
     if blocking:
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
@@ -246,12 +250,14 @@ def look(
         if not drops:
             raise NothingFallsError("the rotor does not fall from where it floated; check channels and gap")
     except NothingFallsError as error:
-        return _look_at_held(read, findings, gaps, guessed, machine, str(error))
+        unseen = not_seen(evidence, fell=False)
+        return _look_at_held(read, findings, unseen, gaps, guessed, machine, str(error))
     turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
         motion=motion,
         findings=findings,
+        not_seen=not_seen(evidence),
         drops=drops,
         whirls=whirls_of(motion, drops[0]),
         planes=tuple(_plane_looks(motion, drops[0], turning)),
@@ -265,6 +271,7 @@ def look(
 def _look_at_held(
     record: Record,
     findings: tuple[Finding, ...],
+    unseen: str,
     gaps: tuple[Gap | None, ...],
     notes: tuple[str, ...],
     machine: Machine | None,
@@ -295,6 +302,7 @@ def _look_at_held(
         record=record,
         motion=motion,
         findings=findings,
+        not_seen=unseen,
         drops=(),
         contacts=tuple(sorted(contacts, key=lambda one: one.time)),
         levels=levels,
@@ -334,6 +342,7 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
         record=record,
         motion=held_motion(record, ()),
         findings=(),
+        not_seen="No check looks at channels of which no two make a plane",
         drops=(),
         levels=levels,
         no_fall=why,
@@ -367,10 +376,8 @@ def _read(
     return open_record(record, machine, profile=rules)
 
 
-def _checked(record: Record, machine: Machine | None) -> tuple[Finding, ...]:
-    """Pass the gate: the whole of it with a machine, else what single channels and the clock show."""
-    if machine is not None:
-        return check_record(record, machine)
+def _checked(record: Record) -> tuple[Finding, ...]:
+    """Pass as much of the gate as needs no machine: what single channels and the clock show."""
     damage = [
         Finding(kind=Kind.DAMAGE, message=words, remedy="copy or export it again", severity="warning")
         for words in record.warnings
@@ -493,6 +500,7 @@ _DOCUMENT: dict[str, Part] = {
         message=_read_off(TEXT, "message"),
         remedy=_read_off(TEXT, "remedy"),
     ),
+    "not_seen": _read_off(TEXT, "not_seen"),
     "no_fall": _read_off(TEXT, "no_fall"),
     "drops": _rows(
         lambda seen: seen.drops,

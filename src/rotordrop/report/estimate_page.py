@@ -32,7 +32,7 @@ from rotordrop.report.machine_sections import defaults_section, drawing_section,
 from rotordrop.report.origin import Origin
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
 from rotordrop.report.quantity import Quantity, shown, written
-from rotordrop.report.record_quality import quality_statements, record_quality_section
+from rotordrop.report.record_quality import quality_statements, record_quality_section, unseen_in
 from rotordrop.report.replay_sections import (
     agreement_section,
     correlation_table,
@@ -213,7 +213,7 @@ def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tupl
         *((cross_check,) if estimate.cross_check else ()),
         inspection_section(estimate),
         limits_section(estimate),
-        record_quality_section(estimate.findings),
+        record_quality_section(estimate.findings, *unseen_in(estimate.notes)),
         drawing_section(estimate.machine),
         assumptions_section(),
         *defaults_section(estimate.machine),

@@ -11,11 +11,11 @@ import numpy as np
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.evidence.quality import not_seen
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
 from rotordrop.report.estimate_numbers import static_limit_statement
 from rotordrop.report.estimate_page import estimate_verdict
 from rotordrop.report.quantity import Quantity, shown
+from rotordrop.report.record_quality import unseen_in
 
 LONGEST_VERDICT, LONGEST = 270, 185
 """Characters of the verdict and of another statement: three lines and two of a terminal of 100 columns."""
@@ -29,7 +29,7 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     judgement, _part, *others = estimate_verdict(estimate)
     later = {one.sentence() for one in estimate.later if one.larger}
     static = [static_limit_statement(b, certain=estimate.consistent) for b in estimate.bearings]
-    unseen = [note for note in estimate.notes if note in (not_seen(tail=True), not_seen(tail=False))]
+    unseen = unseen_in(estimate.notes)
     elsewhere = {*estimate.assumed, *unseen, *(one.text for one in static)}
     limits = [one for one in others if one.level != "good" and one.text not in elsewhere]
     # what hides a loss first, then what is a warning

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
-from rotordrop.evidence.quality import not_seen
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -63,15 +62,14 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         verdict=(
             *_verdict(seen),
             *quality_statements(seen.findings),
-            Statement(not_seen(tail=False)),
-            *(() if drawn else (read, *notes)),
+            *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
         summary=(table(seen.timeline(), timeline, "What happened when"),),
         sections=(
             *(_figures(seen) if drawn else ()),
             Section("Impacts", tables=(_impacts(seen),)),
-            record_quality_section(seen.findings),
+            record_quality_section(seen.findings, seen.not_seen),
             Section("What was read and guessed", statements=notes),
         ),
     )
@@ -81,6 +79,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     """Contacts of a held rotor, levels and spectra of a record in which nothing falls."""
     record, facts = seen.record, _facts(seen)
     notes = tuple(Statement(note) for note in seen.notes)
+    read = Statement(f"Read: {dict(facts)['samples']}.")
     if seen.contacts:
         ends = dict.fromkeys(one.plane for one in seen.contacts)
         parts = [f"{sum(one.plane == end for one in seen.contacts)} at {end}" for end in ends]
@@ -118,14 +117,14 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         verdict=(
             *said,
             *quality_statements(seen.findings),
-            *(() if drawn else (Statement(f"Read: {dict(facts)['samples']}."), *notes)),
+            *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=(),
         summary=tuple(summary),
         sections=(
             *(() if spectra is None else (spectra,)),
             Section("What happened when", tables=(table(seen.timeline(), events, "What happened when"),)),
-            record_quality_section(seen.findings),
+            record_quality_section(seen.findings, seen.not_seen),
             Section("What was read and guessed", statements=notes),
         ),
     )

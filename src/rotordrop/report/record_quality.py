@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from rotordrop.evidence.quality import NO_CHECK_SEES
 from rotordrop.report.content import Column, Level, Section, Statement, table
 from rotordrop.report.quantity import shown
 
@@ -16,10 +17,11 @@ LEVELS: dict[str, Level] = {"stop": "bad", "warning": "warning", "note": "notice
 SOUND = "The plausibility checks found nothing wrong with the record."
 
 
-def record_quality_section(findings: Sequence[Finding]) -> Section:
-    """Tell what the gate found, each with channel, time and remedy; or that it found nothing."""
+def record_quality_section(findings: Sequence[Finding], *unseen: str) -> Section:
+    """Tell what the gate found, with channel, time and remedy, or that it found nothing; what it cannot."""
+    limits = tuple(map(Statement, unseen))
     if not findings:
-        return Section("Data quality", statements=(Statement(SOUND, "good"),))
+        return Section("Data quality", statements=(Statement(SOUND, "good"), *limits))
     columns = (
         Column("finding", "kind"),
         Column("channel", lambda found: found.channel or "all"),
@@ -28,8 +30,15 @@ def record_quality_section(findings: Sequence[Finding]) -> Section:
         Column("remedy", "remedy"),
     )
     return Section(
-        "Data quality", statements=quality_statements(findings), tables=(table(findings, columns),)
+        "Data quality",
+        statements=(*quality_statements(findings), *limits),
+        tables=(table(findings, columns),),
     )
+
+
+def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:
+    """What the gate cannot see, among the notes of an estimate."""
+    return tuple(note for note in notes if note.startswith(NO_CHECK_SEES))
 
 
 def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:

@@ -17,6 +17,7 @@ from rotordrop.arrays import Array
 from rotordrop.files import write_json
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.record_quality import unseen_in
 from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, vector_lines, waterfall_lines
 from rotordrop.web.rows import content_json, quantity_json, row_of, shown_units
 from rotordrop.web.traces import write_traces
@@ -116,6 +117,7 @@ def write_look(
                 "radial velocity before",
             ],
             "findings": _findings(seen.findings),
+            "not_seen": seen.not_seen,
             "command": _command(job, options, "look"),
             "python": look_lines(job.read()["files"], options, len(seen.motion.paths)),
         },
@@ -179,6 +181,7 @@ def write_estimate(
             "labels": {column: _label(estimate, column) for column in columns},
             "timeline": _events(estimate),
             "findings": _findings(estimate.findings),
+            "not_seen": " ".join(unseen_in(estimate.notes)),
             "zero": estimate.drop_instant.value,
             "speed": estimate.speed,
             "places": places,

@@ -12,7 +12,7 @@ from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
-from rotordrop.evidence.quality import Finding, Kind, standing
+from rotordrop.evidence.quality import NO_CHECK_SEES, Finding, Kind, not_seen, standing
 from rotordrop.evidence.quality import fall as quality_fall
 from rotordrop.evidence.quality.arrangement import check_planes
 from rotordrop.evidence.quality.fall import fell_as_described
@@ -64,6 +64,42 @@ def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):
     assert "47.7 Hz (2860 rpm) at 2 s" in found.message
     assert "--tail" in found.remedy
     assert found.time == pytest.approx(2.0)
+
+
+def _block_exchanged(signals):
+    """Two blocks of eight samples of a channel while the rotor floats."""
+    signals[1000:1016, 1] = np.roll(signals[1000:1016, 1].copy(), 8)
+
+
+UNSEEN_FAULTS = {
+    "in the tail ends exchanged": lambda edited, drop, tail: (drop, reordered(edited, tail, [2, 3, 0, 1])),
+    ", axes exchanged": lambda edited, drop, tail: (drop, reordered(edited, tail, [1, 0, 3, 2])),
+    "all gains off by 20 %": lambda edited, drop, tail: (
+        scaled(edited, drop, 1.2),
+        scaled(edited, tail, 1.2),
+    ),
+    "blocks exchanged": lambda edited, drop, tail: (edited(drop, _block_exchanged), tail),
+}
+
+
+@pytest.mark.parametrize("words", UNSEEN_FAULTS)
+def test_what_the_gate_cannot_see_of_this_record_is_said_and_passes_it(
+    words, whole_drop, tail, machine, edited
+):
+    spoiled, other = UNSEEN_FAULTS[words](edited, whole_drop, tail)
+    assert check_record(spoiled, machine, other) == ()
+    said = not_seen(Evidence(record=spoiled, machine=machine, tail=other))
+    assert said.startswith(NO_CHECK_SEES) and words in said
+    assert len(said) <= 185  # two lines of a terminal, so that the first screen of an estimate keeps it
+
+
+def test_what_the_gate_sees_of_this_record_is_not_said_to_pass(whole_drop, tail, machine, edited):
+    def moved(signals):
+        signals[:, 0] += 4e-5
+
+    assert "zeros off" not in not_seen(Evidence(record=whole_drop, machine=machine, tail=tail))
+    assert only(whole_drop, machine, edited(tail, moved), severity="warning").kind == "tail offset"
+    assert "tail" not in not_seen(Evidence(record=whole_drop, machine=machine))
 
 
 class TestSingleChannels:

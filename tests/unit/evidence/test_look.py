@@ -391,3 +391,4 @@ def test_the_terminal_says_what_was_read_and_guessed(capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert re.search(r"Read: .*_A, .*_B; .* at 20000 Hz, -0\.25 to ", said)
     assert "their sensors taken as perpendicular" in said
+    assert "lost samples; without a machine file none looks at wiring, polarity, gains and gaps" in said

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
@@ -21,12 +22,9 @@ from rotordrop.evidence.quality.channels import check_channels, check_rail
 from rotordrop.evidence.quality.continuity import check_orbit
 from rotordrop.evidence.quality.fall import check_ends, check_exchanged, fell_as_described
 from rotordrop.evidence.quality.finding import (
-    UNSEEN,
-    UNSEEN_IN_TAIL,
     Finding,
     Kind,
     Severity,
-    not_seen,
     ranked,
     refuse_unusable,
     stops,
@@ -252,6 +250,68 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
 """The checks of the gate by name, stage by stage."""
 
 
+def _passes(evidence: Evidence, change: Callable[[Array, Record], Array]) -> bool:
+    """Whether readings at rest that are changed so would pass too; false where there is no tail."""
+    still = evidence.still
+    if evidence.tail is None or isinstance(still, Missing):
+        return False
+    other = replace(still, signals=change(still.signals, still))
+    return not _tail_at_rest(evidence.with_facts(still=other))
+
+
+def _exchanged(signals: Array, order: list[tuple[int, ...]]) -> Array:
+    """Readings of the columns listed one list after the other in place of those in rising order."""
+    return signals[:, [column for columns in order for column in columns]]
+
+
+def _ends(signals: Array, still: Record) -> Array:
+    first, *middle, last = (plane.columns for plane in still.planes)
+    return _exchanged(signals, [last, *middle, first])
+
+
+def _axes(signals: Array, still: Record) -> Array:
+    return _exchanged(signals, [plane.columns[::-1] for plane in still.planes])
+
+
+def _zeros(evidence: Evidence) -> bool:
+    """Whether a zero that moved by 40 µm between record and tail would pass in some channel."""
+    still = evidence.still
+    moved: list[Array] = [] if isinstance(still, Missing) else [*(4e-5 * np.eye(still.signals.shape[1]))]
+    return any(
+        _passes(evidence, lambda signals, _, off=off: signals + off)  # type: ignore[misc]
+        for off in [*moved, *(-one for one in moved)]
+    )
+
+
+UNSEEN_ANYWHERE = ("blocks exchanged within 20 µm", "up to 6 lost samples")
+UNSEEN: Mapping[str, Callable[[Evidence], bool]] = {
+    "gaps or all gains off by 20 %": lambda e: True,
+    "the rotor's mass": lambda e: True,
+    "ends exchanged": lambda e: len(e.record.whole.planes) > 2,
+}
+UNSEEN_IN_TAIL: Mapping[str, Callable[[Evidence], bool]] = {
+    "ends exchanged": lambda e: _passes(e, _ends),
+    "axes exchanged": lambda e: _passes(e, _axes),
+    "zeros off by 40 µm": _zeros,
+}
+"""What passes these checks in `studies/gate`, and in which records it does; of the tail they are asked."""
+
+NO_CHECK_SEES = "No check sees: "
+
+
+def not_seen(evidence: Evidence | None, *, fell: bool = True) -> str:
+    """What no check can see of this record, in a sentence; without evidence no machine is known."""
+    said = f"{NO_CHECK_SEES}{', '.join(UNSEEN_ANYWHERE)}"
+    if evidence is None or not fell:
+        lacking = "a machine file" if evidence is None else "a fall"
+        return f"{said}; without {lacking} none looks at wiring, polarity, gains and gaps"
+    record, tail = (
+        ", ".join(words for words, passes in table.items() if passes(evidence))
+        for table in (UNSEEN, UNSEEN_IN_TAIL)
+    )
+    return f"{said}, {record}" + (f"; in the tail {tail}" if tail else "")
+
+
 def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Finding]:
     """The findings that stand: the one place that says which of them overrules which.
 
@@ -299,8 +359,7 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
 
 
 __all__ = [
-    "UNSEEN",
-    "UNSEEN_IN_TAIL",
+    "NO_CHECK_SEES",
     "Finding",
     "Kind",
     "Severity",

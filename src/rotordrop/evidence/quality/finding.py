@@ -14,21 +14,6 @@ Severity = Literal["stop", "warning", "note"]
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
-UNSEEN = (
-    "blocks exchanged within 20 µm",
-    "1 to 5 lost samples",
-    "a gain error of all channels",
-    "the mass of another rotor",
-)
-UNSEEN_IN_TAIL = ("a tail's ends or axes exchanged", "its zeros off by 40 µm")
-"""What passes the gate, most of it in `studies/gate`, in a few words: it is said where people decide."""
-
-
-def not_seen(*, tail: bool) -> str:
-    """What no check sees of a record, with or without a tail of its own."""
-    return f"No check sees: {', '.join((*UNSEEN, *UNSEEN_IN_TAIL) if tail else UNSEEN)}"
-
-
 class Kind(StrEnum):
     """What the gate can find, by the names that documents carry."""
 

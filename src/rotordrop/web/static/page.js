@@ -45,7 +45,7 @@ const TABS = {
     const page = state.estimate || state.look;
     return [cards(page.cards), make("ul", { class: "statements", of: page.verdict.map(sentence) }), ...(state.estimate ? page.summary : []).map(table)];
   },
-  Quality: () => [findings(state.estimate?.findings || state.look.findings), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
+  Quality: () => [findings(state.estimate?.findings || state.look.findings), make("p", { class: "small", text: (state.estimate || state.look).not_seen || "" }), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
   Restart: () => {
     const card = state.estimate?.restart;
     if (!card) { return [make("p", { text: "An estimate of this drop is needed to weigh whether the machine may run again." })]; }
