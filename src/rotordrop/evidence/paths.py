@@ -93,8 +93,10 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     rest = np.median(raw[rest_from:], axis=0)
     paths = []
     for number, plane in enumerate(record.planes):
-        other = raw[:, 0 if number else -1]
         position, floated = raw[:, number], np.mean(raw[:begin, number], axis=0)
+        # the plane at the other end is the one that moves most unlike this
+        unlike = np.linalg.norm(np.std(raw - position[:, None], axis=0), axis=1)
+        other = raw[:, int(np.argmax(unlike))]
         wall = find_wall(position, other, rate, (begin, sunk), gaps[number])
         apart = position - floated - other + np.mean(other[:begin], axis=0)
         turn = np.eye(2) if angles_known else _upright(position[:begin], rest[number] - floated)

@@ -9,7 +9,7 @@ frequency of the rotor on its contact; at rest it lies beyond by ``g β²``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -40,10 +40,6 @@ _ROUND = 0.01
 _STRAYS = 0.35
 """Standard deviation of the depth of a reversal over ``β v`` [1] (chosen)."""
 
-_KINK, _SLOW_KINK = 0.012, 0.04
-"""Standard deviation of the place of the first touch over the gap [1], of a hard and a soft contact
-(chosen)."""
-
 _USUAL_BETA = (6e-4, 1.2)
 """Inverse frequency of rotor on contact [s] and the standard deviation of its logarithm: 5 kg have 2e-4, 6 t
 4e-3."""
@@ -51,8 +47,12 @@ _USUAL_BETA = (6e-4, 1.2)
 _SAG_DOUBT = 0.4
 """Standard deviation of the logarithm of the static depth over ``g β²`` [1] (chosen)."""
 
-_HOLDS = 0.87
-"""Share of the standard error whose 90 % interval holds 90 % of gaps in the first half of DropBench [1]."""
+_STEP, _SHORTEST, _MOST_STEPS = 1.0, 3e-3, 30
+"""Steps of radius in which the fits are averaged: over the standard error at the best fit, over the gap at
+least [1], and how many to either side at most (all chosen)."""
+
+_UNLIKELY = 7.0
+"""Sum of squares beyond the least from which a radius is passed over [1]: its weight is 3 %."""
 
 GAIN = 0.01
 """Standard deviation of the gain of displacement sensors [1] (chosen; calibrated ones keep 1 %)."""
@@ -69,6 +69,9 @@ _INDEPENDENT = 4.0
 
 _STEPS = np.array([1e-5, 1e-5, 1e-5, 0.3, 0.3, 0.05])
 """Sizes of the unknowns of a wall: centre [m], radius [m], logarithms of ``β`` and sag, lever [1]."""
+
+_ALL, _BUT_RADIUS = (0, 1, 2, 3, 4, 5), (0, 1, 3, 4, 5)
+"""Unknowns that a fit may move."""
 
 _SEARCHED = 2.0
 """How long after the fall impacts are looked for to find the wall [s]."""
@@ -131,7 +134,8 @@ def find_wall(
     Notes
     -----
     Damped least squares with robust weights over centre, radius, ``β``, static depth and the lever of the
-    bearing outside the sensor plane; what the record leaves open, the priors named above hold.
+    bearing outside the sensor plane; what the record leaves open, the priors named above hold. Centre, radius
+    and errors are those of `_moments`; none of it was fitted to known gaps.
     """
     begin, sunk = fall
     until = min(len(place), sunk + int(_SEARCHED * rate))
@@ -142,9 +146,13 @@ def find_wall(
     size = _first_size(place, floated, sunk)
     down = (place[sunk] - floated) / math.hypot(*(place[sunk] - floated))
     touch = first_touch(place, floated, rate, begin, size, noise)
-    touched = None if touch is None or not touch.by_kink else (touch.at(place), touch.at(apart))
+    touched = None
+    if touch is not None and touch.by_kink:
+        touched = touch.at(place), touch.at(apart)
+        # a touch that is dated so well is placed by the speed of the fall as well
+        astray = math.hypot(_ROUND * size, touch.error * math.sqrt(2.0 * GRAVITY * size))
 
-    def residual(sought: Array, hits: Impacts, strays: Array, lying: NDArray[np.int64]) -> Array:
+    def residual(sought: Array, hits: Impacts, lying: NDArray[np.int64]) -> Array:
         centre, gap, beta, lever = sought[:2], sought[2], math.exp(sought[3]), sought[5]
 
         def beyond(here: Array, aside: Array) -> Array:
@@ -152,10 +160,12 @@ def find_wall(
 
         deepest = sunk + hits.deepest
         depth = beta * hits.approach
-        impacts = (beyond(place[deepest], apart[deepest]) - depth) / np.hypot(_ROUND * size, strays)
+        strays = _STRAYS * depth / (_ROUND * size)
+        impacts = (beyond(place[deepest], apart[deepest]) - depth) / np.hypot(1.0, strays) / (_ROUND * size)
         rest = beyond(place[lying], apart[lying]) - GRAVITY * beta**2 * math.exp(sought[4])
         parts = [
             _robust(impacts),
+            np.sqrt(np.log1p(strays**2)),  # of the likelihood: errors that are expected larger cost
             _robust(rest / (_ROUND * size)) / math.sqrt(max(len(lying) / _INDEPENDENT, 1.0)),
             (centre - floated) / (_CENTRED * size),
             [
@@ -165,9 +175,8 @@ def find_wall(
                 (gap / size - 1.0) / _UNLIKE,
             ],
         ]
-        if touched is not None and touch is not None:
-            scale = (_SLOW_KINK if touch.soft else _KINK) * size
-            parts.append(_robust(np.atleast_1d(beyond(*touched) / scale)))
+        if touched is not None:
+            parts.append(_robust(np.atleast_1d(beyond(*touched) / astray)))
         if given is not None:
             parts.append([(gap - given[0]) / max(given[1], 1e-9)])
         return np.concatenate(parts)
@@ -180,47 +189,92 @@ def find_wall(
         path = place + sought[5] * apart
         radius = np.hypot(*(path - sought[:2]).T)
         hits = find_impacts(path[sunk:] - sought[:2], rate, float(sought[2]), noise, down)
-        strays = _STRAYS * math.exp(sought[3]) * hits.approach
         lying = _lying(
             radius, sunk + (int(hits.deepest[-1]) if len(hits.deepest) else 0), rate, sought[2], noise
         )
         before, (sought, slopes) = (
             sought,
-            _least_squares(partial(residual, hits=hits, strays=strays, lying=lying), sought, low, high),
+            _least_squares(partial(residual, hits=hits, lying=lying), sought, low, high),
         )
         if np.max(np.abs(sought[:3] - before[:3])) < 1e-7:
             break
-    error = _HOLDS * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     exact = given is not None and given[1] == 0.0
-    gap = given[0] if given is not None and exact else float(sought[2])
+    frozen = partial(residual, hits=hits, lying=lying)
+    mean, error = _moments(frozen, sought, slopes, low, high, len(hits.deepest))
+    gap = given[0] if given is not None and exact else float(mean[2])
     return Wall(
-        centre=sought[:2].copy(),
+        centre=mean[:2].copy(),
         centre_error=error[:2],
         gap=gap,
         gap_error=0.0 if exact else math.hypot(float(error[2]), GAIN * gap),
-        lever=float(sought[5]),
+        lever=float(mean[5]),
         touch=touch,
     )
 
 
+def _moments(
+    residual: Callable[[Array], Array], best: Array, slopes: Array, low: Array, high: Array, impacts: int
+) -> tuple[Array, Array]:
+    """Means and standard errors of the unknowns: the fit at each likely radius, with its marginal likelihood.
+
+    A soft contact in a narrow circle and a hard one in a wide circle explain few impacts alike, which the
+    slopes at one of them do not say. Where the ``impacts``, the first of the residuals, lie further from any
+    circle than chance lets them in 95 of 100 cases, all errors grow by as much.
+    """
+    by_chance = impacts + math.sqrt(8.0 * impacts)
+
+    def judged(fit: Array) -> tuple[float, float]:
+        rest = residual(fit)
+        return float(rest @ rest), max(float(np.sum(rest[:impacts] ** 2)) / max(by_chance, 1.0), 1.0)
+
+    least, misfit = judged(best)
+    step = max(_STEP * math.sqrt(misfit * np.linalg.inv(slopes.T @ slopes)[2, 2]), _SHORTEST * best[2])
+    costs, fits, inverses = [], [], []
+    for side in (-1, 1):
+        fit = best
+        for number in range(side < 0, _MOST_STEPS):
+            fit = fit.copy()
+            fit[2] = best[2] + side * number * step
+            if not low[2] < fit[2] < high[2]:
+                break
+            fit, inner = _least_squares(residual, fit, low, high, _BUT_RADIUS)
+            cost, fit_misfit = judged(fit)
+            if cost < least:
+                least, misfit = cost, fit_misfit
+            if cost - least > _UNLIKELY * misfit:
+                break
+            costs.append(cost)
+            fits.append(fit)
+            inverses.append(np.linalg.inv(inner.T @ inner))
+    volumes = np.linalg.slogdet(np.array(inverses))[1]
+    weight = 0.5 * (volumes - (np.array(costs) - least) / misfit)
+    weight = np.exp(weight - np.max(weight))
+    weight /= np.sum(weight)
+    own = misfit * np.insert(np.diagonal(np.array(inverses), axis1=1, axis2=2), 2, 0.0, axis=1)
+    mean = weight @ np.array(fits)
+    return mean, np.sqrt(weight @ (own + (np.array(fits) - mean) ** 2))
+
+
 def _least_squares(
-    residual: Callable[[Array], Array], start: Array, low: Array, high: Array
+    residual: Callable[[Array], Array], start: Array, low: Array, high: Array, free: Sequence[int] = _ALL
 ) -> tuple[Array, Array]:
     """Unknowns within bounds at which the sum of squares is least, and the slopes of the residuals there.
 
-    Damped Gauss-Newton steps by forward differences; SciPy's take half a second to load.
+    Those that are not free keep their values. Damped Gauss-Newton steps by forward differences; SciPy's take
+    half a second to load.
     """
-    sought, damping = np.clip(start, low, high), 1e-3
+    sought, damping, unit = np.clip(start, low, high), 1e-3, _STEPS[list(free)]
     rest = residual(sought)
     while True:
         steps = 1e-4 * _STEPS * np.where(sought + 1e-4 * _STEPS > high, -1.0, 1.0)
-        slopes = np.column_stack(
-            [(residual(sought + row) - rest) / row[k] for k, row in enumerate(np.diag(steps))]
-        )
-        scaled = slopes * _STEPS
+        rows = np.diag(steps)
+        slopes = np.column_stack([(residual(sought + rows[k]) - rest) / steps[k] for k in free])
+        scaled = slopes * unit
         while True:
-            square = scaled.T @ scaled + damping * np.eye(len(sought))
-            tried = np.clip(sought - _STEPS * np.linalg.solve(square, scaled.T @ rest), low, high)
+            square = scaled.T @ scaled + damping * np.eye(len(unit))
+            step = np.zeros(len(sought))
+            step[list(free)] = unit * np.linalg.solve(square, scaled.T @ rest)
+            tried = np.clip(sought - step, low, high)
             there, moved = residual(tried), np.max(np.abs(tried - sought) / _STEPS)
             if there @ there <= rest @ rest or moved < 1e-3:
                 break

@@ -34,10 +34,9 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
-_GAP_ERROR, _OTHER_GAP = 0.08, 2.5
-"""Standard deviation of a gap that a record shows by itself, over it, at least; and in how many of them, with
-the doubt of the machine file, it lies off that to be named [1]. Of 500 planes in clean drops of all rotors
-the root mean square of the error is 6.4 %, and one in a hundred is off by 20 % or more."""
+_OTHER_GAP = 2.5
+"""In how many standard deviations, those of the record and of the machine file, a gap that a record shows by
+itself lies off that of the machine file to be named [1] (chosen)."""
 
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
@@ -98,11 +97,10 @@ def check_gaps(motion: Motion, record: Record, machine: Machine) -> list[Finding
     found = []
     for number in sorted(planes_at_bearings(machine, record)):
         wall, (expected, doubt) = motion.paths[number].wall, expected_gap(machine, record.planes[number])
-        error = max(wall.gap_error, _GAP_ERROR * wall.gap)
-        if abs(wall.gap - expected) > _OTHER_GAP * math.hypot(error, doubt):
+        if abs(wall.gap - expected) > _OTHER_GAP * math.hypot(wall.gap_error, doubt):
             shown, stated = (
                 f"{1e6 * gap:.0f} µm ({1e6 * (gap - NINETY * off):.0f} to {1e6 * (gap + NINETY * off):.0f})"
-                for gap, off in ((wall.gap, error), (expected, doubt))
+                for gap, off in ((wall.gap, wall.gap_error), (expected, doubt))
             )
             found.append((record.planes[number], shown, stated))
     if not found:
