@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotordrop.evidence.events import find_power_off
+from rotordrop.evidence import Evidence
 from rotordrop.machine import example_machine
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -35,7 +35,7 @@ def main() -> None:
             drop = synthesize_drop(
                 hidden, 2.0 * math.pi * SPEED_HZ, 10 * seed + i, duration=0.05, tail=False, tolerance=1e-6
             )
-            found = find_power_off(drop.record, known)
+            found = Evidence(record=drop.record, machine=known).power_off
             rows.append([seed, i, found.value - drop.truth["t_off_in_record_s"], found.standard_error])
     errors = np.array([row[2] for row in rows])
     result = {

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rotordrop.evidence.contacts import first_forces as first_forces
     from rotordrop.evidence.contacts import local_polynomial as local_polynomial
     from rotordrop.evidence.events import DropInstant as DropInstant
-    from rotordrop.evidence.events import find_drop_instant as find_drop_instant
+    from rotordrop.evidence.evidence import Evidence as Evidence
     from rotordrop.evidence.levitated import LevitatedModel as LevitatedModel
     from rotordrop.evidence.levitated import fit_levitated as fit_levitated
     from rotordrop.evidence.quality import Finding as Finding
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 _PUBLIC = {
     "contacts": ("EarlyForces", "FirstForce", "early_forces", "first_forces", "local_polynomial"),
-    "events": ("DropInstant", "find_drop_instant"),
+    "events": ("DropInstant",),
+    "evidence": ("Evidence",),
     "levitated": ("LevitatedModel", "fit_levitated"),
     "quality": ("Finding", "check_record", "refuse_unusable"),
     "rest": ("SettledTail", "settled_tail"),

@@ -97,28 +97,6 @@ class Beginning:
     levitated: LevitatedModel
 
 
-def find_drop_instant(record: Record, machine: Machine) -> DropInstant:
-    """Find power-off from the readings: levitated motion before, released rotor after.
-
-    Parameters
-    ----------
-    record : Record
-        Readings that begin while the rotor is levitated.
-    machine : Machine
-        The machine, for its gaps, AMB planes and rotor.
-
-    Raises
-    ------
-    RecordError
-        When the rotor does not fall in the record, or the record does not begin before the fall.
-    """
-    # The rotor model brings the compiler with it, and a first look at a record needs neither.
-    from rotordrop.evidence.free_rotor import free_rotor
-
-    begun, rotor = beginning_of(record, machine), free_rotor(machine, record.whole.planes)
-    return instant_of(find_fall(record, rotor, begun), begun.levitated, record)
-
-
 def find_fall(record: Record, rotor: FreeRotor, begun: Beginning, *, until: float | None = None) -> Fall:
     """Fit the fall by a released rotor, in the planes whose sensors give x and y.
 
@@ -417,26 +395,6 @@ class PowerOff:
 
     def __float__(self) -> float:
         return self.value
-
-
-def find_power_off(record: Record, machine: Machine) -> DropInstant | PowerOff:
-    """Find power-off from levitation and fall, or from the fall alone where the record begins with it.
-
-    Parameters
-    ----------
-    record : Record
-        The recorded drop.
-    machine : Machine
-        The machine, for its gaps, AMB planes and rotor.
-
-    Raises
-    ------
-    RecordError
-        When the rotor does not fall in the record, or the record begins in the middle of the fall.
-    """
-    if begins_with_fall(record, machine):
-        return power_off_of_fall(record, machine)
-    return find_drop_instant(record, machine)
 
 
 def begins_with_fall(record: Record, machine: Machine) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import EarlyForces, find_drop_instant, first_forces
+from rotordrop.evidence import EarlyForces, Evidence, first_forces
 from rotordrop.evidence.events import coarse_drop
 from rotordrop.evidence.free_rotor import GRID, free_rotor, response_at
 from rotordrop.known import Known
@@ -18,14 +18,18 @@ from rotordrop_bench import hidden_machine, synthesize_drop
 SAMPLE = 5e-5
 
 
+def power_off(record, machine):
+    return Evidence(record=record, machine=machine).power_off
+
+
 @pytest.fixture(scope="module")
 def found(drop, machine):
-    return find_drop_instant(drop, machine)
+    return power_off(drop, machine)
 
 
 @pytest.fixture(scope="module")
 def found_fast(fast_drop, machine):
-    return find_drop_instant(fast_drop, machine)
+    return power_off(fast_drop, machine)
 
 
 def test_power_off_at_60_hz_within_half_a_sample(found):
@@ -48,7 +52,7 @@ def test_power_off_where_one_end_bounces_before_the_other_has_sunk():
     lp400 = example_machine("lp400")
     hidden = hidden_machine(lp400, 20009)
     made = synthesize_drop(hidden, 2.0 * np.pi * 120.0, 20009, duration=0.1)
-    found = find_drop_instant(made.record, lp400)
+    found = power_off(made.record, lp400)
     assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)
     assert found.levitated.end < found.value
     np.testing.assert_allclose(found.levitated.noise, made.truth["noise_rms_m"], rtol=0.05)
@@ -59,7 +63,7 @@ def test_power_off_of_a_heavy_rotor_that_bends_at_low_frequencies():
     heavy = scaled_machine(6000.0, slenderness=1.5)
     hidden = hidden_machine(heavy, 24007, "none", drawn=False)
     made = synthesize_drop(hidden, 2.0 * np.pi * 15.0, 24007, duration=0.06)
-    found = find_drop_instant(made.record, heavy)
+    found = power_off(made.record, heavy)
     assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)
     assert found.fall.misfit < 1.2
 
@@ -70,7 +74,7 @@ def test_the_standard_error_of_the_power_off_is_its_scatter(drop, machine):
     found = []
     for seed in range(12):
         noise = 1.5e-6 * np.random.default_rng(seed).standard_normal(short.signals.shape)
-        found.append(find_drop_instant(replace(short, signals=short.signals + noise), machine))
+        found.append(power_off(replace(short, signals=short.signals + noise), machine))
     scatter = np.std([one.value for one in found], ddof=1)
     stated = np.sqrt(np.mean([one.fall.standard_error**2 for one in found]))
     assert 0.53 < scatter / stated < 1.50  # √χ²₁₁/11 at 1 and 99 per cent
@@ -85,10 +89,10 @@ def test_a_sensor_that_reads_more_is_told_by_the_fall(drop, machine):
     sensors = tuple(sensor.model_copy(update={"gain": loose}) for sensor in machine.sensors)
     unsure = machine.model_copy(update={"sensors": sensors})
     record = replace(drop.window(-0.25, 0.03), sensors=sensors)
-    before = find_drop_instant(record, unsure)
+    before = power_off(record, unsure)
     fallen = record.signals - before.levitated.readings(record.time)
     more = replace(record, signals=record.signals + 0.05 * fallen * np.array([0.0, 1.0, 0.0, 0.0]))
-    change = find_drop_instant(more, unsure).fall.gain_errors - before.fall.gain_errors
+    change = power_off(more, unsure).fall.gain_errors - before.fall.gain_errors
     assert change == pytest.approx([0.0, 0.05, 0.0, 0.0], abs=0.011)
     assert change[1] == pytest.approx(0.05, abs=0.005)
 
@@ -100,7 +104,7 @@ def test_the_fall_is_fitted_until_something_pushes(drop, machine, found, push):
     since = np.clip(record.time - found.value - 4e-3, 0.0, None)
     y = [np.sin(float(sensor.angle)) for sensor in record.sensors]
     pushed = replace(record, signals=record.signals + 0.5 * push * since[:, None] ** 2 * y)
-    fall = find_drop_instant(pushed, machine).fall
+    fall = power_off(pushed, machine).fall
     assert 3.5e-3 < fall.end - found.value < 5e-3 < found.fall.end - found.value
     assert fall.instant == pytest.approx(found.value, abs=3.0 * fall.standard_error + 1e-5)
 
@@ -114,7 +118,7 @@ def test_the_remanent_lift_is_found_roughly(found, found_fast):
 
 def test_the_instant_moves_with_the_clock(drop, machine, found):
     later = replace(drop, time=drop.time + 1.234, speed_time=drop.speed_time + 1.234)
-    moved = find_drop_instant(later, machine)
+    moved = power_off(later, machine)
     assert moved.value - found.value == pytest.approx(1.234, abs=2e-6)
 
 
@@ -162,7 +166,7 @@ def test_first_contacts_need_the_amb_planes(drop, machine, found):
 
 def test_without_amb_planes_the_instant_is_still_near(drop, machine):
     """The rotor then counts as held at its sensor planes, beside which its magnets are."""
-    plain = find_drop_instant(drop, machine.changed(ambs=()))
+    plain = power_off(drop, machine.changed(ambs=()))
     assert plain.value == pytest.approx(-0.25e-3, abs=5e-5)
     assert plain.interval_90[0] < -0.25e-3 < plain.interval_90[1]
     assert "forces at nodes 5, 25 (the AMB planes are not known)" in plain.method
@@ -205,7 +209,7 @@ def test_no_drop_in_the_record(drop, machine):
         RecordError,
         match=r"drop_060: no drop in the record: the vertical displacement spans 26.* sinks by 5% of",
     ):
-        find_drop_instant(drop.window(-0.25, -0.01), machine)
+        power_off(drop.window(-0.25, -0.01), machine)
 
 
 def test_a_record_that_begins_in_the_fall(drop, machine):
@@ -213,7 +217,7 @@ def test_a_record_that_begins_in_the_fall(drop, machine):
         RecordError,
         match=r"sunk by 9\d.* µm at 0.006.* after the record begins: the levitated part .* is missing",
     ):
-        find_drop_instant(drop.window(0.002, 0.3), machine)
+        coarse_drop(drop.window(0.002, 0.3), machine)
 
 
 def test_the_coarse_search_needs_the_speed(drop, machine):
@@ -228,7 +232,7 @@ def test_a_rotor_that_rings_strongly_is_released_when_it_was():
     made = synthesize_drop(
         hidden_machine(machine, 11), 120.0 * 2.0 * np.pi, 110, duration=0.05, tail=False, name="ringing"
     )
-    found = find_drop_instant(made.record, machine)
+    found = power_off(made.record, machine)
     assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=30e-6)
     assert found.fall.misfit < 1.2
     assert np.abs(found.fall.remanent_force).max() < 100.0

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence.events import PowerOff, find_drop_instant, find_power_off, sinking
+from rotordrop.evidence import Evidence
+from rotordrop.evidence.events import DropInstant, PowerOff, sinking
 from rotordrop.machine import example_machine, load_machine
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
 
 LONG_ROTOR = Path(__file__).parents[2] / "machines" / "long_rotor.toml"
+
+
+def power_off(record, machine):
+    return Evidence(record=record, machine=machine).power_off
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +40,7 @@ def from_time(record, start):
 def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(drop, late):
     machine, made = drop
     true = made.truth["t_off_in_record_s"]
-    found = find_power_off(from_time(made.record, true + late), machine)
+    found = power_off(from_time(made.record, true + late), machine)
     assert isinstance(found, PowerOff)
     assert abs(found.value - true) < 2.5 * found.standard_error
     assert found.standard_error < 2e-3
@@ -45,14 +50,14 @@ def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(
 
 def test_a_record_with_levitation_is_read_as_before(drop):
     machine, made = drop
-    assert find_power_off(made.record, machine).value == find_drop_instant(made.record, machine).value
+    assert isinstance(power_off(made.record, machine), DropInstant)
 
 
 def test_a_record_that_begins_just_before_contact_is_refused(drop):
     machine, made = drop
     late = from_time(made.record, made.truth["t_off_in_record_s"] + 6e-3)
     with pytest.raises(RecordError, match=r"pre-trigger|no drop in the record"):
-        find_power_off(late, machine)
+        power_off(late, machine)
 
 
 def test_a_plane_that_lost_a_sensor_is_left_out(drop):
@@ -87,7 +92,7 @@ def test_power_off_of_a_long_rotor_that_circles_widely_at_mid_span():
     made = synthesize_drop(
         hidden_machine(machine, 41), 2.0 * math.pi * 140.0, 4101, duration=0.05, tail=False, tolerance=1e-6
     )
-    found = find_power_off(made.record, machine)
+    found = power_off(made.record, machine)
     assert abs(found.value - made.truth["t_off_in_record_s"]) < 3.0 * found.standard_error < 1e-4
 
 
@@ -99,5 +104,5 @@ def test_the_lowest_of_several_minima_is_the_power_off(seed, speed):
     made = synthesize_drop(
         hidden, 2.0 * math.pi * speed, seed, sensor_chain=chain, duration=0.05, before=0.15, tail=False
     )
-    found = find_drop_instant(made.record, bench_rotor("30 kg"))
+    found = power_off(made.record, bench_rotor("30 kg"))
     assert abs(found.value - made.truth["t_off_in_record_s"]) < 3.0 * found.standard_error < 2e-4
