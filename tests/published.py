@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rotordrop.estimate.published import FORMAT, Bearing, Consistency, Drop, Statistics, Value
+from rotordrop.estimate.published import FORMAT, Bearing, Consistency, Drop, Value
+from rotordrop.severity.statistics import Statistics
 
 NOTHING: dict[str, Any] = {
     "format": FORMAT,

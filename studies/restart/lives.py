@@ -20,10 +20,11 @@ from itertools import pairwise, product
 import numpy as np
 from scipy.stats import gamma
 
-from rotordrop.estimate.published import Bearing, Drop, Parameter, Statistics, Unbalance, Value
+from rotordrop.estimate.published import Bearing, Drop, Parameter, Unbalance, Value
 from rotordrop.known import NINETY
 from rotordrop.restart import restart_card
 from rotordrop.restart.assumptions import assumptions_of
+from rotordrop.severity.statistics import Statistics
 
 MACHINES, MOST_DROPS, ENDS = 20, 8, ("NDE", "DE")
 KINDS = ("worn", "brinelled", "dragging", "loose", "unbalance")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -19,7 +19,7 @@ from rotordrop.estimate import published
 from rotordrop.estimate.published import Value
 from rotordrop.known import Known
 from rotordrop.record.impacts import find_impacts, lasting_from
-from rotordrop.severity.statistics import StressStatistics, stress_statistics
+from rotordrop.severity.statistics import Statistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
 
 if TYPE_CHECKING:
@@ -215,12 +215,12 @@ class BearingDrop:
     """None where the bearing was not touched."""
 
     @property
-    def statistics(self) -> StressStatistics:
+    def statistics(self) -> Statistics:
         """Distribution of the stress (Neisi 2020, Table 5); its maximum is the stated peak."""
         found = stress_statistics(
             self.stress.values, time=self.stress.time, preload_stress=self.preload_stress
         )
-        return replace(found, maximum=self.peak_stress.value)
+        return found.model_copy(update={"maximum": self.peak_stress.value})
 
     @cached_property
     def touched(self) -> Array:
@@ -338,11 +338,10 @@ def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = 
     }
     for path, known in {**bearing.values, **(severity or {})}.items():
         numbers[path] = Value.of_known(known)
-    statistics = {k: v for k, v in asdict(bearing.statistics).items() if v is not None}
     return published.Bearing(
         origin=bearing.peak_force.origin.value,
         numbers=numbers,
-        stress_statistics_Pa=published.Statistics(**statistics),
+        stress_statistics_Pa=bearing.statistics,
         impacts=[
             published.Impact(
                 start_s=impact.start,

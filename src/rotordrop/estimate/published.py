@@ -21,6 +21,7 @@ from rotordrop.errors import UsageError
 from rotordrop.json_schema import DIALECT, closed
 from rotordrop.known import Known
 from rotordrop.severity.numbers import NUMBERS
+from rotordrop.severity.statistics import Statistics
 from rotordrop.units import si_unit
 
 FORMAT = "rotordrop estimate 2"
@@ -77,28 +78,6 @@ class Impact(Document):
     dissipated_energy_J: Value
     after_flight: bool = False
     """Whether it begins an impact; the others follow a hop too short to be told from the displacement."""
-
-
-class Statistics(Document):
-    """Distribution of the stress [Pa]."""
-
-    rule: str
-    weighted_by_time: bool
-    count: int
-    mean: float
-    median: float
-    lower_quartile: float
-    upper_quartile: float
-    lower_whisker: float
-    upper_whisker: float
-    standard_deviation: float
-    minimum: float
-    maximum: float
-    beyond_whiskers: int
-    above_three_sigma: int
-    three_sigma_limit: float
-    preload_stress: float = ABSENT
-    preload_share: float = ABSENT
 
 
 def described() -> dict[str, str]:

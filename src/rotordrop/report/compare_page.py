@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 
 import numpy as np
 import plotly.graph_objects as go
@@ -19,7 +18,6 @@ from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_tab
 from rotordrop.report.style import axis_title, bars, curve, fit_legend, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
-from rotordrop.severity.statistics import StressStatistics
 
 RANKED = tuple(number for number in NUMBERS if "fatigue" not in number.field)
 """Numbers that rank drops; shares of a life have upper ends only."""
@@ -176,14 +174,11 @@ def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
 
 
 def _boxes(drops: Sequence[ComparedDrop]) -> tuple[StressBox, ...]:
-    names = [item.name for item in fields(StressStatistics)]
     return tuple(
         StressBox(
             label=one.name,
             bearing=bearing,
-            statistics=StressStatistics(
-                **{name: getattr(entry.stress_statistics_Pa, name) for name in names}
-            ),
+            statistics=entry.stress_statistics_Pa,
             outliers=np.zeros(0),
         )
         for one in drops

@@ -12,7 +12,7 @@ from rotordrop.arrays import Array
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import SERIES, axis_title, curve, panels, plain
-from rotordrop.severity.statistics import StressStatistics
+from rotordrop.severity.statistics import Statistics
 
 MEGA = 1e-6
 DRAWN_OUTLIERS = 300
@@ -40,13 +40,13 @@ class StressBox:
     """Drop, for example its speed."""
     bearing: str
     """Name of the bearing."""
-    statistics: StressStatistics
+    statistics: Statistics
     """Numbers of the box and of the table [Pa]."""
     outliers: Array
     """Values beyond the whiskers [Pa]."""
 
 
-def stress_box(label: str, bearing: str, stress: Array, statistics: StressStatistics) -> StressBox:
+def stress_box(label: str, bearing: str, stress: Array, statistics: Statistics) -> StressBox:
     """Take the statistics of a stress history (T,) [Pa] as they are stated, with its outliers to draw."""
     beyond = (stress < statistics.lower_whisker) | (stress > statistics.upper_whisker)
     return StressBox(label=label, bearing=bearing, statistics=statistics, outliers=np.asarray(stress)[beyond])

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotordrop.arrays import Array
+from rotordrop.document import ABSENT, Document
 from rotordrop.errors import UsageError
 
 QuartileRule = Literal["hazen", "linear"]
@@ -23,9 +23,8 @@ SIGMA_REACH = 3.0
 """Standard deviations above the mean beyond which a value is an outlier [1]; Neisi 2020, Table 5."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class StressStatistics:
-    """Summary of a stress history."""
+class Statistics(Document):
+    """Distribution of the stress [Pa], as it is published."""
 
     rule: QuartileRule
     """Rule of the quartiles, "hazen" or "linear"."""
@@ -52,9 +51,9 @@ class StressStatistics:
     """Values above mean + 3 standard deviations: the outliers of the paper's text [1]."""
     three_sigma_limit: float
     """mean + 3 standard deviations [Pa]."""
-    preload_stress: float | None
+    preload_stress: float = ABSENT
     """Stress of the preload alone [Pa]."""
-    preload_share: float | None
+    preload_share: float = ABSENT
     """``preload_stress`` over ``mean`` [1]: near 1 the mean says little about the drop."""
 
     def rules(self) -> str:
@@ -65,10 +64,6 @@ class StressStatistics:
             f"outliers: above mean + {SIGMA_REACH:g} standard deviations (n − 1); {weight}"
         )
 
-    def as_json(self) -> dict[str, Any]:
-        """All numbers (SI) and the rules they follow, ready for JSON."""
-        return {**self.__dict__, "rules": self.rules()}
-
 
 def stress_statistics(
     stress: ArrayLike,
@@ -76,7 +71,7 @@ def stress_statistics(
     time: ArrayLike | None = None,
     rule: QuartileRule = "hazen",
     preload_stress: float | None = None,
-) -> StressStatistics:
+) -> Statistics:
     """Summarise a stress history (T,) [Pa] as a box plot does, and say which rules were followed.
 
     With rising times (T,) [s] each value counts by the time around it, which matters where the steps differ;
@@ -100,7 +95,10 @@ def stress_statistics(
     reach = WHISKER_REACH * (upper - lower)
     inside = values[(values >= lower - reach) & (values <= upper + reach)]
     limit = mean + SIGMA_REACH * deviation
-    return StressStatistics(
+    preload = {} if preload_stress is None else {"preload_stress": preload_stress}
+    if preload_stress is not None and mean != 0.0:
+        preload["preload_share"] = preload_stress / mean
+    return Statistics(
         rule=rule,
         weighted_by_time=time is not None,
         count=values.size,
@@ -116,8 +114,7 @@ def stress_statistics(
         beyond_whiskers=int(values.size - inside.size),
         above_three_sigma=int(np.sum(values > limit)),
         three_sigma_limit=limit,
-        preload_stress=preload_stress,
-        preload_share=None if preload_stress is None or mean == 0.0 else preload_stress / mean,
+        **preload,
     )
 
 
