@@ -874,7 +874,8 @@ def timed_actions() -> dict[str, Callable[[], Any]]:
 
     from rotordrop.evidence.evidence import read_evidence
     from rotordrop.machine import example_machine, load_machine
-    from rotordrop.record import example_record_path, read_record
+    from rotordrop.record.examples import example_record_path
+    from rotordrop.record.record import read_record
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.track.calibration import stage_settings

@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from rotordrop.estimation import Tracked as Tracked
     from rotordrop.estimation import estimate_drop as estimate_drop
     from rotordrop.estimation import estimate_drops as estimate_drops
-    from rotordrop.evidence import check_record as check_record
     from rotordrop.evidence.look import look as look
+    from rotordrop.evidence.quality import check_record as check_record
     from rotordrop.known import Known as Known
     from rotordrop.machine import Machine as Machine
     from rotordrop.machine import example_machine as example_machine
     from rotordrop.machine import load_machine as load_machine
     from rotordrop.machine.saving import save_machine as save_machine
     from rotordrop.machine.schema import machine_schema as machine_schema
-    from rotordrop.record import Record as Record
-    from rotordrop.record import example_record_path as example_record_path
-    from rotordrop.record import read_record as read_record
+    from rotordrop.record.examples import example_record_path as example_record_path
+    from rotordrop.record.record import Record as Record
+    from rotordrop.record.record import read_record as read_record
     from rotordrop.rotor.parameters import DropModel as DropModel
     from rotordrop.rotor.parameters import build_drop_model as build_drop_model
     from rotordrop.simulate.case import DropCase as DropCase
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
     from rotordrop.simulate.drop import simulate_drop as simulate_drop
     from rotordrop.simulate.result import DropResult as DropResult
     from rotordrop.simulate.result import load_result as load_result
-    from rotordrop.study import load_study as load_study
-    from rotordrop.study import run_study as run_study
-    from rotordrop.study import sweep as sweep
+    from rotordrop.study.plan import load_study as load_study
+    from rotordrop.study.run import run_study as run_study
+    from rotordrop.study.run import sweep as sweep
     from rotordrop.track.force_estimate import ForceEstimate as ForceEstimate
     from rotordrop.track.force_estimate import estimate_force as estimate_force
     from rotordrop.twin.calibrated import calibrate_machine as calibrate_machine
@@ -56,33 +56,33 @@ _PUBLIC = {
     "LevitatedStart": "rotordrop.simulate.case",
     "Machine": "rotordrop.machine",
     "PlacedStart": "rotordrop.simulate.case",
-    "Record": "rotordrop.record",
+    "Record": "rotordrop.record.record",
     "RotordropError": "rotordrop.errors",
     "Replay": "rotordrop.estimation",
     "Tracked": "rotordrop.estimation",
     "UnbalanceJump": "rotordrop.simulate.case",
     "build_drop_model": "rotordrop.rotor.parameters",
     "calibrate_machine": "rotordrop.twin.calibrated",
-    "check_record": "rotordrop.evidence",
+    "check_record": "rotordrop.evidence.quality",
     "estimate_drop": "rotordrop.estimation",
     "estimate_drops": "rotordrop.estimation",
     "estimate_force": "rotordrop.track.force_estimate",
     "find_bearing": "rotordrop.elements.catalog.lookup",
     "example_machine": "rotordrop.machine",
-    "example_record_path": "rotordrop.record",
+    "example_record_path": "rotordrop.record.examples",
     "format_quantity": "rotordrop.units",
     "load_machine": "rotordrop.machine",
     "load_result": "rotordrop.simulate.result",
-    "load_study": "rotordrop.study",
+    "load_study": "rotordrop.study.plan",
     "look": "rotordrop.evidence.look",
     "machine_schema": "rotordrop.machine.schema",
     "parse_quantity": "rotordrop.units",
     "read_document": "rotordrop.document",
-    "read_record": "rotordrop.record",
-    "run_study": "rotordrop.study",
+    "read_record": "rotordrop.record.record",
+    "run_study": "rotordrop.study.run",
     "save_machine": "rotordrop.machine.saving",
     "simulate_drop": "rotordrop.simulate.drop",
-    "sweep": "rotordrop.study",
+    "sweep": "rotordrop.study.run",
 }
 
 __all__ = ["__version__", *_PUBLIC]

@@ -38,8 +38,7 @@ from tests.unit.record.every_format import BY_HAND, BY_PROFILE, MACHINE, WRITERS
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
-from rotordrop.record import read_record
-from rotordrop.record.record import Record
+from rotordrop.record.record import Record, read_record
 from rotordrop.record.sandbox import Content
 
 BLOCK = 250

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop import example_machine, read_record
-from rotordrop.evidence import check_record
-from rotordrop.record import example_record_path
+from rotordrop.evidence.quality import check_record
+from rotordrop.record.examples import example_record_path
 from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.study.folder import Shard, open_folder, publish
 from rotordrop.study.plan import read_study

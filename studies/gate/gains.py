@@ -19,12 +19,11 @@ import numpy as np
 
 from rotordrop.errors import RotordropError
 from rotordrop.estimation import estimate_drop
-from rotordrop.evidence import check_record
+from rotordrop.evidence.quality import check_record
 from rotordrop.known import Known
 from rotordrop.machine import example_machine
-from rotordrop.record import read_record
 from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import Record
+from rotordrop.record.record import Record, read_record
 
 RESULTS = Path(__file__).parent / "results" / "gains.jsonl"
 TRUE_PEAKS = {"NDE": 3333.1, "DE": 3618.5}

@@ -44,7 +44,7 @@ from rotordrop import example_machine, read_record
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, RotordropError
 from rotordrop.estimation import estimate_drop
-from rotordrop.evidence import check_record
+from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.recorder import check_blocks
 

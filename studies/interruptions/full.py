@@ -20,7 +20,7 @@ import numpy as np
 from tests.unit.evidence.test_clearance import pushed, record_of_paths
 
 from rotordrop import example_machine, load_machine, save_machine
-from rotordrop.record import example_record_path
+from rotordrop.record.examples import example_record_path
 from rotordrop.record.recording import recording_of
 from rotordrop.record.writers import write_hdf5
 

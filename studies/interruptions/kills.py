@@ -42,7 +42,7 @@ from rotordrop.files import hdf5_is_sealed, write_json
 from rotordrop.ledger.book import read_log
 from rotordrop.machine import example_path, load_machine
 from rotordrop.machine.saving import save_machine
-from rotordrop.record import example_record_path
+from rotordrop.record.examples import example_record_path
 from rotordrop.study.summary import load_results
 from rotordrop.web import child
 from rotordrop.web.running import result_folder, write_state

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rotordrop.evidence import Evidence
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import example_machine
 from rotordrop_bench import hidden_machine, synthesize_drop
 

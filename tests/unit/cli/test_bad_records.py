@@ -12,8 +12,8 @@ import pytest
 
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.machine import example_machine, example_path
-from rotordrop.record import example_record_path, read_record
-from rotordrop.record.record import Record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import Record, read_record
 
 LP400 = str(example_path("lp400"))
 

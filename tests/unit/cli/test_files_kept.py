@@ -22,7 +22,7 @@ from rotordrop.errors import UsageError
 from rotordrop.files import write_json
 from rotordrop.machine import example_machine, example_path
 from rotordrop.machine.saving import save_machine
-from rotordrop.record import example_record_path
+from rotordrop.record.examples import example_record_path
 
 SMALL = example_path("small")
 

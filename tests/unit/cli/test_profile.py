@@ -11,8 +11,9 @@ from rotordrop.cli.app import run
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.machine import example_machine, example_path
 from rotordrop.machine.simple import EXAMPLES
-from rotordrop.record import example_record_path, load_profile, read_record
-from rotordrop.record.profile import profile_of
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.profile import load_profile, profile_of
+from rotordrop.record.record import read_record
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))

@@ -7,8 +7,9 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import EarlyForces, Evidence, first_forces
+from rotordrop.evidence.contacts import EarlyForces, first_forces
 from rotordrop.evidence.events import coarse_drop
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import GRID, free_rotor, response_at
 from rotordrop.known import Known
 from rotordrop.machine import example_machine

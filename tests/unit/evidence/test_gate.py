@@ -7,12 +7,19 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import check_record, refuse_unusable
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
-from rotordrop.evidence.quality import NO_CHECK_SEES, Finding, Kind, not_seen, standing
+from rotordrop.evidence.quality import (
+    NO_CHECK_SEES,
+    Finding,
+    Kind,
+    check_record,
+    not_seen,
+    refuse_unusable,
+    standing,
+)
 from rotordrop.evidence.quality import fall as quality_fall
 from rotordrop.evidence.quality.arrangement import check_planes
 from rotordrop.evidence.quality.fall import fell_as_described
@@ -551,7 +558,7 @@ class TestArrangement:
 
     def test_a_tiny_orbit_cannot_show_its_sense(self, drop, tail, machine, edited):
         """Without an orbit before the drop the exchange of A and B stays open, and this is said."""
-        from rotordrop.evidence import fit_levitated
+        from rotordrop.evidence.levitated import fit_levitated
 
         model = fit_levitated(drop, -0.004, speed=60 * HZ)
         wave = np.outer(np.exp(2j * np.pi * model.frequency * drop.time), model.amplitudes[0]).real

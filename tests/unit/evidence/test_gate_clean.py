@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from rotordrop.evidence import check_record
+from rotordrop.evidence.quality import check_record
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
 

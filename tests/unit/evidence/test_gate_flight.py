@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.evidence import check_record
 from rotordrop.evidence.events import coarse_drop
 from rotordrop.evidence.free_rotor import GRID, Responses, free_rotor
 from rotordrop.evidence.levitated import fit_levitated
+from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.flight import Weighed, check_flights, weighed
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.evidence import check_record
+from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.channels import check_rail
 
 

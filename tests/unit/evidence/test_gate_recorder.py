@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from rotordrop.evidence import check_record, fit_levitated
+from rotordrop.evidence.levitated import fit_levitated
+from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.arrangement import check_ends_named
 from rotordrop.evidence.quality.continuity import check_continuity, check_orbit
 from rotordrop.evidence.quality.recorder import check_blocks, check_filters

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import fit_levitated
+from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.record.speed import RotorAngle, rotor_angle
 
 RATE = 20000.0

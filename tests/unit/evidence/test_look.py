@@ -14,7 +14,7 @@ from rotordrop.errors import UsageError
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
 from rotordrop.machine import example_path
-from rotordrop.record import example_record_path
+from rotordrop.record.examples import example_record_path
 from rotordrop.report.look_page import look_page
 
 RATE = 20_000.0

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import Evidence
 from rotordrop.evidence.events import DropInstant, PowerOff, sinking
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import example_machine, load_machine
 from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
 from rotordrop_bench.rotors import bench_rotor

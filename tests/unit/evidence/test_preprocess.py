@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import local_polynomial
+from rotordrop.evidence.contacts import local_polynomial
 
 RATE = 20000.0
 

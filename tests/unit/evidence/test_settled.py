@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.evidence import settled_tail
+from rotordrop.evidence.rest import settled_tail
 
 
 def test_a_tail_of_its_own_is_settled_throughout(tail, machine):

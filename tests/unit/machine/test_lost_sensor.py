@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rotordrop.errors import MachineFileError
-from rotordrop.evidence import check_record
+from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.finding import stops
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text

@@ -13,9 +13,8 @@ import numpy as np
 import scipy.io
 
 from rotordrop.machine import example_machine
-from rotordrop.record import Profile, save_record
-from rotordrop.record.profile import Clock, SpeedSource, TextLayout
-from rotordrop.record.record import Record
+from rotordrop.record.profile import Clock, Profile, SpeedSource, TextLayout
+from rotordrop.record.record import Record, save_record
 
 COUNT, STEP = 240, 2e-4
 MACHINE = example_machine("lp400")

@@ -7,8 +7,8 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.machine import Sensor
-from rotordrop.record import Record, sensor_planes
-from rotordrop.record.axes import along_sensors, planar_of, sensor_directions
+from rotordrop.record.axes import along_sensors, planar_of, sensor_directions, sensor_planes
+from rotordrop.record.record import Record
 
 TIME = np.arange(50) / 1e4
 MOTION = np.column_stack([20e-6 * np.cos(2 * np.pi * 300 * TIME), -250e-6 * TIME / TIME[-1]])

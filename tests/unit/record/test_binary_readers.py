@@ -9,8 +9,11 @@ import pytest
 import scipy.io
 
 from rotordrop.errors import RecordError, RotordropError
-from rotordrop.record import Profile, example_record_path, read_record, save_record, write_delimited
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.profile import Profile
 from rotordrop.record.readers import find_reader, known_formats, read_recording
+from rotordrop.record.record import read_record, save_record
+from rotordrop.record.writers import write_delimited
 
 
 @pytest.fixture(scope="module")
@@ -355,7 +358,7 @@ def test_another_package_may_add_a_reader(monkeypatch, machine, short):
 
 
 def test_text_written_here_is_read_back(short, machine, tmp_path):
-    from rotordrop.record import recording_of
+    from rotordrop.record.recording import recording_of
 
     recording = recording_of(
         short.time, short.signals, short.channel_names, speed_time=short.speed_time,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.record import Profile, read_record
-from rotordrop.record.profile import Clock, SpeedSource, TextLayout
+from rotordrop.record.profile import Clock, Profile, SpeedSource, TextLayout
 from rotordrop.record.readers.text import is_number
+from rotordrop.record.record import read_record
 from rotordrop.record.recording import split_unit
 
 TIME = np.arange(-4, 16) * 5e-5

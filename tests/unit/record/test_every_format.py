@@ -18,7 +18,7 @@ from tests.unit.record.every_format import (
 )
 
 from rotordrop.errors import RecordError
-from rotordrop.record import read_record
+from rotordrop.record.record import read_record
 
 
 def read(path, name):

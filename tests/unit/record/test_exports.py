@@ -5,8 +5,8 @@ import pytest
 from tests.unit.record.exports import EXPORTS, SPEED, TIME
 
 from rotordrop.errors import RecordError
-from rotordrop.record import Profile
 from rotordrop.record.arrangement import arrangement_of
+from rotordrop.record.profile import Profile
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import open_record
 

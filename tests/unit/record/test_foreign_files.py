@@ -19,10 +19,9 @@ from tests.unit.record.exports import (
 )
 
 from rotordrop.errors import RecordError
-from rotordrop.record import Profile, read_record
-from rotordrop.record.profile import TextLayout
+from rotordrop.record.profile import Profile, TextLayout
 from rotordrop.record.readers import read_recording
-from rotordrop.record.record import open_record
+from rotordrop.record.record import open_record, read_record
 from rotordrop.record.recording import known_unit, split_unit
 
 

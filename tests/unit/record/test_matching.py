@@ -8,18 +8,11 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.record import (
-    Profile,
-    example_record_path,
-    load_profile,
-    read_record,
-    save_profile,
-    save_record,
-)
 from rotordrop.record.arrangement import arrangement_of
 from rotordrop.record.columns import guess_profile
-from rotordrop.record.profile import SpeedSource, rules_of
-from rotordrop.record.record import record_of
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.profile import Profile, SpeedSource, load_profile, rules_of, save_profile
+from rotordrop.record.record import read_record, record_of, save_record
 from rotordrop.record.recording import Channel, Recording
 
 TIME = np.arange(10) * 1e-4
@@ -187,7 +180,8 @@ def test_a_record_is_saved_and_read_back_exactly(drop, machine, tmp_path):
 
 def test_no_partial_file_is_left_when_writing_fails(drop, tmp_path):
     from rotordrop.errors import OutputError
-    from rotordrop.record import recording_of, write_hdf5
+    from rotordrop.record.recording import recording_of
+    from rotordrop.record.writers import write_hdf5
 
     coarse = recording_of(drop.time, drop.signals, drop.channel_names)
     with pytest.raises(OutputError, match=r"needs 2.* steps of 1e-09 m; 16 bits have 32767"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.record import read_record
+from rotordrop.record.record import read_record
 
 NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
 COUNT, STEP = 60, 5e-5

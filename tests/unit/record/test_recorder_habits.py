@@ -10,9 +10,9 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality import check_record
-from rotordrop.record import Profile, read_record
-from rotordrop.record.profile import Clock, SpeedSource, TextLayout
+from rotordrop.record.profile import Clock, Profile, SpeedSource, TextLayout
 from rotordrop.record.readers import read_recording
+from rotordrop.record.record import read_record
 
 NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
 COUNT = 40

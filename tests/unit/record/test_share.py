@@ -15,7 +15,8 @@ from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.machine.saving import save_machine
-from rotordrop.record import Record, example_record_path, read_record, save_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import Record, read_record, save_record
 from rotordrop.record.share import share_record
 
 SECRET = "Ormen"

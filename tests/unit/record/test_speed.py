@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.record import smooth_speed, speed_at_drop
-from rotordrop.record.speed import readings_of_held_signal
+from rotordrop.record.speed import readings_of_held_signal, smooth_speed, speed_at_drop
 
 HZ = 2 * np.pi
 

@@ -20,7 +20,8 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.physics.ball_set import ball_set_energy, two_row_axial_force, two_row_force
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
-from rotordrop.record import example_record_path, read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.report.machine_content import machine_json
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.report.simulate_summary import simulate_summary

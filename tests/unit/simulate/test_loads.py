@@ -167,7 +167,8 @@ def test_what_does_not_fit_is_refused(paper, more, told):
 
 def test_an_estimate_with_loads_is_refused_and_says_what_to_do():
     from rotordrop.evidence.evidence import read_evidence
-    from rotordrop.record import example_record_path, read_record
+    from rotordrop.record.examples import example_record_path
+    from rotordrop.record.record import read_record
 
     machine = with_lines(example_machine("lp400"), down('force = "100 N"'))
     record = read_record(example_record_path("lp400_drop_060"), machine)

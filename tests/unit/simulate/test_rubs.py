@@ -10,7 +10,8 @@ from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import touch
-from rotordrop.record import example_record_path, read_record
+from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.parameters import build_drop_model
