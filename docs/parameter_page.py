@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from rotordrop.elements.parameter import Parameter
-from rotordrop.elements.table import LOADS, STRUCTURE, rows
+from rotordrop.elements.table import STRUCTURE, rows
 from rotordrop.machine import example_machine
+from rotordrop.severity.numbers import LOADS
 
 INTRODUCTION = """\
 # Parameters

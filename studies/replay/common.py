@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.known import Known
-from rotordrop.machine import Machine, TouchdownBearing, example_machine
+from rotordrop.machine import Machine, example_machine
 from rotordrop_bench import HiddenMachine, SensorChain
 
 RESULTS = Path(os.environ.get("STUDY_RESULTS", Path(__file__).parent / "results"))

@@ -14,7 +14,6 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.physics.aerodynamics import exponential_deceleration
 from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics
-from rotordrop.spectrum.coast_down_law import exponential_time_constant
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
 pytestmark = pytest.mark.acceptance
@@ -52,7 +51,7 @@ def hann_amplitudes(inputs: Inputs) -> dict[str, float]:
 
 
 def exponential_coast_down(inputs: Inputs) -> dict[str, float]:
-    tau = exponential_time_constant(inputs["n0"], inputs["n1"], inputs["dt"])
+    tau = inputs["dt"] / math.log(inputs["n0"] / inputs["n1"])
     omega = 2.0 * math.pi * inputs["n0"]
     return {
         "time constant": tau,

@@ -10,9 +10,10 @@ import numpy as np
 
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import structure_rows as structure_rows_of
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import LevitatedStart

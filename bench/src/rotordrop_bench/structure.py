@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.known import Known
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop_bench.violations import BearingViolations, Violations

@@ -13,7 +13,8 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.result import DropResult

@@ -18,9 +18,10 @@ from rotordrop.record.speed import require_speed
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.evidence.fall import Fall
     from rotordrop.evidence.free_rotor import FreeRotor
-    from rotordrop.machine import Machine, TouchdownBearing
+    from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
 FALLEN_SHARE = 0.35

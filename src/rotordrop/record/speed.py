@@ -172,19 +172,6 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
     )
 
 
-def smooth_speed(record: Record, *, span: float = 0.1) -> Array:
-    """Speed over the record [rad/s], shape (N,), outliers replaced and smoothed by local straight lines."""
-    from scipy.signal import savgol_filter
-
-    time, readings = require_speed(record)
-    if len(readings) < 5:
-        return np.interp(record.time, time, readings)
-    clean = _without_outliers(readings)
-    width = int(span / float(np.median(np.diff(time)))) // 2 * 2 + 1
-    width = min(max(width, 5), len(clean) - 1 + len(clean) % 2)
-    return np.asarray(np.interp(record.time, time, savgol_filter(clean, width, 1)))
-
-
 def require_speed(record: Record) -> tuple[Array, Array]:
     """Give the speed readings, time [s] and value [rad/s], or say that they are missing and what to do."""
     if record.speed_time is None or record.speed_readings is None:

@@ -17,7 +17,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
-from rotordrop.elements.touchdown_bearing import AIR_GAP
+from rotordrop.elements.touchdown_bearing import AIR_GAP, TouchdownBearing
 from rotordrop.estimate.agreement import compare_orbits, spread_horizon
 from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA, MODEL_STRESS_SIGMA
 from rotordrop.estimate.assumptions import evidence_assumptions
@@ -42,7 +42,7 @@ from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.rest import AirGap as IdentifiedGap
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.record.record import Record
 from rotordrop.replay.draws import (
     FEWEST_DRAWS,

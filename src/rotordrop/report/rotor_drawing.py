@@ -11,7 +11,10 @@ import plotly.graph_objects as go
 from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, panels, plain
 
 if TYPE_CHECKING:
-    from rotordrop.machine import ActiveMagneticBearing, Machine, Sensor, TouchdownBearing
+    from rotordrop.elements.magnet import ActiveMagneticBearing
+    from rotordrop.elements.sensor import Sensor
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
+    from rotordrop.machine import Machine
 
     Mounted: TypeAlias = ActiveMagneticBearing | Sensor | TouchdownBearing
 

@@ -11,7 +11,8 @@ from rotordrop.elements.face import Face
 from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.elements.thermal import heat_figures, runaway
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs

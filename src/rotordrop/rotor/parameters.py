@@ -13,7 +13,8 @@ from rotordrop.arrays import Array
 from rotordrop.elements.description import Placed
 from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics import aerodynamics, departure, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters

@@ -15,7 +15,8 @@ from rotordrop.physics.linear_algebra import product, solve
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 
 if TYPE_CHECKING:
-    from rotordrop.machine import Machine, TouchdownBearing
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
+    from rotordrop.machine import Machine
 
 
 def weight_vector(fe: RotorFE, gravity: float) -> Array:

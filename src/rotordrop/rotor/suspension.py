@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.support import support_deflection
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.statics import bearing_load_shares

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.rotor.statics import bearing_load_shares
 

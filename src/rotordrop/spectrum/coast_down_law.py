@@ -83,19 +83,6 @@ class DragFit:
         return _drag_solution(parameters, np.asarray(time, dtype=np.float64) - self.start)
 
 
-def exponential_time_constant(first_speed: float, later_speed: float, elapsed: float) -> float:
-    """Time constant [s] of an exponential coast-down from two speeds (any one unit) and the time between [s].
-
-    Source: Neisi 2020, eq. (13) and section 5.1 (60 Hz to 58 Hz in 0.2 s).
-    """
-    if not first_speed > later_speed > 0.0 or elapsed <= 0.0:
-        raise RecordError(
-            f"time constant: speed goes from {first_speed:g} to {later_speed:g} in {elapsed:g} s; "
-            f"expected a falling positive speed and a positive time"
-        )
-    return elapsed / math.log(first_speed / later_speed)
-
-
 def fit_exponential(
     time: ArrayLike, speed: ArrayLike, *, start: float, end: float | None = None
 ) -> ExponentialFit:

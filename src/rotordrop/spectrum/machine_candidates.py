@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.machine import Machine, TouchdownBearing
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.rotor.assembly import build_rotor_fe

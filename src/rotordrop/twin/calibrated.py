@@ -17,7 +17,8 @@ from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Structure
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import NINETY, Known, Status
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, RecordedLift
+from rotordrop.machine import Machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, RecordedLift
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares

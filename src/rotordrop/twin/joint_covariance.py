@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import JointSpread
+from rotordrop.machine.calibration import JointSpread
 from rotordrop.rotor.unknowns import (
     file_of_fitted,
     file_path,

@@ -22,7 +22,8 @@ from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.look import look
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, Machine, example_path, load_machine
+from rotordrop.machine import Machine, example_path, load_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.spectrum.indentation import find_settling

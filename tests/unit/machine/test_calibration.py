@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rotordrop.errors import MachineFileError
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, example_machine, load_machine, loads_machine
+from rotordrop.machine import example_machine, load_machine, loads_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.machine.saving import machine_text, save_machine
 
 NAMES = ("drop 1, after the repair", "müller's “drop”", "calibrated on x")

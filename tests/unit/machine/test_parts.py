@@ -5,8 +5,9 @@ import math
 import pytest
 
 from rotordrop.elements.contact import palmgren_stiffness
+from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.errors import UsageError
-from rotordrop.machine import BalanceGrade, example_machine, loads_machine
+from rotordrop.machine import example_machine, loads_machine
 
 
 def test_mass_and_centre_of_gravity_of_a_simple_rotor(small_text):

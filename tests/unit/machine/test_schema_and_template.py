@@ -7,18 +7,14 @@ import tomllib
 import jsonschema
 import pytest
 
-from rotordrop.machine import (
-    BallBearing,
-    Contact,
-    Friction,
-    Machine,
-    Race,
-    Sensor,
-    Support,
-    TouchdownBearing,
-    example_names,
-    loads_machine,
-)
+from rotordrop.elements.ball_bearing import BallBearing
+from rotordrop.elements.contact import Contact
+from rotordrop.elements.friction import Friction
+from rotordrop.elements.race import Race
+from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.support import Support
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.machine import Machine, example_names, loads_machine
 from rotordrop.machine.examples import example_path
 from rotordrop.machine.saving import machine_text
 from rotordrop.machine.schema import machine_schema

@@ -3,8 +3,8 @@
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop.machine import doubts, example_machine, example_path, loads_machine
-from rotordrop.machine.plausibility import unusual_values
+from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop.machine.plausibility import doubts, unusual_values
 
 MISTYPED = {
     "nominal speed in Hz for rpm": ({"speed.nominal": 56_549.0}, "machine", "nominal speed", "9000 Hz"),

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
-from rotordrop.machine import Sensor
 from rotordrop.record.axes import along_sensors, planar_of, sensor_directions, sensor_planes
 from rotordrop.record.record import Record
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import RecordError
-from rotordrop.record.speed import readings_of_held_signal, smooth_speed, speed_at_drop
+from rotordrop.record.speed import readings_of_held_signal, speed_at_drop
 
 HZ = 2 * np.pi
 
@@ -61,13 +61,6 @@ def test_speed_of_the_bundled_record(whole_drop):
     found = speed_at_drop(whole_drop, -0.00025)
     assert found.value == pytest.approx(60.0 * HZ, rel=3e-4)
     assert found.slope < 0
-
-
-def test_smoothing_follows_the_fall_and_leaves_outliers_out(drop):
-    record = slowing(drop, outliers=(40,))
-    truth = HZ * 60.0 * np.exp(-np.maximum(record.time - 0.003, 0.0) / 9.0)
-    error = smooth_speed(record) - truth
-    assert np.sqrt(np.mean(error**2)) < 0.02 * HZ
 
 
 def test_missing_speed_says_what_to_do(drop):

@@ -7,7 +7,6 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.spectrum.coast_down_law import (
-    exponential_time_constant,
     find_standstill,
     fit_drag,
     fit_exponential,
@@ -130,12 +129,6 @@ def test_a_record_that_ends_before_standstill_says_so():
     found = find_standstill(TIME[early], drag_speed(TIME)[early])
     assert found.status == "the record does not determine it"
     assert found.lower == pytest.approx(TIME[early][-1], abs=0.1)
-
-
-def test_time_constant_of_two_speeds():
-    assert exponential_time_constant(60.0, 58.0, 0.2) == pytest.approx(5.8994349849616)
-    with pytest.raises(RecordError, match=r"from 58 to 60 in 0\.2 s"):
-        exponential_time_constant(58.0, 60.0, 0.2)
 
 
 def test_wrong_records_are_refused():

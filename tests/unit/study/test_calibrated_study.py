@@ -8,7 +8,8 @@ from scipy.special import ndtr
 
 from rotordrop import example_machine
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, JointSpread, loads_machine
+from rotordrop.machine import loads_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.folder import open_folder, study_of
 from rotordrop.study.plan import read_study

@@ -10,7 +10,8 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import kstest
 
 from rotordrop import example_machine
-from rotordrop.machine import CalibrationDrop, CalibrationOrigin, RecordedLift, loads_machine
+from rotordrop.machine import loads_machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, RecordedLift
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.distributions import normal_score
 from rotordrop.study.repeat import next_draw, repeat_study

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.sensing import Sensing, build_sensing
 from rotordrop.known import Known
-from rotordrop.machine import Machine, Sensor
+from rotordrop.machine import Machine
 from rotordrop.replay.modal_expansion import expansion_matrix
 from rotordrop.rotor.parameters import DropModel
 
