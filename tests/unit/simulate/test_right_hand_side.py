@@ -10,7 +10,8 @@ from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
-from rotordrop.simulate.case import DropCase
+from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
 
 SPEED = 2.0 * np.pi * 60.0
@@ -103,6 +104,26 @@ def test_torque_on_the_rotor_is_differentiated(quick, slip):
     row = quick.layout.rotor_speed
     assert np.max(np.abs(numeric[row])) > 1.0
     assert jacobian[row] == pytest.approx(numeric[row], abs=3e-5 * np.max(np.abs(numeric[row])))
+
+
+def assert_jacobian(model, state, speed=SPEED):
+    """The derivative of every rate by every state but the rotor angle; gives that by differences."""
+    jacobian, numeric = both_jacobians(model, state, DropCase(speed=speed, spin="prescribed"))
+    size = np.maximum(np.max(np.abs(numeric), axis=0), 1e-9)
+    error = np.delete(np.max(np.abs(jacobian - numeric), axis=0) / size, model.layout.rotor_angle)
+    assert np.max(error) < 5e-5, int(np.argmax(error))
+    return numeric
+
+
+def mirrored_drops(machine, speed=SPEED):
+    """A drop without unbalance, placed aside and turning, and its mirror image."""
+    even, drops = machine.with_values({"unbalance.0.amount": 0.0}), []
+    for side in (1.0, -1.0):
+        place = np.array([[side * 40e-6, -20e-6], [side * 70e-6, 10e-6]])
+        start = PlacedStart(displacement=place, velocity=np.zeros((2, 2)))
+        case = DropCase(speed=side * speed, duration=0.012, reduction="quick", start=start)
+        drops.append(simulate_drop(even, case))
+    return drops
 
 
 def both_jacobians(model, state, case):

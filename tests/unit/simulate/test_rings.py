@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
+from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jacobian, mirrored_drops
 
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_path, loads_machine
@@ -40,10 +40,7 @@ def test_jacobian_agrees_with_finite_differences(way, bearing):
     state = a_state(model, np.array([-40e-6, 15e-6]), 0.98)
     rings = model.layout.further_at(L.RING_STATES)
     state[rings] = np.resize([way, 4e-3], rings.stop - rings.start)
-    jacobian, numeric = both_jacobians(model, state, DropCase(speed=SPEED, spin="prescribed"))
-    size = np.maximum(np.max(np.abs(numeric), axis=0), 1e-9)
-    error = np.delete(np.max(np.abs(jacobian - numeric), axis=0) / size, model.layout.rotor_angle)
-    assert np.max(error) < 5e-5, int(np.argmax(error))
+    numeric = assert_jacobian(model, state)
     assert np.max(np.abs(numeric[rings.start + 1])) > 1e6
 
 
@@ -88,16 +85,7 @@ def test_the_first_peak_falls_and_friction_gives_some_back():
 
 
 def test_a_mirrored_drop_is_the_mirror():
-    from rotordrop.simulate.case import PlacedStart
-
-    found = []
-    for side in (1.0, -1.0):
-        place = np.array([[side * 40e-6, -20e-6], [side * 70e-6, 10e-6]])
-        start = PlacedStart(displacement=place, velocity=np.zeros((2, 2)))
-        case = DropCase(speed=side * SPEED, duration=0.012, reduction="quick", start=start)
-        machine = sprung()
-        found.append(simulate_drop(machine.with_values({"unbalance.0.amount": 0.0}), case))
-    one, other = found
+    one, other = mirrored_drops(sprung())
     assert one.ring_travel("DE") == pytest.approx(other.ring_travel("DE"), rel=1e-6, abs=1e-12)
     assert one.bearing_force[..., 0] == pytest.approx(-other.bearing_force[..., 0], rel=1e-5, abs=1e-2)
 

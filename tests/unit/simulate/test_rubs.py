@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.unit.simulate.test_right_hand_side import mirrored_drops
 
 from rotordrop.errors import MachineFileError, RecordError
 from rotordrop.evidence.evidence import read_evidence
@@ -15,7 +16,7 @@ from rotordrop.record.record import read_record
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
@@ -80,17 +81,11 @@ def test_a_housing_out_of_reach_changes_nothing():
 
 
 def test_friction_brakes_the_rotor_and_a_mirrored_drop_is_the_mirror(rubbed):
-    found = []
-    for side in (1.0, -1.0):
-        place = np.array([[side * 40e-6, -20e-6], [side * 70e-6, 10e-6]])
-        start = PlacedStart(displacement=place, velocity=np.zeros((2, 2)))
-        case = DropCase(speed=side * SPEED, duration=0.012, reduction="quick", start=start)
-        found.append(simulate_drop(rubbed.with_values({"unbalance.0.amount": 0.0}), case))
-    one, other = found
+    one, other = mirrored_drops(rubbed, SPEED)
     assert one.contacts_at("seal").peak_force == pytest.approx(other.contacts_at("seal").peak_force, rel=1e-4)
     assert one.speed == pytest.approx(-other.speed, rel=1e-9)
-    smooth = rubbed.with_values({"unbalance.0.amount": 0.0, "clearances.seal.friction": 0.0})
-    assert abs(one.speed[-1]) < simulate_drop(smooth, case).speed[-1] * -1.0
+    smooth, _ = mirrored_drops(rubbed.with_values({"clearances.seal.friction": 0.0}), SPEED)
+    assert abs(one.speed[-1]) < smooth.speed[-1]
 
 
 def test_page_and_document_say_what_happens(rubbed, drop):

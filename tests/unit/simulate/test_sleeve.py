@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.unit.simulate.test_right_hand_side import SPEED, a_state, both_jacobians
+from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jacobian, mirrored_drops
 
 from rotordrop.errors import MachineFileError, RecordError, UsageError
 from rotordrop.evidence.evidence import insisted
@@ -21,7 +21,7 @@ from rotordrop.rotor.campbell import campbell_diagram
 from rotordrop.rotor.critical_speeds import critical_speed_map
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
-from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.coast_down import simulate_coast_down
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.drop import simulate_drop
@@ -64,10 +64,7 @@ def test_jacobian_agrees_with_finite_differences(model):
     state[model.layout.support][-2:] = 9e-6, -4e-6
     race = np.r_[model.layout.race][2:], np.r_[model.layout.velocity_of(model.layout.race)][2:]
     state[np.concatenate(race)] = state[model.layout.race_spin.stop - 1] = 0.0
-    jacobian, numeric = both_jacobians(model, state, DropCase(speed=SPEED, spin="prescribed"))
-    size = np.maximum(np.max(np.abs(numeric), axis=0), 1e-9)
-    error = np.delete(np.max(np.abs(jacobian - numeric), axis=0) / size, model.layout.rotor_angle)
-    assert np.max(error) < 5e-5, int(np.argmax(error))
+    assert_jacobian(model, state)
 
 
 def test_energy_closes_by_place_and_the_contact_is_what_the_bearing_bears(model, drop):
@@ -83,14 +80,7 @@ def test_energy_closes_by_place_and_the_contact_is_what_the_bearing_bears(model,
 
 
 def test_a_mirrored_drop_is_the_mirror():
-    machine = loads_machine(text_of("NDE", "DE")).with_values({"unbalance.0.amount": 0.0})
-    found = []
-    for side in (1.0, -1.0):
-        place = np.array([[side * 40e-6, -20e-6], [side * 70e-6, 10e-6]])
-        start = PlacedStart(displacement=place, velocity=np.zeros((2, 2)))
-        case = DropCase(speed=side * SPEED, duration=0.012, reduction="quick", start=start)
-        found.append(simulate_drop(machine, case))
-    one, other = found
+    one, other = mirrored_drops(loads_machine(text_of("NDE", "DE")))
     assert one.bearing_force[..., 0] == pytest.approx(-other.bearing_force[..., 0], rel=1e-5, abs=1e-2)
     assert one.bearing_force[..., 1] == pytest.approx(other.bearing_force[..., 1], rel=1e-5, abs=1e-2)
 
