@@ -1,4 +1,4 @@
-"""A synthetic drop of a hidden machine, for the tests of what is estimated from it."""
+"""Bundled machines, and a synthetic drop of a hidden one for the tests of what is estimated from it."""
 
 from __future__ import annotations
 
@@ -17,6 +17,18 @@ SEED = 4
 def known() -> Machine:
     """The machine of the supplied records, as its owner knows it."""
     return example_machine("lp400")
+
+
+@pytest.fixture(scope="session")
+def lp400(known: Machine) -> Machine:
+    """The same by its name."""
+    return known
+
+
+@pytest.fixture(scope="session")
+def paper() -> Machine:
+    """The reference machine of the paper."""
+    return example_machine("paper")
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from rotordrop.cli.app import run
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import RecordError
 from rotordrop.evidence.clearance import measure_clearance, wear_between
-from rotordrop.machine import example_machine, example_path, load_machine
+from rotordrop.machine import example_path, load_machine
 from rotordrop.record.record import Record
 from rotordrop.record.recording import recording_of
 from rotordrop.record.writers import write_hdf5
@@ -51,11 +51,6 @@ def record_of_paths(paths, machine):
     )
     time = np.arange(len(signals)) / RATE
     return Record(time=time, signals=signals, sensors=machine.sensors, sampling_rate=RATE)
-
-
-@pytest.fixture(scope="module")
-def lp400():
-    return example_machine("lp400")
 
 
 def test_the_interval_holds_the_true_radius_as_often_as_it_says(lp400):

@@ -5,15 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.machine import Machine, example_machine
+from rotordrop.machine import Machine
 from rotordrop.physics.timoshenko import round_section
 from rotordrop.rotor.assembly import PointMass, RotorFE, assemble, build_rotor_fe
-
-
-@pytest.fixture(scope="session")
-def paper() -> Machine:
-    """The reference machine of the paper."""
-    return example_machine("paper")
 
 
 @pytest.fixture(scope="session")

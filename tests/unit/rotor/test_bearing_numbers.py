@@ -10,14 +10,8 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
-
-
-@pytest.fixture(scope="module")
-def paper() -> Machine:
-    return example_machine("paper")
 
 
 @pytest.mark.parametrize("preload", [20.0, 92.0, 400.0])

@@ -19,18 +19,12 @@ from rotordrop.elements.table import (
     separating_measurement,
 )
 from rotordrop.known import Known
-from rotordrop.machine import Machine
 from rotordrop.machine.examples import example_machine
 from rotordrop.physics import columns as L
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.units import KINDS
-
-
-@pytest.fixture(scope="module")
-def lp400() -> Machine:
-    return example_machine("lp400")
 
 
 def test_paths_and_fields_name_one_row_each():

@@ -10,18 +10,12 @@ import pytest
 from rotordrop.elements.table import parameter, rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
-from rotordrop.machine.examples import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, prior, sensor_prior
 
 GAP = parameter("air_gap")
 STIFFNESS = parameter("support.stiffness")
 GAIN, OFFSET = parameter("gain", "sensor"), parameter("offset", "sensor")
-
-
-@pytest.fixture(scope="module")
-def lp400() -> Machine:
-    return example_machine("lp400")
 
 
 def unknown_of(machine: Machine, path: str) -> Unknown:

@@ -5,19 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.machine import Machine, example_machine
+from rotordrop.machine import Machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.case import DropCase, PlacedStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 
 SPEED = 2.0 * np.pi * 60.0
-
-
-@pytest.fixture(scope="session")
-def paper() -> Machine:
-    """The reference machine of the paper."""
-    return example_machine("paper")
 
 
 @pytest.fixture(scope="session")

@@ -75,11 +75,6 @@ def test_a_ground_that_accelerates_steadily_is_another_gravity():
     assert moved.displacement[:, 0, 1] == pytest.approx(heavier.displacement[:, 0, 1], abs=1e-7)
 
 
-@pytest.fixture(scope="module")
-def paper():
-    return example_machine("paper")
-
-
 SIDEWAYS = '\n[[loads]]\nnode = 20\ndirection = "{} deg"\nforce = "200 N"\n'
 SWAYS = '\n[base]\nx = "{} m/s^2"\ny = "1 m/s^2"\nfrequency = "40 Hz"\n'
 

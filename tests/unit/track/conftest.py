@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 
 from rotordrop.evidence.evidence import Evidence, read_evidence
-from rotordrop.machine import Machine, example_machine
+from rotordrop.machine import Machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, PassSettings, Smoothed, forward, smooth
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem
-
-
-@pytest.fixture(scope="session")
-def lp400() -> Machine:
-    """The machine of the bundled record, as its owner knows it."""
-    return example_machine("lp400")
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from rotordrop.estimate.document import published_structure
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine, load_machine
+from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
@@ -40,11 +40,6 @@ from rotordrop.twin.search import (
     score_of,
 )
 from rotordrop_bench import SyntheticDrop
-
-
-@pytest.fixture(scope="module")
-def lp400() -> Machine:
-    return example_machine("lp400")
 
 
 def fit_of(negative_log_likelihood: float, nis: float, factor: float = 1.0) -> Any:

@@ -5,6 +5,7 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from tests.unit.web.browser import Browser
 from tests.unit.web.serving import Served
 
 from rotordrop.web.workspace import Workspace
@@ -17,6 +18,21 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     server = Served(Workspace(tmp_path_factory.mktemp("served")))
     yield server
     server.stop()
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Served]:
+    """A page with an empty workspace."""
+    one = Served(Workspace(tmp_path / "space"))
+    yield one
+    one.stop()
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[Browser]:
+    page = Browser(tmp_path / "profile")
+    yield page
+    page.close()
 
 
 @pytest.fixture(scope="session")

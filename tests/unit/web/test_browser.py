@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
@@ -21,13 +20,6 @@ from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job, Workspace
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    page = Browser(tmp_path / "profile")
-    yield page
-    page.close()
 
 
 def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_path, files):

@@ -19,13 +19,6 @@ MENU = "document.querySelector('button[aria-label=\"More of {}\"]').click()"
 OPEN = "[...document.querySelectorAll('[role=menu]:not([hidden]) button')]"
 
 
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
-    page = Browser(tmp_path / "profile")
-    yield page
-    page.close()
-
-
 def chosen_of(browser: Browser, name: str, item: str) -> None:
     browser.evaluate(MENU.format(name))
     browser.evaluate(f"{OPEN}.find(one => one.innerText === {item!r}).click()")

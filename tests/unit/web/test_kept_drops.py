@@ -17,13 +17,6 @@ def listed(server: Served) -> dict[str, dict]:
     return {one["id"]: one for one in server.ask("GET", "/api/jobs").told["jobs"]}
 
 
-@pytest.fixture
-def server(tmp_path):
-    one = Served(Workspace(tmp_path / "space"))
-    yield one
-    one.stop()
-
-
 def test_the_row_of_a_drop_says_what_its_estimate_says(server):
     number = estimated(
         server, "mine", "a" * 64, 3100.0, recorded="2019-10-16T13:42:07", simulated_record=True

@@ -10,14 +10,6 @@ from tests.unit.web.serving import Served
 from tests.unit.web.steps import quiet, words
 
 from rotordrop.web.running import publish, write_state
-from rotordrop.web.workspace import Workspace
-
-
-@pytest.fixture
-def server(tmp_path):
-    one = Served(Workspace(tmp_path / "space"))
-    yield one
-    one.stop()
 
 
 def machine_alone(server: Served, files) -> str:

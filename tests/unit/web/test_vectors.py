@@ -7,22 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
-from tests.unit.web.serving import Served
 
 from rotordrop.spectrum.orders import track_orders
 from rotordrop.spectrum.speed_profile import fit_speed_profile
 from rotordrop.web.drawn import vectors_of
 from rotordrop.web.python_lines import vector_lines
-from rotordrop.web.workspace import Workspace
 
 RATE, TURN = 2000.0, 2.0 * np.pi
-
-
-@pytest.fixture
-def server(tmp_path):
-    one = Served(Workspace(tmp_path / "space"))
-    yield one
-    one.stop()
 
 
 def test_the_vectors_sent_are_those_that_turn_with_the_shaft():
