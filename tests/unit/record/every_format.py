@@ -10,6 +10,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 import scipy.io
 
 from rotordrop.machine import example_machine
@@ -81,36 +82,63 @@ def _mat_73(path: Path) -> None:
     path.write_bytes(content)
 
 
-def _tdms(path: Path) -> None:
-    import nptdms
+def as_tdms(record: Record, path: Path, *, without: tuple[str, ...] = ()) -> None:
+    """Two groups with the clock of each, `without` some of its properties."""
+    nptdms = pytest.importorskip("nptdms")
 
-    clock = {"wf_increment": STEP, "wf_start_offset": TIME[0], "wf_start_time": np.datetime64("2019-10-16")}
+    def channel(group: str, name: str, values: np.ndarray, unit: str, start: float, step: float) -> object:
+        properties = {
+            "wf_increment": step,
+            "wf_start_offset": start,
+            "wf_start_time": np.datetime64("2019-10-16"),
+            "unit_string": unit,
+        }
+        properties = {key: value for key, value in properties.items() if key not in without}
+        return nptdms.ChannelObject(group, name, values, properties=properties)
+
     objects = [
-        nptdms.ChannelObject("drop", name, values, properties=clock | {"unit_string": unit})
-        for name, values, unit in [
-            *((name, READINGS[:, i], "um") for i, name in enumerate(NAMES)),
-            ("Speed", SPEED, "Hz"),
-        ]
+        channel(
+            "Displacement", name, record.signals[:, i] * 1e6, "um", record.time[0], 1.0 / record.sampling_rate
+        )
+        for i, name in enumerate(record.channel_names)
     ]
+    step = float(np.median(np.diff(record.speed_time)))
+    objects.append(
+        channel("Speed", "ShaftSpeed", record.speed_readings / (2 * np.pi), "Hz", record.speed_time[0], step)
+    )
     with nptdms.TdmsWriter(path) as writer:
         writer.write_segment([nptdms.RootObject({"name": "drop"}), *objects])
 
 
-def _uff(path: Path, binary: bool) -> None:
+def as_uff(record: Record, path: Path, binary: bool = True) -> None:
+    """Dataset 58 as the format prescribes, written by hand: an independent counterpart of the reader."""
+    pytest.importorskip("pyuff")
+    count, step = len(record.time), 1.0 / record.sampling_rate
     parts = []
-    for i, name in enumerate(NAMES):
-        kind = f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * COUNT:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
-        lines = [f"{-1:6d}", kind if binary else f"{58:6d}{'':74}"]
-        lines += [f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE")]
+    for i, name in enumerate(record.channel_names):
+        kind = (
+            f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
+            if binary
+            else f"{58:6d}{'':74}"
+        )
+        lines = [f"{-1:6d}", kind, *(f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE"))]
         lines.append(f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d} ")
-        lines.append(f"{4:10d}{COUNT:10d}{1:10d}{TIME[0]:13.5e}{STEP:13.5e}{0.0:13.5e}")
-        axes = ((17, "Time", "s"), (8, "Displacement", "m"), (0, "NONE", "NONE"), (0, "NONE", "NONE"))
-        lines += [f"{w:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}" for w, label, unit in axes]
+        lines.append(f"{4:10d}{count:10d}{1:10d}{record.time[0]:13.5e}{step:13.5e}{0.0:13.5e}")
+        for what, label, unit in (
+            (17, "Time", "s"),
+            (8, "Displacement", "m"),
+            (0, "NONE", "NONE"),
+            (0, "NONE", "NONE"),
+        ):
+            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}")
         parts.append(("\n".join(lines) + "\n").encode())
-        values = READINGS[:, i] * 1e-6
-        rows = [values[k : k + 4] for k in range(0, COUNT, 4)]
-        text = "".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode()
-        parts += [values.astype("<f8").tobytes() if binary else text, f"{-1:6d}\n".encode()]
+        values = record.signals[:, i]
+        if binary:
+            parts.append(values.astype("<f8").tobytes())
+        else:
+            rows = [values[k : k + 4] for k in range(0, count, 4)]
+            parts.append("".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode())
+        parts.append(f"{-1:6d}\n".encode())
     path.write_bytes(b"".join(parts))
 
 
@@ -186,9 +214,9 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "MAT plain": ("mat", lambda path: _mat(path, packed=False)),
     "MAT packed": ("mat", lambda path: _mat(path, packed=True)),
     "MAT 7.3": ("mat", _mat_73),
-    "TDMS": ("tdms", _tdms),
-    "UFF text": ("uff", lambda path: _uff(path, binary=False)),
-    "UFF binary": ("uff", lambda path: _uff(path, binary=True)),
+    "TDMS": ("tdms", lambda path: as_tdms(record(), path)),
+    "UFF text": ("uff", lambda path: as_uff(record(), path, binary=False)),
+    "UFF binary": ("uff", lambda path: as_uff(record(), path, binary=True)),
     "Excel": ("xlsx", _xlsx),
 }
 """Suffix and writer of every format by its name."""

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from tests.unit.record.every_format import as_tdms, as_uff
 
 from rotordrop.errors import RecordError, RotordropError
 from rotordrop.record.examples import example_record_path
@@ -31,63 +32,6 @@ def as_matlab(record, path, *, packed=True, time=False):
     }
     content |= {"t": record.time} if time else {"fs": record.sampling_rate, "t0": record.time[0]}
     scipy.io.savemat(path, content, do_compression=packed)
-
-
-def as_tdms(record, path, *, without=()):
-    nptdms = pytest.importorskip("nptdms")
-
-    def channel(group, name, values, unit, start, step):
-        properties = {
-            "wf_increment": step,
-            "wf_start_offset": start,
-            "wf_start_time": np.datetime64("2019-10-16"),
-            "unit_string": unit,
-        }
-        properties = {key: value for key, value in properties.items() if key not in without}
-        return nptdms.ChannelObject(group, name, values, properties=properties)
-
-    objects = [
-        channel("Displacement", name, record.signals[:, i] * 1e6, "um", record.time[0], 5e-5)
-        for i, name in enumerate(record.channel_names)
-    ]
-    step = float(np.median(np.diff(record.speed_time)))
-    objects.append(
-        channel("Speed", "ShaftSpeed", record.speed_readings / (2 * np.pi), "Hz", record.speed_time[0], step)
-    )
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([nptdms.RootObject({"name": "drop"}), *objects])
-
-
-def as_uff(record, path, binary=True):
-    """Dataset 58 as the format prescribes, written by hand: an independent counterpart of the reader."""
-    pytest.importorskip("pyuff")
-    count = len(record.time)
-    parts = []
-    for i, name in enumerate(record.channel_names):
-        kind = (
-            f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
-            if binary
-            else f"{58:6d}{'':74}"
-        )
-        lines = [f"{-1:6d}", kind, *(f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE"))]
-        lines.append(f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d} ")
-        lines.append(f"{4:10d}{count:10d}{1:10d}{record.time[0]:13.5e}{5e-5:13.5e}{0.0:13.5e}")
-        for what, label, unit in (
-            (17, "Time", "s"),
-            (8, "Displacement", "m"),
-            (0, "NONE", "NONE"),
-            (0, "NONE", "NONE"),
-        ):
-            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}")
-        parts.append(("\n".join(lines) + "\n").encode())
-        values = record.signals[:, i]
-        if binary:
-            parts.append(values.astype("<f8").tobytes())
-        else:
-            rows = [values[k : k + 4] for k in range(0, count, 4)]
-            parts.append("".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode())
-        parts.append(f"{-1:6d}\n".encode())
-    path.write_bytes(b"".join(parts))
 
 
 WRITERS = {"mat": as_matlab, "tdms": as_tdms, "uff": as_uff, "h5": save_record}
