@@ -14,7 +14,6 @@ from pydantic_core import core_schema
 
 from rotordrop.errors import UsageError
 from rotordrop.files import DIGEST, read_sealed, without_digest
-from rotordrop.json_schema import DIALECT
 
 ABSENT: Any = None
 """Default of a field that may be left out. It is then not written, and null is refused in its place."""
@@ -67,12 +66,6 @@ class Document(BaseModel):
             return cls.model_validate(content)
         except ValidationError as error:
             raise UsageError(f"{place}: {first_fault(error)}. Give a file that '{made_by}' wrote.") from None
-
-    @classmethod
-    def schema_of(cls, title: str, description: str) -> dict[str, Any]:
-        """The published JSON Schema."""
-        made = cls.model_json_schema(schema_generator=Schema, mode="validation")
-        return {"$schema": DIALECT, **made, "title": title, "description": description}
 
 
 def read_document(path: str | Path) -> dict[str, Any]:

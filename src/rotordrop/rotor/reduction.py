@@ -64,8 +64,6 @@ class RotorBasis:
     """Modal damping of the free-free flexible modes, projected [1/s], shape (m, m)."""
     reduction: Reduction
     """The choice that made it."""
-    attachment_nodes: tuple[int, ...] = ()
-    """Nodes with an attachment mode, counted from 1."""
     n_rigid: int = N_RIGID
     """Number of rigid modes."""
 
@@ -179,7 +177,6 @@ def _basis(
         polar=np.asarray(0.5 * (polar + polar.T)),
         damping=damping,
         reduction=reduction,
-        attachment_nodes=nodes,
     )
 
 

@@ -40,7 +40,6 @@ class ExponentialFit:
     residual: Array
     """Recorded minus fitted speed [rad/s] over time [s], shape (K,)."""
     residual_rms: float
-    residual_largest: float
     """Size of the residual [rad/s]."""
     noise: float
     """What of the residual is noise of the recording [rad/s]; the rest says the law is not exponential."""
@@ -115,7 +114,6 @@ def fit_exponential(
         time=t,
         residual=residual,
         residual_rms=rms,
-        residual_largest=float(np.abs(residual).max()),
         noise=noise,
         statement=_law_statement("One time constant", rms, noise, float(omega.max())),
     )

@@ -41,10 +41,7 @@ class SwingRange:
     bearing: str
     """Name of the touchdown bearing."""
     length: float
-    length_lower: float
-    length_upper: float
-    """Pendulum length: air gap, indentation, sag of race and support [m]; its limits with those of the gap.
-    """
+    """Pendulum length: air gap, indentation, sag of race and support [m]."""
     small: float
     """Frequency of a small sliding swing [Hz]."""
     lowest: float
@@ -107,8 +104,6 @@ def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float,
     return SwingRange(
         bearing=bearing.name,
         length=lengths[0],
-        length_lower=lengths[1],
-        length_upper=lengths[2],
         small=float(small_frequency(lengths[0], g)),
         lowest=slowest,
         highest=float(small_frequency(lengths[1], g)),
