@@ -3,6 +3,7 @@
 Usage: python studies/gate/score.py faults OUT FOLDER FIRST [SUPPLIED [KIND ...]]
        python studies/gate/score.py clean OUT FOLDER FIRST LAST
        python studies/gate/score.py blocks OUT FOLDER FIRST LAST
+       python studies/gate/score.py costs OUT FOLDER BLOCKS [MOST]
        python studies/gate/score.py ranges OUT FOLDER FIRST SUPPLIED FAULTS
        python studies/gate/score.py count OUT [OUT ...]
 
@@ -15,6 +16,9 @@ three records: a supplied one, one of a rotor up to 60 kg and one of a heavier o
 `ranges` estimates the records whose fault was not caught in FAULTS, the OUT of the faults before, and asks
 whether the ranges of the peak forces hold the truth, bearing by bearing. A supplied drop without a truth file
 (`truth/`) has the values that are estimated of it without the fault in place of a truth.
+
+`costs` estimates the records whose exchanged blocks were silent in BLOCKS, the OUT of the blocks before, with
+and without them: first those after power-off, then those before it by size, MOST in all.
 
 A fault counts as caught by a finding that the record as it was does not have: a refusal, a warning or a note.
 A clean record counts as a false alarm by any warning or refusal. Clean records whose levitated orbit is wider
@@ -47,6 +51,7 @@ from rotordrop.estimation import estimate_drop
 from rotordrop.evidence.quality import check_record
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.recorder import check_blocks
+from rotordrop.record.record import Record
 
 LIGHT, HEAVY = (0, 1, 2, 3, 8), (4, 5, 6, 7, 9)
 """Places of the rotors up to 60 kg and of the heavier ones in `NAMES`."""
@@ -157,9 +162,7 @@ def run_blocks(path: Path, folder: Path, seeds: range) -> None:
         for seed, kind in product(seeds, BLOCKS):
             if (kind, seed) in done:
                 continue
-            random = np.random.default_rng(zlib.crc32(f"{kind} {seed}".encode()))
-            record = kept(folder, seed)[0]
-            torn = replace(record, signals=BLOCKS[kind](record.signals.copy(), random))
+            record, torn, _ = torn_record(folder, kind, seed)
             said = [
                 {(one.kind, one.channel) for one in check_channels(read) + check_blocks(read)}
                 for read in (record, torn)
@@ -167,6 +170,69 @@ def run_blocks(path: Path, folder: Path, seeds: range) -> None:
             size = float(np.max(np.abs(torn.signals - record.signals)))
             line = {"block": kind, "seed": seed, "size": size, "seen": bool(said[1] - said[0])}
             out.write(json.dumps(line) + "\n")
+
+
+def torn_record(folder: Path, kind: str, seed: int) -> tuple[Record, Record, Record]:
+    """A clean record, the same with exchanged or zeroed blocks, and its tail."""
+    random = np.random.default_rng(zlib.crc32(f"{kind} {seed}".encode()))
+    record, tail = kept(folder, seed)
+    return record, replace(record, signals=BLOCKS[kind](record.signals.copy(), random)), tail
+
+
+def run_costs(path: Path, folder: Path, blocks: Path, most: int) -> None:
+    """Estimate records with and without the blocks that no check sees."""
+    done = {(line["silent"], line["seed"]) for line in lines_of(path)}
+    silent = []
+    for line in lines_of(blocks):
+        if not line["seen"] and line["size"] > 0.0:
+            record, torn, tail = torn_record(folder, line["block"], line["seed"])
+            changed = record.time[np.any(record.signals != torn.signals, axis=1)]
+            silent.append((changed[-1] < 0.0, -line["size"], line, changed, (record, torn, tail)))
+    silent.sort(key=lambda one: one[:2])
+    with path.open("a") as out:
+        for _, _, line, changed, (record, torn, tail) in silent[:most]:
+            if (line["block"], line["seed"]) in done:
+                continue
+            machine = rotor_of(line["seed"])
+            long = line["seed"] % 5 == 0
+            told = {
+                "silent": line["block"],
+                "seed": line["seed"],
+                "size": line["size"],
+                "from": float(changed[0]),
+                "to": float(changed[-1]),
+                "true": list(made(line["seed"], long=long).truth["peak_force_N"].values()),
+                "whole": peaks_of(Given(record=record, tail=tail, machine=machine)),
+                "torn": peaks_of(Given(record=torn, tail=tail, machine=machine)),
+            }
+            out.write(json.dumps(told) + "\n")
+            out.flush()
+
+
+def count_costs(lines: list[dict[str, Any]]) -> None:
+    """Print how far blocks that no check sees move the peaks, and which ranges hold the truth."""
+    outside = held = held_whole = peaks = 0
+    for line in lines:
+        shifts = []
+        for (whole, *_), (_, low, high), true, (_, least, most) in zip(
+            line["whole"]["peaks"],
+            line["torn"]["peaks"],
+            line["true"],
+            line["whole"]["peaks"],
+            strict=False,
+        ):
+            peaks += 1
+            outside += not low <= whole <= high
+            held += low <= true <= high
+            held_whole += least <= true <= most
+            shifts.append(f"{low:.0f} {whole:.0f} {high:.0f} true {true:.0f}")
+        verdicts = " → ".join(line[which]["verdict"][:60] for which in ("whole", "torn"))
+        print(
+            f"{line['silent']:34} {line['seed']} {1e6 * line['size']:5.1f} µm {1e3 * line['from']:7.1f} to "
+            f"{1e3 * line['to']:7.1f} ms {verdicts} {shifts}"
+        )
+    print(f"{len(lines)} records, {peaks} peaks: outside the range with the block {outside}")
+    print(f"truth held {wilson(held, peaks)}; without the block {wilson(held_whole, peaks)}")
 
 
 def new_findings(lines: list[dict[str, Any]]) -> dict[tuple[str, str], list[list[str]]]:
@@ -332,6 +398,7 @@ if __name__ == "__main__":
             "rotor": count_clean,
             "findings": count_faults,
             "block": count_blocks,
+            "silent": count_costs,
             "peaks": count_ranges,
         }
         for line in every:
@@ -342,6 +409,9 @@ if __name__ == "__main__":
     elif what == "faults":
         out, folder, first, given, *kinds = [*rest, ""] if len(rest) < 4 else rest
         run_faults(Path(out), Path(folder), int(first), given, tuple(kinds))
+    elif what == "costs":
+        out, folder, blocks, *most = rest
+        run_costs(Path(out), Path(folder), Path(blocks), int(most[0]) if most else 10**6)
     elif what == "ranges":
         out, folder, first, given, faults = rest
         run_ranges(Path(out), Path(folder), int(first), given, Path(faults))
