@@ -22,6 +22,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from scipy.stats import binomtest
+
 from rotordrop.errors import RotordropError
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import drop_of
@@ -132,11 +134,9 @@ def compared(seed: int, k: int, first: dict[str, Any], row: dict[str, Any]) -> d
 
 def wilson(hits: int, count: int) -> dict[str, Any]:
     """A share with its 95 % interval."""
-    z, share = 1.96, hits / max(count, 1)
-    wide = z * z / max(count, 1)
-    half = z * math.sqrt(share * (1.0 - share) / max(count, 1) + wide / (4.0 * max(count, 1)))
-    low, high = ((share + wide / 2.0 + side * half) / (1.0 + wide) for side in (-1.0, 1.0))
-    return {"count": hits, "of": count, "share": share, "wilson_95": [max(low, 0.0), min(high, 1.0)]}
+    found = binomtest(hits, max(count, 1))
+    low, high = found.proportion_ci(0.95, "wilson")
+    return {"count": hits, "of": count, "share": found.statistic, "wilson_95": [float(low), float(high)]}
 
 
 def summary_of(pairs: list[dict[str, Any]]) -> dict[str, Any]:

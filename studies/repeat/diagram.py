@@ -11,24 +11,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import kstwo
+from scipy.stats import binomtest, kstwo
 
 HERE = Path(__file__).parent
 SIZE, LEFT, TOP, WIDTH = 300, 56, 40, 820
 COLOURS = ("#0b62b8", "#d9780a", "#1a8f6f", "#8e44ad")
-NINETY = 1.645
 
 
 def wilson(share: float, count: int) -> tuple[float, float]:
     """90 % interval of a share."""
-    wide = NINETY**2 / count
-    middle = (share + wide / 2.0) / (1.0 + wide)
-    half = NINETY * math.sqrt(share * (1.0 - share) / count + wide / (4.0 * count)) / (1.0 + wide)
-    return middle - half, middle + half
+    found = binomtest(round(share * count), count).proportion_ci(0.9, "wilson")
+    return float(found.low), float(found.high)
 
 
 class Panel:

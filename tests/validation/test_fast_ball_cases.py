@@ -16,7 +16,6 @@ from rotordrop.physics.fast_balls import (
     FastBalls,
     ball_equilibrium,
     centred_balls,
-    gyroscopic_moment,
     offset_on_springs,
 )
 
@@ -108,6 +107,25 @@ def slopes(v: Inputs) -> dict[str, float]:
         "outer load by centrifugal force": float(np.diff(ball.outer_load)[0]) / v["step"],
         "outer angle by centrifugal force": math.degrees(np.diff(ball.outer_angle)[0]) / v["step"],
     }
+
+
+def gyroscopic_moment(
+    balls: FastBalls, omega: float, inner_angle: float, outer_angle: float
+) -> tuple[float, float]:
+    """Moment of a ball [N m] that does not spin on the outer race, J ω_c ω_R sin β, and its orbit [rad/s].
+
+    Jones 1960; Harris, Rolling Bearing Analysis.
+    """
+    share, inertia = balls.diameter / balls.pitch_diameter, 0.1 * balls.mass * balls.diameter**2
+    c_i, s_i = math.cos(inner_angle), math.sin(inner_angle)
+    c_o, s_o = math.cos(outer_angle), math.sin(outer_angle)
+    lean = s_o / (c_o + share)  # tangent of the pitch angle β
+    on_o, on_i = c_o + lean * s_o, c_i + lean * s_i
+    below, above = 1.0 - share * c_i, 1.0 + share * c_o
+    cosine = 1.0 / math.sqrt(1.0 + lean * lean)
+    orbit = omega / (1.0 + above * on_i / (below * on_o))
+    spin = omega / ((on_o / above + on_i / below) * share * cosine)
+    return inertia * orbit * spin * lean * cosine, orbit
 
 
 def controlled(v: Inputs) -> dict[str, float]:

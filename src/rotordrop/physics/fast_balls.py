@@ -179,37 +179,6 @@ def offset_on_springs(balls: FastBalls, ball_count: int, force: float, omega: fl
     return middle
 
 
-def gyroscopic_moment(
-    balls: FastBalls, omega: float, inner_angle: float, outer_angle: float
-) -> tuple[float, float]:
-    """Gyroscopic moment of a ball [N m] and speed of its orbit [rad/s], with the outer race in control.
-
-    Parameters
-    ----------
-    balls : FastBalls
-        The balls.
-    omega : float
-        Speed of the inner race [rad/s].
-    inner_angle, outer_angle : float
-        Contact angles [rad].
-
-    Notes
-    -----
-    ``M_g = J ω_c ω_R sin β`` with both speeds positive: the ball does not spin on the outer race. Source:
-    Jones 1960; Harris, Rolling Bearing Analysis. Not validated: a fiction for dry balls that accelerate.
-    """
-    share, inertia = balls.diameter / balls.pitch_diameter, 0.1 * balls.mass * balls.diameter**2
-    c_i, s_i = math.cos(inner_angle), math.sin(inner_angle)
-    c_o, s_o = math.cos(outer_angle), math.sin(outer_angle)
-    lean = s_o / (c_o + share)  # tangent of the pitch angle β
-    on_o, on_i = c_o + lean * s_o, c_i + lean * s_i
-    below, above = 1.0 - share * c_i, 1.0 + share * c_o
-    cosine = 1.0 / math.sqrt(1.0 + lean * lean)
-    orbit = omega / (1.0 + above * on_i / (below * on_o))
-    spin = omega / ((on_o / above + on_i / below) * share * cosine)
-    return inertia * orbit * spin * lean * cosine, orbit
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Contacts:
     o1: Array

@@ -12,11 +12,6 @@ from rotordrop.errors import UsageError
 _SUFFIXES = (".h5", ".csv")
 
 
-def example_record_names() -> tuple[str, ...]:
-    """Name the recordings that come with the package, machine first: ``"lp400_drop_060"``."""
-    return tuple(sorted(_paths()))
-
-
 def example_record_path(name: str) -> Path:
     """Give the file of a recording that comes with the package, for example ``"lp400_drop_060"``.
 
