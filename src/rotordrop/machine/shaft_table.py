@@ -213,19 +213,15 @@ def _by_position(rows: list[dict[str, Any]], table: _Table) -> dict[str, Any]:
             "the last row must hold the end of the shaft only, its position", rows[-1][SECTION_LINE]
         )
     sections: list[dict[str, Any]] = []
+    before: dict[str, Any] = {}
     for node, row in enumerate(rows[:-1], start=1):
-        if sections and _same_shaft(sections[-1], row):
+        shaft = {key: value for key, value in row.items() if key != SECTION_LINE}
+        if shaft == before:
             sections[-1]["nodes"][1] = node + 1
         else:
             sections.append(row | {"nodes": [node, node + 1]})
+        before = shaft
     return {"node_positions": tuple(positions), "sections": sections}
-
-
-def _same_shaft(section: dict[str, Any], row: dict[str, Any]) -> bool:
-    ignored = {SECTION_LINE, "nodes"}
-    return {k: v for k, v in section.items() if k not in ignored} == {
-        k: v for k, v in row.items() if k not in ignored
-    }
 
 
 def _need(row: dict[str, Any], name: str, table: _Table) -> None:

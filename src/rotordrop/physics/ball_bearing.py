@@ -228,7 +228,8 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         ball_stiffness=K,
         stress_coefficient_inner=float(inner.stress_coefficient),
         stress_coefficient_outer=float(outer.stress_coefficient),
-        ball_angles=_first_row_angles(Z, float(bearing.first_ball_angle)),
+        ball_angles=np.arange(Z, dtype=np.float64) * (2.0 * math.pi / Z)
+        + (0.5 * math.pi + float(bearing.first_ball_angle)),
         second_row_offset=float(bearing.second_row_offset),
         axial_signs=_AXIAL_SIGNS[bearing.arrangement],
         preload=F_V,
@@ -284,11 +285,6 @@ def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) 
 def _elongation(s: ArrayLike, A: ArrayLike, A_0: ArrayLike, alpha_0: ArrayLike) -> Any:
     """``A − A₀`` [m] without the cancellation of the difference; zero where the balls are loose."""
     return np.maximum(s * (2.0 * A_0 * sin_each(alpha_0) + s) / (A + A_0), 0.0)
-
-
-def _first_row_angles(Z: int, first_ball_angle: float) -> Array:
-    turns = np.arange(Z, dtype=np.float64) * (2.0 * math.pi / Z)
-    return np.add(turns, 0.5 * math.pi + first_ball_angle)
 
 
 def _row(constants: BearingConstants) -> tuple[float, float, float]:
