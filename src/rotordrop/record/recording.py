@@ -24,7 +24,7 @@ _UNITS = {
 
 _SPACED_UNIT = re.compile(r"(.*[^\s,]),?\s(µm|μm|um|mm|mil|mils|rpm|1/min|min-1|Hz|mV)", re.IGNORECASE)
 _LONGEST_NAME = 200
-"""Characters of a column name that are looked at (chosen): damaged files hold names of megabytes."""
+"""Characters of a column name or a unit that are looked at (chosen): damaged files hold megabytes."""
 
 FULL_SCALE = "of full scale"
 """Unit of readings that a file holds as shares of a full scale it does not tell."""
@@ -125,8 +125,11 @@ def known_unit(text: str) -> str | None:
 
 
 def spelled(unit: str) -> str:
-    """A unit in this package's spelling, or as written where it is not one found in recordings."""
-    return known_unit(unit) or unit
+    """A unit in this package's spelling, or as written where it is not one found in recordings.
+
+    One that is too long to be one ends in dots, which no unit does.
+    """
+    return known_unit(unit) or (unit if len(unit) <= _LONGEST_NAME else f"{unit[:_LONGEST_NAME]}…")
 
 
 def split_unit(written: str) -> tuple[str, str, str]:

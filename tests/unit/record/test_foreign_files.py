@@ -2,6 +2,7 @@
 
 import re
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -173,6 +174,21 @@ def test_captures_of_other_length_side_by_side_keep_their_own_times(tmp_path):
 def test_brackets_that_do_not_match_are_no_unit(wrong):
     assert known_unit(wrong) is None
     assert known_unit("(m)") == known_unit("[m]") == known_unit(" m ") == "m"
+
+
+def test_a_unit_of_a_megabyte_is_named_by_its_beginning(tmp_path):
+    """A damaged attribute filled the terminal for a minute."""
+    path = tmp_path / "drop.h5"
+    with h5py.File(path, "w") as file:
+        for name in ("A", "B"):
+            file[name] = MICRONS[:, 0]
+            file[name].attrs["unit"] = "m" * 60_000
+        file["time"] = TIME
+    (unit,) = {channel.unit for channel in read(path).channels if channel.unit}
+    assert len(unit) == 201 and known_unit(unit) is None
+    with pytest.raises(RecordError, match="can be displacements") as refusal:
+        open_record(path, None, profile=Profile())
+    assert len(str(refusal.value)) < 1500
 
 
 @pytest.mark.parametrize(
