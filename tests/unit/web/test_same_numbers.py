@@ -330,7 +330,9 @@ def test_no_number_of_the_page_is_missing_in_the_document_or_in_python(
     for bearing in estimate.bearings:
         known |= {*in_python([*severity_values(estimate, bearing).values()], set())}
         known |= {
-            *in_python([bearing.peak_force.known, bearing.peak_stress.known, bearing.statistics], set())
+            *in_python(
+                [bearing.peak_force.known, bearing.peak_stress.known, bearing.statistics.as_json()], set()
+            )
         }
         known |= {one.value for one in bearing.values.values()}
     compared = 0
