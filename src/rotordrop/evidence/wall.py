@@ -235,7 +235,7 @@ def _moments(
         for number in range(side < 0, _MOST_STEPS):
             fit = fit.copy()
             fit[2] = best[2] + side * number * step
-            if not low[2] < fit[2] < high[2]:
+            if not low[2] <= fit[2] <= high[2]:
                 break
             fit, inner = _least_squares(residual, fit, low, high, _BUT_RADIUS)
             cost, fit_misfit = judged(fit)
