@@ -12,9 +12,10 @@ from rotordrop.errors import UsageError
 from rotordrop.files import write_json
 from rotordrop.machine import load_machine
 from rotordrop.record.record import sha256_of
-from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_bench
+from rotordrop_bench import DROPS, Violations, make_bench, read_truth, score_bench
 from rotordrop_bench.cli.app import run
 from rotordrop_bench.departures import departures
+from rotordrop_bench.drops import LISTS, SINCE
 from rotordrop_bench.make import chosen_drops
 from rotordrop_bench.rotors import ROTORS, bench_rotor
 from rotordrop_bench.true_values import KINDS, violated_kinds
@@ -29,10 +30,11 @@ def folder(tmp_path_factory):
     return path
 
 
-def test_the_list_of_a_version_is_fixed():
+@pytest.mark.parametrize(("version", "expected"), [("1", "8dd028365b3c049a"), ("2", "cc2c7a5a86b4a900")])
+def test_the_list_of_a_version_is_fixed(version, expected):
     """A change of the list or of a rotor asks for another version, here too."""
-    digest = hashlib.sha256(repr(DROPS).encode())
-    for drop in DROPS:
+    digest = hashlib.sha256(repr(LISTS[version]).encode())
+    for drop in LISTS[version]:
         parts = departures(bench_rotor(drop.rotor), 2.0 * math.pi * drop.speed, drop.departures)
         digest.update(repr(parts).encode())
     for rotor in ROTORS:
@@ -43,7 +45,16 @@ def test_the_list_of_a_version_is_fixed():
                 float(v) for v in (b.air_gap, b.support.mass, b.support.stiffness, b.contact.stiffness)
             ]
         digest.update(" ".join(f"{number:.6g}" for number in numbers).encode())
-    assert (VERSION, digest.hexdigest()[:16]) == ("1", "8dd028365b3c049a")
+    assert digest.hexdigest()[:16] == expected
+
+
+def test_a_version_is_chosen_by_its_name():
+    assert [len(chosen_drops([f"version {v}"])) for v in LISTS] == [73, 26]
+    assert {SINCE[drop.name] for drop in chosen_drops(["version 1"])} == {"1"}
+    later = chosen_drops(["version 2"])
+    sizes = [drop.departures[0] for drop in later]
+    assert len(set(sizes)) == len(later) and {size for _, size in sizes} == {0, 1}
+    assert {drop.rotor for drop in later} == set(ROTORS)
 
 
 def test_the_list_spans_what_it_promises():
@@ -104,7 +115,7 @@ def test_what_is_there_stays_and_what_was_cut_off_comes_back_the_same(folder):
 
 def test_the_truth_says_where_it_belongs(folder):
     truth = read_truth(folder / "truth/drop_034.json")
-    assert truth.values["bench_version"] == VERSION
+    assert truth.values["bench_version"] == "1"
     assert truth.values["violated"] == ["long remanence"]
     assert truth.structure["remanence.time_constant"] == 0.01
     assert all(rows[0][0] < 0.1 for rows in truth.values["contact_intervals_0_0p25_s"].values())
@@ -194,9 +205,9 @@ def test_the_table_is_printed_and_written(folder, estimates, tmp_path, capsys):
     file = tmp_path / "scores.json"
     assert run(["score-all", str(folder), str(estimates), "--json", str(file)]) == 0
     out = capsys.readouterr().out
-    assert "DropBench, version 1" in out
+    assert "DropBench, version 2" in out
     assert "Drops: 2; estimates that call themselves not consistent: 0." in out
-    assert json.loads(file.read_text())["bench_version"] == "1"
+    assert json.loads(file.read_text())["bench_version"] == "2"
 
 
 def test_another_version_is_refused(folder, estimates, tmp_path):
@@ -204,14 +215,15 @@ def test_another_version_is_refused(folder, estimates, tmp_path):
     old = json.loads((folder / "truth/drop_004.json").read_text()) | {"bench_version": "0"}
     write_json(tmp_path / "old/truth/drop_004.json", old, sealed=True)
     with pytest.raises(
-        UsageError, match="is of version '0' of the bench, this is version '1'; make the bench"
+        UsageError, match="is of version '0' of the bench, here the drop is of version '1'; make"
     ):
         score_bench(tmp_path / "old", estimates)
 
 
 def test_an_unknown_drop_names_what_there_is():
     with pytest.raises(
-        UsageError, match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg'"
+        UsageError,
+        match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg', a version",
     ):
         chosen_drops(["drop_999"])
     assert {drop.rotor for drop in chosen_drops(["6 t"])} == {"6 t"}

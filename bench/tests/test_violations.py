@@ -181,6 +181,73 @@ def test_a_lag_delays_a_slow_signal_by_its_time_constant():
     assert lagged[late, 0] == pytest.approx(expected[late], abs=2e-4)
 
 
+LATER = {
+    "race": ({"mass": 1.0}, {"mass": 2.3}),
+    "side_force": ({"node": 17, "force": "0 N"}, {"node": 17, "force": "80 N"}),
+    "stand": ({"tilt": "0 deg"}, {"tilt": "3 deg"}),
+    "magnets": ({"pull": 0.0, "pull_time": "10 ms"}, {"pull": 0.2, "pull_time": "10 ms"}),
+    "rotor": ({"bow": "0 um", "bow_speed": "60 Hz"}, {"bow": "10 um", "bow_speed": "60 Hz"}),
+    "seal": (
+        {"node": 17, "gap": 9.0, "stiffness": "20 N/um"},
+        {"node": 17, "gap": 1.02, "stiffness": "20 N/um"},
+    ),
+    "sleeve": ({"eccentricity": "0 um", "ovality": "0 um"}, {"eccentricity": "12 um", "ovality": "5 um"}),
+    "friction": ({"wear": 0.0, "wear_heat": "20 J"}, {"wear": 0.6, "wear_heat": "20 J"}),
+    "sensors": (
+        {
+            "flicker": "0 um",
+            "clock_error": 0.0,
+            "speed_delay": "0 s",
+            "curvature": 0.0,
+            "curvature_at": "1 mm",
+        },
+        {"curvature": 0.03, "curvature_at": "300 um"},
+    ),
+}
+
+
+def test_what_came_later_leaves_every_reading_where_it_is_absent(known, perfect):
+    drop = _recorded(known, **{part: absent for part, (absent, _) in LATER.items()})
+    for record, plain in ((drop.record, perfect.record), (drop.tail, perfect.tail)):
+        assert np.array_equal(record.signals, plain.signals)
+    assert np.array_equal(drop.record.speed_readings, perfect.record.speed_readings)
+
+
+@pytest.mark.parametrize("part", LATER)
+def test_what_came_later_moves_the_readings_where_it_is_present(known, perfect, part):
+    drop = _recorded(known, **{part: LATER[part][1]})
+    assert np.max(np.abs(drop.record.signals - perfect.record.signals)) > 0.2e-6
+
+
+def test_curved_sensors_read_too_little_far_out(known, perfect):
+    drop = _recorded(known, sensors=LATER["sensors"][1])
+    shaft = perfect.record.signals
+    assert drop.record.signals == pytest.approx(shaft - 0.03 * shaft**3 / 300e-6**2, abs=1e-15)
+
+
+def test_a_clock_and_a_late_speed_signal_move_what_is_read_in_time(known, perfect):
+    drop = _recorded(known, sensors={"clock_error": 0.005, "speed_delay": "20 ms"})
+    off = drop.truth["t_off_in_record_s"]
+    when = 1.005 * (drop.record.time - off) + off
+    inside = (when > perfect.record.time[0]) & (when < 0.01)
+    for read, shaft in zip(drop.record.signals.T, perfect.record.signals.T, strict=True):
+        expected = np.interp(when[inside], perfect.record.time, shaft)
+        assert read[inside] == pytest.approx(expected, abs=0.2e-6)
+        assert np.max(np.abs(read - shaft)) > 1e-6
+    held = drop.record.speed_time < off + 0.02
+    assert np.ptp(drop.record.speed_readings[held]) < 1e-9
+    assert np.array_equal(drop.result.state, perfect.result.state)
+
+
+def test_flicker_noise_has_its_size_and_falls_with_the_frequency(known, perfect):
+    drop = _recorded(known, sensors={"flicker": "1 um"})
+    noise = drop.record.signals - perfect.record.signals
+    assert np.sqrt(np.mean(noise**2, axis=0)) == pytest.approx(1e-6, rel=1e-6)
+    power = np.mean(np.abs(np.fft.rfft(noise, axis=0)) ** 2, axis=1)
+    low, high = np.mean(power[10:100]), np.mean(power[100:1000])
+    assert low / high == pytest.approx(10.0, rel=0.3)
+
+
 @pytest.mark.parametrize("rate", [10e3, 100e3])
 def test_a_lagging_sensor_reads_the_shaft_of_a_while_ago(known, rate):
     """At any sampling rate: the reading plus time constant times its slope is what the shaft does."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import cycle
 
-from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT
+from rotordrop_bench.departures import DEPARTURES, LARGE, LATER_DEPARTURES, SLIGHT
 from rotordrop_bench.rotors import ROTORS
 
-VERSION = "1"
+VERSION = "2"
 """Changes whenever a drop of the list does; scores of different versions are not comparable."""
 
 
@@ -66,6 +66,10 @@ TRIPLES: tuple[tuple[str, ...], ...] = (
 RATES = (10e3, 50e3, 100e3)
 
 
+FIRST_LATER = 101
+"""Number of the first drop that came with version 2."""
+
+
 def _listed() -> tuple[BenchDrop, ...]:
     found: list[BenchDrop] = []
     speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
@@ -101,5 +105,29 @@ def _listed() -> tuple[BenchDrop, ...]:
     return tuple(found)
 
 
-DROPS: tuple[BenchDrop, ...] = _listed()
+def _later() -> tuple[BenchDrop, ...]:
+    found: list[BenchDrop] = []
+    rotors, speeds = cycle(ROTORS), {rotor: cycle(values) for rotor, values in SPEEDS.items()}
+    for size, word in ((SLIGHT, "slight"), (LARGE, "large")):
+        for i, kind in enumerate(LATER_DEPARTURES):
+            number, rotor = FIRST_LATER + len(found), next(rotors)
+            found.append(
+                BenchDrop(
+                    name=f"drop_{number:03d}",
+                    family=f"later kinds, {word}",
+                    rotor=rotor,
+                    speed=next(speeds[rotor]),
+                    machine_seed=1300 + 100 * size + i,
+                    drop_seed=9000 + number,
+                    departures=((kind, size),),
+                )
+            )
+    return tuple(found)
+
+
+LISTS: dict[str, tuple[BenchDrop, ...]] = {"1": _listed(), VERSION: _later()}
+"""What came with each version; the drops of an earlier one stay as they are, bit for bit."""
+DROPS: tuple[BenchDrop, ...] = tuple(drop for drops in LISTS.values() for drop in drops)
 """All drops of the bench, in order."""
+SINCE: dict[str, str] = {drop.name: version for version, drops in LISTS.items() for drop in drops}
+"""Version with which a drop came, by its name; its truth file has it."""

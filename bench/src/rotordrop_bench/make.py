@@ -14,7 +14,7 @@ from rotordrop.files import make_folder, write_json
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import sha256_of
 from rotordrop_bench.departures import departures
-from rotordrop_bench.drops import DROPS, VERSION, BenchDrop
+from rotordrop_bench.drops import DROPS, SINCE, BenchDrop
 from rotordrop_bench.event import hidden_machine
 from rotordrop_bench.files import write_record
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
@@ -52,19 +52,23 @@ def happened(made: SyntheticDrop) -> bool:
 
 
 def chosen_drops(only: Iterable[str]) -> tuple[BenchDrop, ...]:
-    """Drops by name, by family or by rotor; all without any."""
+    """Drops by name, by family, by rotor or by version (``version 1``); all without any."""
     wanted = list(only)
     if not wanted:
         return DROPS
-    known = {key for drop in DROPS for key in (drop.name, drop.family, drop.rotor)}
+    known = {key for drop in DROPS for key in _keys(drop)}
     for key in wanted:
         if key not in known:
             families = ", ".join(repr(f) for f in dict.fromkeys(drop.family for drop in DROPS))
             raise UsageError(
                 f"the bench has no drop {key!r}; name one of {DROPS[0].name} to {DROPS[-1].name}, a rotor "
-                f"such as {DROPS[0].rotor!r}, or a family: {families}"
+                f"such as {DROPS[0].rotor!r}, a version such as 'version 1', or a family: {families}"
             )
-    return tuple(drop for drop in DROPS if {drop.name, drop.family, drop.rotor} & set(wanted))
+    return tuple(drop for drop in DROPS if _keys(drop) & set(wanted))
+
+
+def _keys(drop: BenchDrop) -> set[str]:
+    return {drop.name, drop.family, drop.rotor, f"version {SINCE[drop.name]}"}
 
 
 def make_bench(
@@ -75,7 +79,7 @@ def make_bench(
     """Make what is missing of the bench and give the names of the drops made.
 
     ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth, written last: a drop
-    that has it is complete. ``only`` holds names of drops, families or rotors; all are made when it is empty.
+    that has it is complete. ``only`` holds names of drops, families, rotors or versions; empty means all.
     """
     folder = Path(folder)
     drops = chosen_drops(only)
@@ -85,9 +89,9 @@ def make_bench(
         made = bench_recording(drop)
         if not happened(made):
             raise UsageError(
-                f"{drop.name} of version {VERSION} is no drop here: a bearing was not reached within "
-                f"{LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor --fingerprint); "
-                "leave it out"
+                f"{drop.name} of version {SINCE[drop.name]} is no drop here: a bearing was not "
+                f"reached within {LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor "
+                "--fingerprint); leave it out"
             )
         place = folder / DROPS_FOLDER / drop.name
         make_folder(place)
@@ -97,7 +101,7 @@ def make_bench(
         if made.tail is not None:
             write_record(made.tail, place / "tail.csv")
         truth: dict[str, Any] = made.truth | {
-            "bench_version": VERSION,
+            "bench_version": SINCE[drop.name],
             "family": drop.family,
             "rotor": drop.rotor,
             "record_sha256": {"record.csv": sha256_of(place / "record.csv")},

@@ -96,6 +96,14 @@ def synthesize_drop(
     chain = fitted_to(sensor_chain or SensorChain(), hidden.known)
     corner = hidden.violations.sensors.anti_alias_frequency
     chain = chain if corner is None else replace(chain, anti_alias_frequency=float(corner))
+    wrong = hidden.violations.sensors
+    if wrong.model_fields_set & {"flicker", "clock_error", "speed_delay"}:
+        chain = replace(
+            chain,
+            flicker=float(wrong.flicker),
+            clock_error=float(wrong.clock_error),
+            speed_delay=float(wrong.speed_delay),
+        )
     conditions = conditions or drop_conditions(hidden, speed, seed)
     case = DropCase(
         speed=conditions.speed,
@@ -106,7 +114,8 @@ def synthesize_drop(
     result = true_drop(hidden, case)
     errors = _true_errors(hidden, chain)
     record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
-    rest = settled_coordinates(hidden.model)
+    angle = float(stream(seed, "tail").uniform(0.0, 2.0 * np.pi))
+    rest = settled_coordinates(hidden.model, angle)
     random, count = stream(seed, "swing"), len(hidden.machine.touchdown_bearings)
     swing = Swing(
         amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
@@ -159,6 +168,7 @@ def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
         cross_axis=np.array([float(v.cross_axis) for v in broken]) * np.where(exact, 1.0, drawn),
         follows_housing=np.array([float(v.follows_housing) for v in broken]),
         time_constant=np.array([float(v.time_constant) for v in broken]),
+        curvature=np.array([float(v.curvature) / float(v.curvature_at) ** 2 for v in broken]),
     )
 
 
@@ -177,13 +187,14 @@ def _record(
     rate = chain.sampling_rate
     start, stop = -round(before * rate), round(duration * rate)
     time = np.arange(start * dense, stop * dense + 1) / (rate * dense)
-    amplitudes, angle, speed = true_motion(hidden, result, conditions, time - conditions.jitter)
+    true_time = (1.0 + chain.clock_error) * (time - conditions.jitter)
+    amplitudes, angle, speed = true_motion(hidden, result, conditions, true_time)
     rows = true_rows(hidden.machine, hidden.model.basis, errors)
-    along = amplitudes @ rows.T - _with_housing(
-        hidden, errors, housing_motion(result, time - conditions.jitter)
-    )
+    along = amplitudes @ rows.T - _with_housing(hidden, errors, housing_motion(result, true_time))
     signals = readings(along, time, angle, chain, errors, stream(seed, "noise"))
     time, speed = time[::dense], speed[::dense]
+    if chain.speed_delay > 0.0:
+        speed = np.interp(time - chain.speed_delay, time, speed)
     when, read = speed_readings(time, speed, chain, stream(seed, "tacho"))
     return Record(
         time=time,
@@ -217,7 +228,7 @@ def _tail(
     random = stream(seed, "tail")
     slow = replace(chain, sampling_rate=TAIL_RATE, anti_alias_frequency=None)
     time = np.arange(round(TAIL_DURATION * TAIL_RATE)) / TAIL_RATE
-    amplitudes = swinging_amplitudes(hidden.model, rest, swing, time)
+    amplitudes = swinging_amplitudes(hidden.model, rest, swing, (1.0 + chain.clock_error) * time)
     rows = true_rows(hidden.machine, hidden.model.basis, errors)
     angle = np.full(len(time), random.uniform(0.0, 2.0 * np.pi))
     supports = rest[hidden.model.layout.support].reshape(-1, 2)

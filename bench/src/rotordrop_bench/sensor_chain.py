@@ -50,6 +50,12 @@ class SensorChain:
     widest air gap where that is more."""
     anti_alias_frequency: float | None = None
     """Corner frequency of a Butterworth filter of fourth order before the sampling [Hz]."""
+    flicker: float = 0.0
+    """Noise with a power that falls as one over the frequency, beside the white one [m rms]."""
+    clock_error: float = 0.0
+    """How much longer the seconds of the recorder are than true ones [1]."""
+    speed_delay: float = 0.0
+    """How late the speed signal is [s]."""
     speed_interval: float = 0.01
     """Time between two readings of the speed [s]."""
     speed_noise: float = 2.0 * math.pi * 0.02
@@ -113,6 +119,8 @@ class SensorErrors:
     """Share of the motion of the bearing's housing that the sensor moves with [1]."""
     time_constant: Array
     """Time constant of first order with which the reading follows [s]."""
+    curvature: Array
+    """Share by which it reads too little, over the square of the displacement [1/m²]."""
 
 
 def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) -> SensorErrors:
@@ -132,6 +140,7 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
         cross_axis=np.zeros(sensors),
         follows_housing=np.zeros(sensors),
         time_constant=np.zeros(sensors),
+        curvature=np.zeros(sensors),
     )
 
 
@@ -196,6 +205,7 @@ def readings(
     at record times (M,) [s] and rotor angles (M,) [rad].
     """
     turn = np.exp(1j * angle)[:, None]
+    along = along - errors.curvature * along**3
     signal = errors.gain * along + errors.offset
     signal = signal + (errors.runout_1x * turn + errors.runout_2x * turn**2).real
     signal = lagging(signal, errors.time_constant, chain.sampling_rate * oversampling(chain, errors))
@@ -210,7 +220,18 @@ def readings(
         signal = np.asarray(sosfilt(sections, signal, axis=0, zi=start)[0])
     signal = signal[:: oversampling(chain, errors)]
     signal = signal + chain.noise * random.standard_normal(signal.shape)
+    if chain.flicker > 0.0:
+        signal = signal + chain.flicker * flicker_noise(random, signal.shape)
     return quantised(signal, chain)
+
+
+def flicker_noise(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Noise (N, S) of rms 1 whose power falls as one over the frequency, from the first line on."""
+    lines = np.fft.rfft(random.standard_normal(shape), axis=0)
+    lines[0] = 0.0
+    lines[1:] /= np.sqrt(np.arange(1, len(lines)))[:, None]
+    noise = np.fft.irfft(lines, n=shape[0], axis=0)
+    return np.asarray(noise / np.sqrt(np.mean(noise**2, axis=0)))
 
 
 def oversampling(chain: SensorChain, errors: SensorErrors) -> int:

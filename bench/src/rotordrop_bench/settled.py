@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
 from rotordrop.physics.columns import KernelParameters
+from rotordrop.physics.load import load_now
 from rotordrop.physics.pendulum import small_frequency
 from rotordrop.rotor.parameters import DropModel, sag_of_model
 from rotordrop.simulate._histories import stored_energy
@@ -41,15 +43,15 @@ class Swing:
     """Time constant of its decay [s]."""
 
 
-def settled_coordinates(model: DropModel) -> Array:
+def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
     """Coordinates (modal amplitudes, races, supports), shape (n_q,), of the rotor at rest in its bearings.
 
     The lowest energy near the rotor lying straight down, by Newton steps damped until the energy falls. Of a
     machine that departs from its model the one nearest to that: slip in a support has crept to nothing, the
-    cage stands where it stood.
+    cage stands where it stood. The rotor stands at an angle [rad].
     """
     if model.layout.departing:
-        return _departing_rest(model)
+        return _departing_rest(model, angle)
     parameters = without_magnets(model)
     mass = coordinate_masses(model)
     state = model.at_rest()
@@ -63,7 +65,7 @@ def settled_coordinates(model: DropModel) -> Array:
         state[:n_q],
         mass,
         float(np.max(np.abs(parameters.gravity))),
-        lambda q: _energy(completed(q), parameters),
+        lambda q: _energy(completed(q), parameters) - load_potential(model, q),
         lambda q: _force_and_stiffness(model, parameters, mass, completed(q)),
         model.machine.name,
     )
@@ -71,7 +73,19 @@ def settled_coordinates(model: DropModel) -> Array:
 
 def without_magnets(model: DropModel) -> KernelParameters:
     """Parameters of a machine whose magnets no longer act and whose rotor does not turn."""
-    return model.parameters._replace(flags=np.zeros(L.N_FLAGS, dtype=np.int64))
+    flags = np.zeros(L.N_FLAGS, dtype=np.int64)
+    flags[L.LOADS_ACT] = model.parameters.flags[L.LOADS_ACT]
+    return model.parameters._replace(flags=flags)
+
+
+def load_potential(model: DropModel, coordinates: Array) -> float:
+    """Work [J] that the loads have done on the way to a place of rest."""
+    p, layout = model.parameters, model.layout
+    work = 0.0
+    for row, shape in zip(p.load, p.load_shape, strict=True):
+        x, y = load_now(row, p.load_points, LONG_AFTER, 0.0)
+        work += float(x * (shape @ coordinates[layout.modal_x]) + y * (shape @ coordinates[layout.modal_y]))
+    return work
 
 
 def lowest_energy(
@@ -129,9 +143,15 @@ def _energy(state: Array, parameters: KernelParameters) -> float:
     return float(stored_energy(LONG_AFTER, state, parameters, False))
 
 
-def _departing_rest(model: DropModel) -> Array:
+def _departing_rest(model: DropModel, angle: float) -> Array:
     plain = model.departing(model.parameters.departure[:0])
     parameters, n_q = without_magnets(model), model.layout.n_coordinates
+    parameters = parameters._replace(departure=parameters.departure.copy())
+    for row in parameters.departure:
+        if row[D.SLEEVE_OVAL] != 0.0:  # it rests on one place of its sleeve, as an eccentric one would
+            off_x, off_y, _, _ = D.sleeve(row, angle, 0.0, -1.0)
+            row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = math.hypot(off_x, off_y), 0.0
+            row[D.SLEEVE_ANGLE] = math.atan2(off_y, off_x) - angle
     found = settled_coordinates(plain)
     places, mass = list(range(n_q)), list(coordinate_masses(model))
     for row, at in zip(parameters.departure, parameters.bearing_at[:, L.DEPARTURE], strict=True):
@@ -145,6 +165,7 @@ def _departing_rest(model: DropModel) -> Array:
 
     def completed(coordinates: Array) -> Array:
         state = model.layout.zeros()
+        state[model.layout.rotor_angle] = angle
         state[at] = coordinates
         return state
 
@@ -163,7 +184,7 @@ def _departing_rest(model: DropModel) -> Array:
         np.concatenate([found, np.zeros(len(at) - n_q)]),
         masses,
         float(np.max(np.abs(parameters.gravity))),
-        lambda q: _energy(completed(q), parameters),
+        lambda q: _energy(completed(q), parameters) - load_potential(model, q),
         force_and_stiffness,
         model.machine.name,
     )[:n_q]
@@ -177,8 +198,8 @@ def _force_and_stiffness(
     n_q, size = layout.n_coordinates, layout.n_dynamic
     change, work = layout.zeros(), scratch_of(parameters)
     jacobian = np.zeros((size, size))
-    drop_derivative(0.0, state, parameters, change, work)
-    drop_jacobian(0.0, state, parameters, jacobian)
+    drop_derivative(LONG_AFTER, state, parameters, change, work)
+    drop_jacobian(LONG_AFTER, state, parameters, jacobian)
     rows = slice(n_q, 2 * n_q)
     return mass * change[rows], -mass[:, None] * jacobian[rows, :n_q]
 
@@ -197,13 +218,17 @@ def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time
     """Modal amplitudes, shape (N, 2m), of a settled rotor whose ends swing like pendulums."""
     layout = model.layout
     rest = coordinates[layout.modal_y]
-    depth = np.abs(model.parameters.bearing_shape @ rest)
+    shape = model.parameters.bearing_shape
+    depth, aside = np.abs(shape @ rest), np.zeros(len(shape))
+    if len(model.parameters.load):  # the swing is about where the rotor lies, not about straight below
+        across = shape @ coordinates[layout.modal_x]
+        depth, aside = np.hypot(depth, across), np.arctan2(across, depth)
     decay = np.exp(-time / swing.decay_time)[:, None]
     turn = 2.0 * np.pi * np.array([small_frequency(d, float(model.machine.gravity)) for d in depth])
     angle = swing.amplitude * decay * np.cos(turn * time[:, None] + swing.phase)
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     per_end = rigid_amplitudes(model, positions, np.eye(len(nodes)))
-    x = coordinates[layout.modal_x] + (depth * np.sin(angle)) @ per_end.T
-    y = rest + (depth * (1.0 - np.cos(angle))) @ per_end.T
+    x = coordinates[layout.modal_x] + (depth * (np.sin(aside + angle) - np.sin(aside))) @ per_end.T
+    y = rest + (depth * (np.cos(aside) - np.cos(aside + angle))) @ per_end.T
     return np.hstack([x, y])

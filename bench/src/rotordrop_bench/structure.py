@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.clearance import Clearance
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.known import Known
 from rotordrop.machine import Machine
+from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
+from rotordrop.rotor.parameters import DropModel
 from rotordrop_bench.violations import BearingViolations, Violations
 
+PULL_LASTS, PULL_POINTS = 6.0, 61
+"""Time constants after which a pull is gone, and points of its course: straight between two of them it is
+within 0.2 % of the largest; chosen, not measured."""
 TYPICAL_LOADS = 5.0
 """Force over the mean load of a bearing at which a contact with another exponent is as deep as before [1]."""
 
@@ -34,6 +41,13 @@ def violated(machine: Machine, violations: Violations) -> Machine:
         for index, unbalance in enumerate(machine.unbalances):
             values[f"unbalance.{index}.amount"] = factor * float(unbalance.amount)
     machine = machine.with_values(values) if values else machine
+    seal = violations.seal
+    if seal is not None:
+        gap = float(seal.gap) * max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+        stiffness = f"{float(seal.stiffness)!r} N/m"
+        place = Clearance(name="seal", node=seal.node, gap=f"{gap!r} m", stiffness=stiffness)
+        place = place.completed_with(place.completed(machine.rotor))
+        machine = machine.completed_with({"clearances": (*machine.clearances, place)})
     softer = float(violations.rotor.youngs_modulus)
     if softer == 1.0:
         return machine
@@ -58,7 +72,8 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
     dynamic = float(friction.dynamic) if v.friction.dynamic is None else float(v.friction.dynamic)
     factors = {
         "contact.damping": (float(contact.damping), float(v.contact.damping)),
-        "race.inertia": (float(bearing.race.inertia), float(v.race.inertia)),
+        "race.mass": (float(bearing.race.mass), float(v.race.mass)),
+        "race.inertia": (float(bearing.race.inertia), float(v.race.inertia) * float(v.race.mass)),
         "friction.stribeck_speed": (float(friction.stribeck_speed), float(v.friction.stribeck_speed)),
         "friction.dynamic": (float(friction.dynamic), dynamic / float(friction.dynamic)),
         "friction.static": (
@@ -118,6 +133,10 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
         row[[D.GAP_DRIFT, D.GAP_DRIFT_TIME]] = float(gap.drift), float(gap.drift_time)
     if float(gap.closing) != 0.0:
         row[[D.GAP_CLOSING, D.GAP_HEAT]] = float(gap.closing), float(gap.heat)
+    row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = float(v.sleeve.eccentricity), float(v.sleeve.ovality)
+    row[D.SLEEVE_ANGLE] = float(v.sleeve.angle)
+    if float(v.friction.wear) > 0.0:
+        row[[D.WEAR, D.WEAR_HEAT]] = float(v.friction.wear), float(v.friction.wear_heat)
     if v.balls.turn:
         balls = bearing.bearing
         share = (
@@ -132,6 +151,55 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
         row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, float(bearing.contact.damping))
         row[at + D.LAW_UNTIL] = d2
     return row
+
+
+def pushed(model: DropModel, violations: Violations) -> DropModel:
+    """The model with what pushes its rotor beside level gravity and the drawn unbalance."""
+    p, machine = model.parameters, model.machine
+    rows: list[tuple[Array, Array, Array]] = []  # entries, course, shape over the modes
+    side, tilt, bow = violations.side_force, float(violations.stand.tilt), float(violations.rotor.bow)
+
+    def steady(x: float, y: float, shape: Array) -> None:
+        entries = np.zeros(L.N_LOAD_COLUMNS)
+        entries[[L.LOAD_X, L.LOAD_Y]] = x, y
+        rows.append((entries, np.zeros((0, 3)), shape))
+
+    if side is not None and float(side.force) > 0.0:
+        force, angle = float(side.force), float(side.direction)
+        steady(force * math.cos(angle), force * math.sin(angle), model.basis.node_row(side.node))
+    if tilt != 0.0:  # gravity alone acts along -y
+        steady(-math.sin(tilt), math.cos(tilt) - 1.0, p.gravity)
+    pull = float(violations.magnets.pull)
+    if pull > 0.0:
+        share = pull * machine.rotor.mass * float(machine.gravity) / len(machine.ambs)
+        times = np.append(np.linspace(0.0, PULL_LASTS, PULL_POINTS), PULL_LASTS + 1.0)
+        left = np.append(np.exp(-times[:-1]), 0.0)
+        course = np.column_stack([float(violations.magnets.pull_time) * times, share * left, 0.0 * left])
+        rows += [(np.zeros(L.N_LOAD_COLUMNS), course, shape) for shape in p.magnet_shape]
+    if rows:
+        points = np.zeros((0, 3))
+        for entries, course, _ in rows:
+            entries[[L.LOAD_FIRST, L.LOAD_END]] = len(points), len(points) + len(course)
+            points = np.vstack([points, course])
+        flags = p.flags.copy()
+        flags[L.LOADS_ACT] = 1
+        p = p._replace(
+            load=np.array([entries for entries, _, _ in rows]),
+            load_shape=np.array([shape for _, _, shape in rows]),
+            load_points=points,
+            flags=flags,
+        )
+    if bow != 0.0:
+        # the force that would straighten it turns with the rotor
+        place = np.asarray(model.fe.node_positions)
+        along = (place - place[0]) / (place[-1] - place[0])
+        bent = np.zeros(model.fe.mass.shape[0])
+        bent[0::2] = 4.0 * bow * along * (1.0 - along)
+        bent[1::2] = 4.0 * bow * (1.0 - 2.0 * along) / (place[-1] - place[0])
+        straightening = p.eigenvalue * (model.basis.shapes.T @ (model.fe.mass @ bent))
+        speed = 2.0 * math.pi * float(violations.rotor.bow_speed)
+        p = p._replace(unbalance_cos=p.unbalance_cos + straightening / speed**2)
+    return model if p is model.parameters else replace(model, parameters=p)
 
 
 def _mode(compliance: float, across: float, upright: float, damping_ratio: Known) -> list[float]:

@@ -12,7 +12,7 @@ import numpy as np
 from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
 from rotordrop.severity.numbers import LOADS
-from rotordrop_bench.drops import VERSION
+from rotordrop_bench.drops import SINCE, VERSION
 from rotordrop_bench.make import chosen_drops, truth_path
 from rotordrop_bench.score import score_estimate
 from rotordrop_bench.truth import Truth, read_truth
@@ -113,7 +113,7 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
     scores: list[Mapping[str, Any]] = []
     unscored = {}
     for drop, truth in zip(made, truths, strict=True):
-        found = _scored(estimates / f"{drop.name}.json", truth)
+        found = _scored(estimates / f"{drop.name}.json", truth, SINCE[drop.name])
         if isinstance(found, str):
             unscored[drop.name] = found
             found = {}
@@ -143,13 +143,13 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
     return BenchScores(rows=tuple(rows), drops=tuple(drops), unscored=unscored)
 
 
-def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
+def _scored(file: Path, truth: Truth, since: str) -> dict[str, Any] | str:
     """Scores of one estimate, or why there are none."""
     version = truth.values.get("bench_version")
-    if version != VERSION:
+    if version != since:
         raise UsageError(
-            f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make the "
-            "bench again in another folder"
+            f"{truth.path} is of version {version!r} of the bench, here the drop is of version {since!r}; "
+            "make the bench again in another folder"
         )
     if not file.is_file():
         return f"there is no {file.name}"

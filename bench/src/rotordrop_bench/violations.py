@@ -35,6 +35,8 @@ Share = Annotated[Known, Physical("dimensionless", least=0.0, most=1.0)]
 CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
 Lift = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
 Frequency = Annotated[Known, Physical("frequency", above=0.0)]
+ClockError = Annotated[Known, Physical("dimensionless", least=-0.1, most=0.1)]
+AboveOne = Annotated[Known, Physical("dimensionless", above=1.0)]
 Energy = Annotated[Known, Physical("energy", above=0.0)]
 NonNegativeNumber = Annotated[Known, Physical("dimensionless", least=0.0)]
 MOST_POINTS = 9
@@ -163,6 +165,8 @@ class ContactViolation(Violation):
 class RaceViolation(Violation):
     """Another race, or one that tilts under the contact force."""
 
+    mass: Positive = default(1.0, NO_CHANGE)
+    """Factor on its mass, and on its inertia with it, as of a carrier that turns along [1]."""
     inertia: Positive = default(1.0, NO_CHANGE)
     """Factor on its polar moment of inertia [1]."""
     tilt_stiffness: Stiffness | None = None
@@ -183,6 +187,12 @@ class FrictionViolation(Violation):
     static: Positive = default(1.0, NO_CHANGE)
     stribeck_speed: Positive = default(1.0, NO_CHANGE)
     """Factors on static coefficient and Stribeck speed [1]."""
+    wear: Share = default(0.0, "no wear")
+    """Share of the friction that is lost as the surfaces run in [1]."""
+    wear_heat: Energy = default(1.0, "of no effect without wear")
+    """Heat of friction at which 63 % of that is lost [J]."""
+
+    together: ClassVar = (("wear", "wear_heat"),)
 
 
 class GapViolation(Violation):
@@ -207,6 +217,17 @@ class BallsViolation(Violation):
     """Where the first ball stands [rad]."""
     turn: bool = False
     """Whether the balls turn with the cage as the race spins up."""
+
+
+class SleeveViolation(Violation):
+    """A landing sleeve on the rotor that is not round and centred."""
+
+    eccentricity: Length = default(0.0, "centred")
+    """Its centre off the axis of the rotor [m]."""
+    ovality: Length = default(0.0, "round")
+    """Amplitude of its radius twice per turn [m]."""
+    angle: Angle = default(0.0, "as any other")
+    """Angle of both from +x at rotor angle zero [rad]."""
 
 
 class CentreViolation(Violation):
@@ -234,6 +255,8 @@ class BearingViolations(Violation):
     """The air gap."""
     balls: BallsViolation = BallsViolation()
     """The balls."""
+    sleeve: SleeveViolation = SleeveViolation()
+    """The landing sleeve of the rotor."""
     centre: CentreViolation = CentreViolation()
     """Its centre."""
 
@@ -250,6 +273,12 @@ class SensorViolation(Violation):
     """How much nearer to the middle of the rotor the sensor stands than stated [m]."""
     follows_housing: Share = default(0.0, "a bracket on the ground")
     """Share of the motion of the bearing's housing that the bracket of the sensor follows [1]."""
+    curvature: Share = default(0.0, "a straight line")
+    """Share by which it reads too little at the displacement below; it grows with the square [1]."""
+    curvature_at: PositiveLength = default(1.0, "of no effect without curvature")
+    """That displacement [m]."""
+
+    together: ClassVar = (("curvature", "curvature_at"),)
 
 
 class ChainViolation(SensorViolation):
@@ -257,6 +286,12 @@ class ChainViolation(SensorViolation):
 
     anti_alias_frequency: Frequency | None = None
     """Corner of a filter before the sampling that nobody mentions [Hz]."""
+    flicker: Length = default(0.0, "white noise alone")
+    """Noise with a power that falls as one over the frequency, beside the white one [m rms]."""
+    clock_error: ClockError = default(0.0, "right")
+    """How much longer the seconds of the recorder are than true ones [1]."""
+    speed_delay: Time = default(0.0, "at once")
+    """How late the speed signal is [s]."""
 
 
 class MagnetViolation(Violation):
@@ -266,6 +301,12 @@ class MagnetViolation(Violation):
     """Time constant of the remanent lift [s]."""
     remanent_lift: Lift | None = None
     """Vertical remanent lift of every magnet over its share of the weight [1]."""
+    pull: Lift = default(0.0, "none")
+    """Horizontal pull of every magnet at power-off, over its share of the weight, beside what remains [1]."""
+    pull_time: PositiveTime = default(1.0, "of no effect without pull")
+    """Time constant with which that decays [s]."""
+
+    together: ClassVar = (("pull", "pull_time"),)
 
 
 class RotorViolation(Violation):
@@ -275,6 +316,42 @@ class RotorViolation(Violation):
     """Factor on Young's modulus of every section [1]."""
     unbalance: Positive = default(1.0, NO_CHANGE)
     """Factor on the drawn unbalances, which may leave the grade [1]."""
+    bow: Length = default(0.0, "straight")
+    """How far the middle of the shaft stands off the line of its ends [m], towards +x at rotor angle zero."""
+    bow_speed: Frequency = default(1.0, "of no effect without bow")
+    """Speed [Hz] at which it bends as a bowed shaft does. It goes with the square of the speed, as an
+    unbalance, so that it is exact there only."""
+
+    together: ClassVar = (("bow", "bow_speed"),)
+
+
+class StandViolation(Violation):
+    """How the machine stands."""
+
+    tilt: Angle = default(0.0, "level")
+    """Angle by which it is turned about its axis [rad]: gravity has a part towards +x."""
+
+
+class SideForce(Violation):
+    """A force on the rotor that stays, as of a belt or of the pressure round an impeller."""
+
+    node: Node
+    """Node it acts at, counted from 1."""
+    force: Force
+    """Force [N]."""
+    direction: Angle = default(0.0, "horizontal")
+    """Its direction, from +x towards y [rad]."""
+
+
+class Seal(Violation):
+    """A seal that the rotor rubs on."""
+
+    node: Node
+    """Node it sits at, counted from 1."""
+    gap: AboveOne
+    """Its gap over the widest air gap of the touchdown bearings [1]."""
+    stiffness: Stiffness
+    """Stiffness of its housing [N/m]."""
 
 
 class UnbalanceJump(Violation):
@@ -303,8 +380,14 @@ class Violations(BearingViolations):
     """The magnets."""
     rotor: RotorViolation = RotorViolation()
     """The rotor."""
+    stand: StandViolation = StandViolation()
+    """How the machine stands."""
     unbalance_jump: UnbalanceJump | None = None
     """An unbalance that comes during the drop."""
+    side_force: SideForce | None = None
+    """A force that stays."""
+    seal: Seal | None = None
+    """A seal that rubs."""
 
     def of_bearing(self, name: str) -> BearingViolations:
         """What holds at one bearing: what is said of it, then what is said of all."""
@@ -318,7 +401,7 @@ class Violations(BearingViolations):
     def of_sensor(self, name: str) -> SensorViolation:
         """What holds at one sensor: what is said of it, then what is said of all."""
         every = {key: getattr(self.sensors, key) for key in self.sensors.model_fields_set}
-        every.pop("anti_alias_frequency", None)
+        every = {key: value for key, value in every.items() if key in SensorViolation.model_fields}
         found: SensorViolation = _over(SensorViolation(**every), self.sensor.get(name))
         return found
 
@@ -335,11 +418,15 @@ class Violations(BearingViolations):
                         f"it has {', '.join(there)}"
                     )
         nodes = len(machine.rotor.node_positions)
-        if self.unbalance_jump is not None and self.unbalance_jump.node > nodes:
-            raise UsageError(
-                f"the unbalance comes at node {self.unbalance_jump.node}, outside the rotor; its nodes are 1 "
-                f"to {nodes}"
-            )
+        for what, part in (
+            ("unbalance comes", self.unbalance_jump),
+            ("side force acts", self.side_force),
+            ("seal sits", self.seal),
+        ):
+            if part is not None and part.node > nodes:
+                raise UsageError(
+                    f"the {what} at node {part.node}, outside the rotor; its nodes are 1 to {nodes}"
+                )
 
 
 def _over(every: Any, own: Any) -> Any:

@@ -31,7 +31,11 @@ CAGE_RATIO = 22  # turn of the cage per turn of the race
 LAW_PIECES, LAW = 23, 24
 LAW_UNTIL, LAW_WIDTH = contact.N_ENTRIES, contact.N_ENTRIES + 1  # behind a contact law, its end [m]
 MOST_PIECES = 8
-N_COLUMNS = LAW + MOST_PIECES * LAW_WIDTH
+# Landing sleeve: its centre off the axis, half the difference of its largest and smallest radius [m], angle
+# of both from the mark of the rotor [rad]. Share of the friction that wears off, after much more than [J].
+SLEEVE_OFF = LAW + MOST_PIECES * LAW_WIDTH
+SLEEVE_OVAL, SLEEVE_ANGLE, WEAR, WEAR_HEAT = range(SLEEVE_OFF + 1, SLEEVE_OFF + 5)
+N_COLUMNS = SLEEVE_OFF + 5
 
 # States of a departure: displacement, then velocity of foundation and of tilt (x, y), slip over its travel
 # [1], heat rubbed into the contact [J], angle of the cage [rad].
@@ -49,24 +53,57 @@ def no_departure() -> Array:
     Source: by definition; it gives the bits of a bearing without a row.
     """
     row = np.zeros(N_COLUMNS)
-    row[[AXIS_COSINE, SLIP_TRAVEL, GAP_DRIFT_TIME, GAP_HEAT]] = 1.0
+    row[[AXIS_COSINE, SLIP_TRAVEL, GAP_DRIFT_TIME, GAP_HEAT, WEAR_HEAT]] = 1.0
     return row
 
 
 @inner_kernel
 def against_bore(
-    s: Array, own: Array, x: float, y: float, vx: float, vy: float
+    s: Array, own: Array, angle: float, spin: float, x: float, y: float, vx: float, vy: float
 ) -> tuple[float, float, float, float]:
-    """Motion of the rotor against the tilted bore [m], [m/s] from that against the race.
+    """Motion of the landing sleeve against the tilted bore [m], [m/s] from that of rotor against race.
 
-    Source: kinematics of a bore that stands off the axis of the magnets and tilts where the rotor touches.
+    ``angle`` [rad] and ``spin`` [rad/s] are those of the rotor. Source: kinematics of a bore that stands off
+    the axis of the magnets and tilts where the rotor touches, and of `sleeve`.
     """
+    x, y = x - own[TILT] - s[CENTRE_X], y - own[TILT + 1] - s[CENTRE_Y]
+    vx, vy = vx - own[TILT + 2], vy - own[TILT + 3]
+    if s[SLEEVE_OFF] == 0.0 and s[SLEEVE_OVAL] == 0.0:
+        return x, y, vx, vy
+    off_x, off_y, by_x, by_y = sleeve(s, angle, x, y)
+    return x + off_x, y + off_y, vx + spin * by_x, vy + spin * by_y
+
+
+@lean_kernel
+def sleeve(s: Array, angle: float, x: float, y: float) -> tuple[float, float, float, float]:
+    """How far a sleeve that is eccentric and oval reaches beyond a round one [m], and its rate per spin [m].
+
+    At a rotor angle [rad] and a displacement of the rotor against the bore [m]. Source: a circle about
+    another centre; the support function of the radius ``R + a cos 2β`` in a bore, to the first order of ``a``
+    over the displacement: the place of contact moves by ``-2 a sin 2β`` along the bore.
+    """
+    sine, cosine = sine_cosine(angle + s[SLEEVE_ANGLE])
+    e, a = s[SLEEVE_OFF], s[SLEEVE_OVAL]
+    r = math.sqrt(x * x + y * y)
+    nx, ny = (x / r, y / r) if r > 0.0 else (0.0, 0.0)
+    c, z = cosine * nx + sine * ny, cosine * ny - sine * nx  # of β, from the long axis to the contact
+    once, twice = a * (c * c - z * z), 2.0 * a * (2.0 * c * z)
     return (
-        x - own[TILT] - s[CENTRE_X],
-        y - own[TILT + 1] - s[CENTRE_Y],
-        vx - own[TILT + 2],
-        vy - own[TILT + 3],
+        e * cosine + once * nx + twice * ny,
+        e * sine + once * ny - twice * nx,
+        twice * nx - e * sine,
+        twice * ny + e * cosine,
     )
+
+
+@lean_kernel
+def friction_left(s: Array, own: Array) -> float:
+    """Share of the friction that wear has left [1], by the heat rubbed in so far.
+
+    Source: chosen, not measured: as a surface that runs in, to a limit.
+    """
+    left: float = 1.0 - s[WEAR] * (1.0 - exp(-own[HEAT] / s[WEAR_HEAT]))
+    return left
 
 
 @lean_kernel

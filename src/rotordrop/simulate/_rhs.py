@@ -100,7 +100,8 @@ def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[floa
     ux, uy, vx, vy = ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
     if p.bearing_at[b, L.DEPARTURE] >= 0:
         s, own = departing(b, y, p)
-        return departure.against_bore(s, own, ux, uy, vx, vy)
+        angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
+        return departure.against_bore(s, own, angle, spin, ux, uy, vx, vy)
     return ux, uy, vx, vy
 
 
@@ -131,11 +132,17 @@ def contact_values(
     omega_i = y[spin] if spin >= 0 else 0.0
     row, gap = p.bearing[b], gap_at(t, b, y, p)
     numbers, law = row[L.TOUCH : L.TOUCH_END], row[L.CONTACT : L.CONTACT_END]
+    omega = y[p.rotor_at[L.ROTOR_SPEED]]
     if p.bearing_at[b, L.DEPARTURE] >= 0:
-        s = p.departure[b]
+        s, own = departing(b, y, p)
         at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
         law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
-    return touch.touch(numbers, gap, law, ux, uy, vx, vy, y[p.rotor_at[L.ROTOR_SPEED]], omega_i)
+        left = departure.friction_left(s, own)
+        delta, F_r, F_mu, nx, ny, sliding, lost = touch.touch(
+            numbers, gap, law, ux, uy, vx, vy, omega, omega_i
+        )
+        return delta, F_r, left * F_mu, nx, ny, left * sliding, lost
+    return touch.touch(numbers, gap, law, ux, uy, vx, vy, omega, omega_i)
 
 
 @inner_kernel
@@ -554,6 +561,25 @@ def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
 
 
 @lean_kernel
+def sleeve_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Torque on the rotor [N m] of the contact force that ``dy`` holds so far, beside that of friction.
+
+    Source: virtual work of `departure.sleeve`.
+    """
+    s, own = departing(b, y, p)
+    if s[departure.SLEEVE_OFF] == 0.0 and s[departure.SLEEVE_OVAL] == 0.0:
+        return 0.0
+    body = p.contact_at[p.bearing_at[b, L.CONTACTS], L.CONTACT_BODY]
+    qx, qy, _sx, _sy = modal_parts(y, p)
+    x = project(p.bearing_shape[b], qx) - y[body] - own[departure.TILT] - s[departure.CENTRE_X]
+    z = project(p.bearing_shape[b], qy) - y[body + 1] - own[departure.TILT + 1] - s[departure.CENTRE_Y]
+    _x, _z, by_x, by_z = departure.sleeve(s, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
+    at = p.rotor_at[L.N_COORDINATES] + body
+    torque: float = -by_x * dy[at] - by_z * dy[at + 1]
+    return torque
+
+
+@lean_kernel
 def add_departing_support(
     b: int, F_x: float, F_y: float, sliding: float, y: Array, p: KernelParameters, dy: Array
 ) -> float:
@@ -611,6 +637,7 @@ def bearing_accelerations(
     F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
     departs = p.bearing_at[b, L.DEPARTURE] >= 0
     by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
+    by_sleeve = sleeve_torque(b, y, p, dy) if departs else 0.0
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
@@ -638,7 +665,7 @@ def bearing_accelerations(
     power = work.power[b]
     power[SLIDING], power[IN_CONTACT] = sliding, lost
     power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
-    return -friction * row[L.ROTOR_RADIUS], by_balls + by_drag + by_support + (sliding + lost)
+    return by_sleeve - friction * row[L.ROTOR_RADIUS], by_balls + by_drag + by_support + (sliding + lost)
 
 
 @inner_kernel

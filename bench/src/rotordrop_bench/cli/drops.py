@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 FolderArgument = Annotated[Path, Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)]
 OnlyOption = Annotated[
     list[str] | None,
-    Option("--only", metavar="NAME", help="A drop, a family or a rotor; repeatable. All by default."),
+    Option(
+        "--only",
+        metavar="NAME",
+        help='A drop, a family, a rotor or a version, such as "version 1"; repeatable.',
+    ),
 ]
 
 
