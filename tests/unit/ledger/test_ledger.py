@@ -350,7 +350,7 @@ log, left = sys.argv[1:]
 if left == "wal":
     with sqlite3.connect(log) as reader:  # keeps open what an older rotordrop kept
         reader.execute("PRAGMA journal_mode = WAL")
-        _store._leave_wal = lambda connection: None
+        _store.leave_wal = lambda connection: None
         reader.execute("SELECT * FROM drops").fetchall()
     for number in range(3, 6):
         add_drop(log, replace(DROP, sha256=str(number) * 64))
