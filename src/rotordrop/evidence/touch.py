@@ -1,4 +1,4 @@
-"""The first touch of a race: the kink with which the motion leaves the free fall, no machine known.
+"""The first touch of a race: where the motion leaves the free fall, no machine known.
 
 With a machine file, `rotordrop.evidence.contacts` has the forces behind it.
 """
@@ -12,53 +12,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.record.impacts import slope
 from rotordrop.units import GRAVITY
 
 _NEAREST, _FARTHEST = 0.75, 1.08
 """The race is touched between these shares of the way from floating to rest [1] (chosen)."""
 
-_SURELY = (0.86, 1.12)
-"""Shares of that way at which the kink of a hard contact is taken for a touch [1] (chosen)."""
+_SURELY, _FIRST_SOFT = (0.86, 1.12), 0.6
+"""Shares of that way at which the kink of a hard contact is taken for a touch, and the least of a soft one
+[1] (chosen): it rests deep in its race."""
 
-_SOFT = 3e-3
-"""A rotor that goes deeper for longer than this has a soft contact [s] (chosen)."""
+_SOFT = 1.2e-3
+"""A contact whose deceleration grows for longer than this is soft [s] (set with DropBench in view)."""
+
+_FLANK, _DELAY = (0.2, 0.6), 0.26e-3
+"""Shares of the largest deceleration between which its growth is taken as straight [1], and how much earlier
+than the touch that line leaves the fall, by the windows of the velocities [s] (set with DropBench in
+view)."""
+
+_FLANK_ERROR = 0.1
+"""Standard error of a soft touch over the time in which its deceleration grows [1] (the same)."""
 
 _LATEST = 8e-3
 """How long after `_NEAREST` a touch is looked for [s]."""
 
+_BEFORE, _AFTER = 2e-3, 0.35e-3
+"""Lengths of the free fall before the kink of a hard contact and of the contact after it that are fitted
+[s]."""
 
-@dataclass(frozen=True, kw_only=True)
-class _Windows:
-    """Lengths [s] of the free fall before a kink and of the contact after it that are fitted."""
+_SEARCHED = (-0.7e-3, 0.2e-3)
+"""How far from the sample that stands out the kink is searched [s]."""
 
-    before: float
-    after: float
-    power: int
-    """Power of time with which the contact moves the rotor away from its fall."""
-    earliest: float
-    latest: float
-    """How far from the sample that stands out the kink is searched [s]."""
-    ringing: float
-    """A kink stands this much above the ringing of the falling rotor [1]."""
-    least: float
-    """Least acceleration at a kink over gravity [1]."""
-    error: float
-    """Standard error of the kink [s] (set with all of DropBench in view)."""
+_RINGING, _LEAST = 2.5, 0.8
+"""How much a kink stands above the ringing of the falling rotor [1], and its least acceleration over gravity
+[1]."""
 
+_SOFT_RINGING, _SOFT_LEAST = 4.0, 1.5
+"""The same of the deceleration of a soft contact, over the root mean square of the ringing."""
 
-_HARD_KINK = _Windows(
-    before=2e-3,
-    after=0.35e-3,
-    power=2,
-    earliest=-0.7e-3,
-    latest=0.2e-3,
-    ringing=2.5,
-    least=0.8,
-    error=0.15e-3,
-)
-_SOFT_KINK = _Windows(
-    before=2e-3, after=1.2e-3, power=3, earliest=-1.5e-3, latest=0.8e-3, ringing=1.5, least=0.4, error=0.35e-3
-)
+_KINK_ERROR = 0.15e-3
+"""Standard error of the kink of a hard contact [s] (set with all of DropBench in view)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,9 +63,8 @@ class Touch:
     error: float
     """Standard error [s]."""
     by_kink: bool
-    """Whether a kink of the velocity shows it; else it is where the path crosses the air gap."""
-    soft: bool
-    """Whether the rotor goes on for longer than 3 ms."""
+    """Whether the motion shows it, by a kink or by where its deceleration begins; else it is where the path
+    crosses the air gap."""
 
     def at(self, values: Array) -> Array:
         """Values (N, K) at the touch."""
@@ -86,7 +78,7 @@ class Touch:
 def first_touch(
     place: Array, floated: Array, rate: float, begin: int, size: float, noise: float
 ) -> Touch | None:
-    """Find the kink with which the fall ends; None where ringing hides it.
+    """Find where the fall ends; None where ringing hides it.
 
     Parameters
     ----------
@@ -105,37 +97,67 @@ def first_touch(
 
     Notes
     -----
-    A free fall is a cubic in time over some milliseconds. A contact adds to it a part that begins at the kink
-    and points inwards; the first one that stands above noise and ringing is the touch, and the best fit of
-    both parts dates it.
+    A free fall is a cubic in time over some milliseconds. A hard contact adds to it a part that begins at the
+    kink and points inwards; the first one that stands above noise and ringing is the touch, and the best fit
+    of both parts dates it. A soft contact has no kink: its deceleration grows along a line, which is followed
+    back to the fall.
     """
     way = np.hypot(*(place - floated).T)
     near = _first_beyond(way, begin, _NEAREST * size)
-    closest = _first_beyond(way, begin, 0.9 * size)
-    if near is None or closest is None:
+    if near is None:
         return None
-    soft = _turns(way, closest, rate) - closest > _SOFT * rate
-    windows = _SOFT_KINK if soft else _HARD_KINK
+    released = max(near - int(math.sqrt(2.0 * _NEAREST * size / GRAVITY) * rate), 0)
+    flank = _flank(way, rate, (released, near))
+    if flank is not None and flank[1] > _SOFT * rate:
+        begins, lasts = flank
+        share = float(np.interp(begins, np.arange(len(way)), way)) / size
+        if _FIRST_SOFT < share < _SURELY[1]:
+            return Touch(sample=begins, error=_FLANK_ERROR * lasts / rate, by_kink=True)
     far = _first_beyond(way, begin, _FARTHEST * size) or len(way) - 1
     last = min(far, near + int(_LATEST * rate))
     last = near + int(np.argmax(way[near : last + 1]))
-    released = near - int(math.sqrt(2.0 * _NEAREST * size / GRAVITY) * rate)
-    samples, inward, unit = _departures(
-        place, floated, rate, windows, (max(released, 0), max(last, near + 2))
-    )
-    after = max(round(windows.after * rate), 3)
-    falling = (samples + after < near) & (samples - windows.before * rate > released - 0.5e-3 * rate)
+    samples, inward, unit = _departures(place, floated, rate, (released, max(last, near + 2)))
+    after = max(round(_AFTER * rate), 3)
+    falling = (samples + after < near) & (samples - _BEFORE * rate > released - 0.5e-3 * rate)
     ringing = float(np.percentile(inward[falling], 95)) if np.count_nonzero(falling) > 10 else 0.0
-    limit = max(5.0 * noise, windows.ringing * ringing, windows.least * GRAVITY * unit)
+    limit = max(5.0 * noise, _RINGING * ringing, _LEAST * GRAVITY * unit)
     strong = np.flatnonzero((samples >= near) & (inward > limit))
     if not len(strong):
         return None
-    best = strong[0] + int(np.argmax(inward[strong[0] : strong[0] + int(windows.after * rate) + 1]))
-    kink = _dated(place, int(samples[best]), rate, windows)
+    best = strong[0] + int(np.argmax(inward[strong[0] : strong[0] + int(_AFTER * rate) + 1]))
+    kink = _dated(place, int(samples[best]), rate)
     share = float(np.interp(kink, np.arange(len(way)), way)) / size
-    if not (_NEAREST if soft else _SURELY[0]) < share < _SURELY[1]:
+    if not _SURELY[0] < share < _SURELY[1]:
         return None
-    return Touch(sample=kink, error=math.hypot(windows.error, 0.3 / rate), by_kink=True, soft=soft)
+    return Touch(sample=kink, error=math.hypot(_KINK_ERROR, 0.3 / rate), by_kink=True)
+
+
+def _flank(way: Array, rate: float, fall: tuple[int, int]) -> tuple[float, float] | None:
+    """When the deceleration of the first contact begins to grow, and for how long it does [samples].
+
+    ``fall`` are the samples of the release and of the way from which a contact is looked for.
+    """
+    first = max(fall[0] - int(2e-3 * rate), 0)
+    outward = slope(slope(way[first : fall[1] + int(2.0 * _LATEST * rate)], rate), rate)
+    released, near = fall[0] - first + int(1e-3 * rate), fall[1] - first
+    if near - released < 4:
+        return None
+    usual, ringing = float(np.median(outward[released:near])), float(np.std(outward[released:near]))
+    deep = outward[near : near + int(_LATEST * rate)] < usual - max(
+        _SOFT_LEAST * GRAVITY, _SOFT_RINGING * ringing
+    )
+    if not deep.any():
+        return None
+    most = near + int(np.argmax(deep))
+    while most + 1 < len(outward) and outward[most + 1] <= outward[most]:
+        most += 1
+    early, late = (
+        most - int(np.argmax(outward[most::-1] >= usual - share * (usual - outward[most])))
+        for share in _FLANK
+    )
+    low, high = _FLANK
+    begins = early - (late - early) * low / (high - low)
+    return first + begins + _DELAY * rate, most - begins
 
 
 def crossing(radius: Array, begin: int, rate: float, gap: float, error: float) -> Touch | None:
@@ -147,7 +169,7 @@ def crossing(radius: Array, begin: int, rate: float, gap: float, error: float) -
     speed = max(float(radius[at] - radius[back]) * rate / (at - back), 1e-3)
     below, above = float(radius[at - 1]), float(radius[at])
     sample = at - (above - gap) / max(above - below, 1e-12) if above > below else float(at)
-    return Touch(sample=sample, error=math.hypot(_HARD_KINK.error, error / speed), by_kink=False, soft=False)
+    return Touch(sample=sample, error=math.hypot(_KINK_ERROR, error / speed), by_kink=False)
 
 
 def _first_beyond(values: Array, begin: int, limit: float) -> int | None:
@@ -155,25 +177,14 @@ def _first_beyond(values: Array, begin: int, limit: float) -> int | None:
     return begin + int(beyond[0]) if len(beyond) else None
 
 
-def _turns(way: Array, since: int, rate: float) -> int:
-    """Sample at which the rotor stops going deeper, ringing smoothed away."""
-    width = max(int(0.5e-3 * rate), 1)
-    ahead = way[since : since + int(30e-3 * rate)]
-    if len(ahead) <= width + 1:
-        return since
-    smooth = np.convolve(ahead, np.ones(width) / width, mode="valid")
-    back = np.flatnonzero(np.diff(smooth) < 0.0)
-    return since + (int(back[0]) if len(back) else 0) + width // 2
-
-
 def _departures(
-    place: Array, floated: Array, rate: float, windows: _Windows, span: tuple[int, int]
+    place: Array, floated: Array, rate: float, span: tuple[int, int]
 ) -> tuple[NDArray[np.int64], Array, float]:
     """How far each sample's contact would move the rotor inwards, and what 1 m/s² would.
 
     Samples (K,), amplitudes along a unit vector [m], shape (K,), and that of an acceleration of 1 m/s² [m].
     """
-    before, after = round(windows.before * rate), max(round(windows.after * rate), 3)
+    before, after = round(_BEFORE * rate), max(round(_AFTER * rate), 3)
     index = np.arange(-before, after + 1)
     time = index / (after * 1.0)
     cubic = np.linalg.qr(np.vander(time, 4, increasing=True))[0]
@@ -188,18 +199,18 @@ def _departures(
     return samples, -np.sum(moved * out, axis=1) / np.maximum(np.hypot(*out.T), 1e-12), unit
 
 
-def _dated(place: Array, near: int, rate: float, windows: _Windows) -> float:
-    """The kink [samples] that fits best: cubic before, and a power of time more after it."""
+def _dated(place: Array, near: int, rate: float) -> float:
+    """The kink [samples] that fits best: cubic before, and a parabola more after it."""
     index = np.arange(
-        max(near - round(windows.before * rate), 0),
-        min(near + max(round(windows.after * rate), 4), len(place) - 1) + 1,
+        max(near - round(_BEFORE * rate), 0),
+        min(near + max(round(_AFTER * rate), 4), len(place) - 1) + 1,
     )
     time = (index - near) / rate * 1e3
     cubic = np.linalg.qr(np.vander(time, 4))[0]
     readings = place[index] - place[near]
     rest = readings - cubic @ (cubic.T @ readings)
-    tried = np.arange(windows.earliest * 1e3, windows.latest * 1e3, 0.02)
-    pushed = np.maximum(time - tried[:, None], 0.0) ** windows.power
+    tried = np.arange(_SEARCHED[0] * 1e3, _SEARCHED[1] * 1e3, 0.02)
+    pushed = np.maximum(time - tried[:, None], 0.0) ** 2
     pushed -= (pushed @ cubic) @ cubic.T
     size = np.sum(pushed**2, axis=1)
     explained = np.sum((pushed @ rest) ** 2, axis=1) / np.maximum(size, 1e-12)
