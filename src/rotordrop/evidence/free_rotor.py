@@ -14,23 +14,12 @@ import numpy as np
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.machine import Machine
 from rotordrop.record.axes import Plane
-from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
-from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
+from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe
+from rotordrop.rotor.reduction import Reduction, RotorBasis, modes_that_sag, reduce_rotor
 from rotordrop.rotor.statics import rest_on
-from rotordrop.units import GRAVITY
 
 GRID = 1e-5
 """Step of the tabulated responses [s]: straight lines between them are off by 0.1 nm in a fall."""
-
-_FEWEST_MODES = 6
-"""Free-free modes, the two rigid ones included, at least."""
-
-_SAG = 1e-7
-"""Deflection g/ω² of a mode [m] from which it is among them: a fifth of the noise of a good sensor.
-
-Source: with six modes the fall of a rotor of 5 t that bends at 39 Hz and more was dated 0.21 ms early, six of
-its standard errors, and another one 0.38 ms; with the modes of this limit by 0.001 and 0.004 ms.
-"""
 
 
 def motion_of(basis: RotorBasis, speed: float) -> ComplexArray:
@@ -122,17 +111,11 @@ class FreeRotor:
         return np.asarray(self.plane_rows @ states[:, :m])
 
 
-def _modes_seen(fe: RotorFE) -> int:
-    """Number of free-free modes that sensors see give way when the rotor is let go."""
-    seen = np.count_nonzero(free_free_modes(fe).omega ** 2 < GRAVITY / _SAG)
-    return min(max(_FEWEST_MODES, int(seen)), fe.size - N_RIGID)
-
-
 def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
     """Model the rotor that is released by what held it."""
     fe = build_rotor_fe(machine)
     held = held_by(machine, planes, fe)
-    modes = _modes_seen(fe)
+    modes = modes_that_sag(fe)
     basis = reduce_rotor(fe, Reduction(modes=modes, attachment=False))
     words = f"free rotor with {modes - N_RIGID} bending modes, released by {held.words}"
     return _pushed(fe, basis, planes, held.nodes, held.lift, words)
@@ -142,7 +125,7 @@ def rotor_pushed_at_bearings(machine: Machine, planes: tuple[Plane, ...]) -> Fre
     """Model the free rotor with forces at the touchdown bearings, local flexibility there included."""
     fe = build_rotor_fe(machine)
     nodes = [bearing.node for bearing in machine.touchdown_bearings]
-    basis = reduce_rotor(fe, Reduction(modes=_modes_seen(fe) + 2, attachment=True), nodes)
+    basis = reduce_rotor(fe, Reduction(modes=modes_that_sag(fe) + 2, attachment=True), nodes)
     words = f"free rotor, {basis.description}, pushed at {len(nodes)} touchdown bearings"
     return _pushed(fe, basis, planes, nodes, np.zeros(len(nodes)), words)
 

@@ -29,8 +29,19 @@ from rotordrop.rotor.assembly import (
     with_positive_peak,
 )
 from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.units import GRAVITY
 
 _DEPENDENT = 1e-8
+
+_FEWEST_MODES = 6
+"""Free-free modes, the two rigid ones included, at least."""
+
+_SAG = 1e-7
+"""Deflection g/ω² of a mode [m] from which it is among them: a fifth of the noise of a good sensor.
+
+Source: with six modes the fall of a rotor of 5 t that bends at 39 Hz and more was dated 0.21 ms early, six of
+its standard errors, and another one 0.38 ms; with the modes of this limit by 0.001 and 0.004 ms.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +115,12 @@ class RotorBasis:
         if not 1 <= node <= count:
             raise UsageError(f"node {node} is not on the rotor, which has nodes 1 to {count}")
         return 2 * (node - 1)
+
+
+def modes_that_sag(fe: RotorFE) -> int:
+    """Number of free-free modes that sensors see give way when the rotor is let go."""
+    seen = np.count_nonzero(free_free_modes(fe).omega ** 2 < GRAVITY / _SAG)
+    return min(max(_FEWEST_MODES, int(seen)), fe.size - N_RIGID)
 
 
 def reduction_of(choice: str | Reduction) -> Reduction:

@@ -19,14 +19,13 @@ from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import RotordropError
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
+from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.reduction import Reduction, modes_that_sag
 from rotordrop.rotor.unknowns import prior
 from rotordrop.track.problem import RecordedDrop, build_problem
 from rotordrop.track.rotor_likelihood import Readings, readings_of, rotor_likelihood_of
 
-BASIS = Reduction(modes=6, attachment=False)
-"""Modes of the search: it asks for the motion of the sensor planes, which four bending modes hold."""
 STEP = 5e-3
 """Step of the derivatives, in standard deviations of the prior [1]."""
 FARTHEST = 2.5
@@ -65,7 +64,9 @@ def with_found_rotor(machine: Machine, drops: Sequence[RecordedDrop]) -> Machine
         unknowns.append(_Unknown(row=row, path=row.path_of(""), mean=known.mean, sigma=known.sigma))
     if not unknowns:
         return machine
-    model = build_drop_model(machine, BASIS)
+    # the search asks for the motion of the sensor planes; as many modes throughout, else the likelihood jumps
+    basis = Reduction(modes=modes_that_sag(build_rotor_fe(machine)), attachment=False)
+    model = build_drop_model(machine, basis)
     seen: list[tuple[RecordedDrop, Readings]] = []
     for drop in drops:
         until = float(drop.time[-1])
@@ -78,7 +79,7 @@ def with_found_rotor(machine: Machine, drops: Sequence[RecordedDrop]) -> Machine
         inside = np.clip(deviations, -FARTHEST, FARTHEST)
         beyond = 1e3 * float(np.sum((deviations - inside) ** 2))
         try:
-            tried = build_drop_model(with_values(inside), BASIS)
+            tried = build_drop_model(with_values(inside), basis)
             total = sum(rotor_likelihood_of(tried, drop, readings) for drop, readings in seen)
         except RotordropError:  # no rotor can be so
             return math.inf
