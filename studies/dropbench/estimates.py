@@ -1,10 +1,11 @@
 """Estimates of the drops of a bench by this package, one process each, and their table.
 
 Usage: python studies/dropbench/estimates.py BENCH ESTIMATES [--only NAME ...] [--limit SECONDS]
+    [--table NAME]
 
 BENCH is a folder of 'rotordrop-bench make'. Estimates that are there already stay; a drop that the estimator
 refuses leaves NAME.txt with its reason. Stops by itself after the limit; call it again to go on. Writes
-``results/scores.json`` and ``results/table.md`` over all estimates there are.
+``results/NAME.json`` and ``results/NAME.md`` over all estimates there are of the drops chosen.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rotordrop_bench import VERSION, score_bench
-from rotordrop_bench.make import chosen_drops
+from rotordrop_bench import score_bench, score_estimate
+from rotordrop_bench.drops import SINCE
+from rotordrop_bench.make import chosen_drops, truth_path
 
 HERE = Path(__file__).parent
 STEP = 5
@@ -48,7 +50,7 @@ def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]
     """The table of all estimates there are, as text, and the scores behind it."""
     scores = score_bench(bench, out, names)
     lines = [
-        f"DropBench, version {VERSION}: {len(scores.drops)} drops.",
+        f"DropBench, version {' and '.join(sorted({SINCE[n] for n in names}))}: {len(scores.drops)} drops.",
         "",
         "| family | quantity | values | missing | median | 90 % | worst | > 10 % | covered | half width |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
@@ -60,12 +62,29 @@ def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]
             lines.append(
                 f"| {row.family} | {row.quantity} | {row.values} | {row.missing} | {' | '.join(cells)} |"
             )
-    lines += ["", "| drop | family | consistent | errors of the peak force |", "| --- | --- | --- | --- |"]
+    lines += [
+        "",
+        "Peak force: error ± half width of the 90 % interval; ! where that does not hold the truth.",
+        "",
+        "| drop | family | rotor | what it has | named | consistent | peak force |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for drop in scores.drops:
-        errors = ", ".join(f"{name} {100 * e:+.1f} %" for name, e in drop["peak_errors"].items())
-        why = scores.unscored.get(drop["name"], "")
-        lines.append(f"| {drop['name']} | {drop['family']} | {drop['consistent']} | {errors or why} |")
+        name = drop["name"]
+        found = scores.unscored.get(name)
+        if found is None:
+            scored = score_estimate(out / f"{name}.json", truth_path(bench, name), drop=name)
+            found = ", ".join(_peak(b, own["peak_force_N"]) for b, own in scored["bearings"].items())
+        has, named = (", ".join(drop[key]) for key in ("violated", "named"))
+        cells = [name, drop["family"], drop["rotor"], has, named, str(drop["consistent"]), found]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n", scores.as_json()
+
+
+def _peak(bearing: str, score: dict[str, Any]) -> str:
+    half = f" ± {100 * score['half_width']:.1f}" if "half_width" in score else ""
+    outside = "" if score.get("covered", True) else " !"
+    return f"{bearing} {100 * score['relative_error']:+.1f}{half} %{outside}"
 
 
 def main() -> None:
@@ -75,6 +94,7 @@ def main() -> None:
     parser.add_argument("estimates", type=Path)
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--limit", type=float, default=float("inf"))
+    parser.add_argument("--table", default="table")
     arguments = parser.parse_args()
     out = arguments.estimates
     out.mkdir(parents=True, exist_ok=True)
@@ -89,8 +109,8 @@ def main() -> None:
     there = [n for n in names if (out / f"{n}.json").is_file() or (out / f"{n}.txt").is_file()]
     text, scores = table(arguments.bench, out, there)
     (HERE / "results").mkdir(exist_ok=True)
-    (HERE / "results" / "table.md").write_text(text)
-    (HERE / "results" / "scores.json").write_text(json.dumps(scores, indent=1) + "\n")
+    (HERE / "results" / f"{arguments.table}.md").write_text(text)
+    (HERE / "results" / f"{arguments.table}.json").write_text(json.dumps(scores, indent=1) + "\n")
     print(text)
 
 
