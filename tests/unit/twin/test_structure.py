@@ -447,14 +447,21 @@ def test_values_that_hold_the_neutral_one_say_nothing(lp400, name):
     assert not extension.says_nothing(machine, telling)
 
 
-def moved_fit(score: float, way: float, further: int = 0) -> Any:
-    """A fit of one drop with two parameters of standard deviation 0.1, the second one moved by a way.
+def moved_fit(score: float, way: float, *, further: int = 0, sigma: float = 1.0, limit: float = 9.0) -> Any:
+    """A fit of one drop with two parameters of standard deviation 0.1, the second one moved by a way from
+    its prior, whose standard deviation is ``sigma``, and at most by ``limit``.
 
     Further ones come before them: those of sensor planes that a coarse fit leaves out.
     """
     paths = [*(f"sensors.{k}.cross_axis" for k in range(further)), "NDE.preload", "DE.preload"]
+    limits = [*([np.inf] * (further + 1)), 2.0 + limit]
     problem = SimpleNamespace(
-        parameter_slice=slice(1, 1 + len(paths)), unknowns=[SimpleNamespace(path=path) for path in paths]
+        parameter_slice=slice(1, 1 + len(paths)),
+        unknowns=[
+            SimpleNamespace(path=path, sigma=sigma, bounds=(-np.inf, most))
+            for path, most in zip(paths, limits, strict=True)
+        ],
+        mean=np.array([5.0, *([99.0] * further), 1.0, 2.0]),
     )
     smoothed = SimpleNamespace(
         means=np.array([[5.0, *([99.0] * further), 1.0, 2.0 + way]]),
@@ -471,18 +478,24 @@ def moved_fit(score: float, way: float, further: int = 0) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("way", "other", "windows", "best"),
-    [(0.2, 900.0, 2, 1000.0), (0.3, 900.0, 4, 900.0), (-0.3, 1100.0, 4, 1000.0)],
+    ("case", "other", "windows", "best"),
+    [
+        ({"way": 0.2}, 900.0, 2, 1000.0),
+        ({"way": 0.3}, 900.0, 4, 900.0),
+        ({"way": -0.3}, 1100.0, 4, 1000.0),
+        ({"way": 0.2, "sigma": 0.07}, 900.0, 4, 900.0),
+        ({"way": 0.2, "limit": 0.2}, 900.0, 4, 900.0),
+    ],
 )
-def test_a_whole_drop_that_moves_a_parameter_beyond_the_first_impacts_is_fitted_from_another_window_too(
-    lp400, monkeypatch, way, other, windows, best
+def test_a_fit_that_its_prior_or_the_first_impacts_hardly_allow_is_begun_again_from_the_prior(
+    lp400, monkeypatch, case, other, windows, best
 ):
-    """Two standard deviations are no reason, three are; the likelier fit is taken."""
-    stages: list[Stage] = []
+    """Two standard deviations are no reason, three and a bound are; the likelier fit is taken."""
+    begun: list[float] = []
 
-    def converged(_problems: Any, stage: Stage, _references: Any, **_: Any) -> Any:
-        stages.append(stage)
-        return moved_fit(1000.0 if len(stages) <= 2 else other, way, further=2)
+    def converged(_problems: Any, _stage: Stage, references: Any, **_: Any) -> Any:
+        begun.append(references[0][0][-1])
+        return moved_fit(1000.0 if len(begun) <= 2 else other, further=2, **case)
 
     monkeypatch.setattr(search_module, "converged", converged)
     monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
@@ -493,8 +506,8 @@ def test_a_whole_drop_that_moves_a_parameter_beyond_the_first_impacts_is_fitted_
     search = Search(drops=drops, progress=None)  # type: ignore[arg-type]
     first = Candidate(machine=lp400, fit=moved_fit(2000.0, 0.0))
     assert search.refine(first).sized_score == (False, best)
-    assert len(stages) == windows
-    assert stages[-2].until < stages[0].until or windows == 2
+    assert len(begun) == windows
+    assert windows == 2 or begun[2] == 2.0
 
 
 @pytest.mark.slow
