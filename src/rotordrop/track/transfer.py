@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rotordrop.arrays import Array
@@ -45,9 +47,14 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
 
 
 def _carry_unknowns(coarse: DropProblem, fine: DropProblem, means: Array, result: Array) -> None:
-    """Carry the unknowns by name; what the coarse problem does not have begins at what is known of it."""
+    """Carry the unknowns by name; what the coarse problem does not have begins at what is known of it.
+
+    So does what another prior holds now: where the old one held it is no place to begin.
+    """
     source = {unknown.path: k for k, unknown in enumerate(coarse.unknowns)}
     for k, unknown in enumerate(fine.unknowns):
         at = source.get(unknown.path)
+        if at is not None and not math.isclose(coarse.unknowns[at].sigma, unknown.sigma):
+            at = None
         values = fine.start[fine.n_dynamic + k] if at is None else means[:, coarse.n_dynamic + at]
         result[:, fine.n_dynamic + k] = values

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotordrop.elements.table import parameter
+from rotordrop.elements.table import EXTENSIONS, parameter
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
@@ -121,6 +121,22 @@ def test_a_race_that_is_heavier_than_inferred_is_as_much_harder_to_turn(lp400):
     assert NINETY * math.sqrt(form) == pytest.approx(math.log(1.3), rel=0.01)
     stated = race_errors(lp400.with_values(unstated | {"NDE.race.inertia": 6e-4}))
     assert stated[0, 1] == 0.0
+
+
+def test_a_race_of_which_nobody_said_what_spins_along_may_be_heavier_and_begins_so(lp400):
+    """A carrier of 2.5 times the ring moved a peak by 12 %; a search from the ring alone did not see it."""
+    rings = next(one for one in EXTENSIONS if one.name == "ring masses")
+    assert rings.values(lp400) == {}  # its masses are stated
+    inferred = Known(value=0.3, status="inferred", range=(0.24, 0.375), unit="kg")
+    unstated = lp400.with_values({"NDE.race.mass": inferred})
+    heavier = rings.added_to(unstated)
+    assert set(rings.values(unstated)) == {"NDE.race.mass", "NDE.race.inertia"}
+    assert rings.values(heavier) == {}
+    mass = unknown_of(heavier, "NDE.race.mass")
+    assert mass.value_of(mass.begin) == pytest.approx(0.6)
+    assert mass.value_of(mass.mean + NINETY * mass.sigma) == pytest.approx(1.5)
+    found = {"NDE.race.mass": Known(value=0.69, interval_90=(0.66, 0.72), unit="kg")}
+    assert "NDE 0.690 kg (0.660 to 0.720)" in rings.found(unstated, found, 300.0)
 
 
 def test_what_a_drop_owns_is_not_shared(flight):
@@ -384,6 +400,19 @@ def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared
 def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
     means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
     np.testing.assert_allclose(transferred(flight, flight, means), means, rtol=1e-9, atol=1e-16)
+
+
+def test_an_unknown_that_another_prior_holds_begins_there(lp400, prepared, flight, random):
+    """Carried along, the mass of a race stayed in the minimum in which the narrow prior had held it."""
+    heavier = Known(value=0.6, status="guess", range=(0.24, 1.5), unit="kg")
+    wide = build_drop_model(lp400.with_values({"NDE.race.mass": heavier}), COARSE_BASIS)
+    problem = drop_problem(wide, prepared, until=0.003)
+    means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
+    moved = transferred(flight, problem, means)
+    at = [one.path for one in flight.unknowns].index("NDE.race.mass") + flight.n_dynamic
+    np.testing.assert_allclose(moved[:, at], problem.start[at])
+    others = np.arange(len(flight.mean)) != at
+    np.testing.assert_allclose(moved[:, others], means[:, others], rtol=1e-9, atol=1e-16)
 
 
 def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machine) -> None:
