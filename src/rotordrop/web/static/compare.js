@@ -107,8 +107,8 @@ const numbersPicture = () => {
   return pen;
 };
 const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-const csvOf = () => ["drop,bearing,quantity,value [SI],lower [SI],upper [SI]", ...groups().flatMap(([, entries]) => entries.map((one) =>
-  [one.drop.name, one.bearing, one.quantity, one.value ?? "", one.lower, one.upper].map(String).map(quoted).join(","))), ""].join("\n");
+const csvOf = () => [`drop,bearing,quantity,${units.COLUMNS}`, ...groups().flatMap(([, entries]) => entries.map((one) =>
+  [one.drop.name, one.bearing, one.quantity, ...units.columnsOf(one)].map(String).map(quoted).join(","))), ""].join("\n");
 const pythonOf = () => [state.estimate?.python.peaks, ...state.others.map((other) => `# ${other.name}\n${other.python && typeof other.python === "string" ? other.python : other.estimate?.python.peaks || ""}`)].filter(Boolean).join("\n");
 
 export function compareTab() {

@@ -54,8 +54,8 @@ function trend(pen, [field, kind, title], top, bottom) {
 const drawTrends = (pen) => FIGURES.forEach((one, i) => trend(pen, one, (i * pen.height) / 2, ((i + 1) * pen.height) / 2));
 const picture = () => { const pen = svgPen(1000, 620, colours().back, `${view.machine}, bearings ${view.bearings}`); drawTrends(pen); return pen; };
 const name = () => `log ${view.machine} ${view.bearings}`.replace(/[^\w.-]+/g, "_");
-const csv = () => ["drop,date,bearing,quantity,value [SI],lower [SI],upper [SI]", ...here().flatMap((drop) => drop.numbers.map((one) =>
-  [drop.log, drop.recorded || drop.added, one.bearing, one.field, one.value ?? "", one.lower, one.upper].map((cell) => JSON.stringify(cell)).join(","))), ""].join("\n");
+const csv = () => [`drop,date,bearing,quantity,${units.COLUMNS}`, ...here().flatMap((drop) => drop.numbers.map((one) =>
+  [drop.log, drop.recorded || drop.added, one.bearing, one.quantity, ...units.columnsOf(one)].map((cell) => JSON.stringify(cell)).join(","))), ""].join("\n");
 const python = () => `from rotordrop.ledger.book import logged_drops, trends\n\ndrops = logged_drops(${JSON.stringify(view.log.name)}, machine=${JSON.stringify(view.machine)}, bearing_set=${JSON.stringify(view.bearings)})\nrising = trends(${JSON.stringify(view.log.name)}, machine=${JSON.stringify(view.machine)})\n`;
 const quoted = (text) => (/^[\w.-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 const command = () => `rotordrop log show ${quoted(view.log.name)} --machine ${quoted(view.machine)}`;

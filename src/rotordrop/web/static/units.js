@@ -26,6 +26,10 @@ export function written(value, digits = 4) {
 }
 export const shown = (value, kind, digits) => (Number.isFinite(value) ? `${written(value / factor(kind), digits)} ${unit(kind)}` : "–");
 
+// A number and its interval as they go into a table of their own, in the unit that is shown.
+export const COLUMNS = "unit,value,lower,upper";
+export const columnsOf = (one) => [unit(one.kind), ...[one.value, one.lower, one.upper].map((value) => (Number.isFinite(value) ? Number((value / factor(one.kind)).toPrecision(7)) : ""))];
+
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);
 export const eventText = (t) => (Math.abs(t) < 1 ? `${fixed(1e3 * t, 2)} ms` : `${fixed(t, 4)} s`);
