@@ -18,6 +18,8 @@ import venv
 from pathlib import Path
 from typing import Any
 
+PATIENCE = 300.0
+"""Time [s] for pip-audit to be had, and for its answer: a network that swallows packets gives none."""
 LOCK = Path(__file__).resolve().parent.parent / "requirements.lock"
 
 
@@ -30,9 +32,13 @@ def audited(requirements: Path, folder: Path) -> list[dict[str, Any]]:
         ["pip", "install", "--quiet", "pip-audit"],
         ["pip_audit", "--progress-spinner", "off", *options],
     ):
-        done = subprocess.run(
-            [python, "-m", *module], capture_output=True, text=True, timeout=600, check=False
-        )
+        try:
+            done = subprocess.run(
+                [python, "-m", *module], capture_output=True, text=True, timeout=PATIENCE, check=False
+            )
+        except subprocess.TimeoutExpired:
+            print(f"{module[0]}: no answer within {PATIENCE:g} s", file=sys.stderr)
+            return []
         if done.returncode and not found.exists():
             print(f"{module[0]}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}", file=sys.stderr)
             return []

@@ -168,6 +168,11 @@ def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
             )
         raise OutputError(f"{file}: {why}") from error
     except sqlite3.DatabaseError as error:
+        if "malformed" in str(error):
+            raise DamagedFileError(
+                f"{file} is damaged ({error}): put back a copy of it, or begin another log and add the kept "
+                "estimates to it"
+            ) from error
         raise UsageError(f"{file} is not a log of drops ({error}); name another file") from error
     except OSError as error:
         raise OutputError(f"{file}: the log cannot be used: {error.strerror}") from error

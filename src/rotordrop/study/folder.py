@@ -158,7 +158,7 @@ def read_plan(path: str | Path) -> dict[str, Any]:
     """Plan of a study folder; refuses what is none."""
     file = Path(path) / "plan.json"
     try:
-        return read_sealed(
+        plan = read_sealed(
             file, "remove it, and run the study again with its study file: finished shards stay"
         )
     except OSError as error:
@@ -167,13 +167,19 @@ def read_plan(path: str | Path) -> dict[str, Any]:
             "run' has made"
         ) from error
     except DamagedFileError:
-        plan = None
+        earlier = None
         with suppress(ValueError, RecursionError):
-            plan = json.loads(file.read_bytes()) if file.is_file() else None
+            earlier = json.loads(file.read_bytes()) if file.is_file() else None
         # what has a digest was not written without one
-        if not isinstance(plan, dict) or plan.get("format") != WITHOUT_DIGESTS or DIGEST in plan:
+        if not isinstance(earlier, dict) or earlier.get("format") != WITHOUT_DIGESTS or DIGEST in earlier:
             raise
-        return plan
+        return earlier
+    if plan.get("format") != FORMAT:
+        raise UsageError(
+            f"{Path(path)} has format {plan.get('format')!r}, and rotordrop {__version__} reads {FORMAT!r}: "
+            "a later version has made it. Go on with that version, or name another folder"
+        )
+    return plan
 
 
 def require_same_version(plan: Mapping[str, Any], path: Path) -> None:

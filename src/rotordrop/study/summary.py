@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
+from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, OutputError, UsageError, unknown_key
 from rotordrop.known import Known
@@ -45,7 +46,7 @@ class StudyResults:
     aside: tuple[str, ...] = ()
     """Files of damaged shards that were kept and computed again."""
     taken_over: str = ""
-    """What nobody knows of drops that were given digests later; empty where all had them from the start."""
+    """What is to be said of drops of another version, or that were given digests later; else empty."""
 
     def __len__(self) -> int:
         return len(self.drop)
@@ -196,12 +197,23 @@ def load_results(folder: str | Path) -> StudyResults:
         numbers={q.name: together[:, j] for j, q in enumerate(columns)},
         reasons=tuple(text.decode() for table in tables for text in table["reason"]),
         aside=tuple(place.aside()),
-        taken_over=""
-        if not taken_over
-        else f"{taken_over} drops were computed by rotordrop {plan['rotordrop']}, which kept no digests. "
-        "Their varied values are those that are drawn for them; whether their results are those that were "
-        "computed, nobody can tell. To know, compute the study again in another folder, and compare.",
+        taken_over=_told_of(plan["rotordrop"], taken_over),
     )
+
+
+def _told_of(version: str, taken_over: int) -> str:
+    """What is to be said of who computed the drops, of which so many were found without digests."""
+    if taken_over:
+        return (
+            f"{taken_over} drops were computed by rotordrop {version}, which kept no digests. Their varied "
+            "values are those that are drawn for them; whether their results are those that were computed, "
+            "nobody can tell. To know, compute the study again in another folder, and compare."
+        )
+    if version != __version__:
+        return (
+            f"The drops were computed by rotordrop {version}; numbers may differ from those of {__version__}."
+        )
+    return ""
 
 
 class EarlyEnd:

@@ -118,6 +118,16 @@ def test_an_allowance_says_how_much_and_by_whom(log, settings, message):
         allow(log, "LP-400", "2026", **settings)
 
 
+def test_a_log_with_a_lost_page_is_called_damaged_and_no_other_file(tmp_path):
+    log = tmp_path / "drops.db"
+    add_drop(log, DROP)
+    raw = bytearray(log.read_bytes())
+    raw[4096:8192] = bytes(4096)  # a page of SQLite's, by default
+    log.write_bytes(raw)
+    with pytest.raises(DamagedFileError, match=r"drops\.db is damaged .*: put back a copy"):
+        logged_drops(log)
+
+
 def test_what_is_no_log_is_named(tmp_path):
     with pytest.raises(UsageError, match=r"none\.db is not there; 'rotordrop log add' makes a log"):
         logged_drops(tmp_path / "none.db")

@@ -263,7 +263,10 @@ def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_pa
     place = shutil.copytree(serial[0], tmp_path / "study")
     plan = json.loads((place / "plan.json").read_text())
     write_json(place / "plan.json", plan | {"rotordrop": "0.0.9"}, sealed=True)
-    assert len(run_study(study_with(), place, threads=1)) == 12
+    results = run_study(study_with(), place, threads=1)
+    assert len(results) == 12
+    assert results.taken_over.startswith("The drops were computed by rotordrop 0.0.9; numbers may differ")
+    assert results.taken_over in str(study_page(results).verdict)
     (place / "shards" / "000001.npy").unlink()
     for go_on in (lambda: run_study(study_with(), place), lambda: work_on(place, 1)):
         with pytest.raises(UsageError, match=r"begun by rotordrop 0\.0\.9, and this is .* Go on with"):
@@ -272,6 +275,18 @@ def test_another_version_shows_a_study_and_does_not_go_on_with_it(serial, tmp_pa
     write_json(place / "plan.json", plan | {"rotordrop": "0.0.9"}, sealed=True)
     with pytest.raises(UsageError, match=r"begun by rotordrop 0\.0\.9.* makes another study of its plan"):
         study_of(place)
+
+
+def test_a_folder_of_a_later_format_is_refused_and_stays_as_it_is(serial, tmp_path):
+    """Every other format was taken for an older one without digests, and written over."""
+    place = shutil.copytree(serial[0], tmp_path / "study")
+    plan = json.loads((place / "plan.json").read_text())
+    write_json(place / "plan.json", plan | {"format": "rotordrop study 99"}, sealed=True)
+    before = (place / "plan.json").read_bytes()
+    for read in (load_results, study_of, lambda place: run_study(study_with(), place, threads=1)):
+        with pytest.raises(UsageError, match=r"format 'rotordrop study 99', .* a later version has made it"):
+            read(place)
+    assert (place / "plan.json").read_bytes() == before
 
 
 @on_posix
