@@ -222,6 +222,7 @@ def test_hum_and_runout_have_their_frequencies():
         cross_axis=np.zeros(1),
         follows_housing=np.zeros(1),
         time_constant=np.zeros(1),
+        curvature=np.zeros(1),
     )
     read = readings(zero, time, 2 * np.pi * turns * time, chain, errors, np.random.default_rng(1))[:, 0]
     size = 2.0 * np.abs(np.fft.rfft(read)) / count

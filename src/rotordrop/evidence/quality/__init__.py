@@ -251,10 +251,12 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
 
 
 def _passes(evidence: Evidence, change: Callable[[Array, Record], Array]) -> bool:
-    """Whether readings at rest that are changed so would pass too; false where there is no tail."""
+    """Whether readings at rest that are changed so would pass too; false where there is no tail to judge."""
     still = evidence.still
-    if evidence.tail is None or isinstance(still, Missing):
+    if evidence.tail is None or isinstance(still, Missing) or isinstance(evidence.beginning, Missing):
         return False
+    if len(still.whole.sensors) < len(still.sensors):
+        return True  # a plane of one sensor: what its readings could be exchanged with is not asked
     other = replace(still, signals=change(still.signals, still))
     return not _tail_at_rest(evidence.with_facts(still=other))
 
