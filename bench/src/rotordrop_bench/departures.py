@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from scipy.constants import g as standard_gravity
+
 from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_law, contact_tangent, depth_at
 from rotordrop.rotor.statics import bearing_load_shares
@@ -16,8 +18,6 @@ Parts = dict[str, dict[str, Any]]
 SLIGHT, LARGE = 0, 1
 """Sizes of a departure: as many machines have it, and as only some do."""
 
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s²], ISO 80000-3."""
 PEAK_LOADS = 10.0
 """A typical peak force over the static load of a bearing [1]; chosen, not measured."""
 
@@ -41,7 +41,7 @@ class _Measures:
     @property
     def fall_time(self) -> float:
         """Time of a free fall through the air gap [s]."""
-        return math.sqrt(2.0 * self.gap / STANDARD_GRAVITY)
+        return math.sqrt(2.0 * self.gap / standard_gravity)
 
     @property
     def support_frequency(self) -> float:

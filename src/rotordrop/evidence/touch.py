@@ -30,6 +30,9 @@ _FLANK, _DELAY = (0.2, 0.6), 0.26e-3
 than the touch that line leaves the fall, by the windows of the velocities [s] (set with DropBench in
 view)."""
 
+_RELEASE = 1e-3
+"""Time after the release from which the deceleration counts as that of the fall [s] (chosen)."""
+
 _FLANK_ERROR = 0.1
 """Standard error of a soft touch over the time in which its deceleration grows [1] (the same)."""
 
@@ -137,9 +140,9 @@ def _flank(way: Array, rate: float, fall: tuple[int, int]) -> tuple[float, float
 
     ``fall`` are the samples of the release and of the way from which a contact is looked for.
     """
-    first = max(fall[0] - int(2e-3 * rate), 0)
+    first = max(fall[0] - int(_BEFORE * rate), 0)
     outward = slope(slope(way[first : fall[1] + int(2.0 * _LATEST * rate)], rate), rate)
-    released, near = fall[0] - first + int(1e-3 * rate), fall[1] - first
+    released, near = fall[0] - first + int(_RELEASE * rate), fall[1] - first
     if near - released < 4:
         return None
     usual, ringing = float(np.median(outward[released:near])), float(np.std(outward[released:near]))
