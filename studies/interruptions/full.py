@@ -24,7 +24,7 @@ from rotordrop.record.examples import example_record_path
 from rotordrop.record.recording import recording_of
 from rotordrop.record.writers import write_hdf5
 
-ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
 STUDY = 'machine = "lp400.toml"\nduration = "9 ms"\nreduction = "quick"\nspeed = "100 Hz"\n'
 DESIGN = (
     STUDY + "candidates = 2\nrounds = 0\nrepeats = 2\nagain = 2\n"
@@ -71,7 +71,7 @@ def main() -> None:
         machine = example_machine("lp400")
         save_machine(machine, folder / "lp400.toml")
         save_machine(
-            load_machine(ROOT / "tests" / "yardstick" / "given" / "lp400_calibrated.toml"),
+            load_machine(HERE / "lp400_calibrated.toml"),
             folder / "calibrated.toml",
         )
         (folder / "drop.h5").write_bytes(example_record_path("lp400_drop_060").read_bytes())

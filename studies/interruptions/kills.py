@@ -50,7 +50,7 @@ from rotordrop.web.workspace import Workspace, receive
 from rotordrop_bench.cli.app import run as run_bench
 
 RESULTS = Path(__file__).parent / "results" / "kills.jsonl"
-ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
 COMMANDS = {
     "look": "look {record} machine.toml --report out.html --json out.json",
     "check": "check machine.toml --report out.html --json out.json",
@@ -168,7 +168,7 @@ PEAKS = {"peak_force_N": value(3300.0), "peak_stress_Pa": value(1.5e9)}
 
 @cache
 def _calibrated() -> Machine:
-    return load_machine(ROOT / "tests" / "yardstick" / "given" / "lp400_calibrated.toml")
+    return load_machine(HERE / "lp400_calibrated.toml")
 
 
 @cache
