@@ -384,6 +384,7 @@ def true_structure(
         }
         values |= {f"sensors.{sensor.name}.{path}": float(value) for path, value in mine.items()}
     values["rotor.stiffness_factor"] = float(hidden.violations.rotor.youngs_modulus)
+    values["clock_error"] = float(hidden.violations.sensors.clock_error)
     values["remanence.time_constant"] = conditions.start.remanence_time_constant
     return values
 

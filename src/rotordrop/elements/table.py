@@ -18,6 +18,7 @@ from rotordrop.elements import (
     magnet,
     mount,
     race,
+    recorder,
     rotor,
     sensor,
     support,
@@ -60,6 +61,7 @@ _ELEMENTS = (
     mount,
     thermal,
     air,
+    recorder,
 )
 
 EXTENSIONS: tuple[Extension, ...] = tuple(

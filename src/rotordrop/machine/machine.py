@@ -22,7 +22,7 @@ from rotordrop.elements.sensor import Sensor, check_sensors_resolve_motion
 from rotordrop.elements.table import keys_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.unbalance import BalanceGrade, Unbalance, from_grade
-from rotordrop.elements.values import Acceleration, PositiveTime, default
+from rotordrop.elements.values import Acceleration, Number, PositiveTime, default
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
@@ -64,6 +64,8 @@ class Machine(Description):
     """Time in which the remanent force of the magnets decays [s]; 2 ms, to a factor of two, when left out."""
     sensors: tuple[Sensor, ...] = ()
     """Displacement sensors."""
+    clock_error: Number | None = None
+    """How much longer a second of their records lasts than a second [1]; right when left out."""
     loads: tuple[Load, ...] = ()
     """Forces on the rotor beside gravity."""
     base: Base | None = None

@@ -279,6 +279,9 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
         described = machine.remanence_time_constant
         known = prior(REMANENCE, guess(REMANENCE_TIME) if described is None else described)
         yield of_drop(REMANENCE, "", 0, known.mean, known.sigma)
+    for row in structure_rows("drop"):
+        if (quantity := row.stated(machine)) is not None:
+            yield _unknown(model, row, "", 0, quantity, prior(row, quantity))
     for row in AERO:
         yield of_drop(row, "", 0, math.log(aero_time_constant(machine)), row.guess_sigma)
 

@@ -222,6 +222,11 @@ def parameter_jacobian(
         values[k] = value
         update_powers(which, values, targets, powers)
         write_values(which, values, powers, targets, p)
+    for i in range(targets.target.shape[0]):
+        if targets.target[i, 1] == ON_SPIN and targets.target[i, 3] == L.CLOCK_ERROR:
+            # a slow clock stretches the step: every rate acts for longer
+            for owner in range(n_b + 1):
+                add_row(1.0 / (1.0 + p.spin[L.CLOCK_ERROR]), base[owner, :s], B[:, targets.target[i, 0]])
 
 
 @lean_kernel
@@ -378,7 +383,7 @@ def propagate(
     touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
     middle = y.copy()
-    step = settings.dt / settings.substeps
+    step = (1.0 + p.spin[L.CLOCK_ERROR]) * settings.dt / settings.substeps
     h = step * settings.frozen
     F[:, :] = 0.0
     for i in range(s):

@@ -66,6 +66,7 @@ def has(machine: Machine) -> frozenset[str]:
         "long remanence": machine.remanence_time_constant,
         "unbalance beyond its grade": machine.unbalances[0].beyond_described,
         "rotor stiffness": machine.rotor.stiffness_factor,
+        "sampling clock": machine.clock_error,
     }
     return frozenset(name for name, value in marks.items() if value is not None)
 
