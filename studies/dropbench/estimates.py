@@ -17,14 +17,18 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
+from rotordrop.known import NINETY
 from rotordrop_bench import score_bench, score_estimate
 from rotordrop_bench.drops import SINCE
 from rotordrop_bench.make import chosen_drops, truth_path
 
 HERE = Path(__file__).parent
 STEP = 5
+SILENT = 0.05
+"""Relative error of a peak force beyond which its interval must not miss it without a word [1]."""
 SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m", "parameters")
 
 
@@ -62,6 +66,7 @@ def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]
             lines.append(
                 f"| {row.family} | {row.quantity} | {row.values} | {row.missing} | {' | '.join(cells)} |"
             )
+    lines += ["", _silent(bench, out, scores.drops)]
     lines += [
         "",
         "Peak force: error ± half width of the 90 % interval; ! where that does not hold the truth.",
@@ -79,6 +84,24 @@ def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]
         cells = [name, drop["family"], drop["rotor"], has, named, str(drop["consistent"]), found]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines) + "\n", scores.as_json()
+
+
+def _silent(bench: Path, out: Path, drops: list[dict[str, Any]]) -> str:
+    """How many peaks are silent, and how many the stated widths would leave so by chance."""
+    found, chance, normal = 0, 0.0, NormalDist()
+    consistent = [drop["name"] for drop in drops if drop["consistent"]]
+    for name in consistent:
+        scored = score_estimate(out / f"{name}.json", truth_path(bench, name), drop=name)
+        for own in scored["bearings"].values():
+            peak = own["peak_force_N"]
+            error, half = abs(peak["relative_error"]), peak["half_width"]
+            found += error > max(half, SILENT)
+            chance += 2.0 * normal.cdf(-NINETY * max(half, SILENT) / half)
+    return (
+        f"Silent (of {len(consistent)} drops called consistent, outside the interval and more than "
+        f"{100 * SILENT:.0f} % off): {found} of the peaks. By chance, errors being normal with the widths "
+        f"stated, it would be {chance:.1f}."
+    )
 
 
 def _peak(bearing: str, score: dict[str, Any]) -> str:
