@@ -41,4 +41,9 @@ def noise_by_differences(values: NDArray[np.float64], order: int) -> float:
         How often differences are taken: a polynomial of a lower degree counts as motion.
     """
     difference = np.diff(values, order, axis=0)
-    return SIGMA_OF_MEDIAN * float(np.nanmedian(np.abs(difference))) / math.sqrt(math.comb(2 * order, order))
+    size = np.abs(difference, out=difference)
+    return (
+        SIGMA_OF_MEDIAN
+        * float(np.nanmedian(size, overwrite_input=True))
+        / math.sqrt(math.comb(2 * order, order))
+    )

@@ -451,7 +451,7 @@ def _largest_between(path: Path, at: int) -> tuple[float, float]:
     """Interval of a distance from the centre [m], 90 %: at the sensors, or at the bearing beside them."""
     here = float(path.radius[at])
     aside = float(np.hypot(*path.bearing_position[at])) - here
-    outward = float(np.hypot(*(path.bearing_position - path.position)[at]))
+    outward = float(np.hypot(*(path.bearing_position[at] - path.position[at])))
     beside = LEVER_DOUBT / max(abs(path.wall.lever), LEVER_DOUBT) * outward
     half = NINETY * math.hypot(path.wall.centre_error.max(), GAIN * here, beside)
     return here + min(aside, 0.0) - half, here + max(aside, 0.0) + half

@@ -86,7 +86,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     NothingFallsError
         When nothing falls.
     """
-    raw, rate = record.motion, record.sampling_rate
+    raw, rate = record.resolved(), record.sampling_rate
     begin, sunk = _first_fall(raw, rate)
     # where the rotor lies: the last quarter after the fall
     rest_from = sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
@@ -95,7 +95,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     for number, plane in enumerate(record.planes):
         position, floated = raw[:, number], np.mean(raw[:begin, number], axis=0)
         # the plane at the other end is the one that moves most unlike this
-        unlike = np.linalg.norm(np.std(raw - position[:, None], axis=0), axis=1)
+        unlike = [float(np.hypot(*np.std(place - position, axis=0))) for place in raw.swapaxes(0, 1)]
         other = raw[:, int(np.argmax(unlike))]
         wall = find_wall(position, other, rate, (begin, sunk), gaps[number])
         apart = position - floated - other + np.mean(other[:begin], axis=0)
@@ -178,7 +178,9 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
     No gap is known yet: every plane is scaled by how far it strays in all.
     """
     first = max(int(0.01 * rate), 8)
-    away = np.linalg.norm(raw - np.mean(raw[:first], axis=0), axis=2)
+    away = np.column_stack(
+        [np.hypot(*(path - np.mean(path[:first], axis=0)).T) for path in raw.swapaxes(0, 1)]
+    )
     reach = np.percentile(away, 98, axis=0)
     usual = np.max(away[:first], axis=0)
     if np.any(reach < 4.0 * usual) or np.any(reach < 5e-6):
@@ -334,8 +336,9 @@ def _release(motion: Motion, start: int, stop: int) -> float | None:
 
 def with_impacts(motion: Motion, drop: Drop) -> Drop:
     """A drop with its impacts and the begin of lasting contact, by the rule of `find_impacts`."""
-    inside = (motion.time >= drop.release) & (motion.time <= drop.end)
-    first, time = int(np.argmax(inside)), motion.time[inside]
+    first = int(np.searchsorted(motion.time, drop.release))
+    inside = slice(first, int(np.searchsorted(motion.time, drop.end, side="right")))
+    time = motion.time[inside]
     impacts, lasting = [], []
     for path in motion.paths:
         place = path.bearing_position[inside]

@@ -69,10 +69,7 @@ def find_impacts(
     its race, or shakes with it, makes none. The first reversal of a path that begins with the fall is one.
     """
     radius = np.hypot(*path.T)
-    speed, velocity = slope(radius, rate), slope(path, rate)
-    along = path / np.maximum(radius, 1e-12)[:, None]
-    across = along[:, 0] * velocity[:, 1] - along[:, 1] * velocity[:, 0]
-    free = GRAVITY * (along @ down) + across**2 / gap
+    speed = slope(radius, rate)
     shortest = shortest_flight(gap)
     early = round(0.25 * SMOOTHING * rate)  # a velocity over a window turns up to half of it before the kink
     reach = max(int(max(2e-3, 1.5 * shortest) * rate), 1)
@@ -86,11 +83,13 @@ def find_impacts(
         approach, rebound = max(float(speed[fastest]), 0.0), max(float(-speed[leaves]), 0.0)
         turned = (approach + rebound) * rate / max(leaves - fastest, 1)
         flew = (fastest - left) / rate
-        gained = float(speed[fastest] - speed[left]) / max(flew, 1.0 / rate)
-        accelerated = gained / max(float(np.mean(free[left : fastest + 1])), _LEAST_FREE * GRAVITY)
         hopped = float(radius[at] - np.min(radius[left : at + 1])) > 0.5 * HOP * gap
-        flight = flew > shortest and accelerated > _FREE
-        if (falls and before is None) or (flight and hopped and turned > _SHARPEST_SWING * GRAVITY):
+        flight = flew > shortest and hopped and turned > _SHARPEST_SWING * GRAVITY
+        if flight:
+            gained = float(speed[fastest] - speed[left]) / flew
+            free = _free_acceleration(path, rate, gap, down, slice(left, fastest + 1))
+            flight = gained > _FREE * max(free, _LEAST_FREE * GRAVITY)
+        if flight or (falls and before is None):
             found.append((at, min(fastest + early, at), approach, rebound))
         before = at
     columns = list(zip(*found, strict=True)) if found else [(), (), (), ()]
@@ -100,6 +99,17 @@ def find_impacts(
         approach=np.array(columns[2], dtype=np.float64),
         rebound=np.array(columns[3], dtype=np.float64),
     )
+
+
+def _free_acceleration(path: Array, rate: float, gap: float, down: Array, flight: slice) -> float:
+    """Mean outward acceleration of a free body that moves as the path does in a flight [m/s²]."""
+    begin = max(flight.start - round(SMOOTHING * rate), 0)
+    near = slice(begin, flight.stop + round(SMOOTHING * rate))
+    inside = slice(flight.start - begin, flight.stop - begin)
+    place, velocity = path[flight], slope(path[near], rate)[inside]
+    along = place / np.maximum(np.hypot(*place.T), 1e-12)[:, None]
+    across = along[:, 0] * velocity[:, 1] - along[:, 1] * velocity[:, 0]
+    return float(np.mean(GRAVITY * (along @ down) + across**2 / gap))
 
 
 def slope(values: Array, rate: float) -> Array:

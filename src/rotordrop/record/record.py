@@ -48,6 +48,9 @@ EVENT_KEYS = (
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _TIME_NAMES = ("time", "t", "zeit")
 
+_PART = 65536
+"""Samples of a long record that are resolved at a time (chosen)."""
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Record:
@@ -259,7 +262,15 @@ class Record:
     @cached_property
     def motion(self) -> Array:
         """Displacement (x, y) of the shaft in every plane, from the origin of the sensors [m], (N, P, 2)."""
-        return planar_of(self.along, self.planes)
+        return self.resolved()
+
+    def resolved(self) -> Array:
+        """The same, made anew and not kept, part by part: copies of a minute would fill 150 MB."""
+        motion = np.empty((len(self.time), len(self.planes), 2))
+        for begin in range(0, len(motion), _PART):
+            part = slice(begin, begin + _PART)
+            motion[part] = planar_of(along_sensors(self.signals[part], self.sensors), self.planes)
+        return motion
 
     def of_channels(self, columns: Sequence[int]) -> Record:
         """The record of some of its sensors."""

@@ -262,7 +262,10 @@ def _waterfalls(
         return ()
     speed = None
     if signal.profile is not None:
-        speed = signal.profile.speed_at(signal.start_time + np.arange(moved.shape[0]) / signal.sampling_rate)
+        speed = np.empty(moved.shape[0])
+        for begin in range(0, len(speed), settings.points):  # a minute at once takes four times its own size
+            index = np.arange(begin, min(begin + settings.points, len(speed)))
+            speed[index] = signal.profile.speed_at(signal.start_time + index / signal.sampling_rate)
     return waterfalls(
         moved,
         signal.sampling_rate,

@@ -393,19 +393,25 @@ def _uneven(record: Record, noise: Array) -> list[Finding]:
     What a channel reads at a wrong time is off by its velocity times one error of time, the same in all.
     Noise, and what the rotor does within a few samples, have no reason to point along the velocity.
     """
-    signals = record.signals / noise
-    scatter = np.diff(signals, _ORDER, axis=0)
-    velocity = (signals[_ORDER - 1 : -1] - signals[1 : 1 - _ORDER]) / (_ORDER - 2)
-    speed = np.linalg.norm(velocity, axis=1)
+    signals, count = record.signals, len(record.signals) - _ORDER
+    speed = np.empty(count)
+    for begin in range(0, count, _PART):
+        part = signals[begin : begin + _PART + _ORDER] / noise
+        velocity = (part[_ORDER - 1 : -1] - part[1 : 1 - _ORDER]) / (_ORDER - 2)
+        speed[begin : begin + _PART] = np.linalg.norm(velocity, axis=1)
     fast = speed > np.median(speed[speed > 0.0]) if np.any(speed > 0.0) else speed > 0.0
     freedom = signals.shape[1] - 1
     if int(np.sum(fast)) < _MOVES or freedom == 0:  # a single channel has nothing across its motion
         return []
     # of the faster half the fastest, where a wrong time shows most
     fast &= speed >= np.sort(speed[fast])[-max(_MOVES, int(np.sum(fast)) // 4)]
-    unit = velocity[fast] / speed[fast, None]
-    along = np.sum(scatter[fast] * unit, axis=1)
-    across = scatter[fast] - along[:, None] * unit
+    # samples from the first of a difference to its last: shape (difference, sample, channel)
+    near = signals[np.flatnonzero(fast)[:, None] + np.arange(_ORDER + 1)]
+    near /= noise
+    unit = (near[:, -2] - near[:, 1]) / (_ORDER - 2) / speed[fast, None]
+    scatter = np.diff(near, _ORDER, axis=1)[:, 0]
+    along = np.sum(scatter * unit, axis=1)
+    across = scatter - along[:, None] * unit
     with_motion = SIGMA_OF_MEDIAN * float(np.median(np.abs(along)))
     middle = freedom * (1.0 - 2.0 / (9.0 * freedom)) ** 3  # median of the chi square
     aside = float(np.sqrt(np.median(np.sum(across**2, axis=1)) / middle))

@@ -6,7 +6,7 @@ None of it needs the machine; each shows by what it takes from the motion of a d
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,12 +182,15 @@ def _copies(record: Record) -> list[Finding]:
 
 def _row_hashes(signals: Array) -> NDArray[np.uint64]:
     """One number per row, the same for the same readings; far faster to sort than the rows."""
-    odd = np.random.default_rng(0).integers(1, 2**62, signals.shape[1], dtype=np.uint64) * np.uint64(
+    odd: Any = np.random.default_rng(0).integers(1, 2**62, signals.shape[1], dtype=np.uint64) * np.uint64(
         2
     ) + np.uint64(1)
-    bits = np.ascontiguousarray(signals + 0.0).view(np.uint64)
-    mixed = (bits ^ (bits >> np.uint64(29))) * odd
-    return np.asarray(np.bitwise_xor.reduce(mixed ^ (mixed >> np.uint64(32)), axis=1))
+    label = np.zeros(len(signals), dtype=np.uint64)
+    for i, column in enumerate(signals.T):
+        bits = (column + 0.0).view(np.uint64)
+        mixed = (bits ^ (bits >> np.uint64(29))) * odd[i]
+        label ^= mixed ^ (mixed >> np.uint64(32))
+    return label
 
 
 def _longest_run(lag: NDArray[np.int64]) -> tuple[int, int]:
@@ -205,35 +208,42 @@ def _jumps(record: Record) -> list[Finding]:
     signals = record.signals
     if len(signals) < 50:
         return []
-    step = np.diff(signals, axis=0)
-    near = np.stack([step[:-4], step[1:-3], step[3:-1], step[4:]])
-    # the median of four, several times faster than by sorting
-    around = 0.5 * (np.sum(near, axis=0) - np.max(near, axis=0) - np.min(near, axis=0))
-    kink = np.abs(step[2:-2] - around)
-    usual = np.maximum(SIGMA_OF_MEDIAN * np.median(kink, axis=0), 1e-12)
-    finest = np.array([np.min(np.diff(np.unique(column)), initial=np.inf) for column in signals.T])
-    limit = np.maximum(np.maximum(12.0 * usual, 2e-6), 4.0 * np.where(np.isfinite(finest), finest, 0.0))
-    enough = max(2, signals.shape[1] // 2 + 1)
-    # channels that stood still before catch up with the rotor: a hold has its own name
-    jumped = (kink > limit) & (step[1:-3] != 0.0)
-    many = np.sum(jumped, axis=1) >= enough
+    # channel by channel: a minute of all of them must not be held a dozen times
+    count = signals.shape[1]
+    kink = np.empty((count, len(signals) - 5))
+    moved = np.empty(kink.shape, dtype=np.bool_)
+    usual, limit, size = np.empty(count), np.empty(count), np.zeros(kink.shape[1])
+    for i, column in enumerate(signals.T):
+        step = np.diff(column)
+        near = step[:-4], step[1:-3], step[3:-1], step[4:]
+        # the median of four, several times faster than by sorting
+        around = 0.5 * (sum(near) - np.maximum.reduce(near) - np.minimum.reduce(near))
+        kink[i] = np.abs(step[2:-2] - around)
+        # channels that stood still before catch up with the rotor: a hold has its own name
+        moved[i] = step[1:-3] != 0.0
+        usual[i] = max(SIGMA_OF_MEDIAN * float(np.median(kink[i])), 1e-12)
+        finest = float(np.min(np.diff(np.unique(column)), initial=np.inf))
+        limit[i] = max(12.0 * usual[i], 2e-6, 4.0 * finest if np.isfinite(finest) else 0.0)
+        size = np.maximum(size, kink[i] / max(8.0 * float(np.percentile(kink[i], 99.9)), limit[i]))
+    enough = max(2, count // 2 + 1)
+    jumps = (kink > limit[:, None]) & moved
+    many = np.sum(jumps, axis=0) >= enough
     # where the rotor moves along one sensor, one channel jumps far and the others less
-    far = np.max(kink / np.maximum(8.0 * np.percentile(kink, 99.9, axis=0), limit), axis=1) > 1.0
-    for jump in np.flatnonzero(far & ~many).tolist():
-        nearby = np.median(kink[max(jump - _AROUND, 0) : jump + _AROUND], axis=0)
-        jumped = (kink[jump] > 6.0 * np.maximum(nearby, usual)) & (step[jump + 1] != 0.0)
+    for jump in np.flatnonzero((size > 1.0) & ~many).tolist():
+        nearby = np.median(kink[:, max(jump - _AROUND, 0) : jump + _AROUND], axis=1)
+        jumped = (kink[:, jump] > 6.0 * np.maximum(nearby, usual)) & moved[:, jump]
         many[jump] = np.sum(jumped) >= enough
     beside = np.append(many[1:], False) | np.append(False, many[:-1])
     alone = np.flatnonzero(many & ~beside)  # a spike makes two such steps in a row
     if not len(alone):
         return []
     at = int(alone[0]) + 2
-    size = float(np.max(np.abs(step[at])))
+    jumped_by = float(np.max(np.abs(signals[at + 1] - signals[at])))
     return [
         Finding(
             kind=Kind.DROPPED_BLOCK,
             message=f"{len(alone)} jump(s) of most channels at once, the first by "
-            f"{size * 1e6:.3g} µm from one "
+            f"{jumped_by * 1e6:.3g} µm from one "
             f"sample to the next at {record.time[at]:.6g} s",
             remedy="samples are missing though the clock runs on; export again",
             severity="stop",
