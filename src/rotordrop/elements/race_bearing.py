@@ -14,6 +14,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.description import Description, Text
 from rotordrop.known import Known
 from rotordrop.physics import ring
+from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
 
 if TYPE_CHECKING:
     from rotordrop.elements.race import Race
@@ -195,6 +196,11 @@ class BearingNumbers(ABC):
     @abstractmethod
     def ring_material(self) -> tuple[float, float]:
         """Young's modulus [Pa] and Poisson's ratio [1] of the race."""
+
+    def rotor_contact(self, bearing: TouchdownBearing, shaft: tuple[float, float]) -> LineContact:
+        """Line contact with a rotor over the width of the race; Young's modulus [Pa], Poisson's ratio [1]."""
+        bore, eta = float(bearing.bore_radius), compliance(*shaft, *self.ring_material)
+        return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)
 
     @abstractmethod
     def entries(self) -> Array:

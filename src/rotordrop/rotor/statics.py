@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
-from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore
+from rotordrop.physics.hertz import LineContact
 from rotordrop.physics.linear_algebra import product, solve
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 
@@ -67,14 +67,9 @@ def bearing_load_shares(machine: Machine, fe: RotorFE | None = None) -> Array:
 
 
 def rotor_on_race(machine: Machine, bearing: TouchdownBearing) -> LineContact:
-    """Line contact of the rotor with the race of one touchdown bearing, over the width of the race.
-
-    The rotor is of the material of the shaft at the bearing's node, the race of that of the rings.
-    """
+    """Line contact of the rotor, of the material of the shaft at its node, with one touchdown bearing."""
     beside = machine.rotor.elements[max(0, bearing.node - 2)]
-    eta = compliance(beside.youngs_modulus, beside.poisson_ratio, *numbers_of(bearing).ring_material)
-    bore = float(bearing.bore_radius)
-    return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)
+    return numbers_of(bearing).rotor_contact(bearing, (beside.youngs_modulus, beside.poisson_ratio))
 
 
 def levitated_sag(fe: RotorFE, machine: Machine) -> Array:
