@@ -139,7 +139,7 @@ def _before_motion(whole: Record) -> float:
 
 def _wiring(evidence: Evidence) -> list[Finding]:
     """Check the planes; none is refused for a lean that friction gave the rotor after a fall as described."""
-    whole, floating = evidence.record.whole, _levitated(evidence.record.whole)
+    whole, floating = evidence.record.whole, _levitated(evidence)
     if floating is None:
         return []
     sunk = fall_of(whole, floating.mean, first_motion(whole)[0])
@@ -148,11 +148,14 @@ def _wiring(evidence: Evidence) -> list[Finding]:
     if isinstance(fall, Missing):
         return found
     straight = fell_as_described(whole, evidence.machine, fall)
-    return check_planes(whole.planes, sunk, evidence.floating.amplitudes[0], fell_straight=straight)
+    return check_planes(whole.planes, sunk, floating.amplitudes[0], fell_straight=straight)
 
 
-def _levitated(whole: Record) -> LevitatedModel | None:
-    """What the sensors read before any of them moved, whatever their wiring: no drop need be found for it."""
+def _levitated(evidence: Evidence) -> LevitatedModel | None:
+    """The levitated motion; where wiring hides the drop, what the sensors read before any of them moved."""
+    if not isinstance(evidence.beginning, Missing):
+        return evidence.floating
+    whole = evidence.record.whole
     assert whole.speed_readings is not None
     try:
         return fit_levitated(whole, _before_motion(whole), speed=float(np.median(whole.speed_readings[:3])))
