@@ -375,6 +375,37 @@ class Extension:
         return self.frame.format(self.joined.join(word for word in words if word))
 
 
+def of_one_unknown(
+    row: Parameter,
+    name: str,
+    neutral: float,
+    sentence: Callable[[Any, Values, float], str] | tuple[str, float],
+    frame: str = "",
+) -> Extension:
+    """An extension whose one unknown has a value with which it says what the base model says.
+
+    The words on a part, or a unit and its size [SI] for name and value; a frame lists the parts in it.
+    """
+
+    def said(part: Any, found: Values, load: float) -> str:
+        if callable(sentence):
+            return sentence(part, found, load)
+        known = found.get(row.path)
+        return "" if known is None else f"{part.name} {in_words(itself(known), *sentence)}"
+
+    return Extension(
+        name=name,
+        owner=row.owner,
+        names=(row.path,),
+        neutral=lambda _: {row.path: guess(neutral)},
+        nothing={row.path: neutral},
+        sentence=said,
+        joined=", " if frame else "; ",
+        frame=frame or "{}",
+        rows=(row,),
+    )
+
+
 def derived(
     function: Callable[..., float], *known: Known, least: float = -math.inf, most: float = math.inf
 ) -> tuple[float, float, float]:

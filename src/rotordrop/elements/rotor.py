@@ -23,7 +23,7 @@ from rotordrop.elements.description import (
     Usual,
     place_on_nodes,
 )
-from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, guess, in_words, itself
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Rule, in_words, itself, of_one_unknown
 from rotordrop.elements.values import default
 from rotordrop.errors import UsageError, unknown_key
 
@@ -420,29 +420,24 @@ class Rotor(Description):
 
 
 EXTENSIONS: tuple[Extension, ...] = (
-    Extension(
-        name="rotor stiffness",
-        owner="rotor",
-        names=("stiffness_factor",),
-        neutral=lambda _: {"stiffness_factor": guess(1.0)},
-        nothing={"stiffness_factor": 1.0},
-        sentence=lambda _, found, __: (
+    of_one_unknown(
+        Parameter(
+            path="stiffness_factor",
+            owner="rotor",
+            label="bending stiffness of the rotor over the described one",
+            kind="dimensionless",
+            measured_by="the first bending frequency of the free rotor, from a hammer test",
+            guess_sigma=0.03,
+            given_sigma=0.01,
+            by_drawing=True,
+            reach=1.3,
+            entries=(Entry(array="modes", column=0, rule=Rule.RATIO),),
+        ),
+        "rotor stiffness",
+        1.0,
+        lambda _, found, __: (
             "the rotor bends as if its stiffness were "
             f"{in_words(itself(found['stiffness_factor']), '')} × the described one"
-        ),
-        rows=(
-            Parameter(
-                path="stiffness_factor",
-                owner="rotor",
-                label="bending stiffness of the rotor over the described one",
-                kind="dimensionless",
-                measured_by="the first bending frequency of the free rotor, from a hammer test",
-                guess_sigma=0.03,
-                given_sigma=0.01,
-                by_drawing=True,
-                reach=1.3,
-                entries=(Entry(array="modes", column=0, rule=Rule.RATIO),),
-            ),
         ),
     ),
 )

@@ -15,10 +15,7 @@ from rotordrop.elements.parameter import (
     SMALLEST_GAP,
     Extension,
     Parameter,
-    Values,
-    guess,
-    in_words,
-    itself,
+    of_one_unknown,
 )
 from rotordrop.elements.values import default
 from rotordrop.physics import columns as L
@@ -145,32 +142,6 @@ def _with_housing(sensor: Sensor) -> Seen:
     return Seen(of_housing=(-cosine, -sine))
 
 
-def _extension(
-    row: Parameter,
-    name: str,
-    neutral: float,
-    words: tuple[str, float, str],
-) -> Extension:
-    """An extension with one unknown of each sensor; words are unit, its size [SI] and text."""
-    unit, size, text = words
-
-    def sentence(sensor: Sensor, found: Values, _load: float) -> str:
-        known = found.get(row.path)
-        return "" if known is None else f"{sensor.name} {in_words(itself(known), unit, size)}"
-
-    return Extension(
-        name=name,
-        owner="sensor",
-        names=(row.path,),
-        neutral=lambda _: {row.path: guess(neutral)},
-        nothing={row.path: neutral},
-        sentence=sentence,
-        joined=", ",
-        frame=text,
-        rows=(row,),
-    )
-
-
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="gain",
@@ -196,7 +167,7 @@ PARAMETERS: tuple[Parameter, ...] = (
 """Unknowns of every sensor."""
 
 EXTENSIONS: tuple[Extension, ...] = (
-    _extension(
+    of_one_unknown(
         Parameter(
             path="time_constant",
             owner="sensor",
@@ -210,9 +181,10 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
         "sensor lag",
         1e-5,
-        ("µs", 1e-6, "sensors that lag behind by {}"),
+        ("µs", 1e-6),
+        "sensors that lag behind by {}",
     ),
-    _extension(
+    of_one_unknown(
         Parameter(
             path="cross_axis",
             owner="sensor",
@@ -230,9 +202,10 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
         "cross-axis sensitivity",
         0.0,
-        ("%", 0.01, "sensors that read part of the motion across: {}"),
+        ("%", 0.01),
+        "sensors that read part of the motion across: {}",
     ),
-    _extension(
+    of_one_unknown(
         Parameter(
             path="follows_housing",
             owner="sensor",
@@ -248,9 +221,10 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
         "brackets that follow the housing",
         0.0,
-        ("%", 0.01, "brackets that make part of the motion of the housing: {}"),
+        ("%", 0.01),
+        "brackets that make part of the motion of the housing: {}",
     ),
-    _extension(
+    of_one_unknown(
         Parameter(
             path="plane_offset",
             owner="sensor",
@@ -265,6 +239,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         ),
         "sensor planes elsewhere",
         0.0,
-        ("mm", 1e-3, "sensors that stand beside their node: {}"),
+        ("mm", 1e-3),
+        "sensors that stand beside their node: {}",
     ),
 )

@@ -23,6 +23,7 @@ from rotordrop.elements.parameter import (
     guess,
     in_words,
     itself,
+    of_one_unknown,
     quotient,
 )
 from rotordrop.elements.values import default, follows, scaled
@@ -352,78 +353,56 @@ def _mode(bearing: Any, found: Values, _load: float) -> str:
 
 
 EXTENSIONS: tuple[Extension, ...] = (
-    Extension(
-        name="turned support axes",
-        owner="bearing",
-        names=("support.coupling",),
-        neutral=lambda _: {"support.coupling": guess(0.0)},
-        nothing={"support.coupling": 0.0},
-        sentence=_axes,
-        rows=(
-            Parameter(
-                path="support.coupling",
-                label="coupling of horizontal and vertical support stiffness",
-                kind="dimensionless",
-                logarithmic=False,
-                guess_sigma=0.25,
-                given_sigma=0.05,
-                lower=-0.85,
-                upper=0.85,
-                entries=bearing_entries(_COUPLING),
-            ),
+    of_one_unknown(
+        Parameter(
+            path="support.coupling",
+            label="coupling of horizontal and vertical support stiffness",
+            kind="dimensionless",
+            logarithmic=False,
+            guess_sigma=0.25,
+            given_sigma=0.05,
+            lower=-0.85,
+            upper=0.85,
+            entries=bearing_entries(_COUPLING),
         ),
+        "turned support axes",
+        0.0,
+        _axes,
     ),
-    Extension(
-        name="cubic support",
-        owner="bearing",
-        names=("support.cubic",),
-        neutral=lambda _: {"support.cubic": guess(0.0)},
-        nothing={"support.cubic": 0.0},
-        sentence=_growth,
-        joined=", ",
-        frame=(
-            "supports whose stiffness changes with load, at the deflection of "
-            f"{PEAK_LOADS:g} mean loads by {{}}"
+    of_one_unknown(
+        Parameter(
+            path="support.cubic",
+            label="cubic term of the support stiffness",
+            kind="cubic_term",
+            logarithmic=False,
+            guess_sigma=0.4,
+            given_sigma=0.1,
+            scale="one over the deflection under ten mean loads, squared",
+            scaled=_cubic_scale,
+            entries=bearing_entries(_CUBIC),
         ),
-        rows=(
-            Parameter(
-                path="support.cubic",
-                label="cubic term of the support stiffness",
-                kind="cubic_term",
-                logarithmic=False,
-                guess_sigma=0.4,
-                given_sigma=0.1,
-                scale="one over the deflection under ten mean loads, squared",
-                scaled=_cubic_scale,
-                entries=bearing_entries(_CUBIC),
-            ),
-        ),
+        "cubic support",
+        0.0,
+        _growth,
+        f"supports whose stiffness changes with load, at the deflection of {PEAK_LOADS:g} mean loads by {{}}",
     ),
-    Extension(
-        name="hysteretic support",
-        owner="bearing",
-        names=("support.friction",),
-        neutral=lambda _: {"support.friction": guess(0.0)},
-        nothing={"support.friction": 0.0},
-        sentence=lambda bearing, found, _load: (
-            f"{bearing.name} {in_words(itself(found['support.friction']), 'N')}"
+    of_one_unknown(
+        Parameter(
+            path="support.friction",
+            label="friction in the support",
+            kind="force",
+            logarithmic=False,
+            guess_sigma=0.3,
+            given_sigma=0.1,
+            lower=0.0,
+            scale="mean load of a bearing",
+            scaled=lambda _, load: (load, (0.0, 3.0 * load)),
+            entries=bearing_entries(_FRICTION),
         ),
-        joined=", ",
-        frame="friction in the supports: {}",
-        rows=(
-            Parameter(
-                path="support.friction",
-                label="friction in the support",
-                kind="force",
-                logarithmic=False,
-                guess_sigma=0.3,
-                given_sigma=0.1,
-                lower=0.0,
-                scale="mean load of a bearing",
-                scaled=lambda _, load: (load, (0.0, 3.0 * load)),
-                entries=bearing_entries(_FRICTION),
-            ),
-        ),
+        "hysteretic support",
+        0.0,
+        ("N", 1.0),
+        "friction in the supports: {}",
     ),
     Extension(
         name="foundation mode",
