@@ -217,6 +217,6 @@ def coast_down_speed_figure(result: CoastDownResult) -> go.Figure:
         curve(figure, time, turning, label, colour=colour)
     if result.standstill_time is not None:
         upright(figure, result.standstill_time, SERIES[4])
-    figure.update_yaxes(title_text=f"{axis_title('speed', 'Hz')}, × 60 in rpm", type="log", **LOG_LABELS)
+    figure.update_yaxes(title_text=axis_title("speed", "Hz"), type="log", **LOG_LABELS)
     figure.update_xaxes(title_text=FROM_POWER_OFF)
     return fit_legend(figure)

@@ -160,6 +160,13 @@ class Section:
     statements: tuple[Statement, ...] = ()
     figures: tuple[Figure, ...] = ()
     tables: tuple[Table, ...] = ()
+    folded: bool = False
+    """Whether a page shows the heading alone until it is opened or printed."""
+
+
+def appendix(sections: Iterable[Section]) -> tuple[Section, ...]:
+    """The same sections folded: what a page holds for whoever asks."""
+    return tuple(replace(section, folded=True) for section in sections)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,7 +191,7 @@ class ReportContent:
     sections: tuple[Section, ...] = ()
     """Figures and tables."""
     lead: int = 0
-    """How many of the sections stand directly under the headline numbers, before the notes."""
+    """How many of the sections stand with the headline numbers, before the notes: the first printed page."""
     ends: tuple[str, str] | None = None
     """Names of the first and the last bearing, between which one looks."""
 

@@ -19,6 +19,7 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
+    appendix,
     fact,
     table,
 )
@@ -108,9 +109,13 @@ def critical_speeds_page(
             _map_section(first),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
             *(_stability_section(machine, stability) if stability else ()),
-            Section("Stiffness of the bearings", tables=(stiffness_table(first),)),
-            *map(_map_section, others),
-            *defaults_section(machine),
+            *appendix(
+                [
+                    Section("Stiffness of the bearings", tables=(stiffness_table(first),)),
+                    *map(_map_section, others),
+                    *defaults_section(machine),
+                ]
+            ),
         ),
         lead=1,
     )
@@ -167,9 +172,9 @@ def _too_near(name: str, crossing: Crossing, one: Separation, nominal: float) ->
     """A critical speed that is nearer to the nominal speed than API 617 asks for."""
     text = (
         f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
-        f"{_speed_text(crossing.speed)}, {one.margin:.1%} from the nominal speed of {_speed_text(nominal)}, "
-        f"with a damping ratio of {crossing.damping_ratio:.2%} and an amplification factor of "
-        f"{one.factor:.1f}; API 617 asks for {one.required:.1%}."
+        f"{_speed_text(crossing.speed)}, {100.0 * one.margin:.1f} % from the nominal speed of "
+        f"{_speed_text(nominal)}, with a damping ratio of {100.0 * crossing.damping_ratio:.2f} % and an "
+        f"amplification factor of {one.factor:.1f}; API 617 asks for {100.0 * one.required:.1f} %."
     )
     return Statement(text, "warning" if name == "free-free" else "bad")
 
@@ -191,8 +196,8 @@ def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: floa
         figures = []
         for number, crossing in enumerate(ordered[:ON_CARD], start=1):
             one, hertz = judged.get(crossing), crossing.speed / TURN
-            margin = "" if one is None else f"; margin {one.margin:.1%}, API 617 {one.verdict}"
-            note = f"{written(60.0 * hertz, 0)} rpm; damping ratio {crossing.damping_ratio:.2%}{margin}"
+            margin = "" if one is None else f"; margin {100.0 * one.margin:.1f} %, API 617 {one.verdict}"
+            note = f"{written(60.0 * hertz, 0)} rpm; damping {100.0 * crossing.damping_ratio:.2f} %{margin}"
             label = f"Critical speed {number}, {crossing.direction}"
             figures.append(fact(label, hertz, "frequency", note=note))
         cards.append(Card(_held(name), tuple(figures)))
@@ -273,8 +278,9 @@ def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
         f"campbell {name}",
     )
     shapes = Figure(
-        mode_shape_figure(diagram, bearings, SHAPES),
-        "Shapes of the lowest modes at the lowest speed, in the plane of the largest deflection.",
+        mode_shape_figure(diagram, bearings, SHAPES, float(machine.speed.nominal)),
+        "Shapes of the lowest forward and mixed modes at the nominal speed, in the plane of the largest "
+        "deflection.",
         f"shapes {name}",
     )
     return Section(f"{_held(name)}: Campbell diagram and shapes", figures=(lines, shapes))
@@ -382,7 +388,7 @@ def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | N
     if nominal is not None:
         for column in (1, 2):
             upright(figure, nominal / TURN, row=1, col=column)
-    figure.update_xaxes(title_text=axis_title("rotor speed, × 60 in rpm", "Hz"))
+    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"))
     figure.update_yaxes(title_text=axis_title("frequency", "Hz"), range=[0.0, highest], col=1)
     figure.update_yaxes(title_text=axis_title("damping ratio", "%"), rangemode="tozero", col=2)
     return fit_legend(figure)
@@ -401,21 +407,25 @@ def stability_figure(found: Sequence[StabilityMap]) -> go.Figure:
 
 
 def mode_shape_figure(
-    diagram: CampbellDiagram, bearings: Sequence[tuple[str, float]], count: int
+    diagram: CampbellDiagram, bearings: Sequence[tuple[str, float]], count: int, speed: float
 ) -> go.Figure:
-    """Draw the shapes of the lowest modes at the lowest speed, in the plane of their largest deflection.
+    """Draw the shapes of the lowest modes at a speed [rad/s] in the plane of their largest deflection.
 
-    Bearings are marked at their positions [m]; of two modes of one frequency only the first is drawn.
+    Bearings are marked at their positions [m]. Backward modes, whose shapes are nearly those of the forward
+    ones, are left out; of two modes of one frequency only the first is drawn.
     """
     figure = panels(("",), height=320)
-    for index, k in enumerate(_distinct(diagram.frequency[0])[:count]):
-        shape = diagram.shapes[0, k]
+    at = int(np.argmin(np.abs(diagram.speed - speed)))
+    seen = np.isfinite(diagram.whirl[at])
+    drawn = [k for k in _distinct(diagram.frequency[at]) if seen[k] and diagram.direction(k) != "backward"]
+    for index, k in enumerate(drawn[:count]):
+        shape = diagram.shapes[at, k]
         plane = int(np.argmax(np.max(np.abs(shape), axis=0)))
         curve(
             figure,
             MILLI * diagram.node_positions,
             shape[:, plane].real,
-            f"{diagram.frequency[0, k]:.1f} Hz",
+            f"{diagram.frequency[at, k]:.1f} Hz, {diagram.direction(k)}",
             colour=SERIES[index % len(SERIES)],
             width=1.6,
             hover="%{x:.0f} mm: %{y:.3f}",

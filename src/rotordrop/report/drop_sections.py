@@ -36,7 +36,7 @@ def drop_sections(
     *,
     contact_tables: tuple[Table, ...] = (),
 ) -> tuple[Section, ...]:
-    """Force, stress, impacts, motion, first contact and orbit of a drop, in this order.
+    """Force, orbit, stress, impacts, motion and first contact of a drop, in this order.
 
     The origin says what is drawn, as "measured and estimated"; the speed at power-off [rad/s] names the
     drop; static loads are the share of the weight by bearing [N].
@@ -49,11 +49,12 @@ def drop_sections(
     )
     return (
         _force(bearings, static_loads or {}),
+        orbit_section(bearings),
         _stress(bearings, speed),
         _impacts(bearings),
         motion_section(bearings, origin),
+        radial_section(bearings),
         Section("First contact", figures=(contact,), tables=contact_tables),
-        orbit_section(bearings),
     )
 
 
@@ -134,11 +135,35 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
 
 
 def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str, *text: str) -> Section:
-    """Displacement against time, horizontal beside vertical, all bearings zooming together."""
+    """Displacement against time: horizontal beside vertical, all bearings zooming together."""
     caption = f"Displacement of the rotor, {origin}; the panels zoom together (Neisi 2020, Figs 7, 8 and 13)."
     carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
     figure = Figure(displacement_figure(bearings), caption, "displacement")
     return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(figure,))
+
+
+def radial_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
+    """Distance of the rotor from the centre of every bearing against time."""
+    rows = [
+        [
+            Panel(
+                title=bearing.name,
+                axis="radial displacement",
+                histories=tuple(motion.radial for motion in bearing.at_gap_limits or bearing.motions),
+                air_gap=bearing.air_gap,
+            )
+        ]
+        for bearing in bearings
+    ]
+    radial = Figure(
+        time_panels(rows, MICRO, "µm", from_zero=True),
+        "Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
+        if any(bearing.at_gap_limits for bearing in bearings)
+        else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
+        "(Neisi 2020, Fig. 14).",
+        "radial displacement",
+    )
+    return Section("Radial displacement", figures=(radial,))
 
 
 def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> object:
@@ -166,7 +191,7 @@ def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> obj
 def orbit_section(
     bearings: Sequence[BearingMotions | BearingDrop], early: Sequence[BearingMotions] = (), until: str = ""
 ) -> Section:
-    """Orbits in the clearance circle, of an early part alone where one is given, and radial displacement."""
+    """Orbits in the clearance circle, of an early part alone where one is given."""
     # planes of sensors alone stand in the order of the record, not in that of the rotor
     seen = f", seen from {bearings[-1].name}" if isinstance(bearings[-1], BearingDrop) else ""
     orbit = Figure(
@@ -175,32 +200,13 @@ def orbit_section(
         "(Neisi 2020, Fig. 12).",
         "orbit",
     )
-    rows = [
-        [
-            Panel(
-                title=bearing.name,
-                axis="radial displacement",
-                histories=tuple(motion.radial for motion in bearing.at_gap_limits or bearing.motions),
-                air_gap=bearing.air_gap,
-            )
-        ]
-        for bearing in bearings
-    ]
-    radial = Figure(
-        time_panels(rows, MICRO, "µm", from_zero=True),
-        "Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
-        if any(bearing.at_gap_limits for bearing in bearings)
-        else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
-        "(Neisi 2020, Fig. 14).",
-        "radial displacement",
-    )
-    return Section("Orbit", figures=(orbit, radial))
+    return Section("Orbit", figures=(orbit,))
 
 
 def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> object:
-    """Draw the speed of the rotor, and of the inner races beside it [rad/s], in Hz; × 60 in rpm."""
-    row = [Panel(title="rotor", axis="speed, × 60 in rpm", histories=tuple(rotor))]
+    """Draw the speed of the rotor, and of the inner races beside it [rad/s], in Hz."""
+    row = [Panel(title="rotor", axis="speed", histories=tuple(rotor))]
     if races:
-        axis = "race speed, × 60 in rpm"
+        axis = "race speed"
         row.append(Panel(title="inner races", axis=axis, histories=tuple(races), series=True))
     return time_panels([row], 1.0 / TURN, "Hz", height=250)

@@ -22,6 +22,7 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
+    appendix,
     table,
 )
 from rotordrop.report.drop_sections import drop_sections
@@ -66,6 +67,8 @@ CROSS_CHECK_NOTE = (
     "that fits its record it takes sensor errors, air gaps and, for the stress, the preload; from one that "
     "does not it takes nothing."
 )
+FRONT = 3
+"""Sections of the page to send: force, orbit, what to do."""
 AGREES = "The independent cross-check agrees within its known accuracy."
 
 
@@ -82,7 +85,9 @@ def estimate_page(
     assumptions of the package.
     """
     weighed = card or assumed_card(estimate, since)
-    return replace(estimate_summary(estimate, origin), sections=_sections(estimate, since, weighed), lead=1)
+    return replace(
+        estimate_summary(estimate, origin), sections=_sections(estimate, since, weighed), lead=FRONT
+    )
 
 
 def assumed_card(estimate: Estimate, since: Drop | None = None) -> RestartCard:
@@ -200,8 +205,11 @@ def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tupl
         statements=cross_check_statements(estimate.cross_check),
         tables=(cross_check_table(estimate.cross_check),),
     )
-    return (
-        *drop_sections(estimate.bearings, origin, estimate.speed, shares, contact_tables=tables),
+    force, orbit, *rest = drop_sections(
+        estimate.bearings, origin, estimate.speed, shares, contact_tables=tables
+    )
+    further = (
+        *rest,
         _severity(estimate),
         changed_section(estimate, since),
         restart_section(card),
@@ -211,13 +219,13 @@ def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tupl
         *(() if steps is None else (speed_section(estimate, steps),)),
         *((_consistency(estimate),) if estimate.checks else ()),
         *((cross_check,) if estimate.cross_check else ()),
-        inspection_section(estimate),
         limits_section(estimate),
         record_quality_section(estimate.findings, *unseen_in(estimate.notes)),
         drawing_section(estimate.machine),
         assumptions_section(),
         *defaults_section(estimate.machine),
     )
+    return (force, orbit, inspection_section(estimate), *appendix(further))
 
 
 def _severity(estimate: Estimate) -> Section:

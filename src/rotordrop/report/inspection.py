@@ -53,7 +53,7 @@ def inspection_section(estimate: Estimate) -> Section:
         f"'rotordrop clearance'). A gap that differs from the one found here ({gaps}) is wear or a sensor "
         "that has moved; turning each bearing by hand shows whether it still runs."
     )
-    return Section("Suggested inspection", (SCOPE,), (*said, Statement(text)))
+    return Section("What to do", (), (*said, Statement(text), Statement(SCOPE)))
 
 
 def limits_section(estimate: Estimate) -> Section:

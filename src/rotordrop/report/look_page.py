@@ -18,10 +18,11 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
+    appendix,
     fact,
     table,
 )
-from rotordrop.report.drop_sections import motion_section, orbit_section
+from rotordrop.report.drop_sections import motion_section, orbit_section, radial_section
 from rotordrop.report.impacts import IMPACT_RULE
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.record_quality import quality_statements, record_quality_section
@@ -44,7 +45,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     """Build the page of a look at a record, with figures where they are wanted."""
     if not seen.drops:
         return _page_without_drop(seen, drawn=drawn)
-    record = seen.record
+    record, figures = seen.record, _figures(seen) if drawn else ()
     speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
     notes = tuple(Statement(note) for note in seen.notes)
     facts = _facts(seen)
@@ -65,10 +66,12 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
+        lead=1 if drawn else 0,
         summary=(table(seen.timeline(), timeline, "What happened when"),),
         sections=(
-            *(_figures(seen) if drawn else ()),
+            *figures[:2],
             Section("Impacts", tables=(_impacts(seen),)),
+            *figures[2:],
             record_quality_section(seen.findings, seen.not_seen),
             Section("What was read and guessed", statements=notes),
         ),
@@ -278,7 +281,11 @@ def _figures(seen: Look) -> tuple[Section, ...]:
         for motion in one.motions
     ]
     until = f" until {ORBIT_UNTIL:g} s after the release" if time[-1] > ORBIT_UNTIL else ""
-    return motion_section(bearings, "measured", SENSOR_PLANES), orbit_section(bearings, first, until)
+    return (
+        orbit_section(bearings, first, until),
+        motion_section(bearings, "measured", SENSOR_PLANES),
+        *appendix([radial_section(bearings)]),
+    )
 
 
 def _impacts(seen: Look) -> Table:

@@ -58,8 +58,8 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
         radii = [float(np.nanmax(np.abs(motion.displacement))) for motion in bearing.motions]
         reach = 1.08 * MICRO * max([*radii, bearing.air_gap.upper if bearing.air_gap else 0.0])
         square(figure, column, reach)
-    figure.update_xaxes(title_text=axis_title("horizontal displacement x", "µm"))
-    figure.update_yaxes(title_text=axis_title("vertical displacement y", "µm"))
+    figure.update_xaxes(title_text=axis_title("displacement x", "µm"))
+    figure.update_yaxes(title_text=axis_title("displacement y", "µm"))
     return fit_legend(figure)
 
 

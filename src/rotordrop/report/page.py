@@ -80,7 +80,8 @@ def content_security_policy(scripts: tuple[str, ...]) -> str:
 
 def _numbered_sections(content: ReportContent) -> list[dict[str, Any]]:
     """Sections with an anchor each and their figures as JSON with a number through the whole page."""
-    numbered, count = [], 0
+    numbered: list[dict[str, Any]] = []
+    count = 0
     for index, section in enumerate(content.sections, start=1):
         figures = [
             {
@@ -92,7 +93,9 @@ def _numbered_sections(content: ReportContent) -> list[dict[str, Any]]:
             for number, figure in enumerate(section.figures, start=count + 1)
         ]
         count += len(figures)
-        numbered.append({"anchor": f"section-{index}", "section": section, "figures": figures})
+        first = section.folded and not any(entry["section"].folded for entry in numbered)
+        anchor = f"section-{index}"
+        numbered.append({"anchor": anchor, "section": section, "figures": figures, "appendix": first})
     return numbered
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rotordrop.estimate.bearing_drop import History, simulated_bearings
-from rotordrop.report.content import Column, Figure, ReportContent, Section, table
+from rotordrop.report.content import Column, Figure, ReportContent, Section, appendix, table
 from rotordrop.report.drop_sections import drop_sections, speed_figure
 from rotordrop.report.heat_section import heat_sections
 from rotordrop.report.machine_sections import machine_sections, weight_shares
@@ -60,17 +60,20 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     turning = Figure(
         speed_figure(rotor, races), "Speed of the rotor and of the inner races, which friction spins up."
     )
+    force, orbit, *rest = drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine))
     return replace(
         simulate_summary(result, machine),
         sections=(
-            *drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine)),
+            force,
+            orbit,
+            *appendix(rest),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
             *((_landing(result, landed),) if landed else ()),
             *heat_sections(result.heat, result.bearing_names),
             Section("Speed", figures=(turning,)),
-            *(() if machine is None else machine_sections(machine)),
+            *(() if machine is None else appendix(machine_sections(machine))),
         ),
-        lead=1,
+        lead=2,
         ends=(bearings[0].name, bearings[-1].name),
     )
 

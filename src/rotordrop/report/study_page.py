@@ -14,11 +14,20 @@ from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.machine import kind_of_path
-from rotordrop.report.content import Column, Figure, ReportContent, Section, Statement, Table, table
+from rotordrop.report.content import (
+    Column,
+    Figure,
+    ReportContent,
+    Section,
+    Statement,
+    Table,
+    appendix,
+    table,
+)
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.spread import ends, percent, study_numbers_of
-from rotordrop.report.style import SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
+from rotordrop.report.style import OVER, SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
 from rotordrop.simulate.clearances import share_column, stopped
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import Quantity
@@ -27,6 +36,8 @@ from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
 
 SHARES = (0.5, 0.9, 0.99)
+BELOW = 115.0
+"""Upper end of the axis of the shares below a value [%]: the label of the last one stands above 100."""
 MAPPED = ("peak_force", "peak_stress", "settling_time")
 """Quantities of a bearing whose quantiles are drawn against what varies."""
 MATTERS = ("peak_force", "peak_stress")
@@ -77,7 +88,7 @@ def study_page(
             *_influence_section(results),
             _distribution_section(results),
             *(_map_section(results, name, limits or {}) for name in by),
-            Section("All quantiles", (QUANTILES,), tables=(_table(results, (0.05, *SHARES)),)),
+            *appendix([Section("All quantiles", (QUANTILES,), tables=(_table(results, (0.05, *SHARES)),))]),
         ),
     )
 
@@ -96,28 +107,35 @@ def _what_is_missing(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Statement]:
+    """What qualifies every number first, then limits, loads, and whether the rotor whirled."""
     said = []
-    if len(results) < results.study.drops:
-        said.append(Statement(_what_is_missing(results)))
-    if results.study.design == "sensitivity":
-        said.append(Statement(SENSITIVITY))
     if results.taken_over:
         said.append(Statement(results.taken_over, "warning"))
     failed = sum(results.failed.values())
     if failed:
         reasons = "; ".join(f"{count} ×: {reason}" for reason, count in results.failed.items())
         said.append(Statement(f"{failed} drops could not be computed: {reasons}", "warning"))
-    for bearing in results.study.machine.touchdown_bearings:
-        whirl = results.exceedance(f"{bearing.name}.backward_whirl", 0.0)
-        text = f"{bearing.name}: {percent(whirl)} of the drops went into backward whirl."
-        said.append(Statement(text, "notice" if whirl.value == 0.0 else "warning"))
+    names = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    for name in names:
         for quantity, limit in limits.items():
-            over = results.exceedance(f"{bearing.name}.{quantity}", limit)
-            shown = format_quantity(limit, _quantity(results, bearing.name, quantity).kind)
-            text = (
-                f"{bearing.name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
-            )
+            over = results.exceedance(f"{name}.{quantity}", limit)
+            shown = format_quantity(limit, _quantity(results, name, quantity).kind)
+            text = f"{name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
             said.append(Statement(text, "notice" if over.high < 0.5 else "warning"))
+    said += [Statement(_loads(results, name)) for name in names]
+    if len(results) < results.study.drops:
+        said.append(Statement(_what_is_missing(results)))
+    if results.study.design == "sensitivity":
+        said.append(Statement(SENSITIVITY))
+    whirls = {name: results.exceedance(f"{name}.backward_whirl", 0.0) for name in names}
+    said += [
+        Statement(f"{name}: {percent(whirl)} of the drops went into backward whirl.", "warning")
+        for name, whirl in whirls.items()
+        if whirl.value > 0.0
+    ]
+    if all(whirl.value == 0.0 for whirl in whirls.values()):
+        most = max(whirl.high for whirl in whirls.values())
+        said.append(Statement(f"No drop went into backward whirl (90 %: at most {100 * most:.2g} % do)."))
     machine = results.study.machine
     places = [(one.name, False, "the rotor touches") for one in machine.clearances]
     places += [(name, True, "the mount reaches its stop") for name in stopped(machine)]
@@ -126,6 +144,18 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         text = f"{name}: {happens} in {percent(touching)} of the drops."
         said.append(Statement(text, "notice" if touching.value == 0.0 else "warning"))
     return [*said, Statement(SCOPE)]
+
+
+def _loads(results: StudyResults, name: str) -> str:
+    """Force and stress of a bearing that all but one in a hundred drops stay below."""
+    rare = SHARES[-1]
+    known = [
+        Shown.of(results.quantile(f"{name}.{quantity}", rare), _quantity(results, name, quantity).kind, 3)
+        for quantity in HEADLINES
+    ]
+    force, stress = (f"{one.text} (90 %: {one.interval_text})" for one in known)
+    said = f"{100 * rare:g} % of the drops stay below a peak force of {force} and a stress of {stress}."
+    return f"{name}: {said}"
 
 
 def _distribution_section(results: StudyResults) -> Section:
@@ -165,12 +195,20 @@ def _distribution_figure(results: StudyResults, quantity: str) -> go.Figure:
         curve(figure, values, below, "drops below", row=2, **drawn, line=step, hover="%{x:.4~g}: %{y:.3~g} %")
         for share in SHARES:
             at = results.quantile(shown.name, share).value / size
-            upright(figure, at, SERIES[1], "dot", row=2, col=column, annotation_text=f"{100 * share:g} %")
+            upright(figure, at, SERIES[1], "dot", row=2, col=column)
+            # at the height of its share, above the curve: at one height the labels of 90 and 99 % collide
+            label = {
+                "text": f"{100 * share:g} %",
+                "showarrow": False,
+                "xanchor": "right",
+                "yanchor": "bottom",
+            }
+            figure.add_annotation(x=at, y=100.0 * share, row=2, col=column, bgcolor=OVER, **label)
         words = quantity.replace("_", " ")
         figure.update_xaxes(title_text=axis_title(words, unit), row=2, col=column)
-        figure.update_xaxes(matches="x" if column == 1 else f"x{column}", row=2, col=column)
     figure.update_yaxes(title_text=axis_title("drops", "%"), rangemode="tozero", row=1, col=1)
-    figure.update_yaxes(title_text=axis_title("drops below", "%"), rangemode="tozero", row=2, col=1)
+    figure.update_yaxes(range=[0.0, BELOW], row=2)
+    figure.update_yaxes(title_text=axis_title("drops below", "%"), row=2, col=1)
     return fit_legend(figure)
 
 
@@ -249,7 +287,16 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
     if kind is None:
         kind = kind_of_path(machine, name.replace("*", machine.touchdown_bearings[0].name, 1))
     asked: list[tuple[str, float | None]] = [(quantity, None) for quantity in MAPPED]
-    asked += (WHIRL | dict(limits)).items()
+    seen = {
+        quantity: limit
+        for quantity, limit in (WHIRL | dict(limits)).items()
+        # what happened in no drop is said in the verdict: its figure would be a line at zero
+        if any(
+            results.exceedance(f"{bearing.name}.{quantity}", limit).value > 0.0
+            for bearing in machine.touchdown_bearings
+        )
+    }
+    asked += seen.items()
     figures = []
     for quantity, limit in asked:
         what = "Quantiles of" if limit is None else "Probability among"

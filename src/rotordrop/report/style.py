@@ -63,6 +63,10 @@ def plain(text: str) -> str:
     return html.escape(str(text), quote=False)
 
 
+OVER = "rgba(255,255,255,0.85)"
+"""Paper behind words that stand over curves."""
+
+
 def axis_title(text: str, unit: str) -> str:
     """Title of an axis, always with its unit; a pure number has the unit 1."""
     return f"{text} [{unit or '1'}]"

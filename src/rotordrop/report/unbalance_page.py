@@ -207,7 +207,7 @@ def bode_figure(response: MachineResponse, nominal: float) -> go.Figure:
             )
     for row in (1, 2):
         upright(figure, nominal / TURN, row=row, col=1)
-    figure.update_xaxes(title_text=axis_title("rotor speed, × 60 in rpm", "Hz"), row=2)
+    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"), row=2)
     figure.update_yaxes(title_text=axis_title("amplitude", "µm"), rangemode="tozero", row=1)
     figure.update_yaxes(title_text=axis_title("phase lag", "°"), row=2)
     return fit_legend(figure)

@@ -246,7 +246,7 @@ def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.
     ):
         curve(figure, t, fitted / TURN, name, colour=colour, width=1.4)
         curve(figure, t, (fitted_to - fitted) / TURN, name, row=2, colour=colour, width=1.4, legend=False)
-    figure.update_yaxes(title_text=f"{axis_title('speed', 'Hz')}, × 60 in rpm", row=1)
+    figure.update_yaxes(title_text=axis_title("speed", "Hz"), row=1)
     figure.update_yaxes(title_text=axis_title("residual", "Hz"), row=2)
     figure.update_xaxes(title_text=FROM_POWER_OFF, row=2)
     return fit_legend(figure)

@@ -46,9 +46,10 @@ def test_a_mode_near_the_nominal_speed_is_a_problem(share):
     (text,) = problems(share)
     hertz = NOMINAL / (2.0 * math.pi)
     assert f"a forward mode meets the rotor's own speed at {share * hertz:.1f} Hz" in text
-    assert f"{abs(share - 1.0):.1%} from the nominal speed of {hertz:.1f} Hz ({60.0 * hertz:.0f} rpm)" in text
-    assert "damping ratio of 2.50% and an amplification factor of 20.0" in text
-    assert f"API 617 asks for {'16.0' if share < 1.0 else '26.0'}%" in text
+    away = f"{100.0 * abs(share - 1.0):.1f} %"
+    assert f"{away} from the nominal speed of {hertz:.1f} Hz ({60.0 * hertz:.0f} rpm)" in text
+    assert "damping ratio of 2.50 % and an amplification factor of 20.0" in text
+    assert f"API 617 asks for {'16.0' if share < 1.0 else '26.0'} %" in text
 
 
 def test_a_mode_further_off_or_against_the_spin_is_none():
@@ -93,5 +94,5 @@ def test_the_cards_hold_the_critical_speeds_forward_ones_first():
     assert card.title == "In its AMBs"
     assert [one.value.text for one in card.figures] == ["120.0 Hz", "548.4 Hz", "90.00 Hz"]
     assert card.figures[0].label == "Critical speed 1, forward"
-    assert "7\u202f200 rpm; damping ratio 2.50%; margin" in card.figures[0].note
+    assert "7\u202f200 rpm; damping 2.50 %; margin" in card.figures[0].note
     assert "margin" not in card.figures[2].note

@@ -10,7 +10,9 @@ import pytest
 from tests.unit.web.browser import CHROMIUM, Browser
 
 from rotordrop.estimate.bearing_drop import History
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
+from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.time_panels import Panel, time_panels
@@ -90,3 +92,35 @@ def test_a_page_is_dark_where_that_is_asked_for_its_figures_too(browser: Browser
         browser.colours(scheme)
         browser.until(f"{drawn} === '{figure}'")
         assert browser.evaluate(paper) == page
+
+
+PAPER = (695, 1005)
+"""Width and height of A4 inside the margins of a report [px of 1/96 inch]."""
+
+
+def test_the_first_printed_page_is_the_one_to_send_and_the_rest_an_appendix(
+    browser: Browser, tmp_path: Path, estimate: Estimate
+) -> None:
+    """Verdict, four numbers for each bearing, force, orbit and what to do; on screens all else is folded."""
+    write_page(estimate_page(estimate), tmp_path / "page.html")
+    browser.size(1280, 900)
+    browser.open(f"file://{tmp_path / 'page.html'}")
+    browser.until("document.documentElement.getAttribute('data-drawn') === '2'")
+    heads = "[...document.querySelectorAll('.front h2')].map(one => one.innerText).join()"
+    assert browser.evaluate(heads) == "Verdict,Bearing force,Orbit,What to do"
+    assert browser.evaluate("document.querySelectorAll('.front .card dl > div').length") == 8
+    last = "[...document.querySelectorAll('.part')].find(one => one.querySelector('.chart'))"
+    assert browser.evaluate(f"{last}.open") is False
+    browser.evaluate(f"document.querySelector(`.contents a[href='#${{{last}.id}}']`).click()")
+    browser.until(f"{last}.open && {last}.querySelector('.chart svg')")
+    browser.size(*PAPER)
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    browser.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    browser.until("[...document.querySelectorAll('.chart')].every(one => one.querySelector('svg'))")
+    assert browser.evaluate("document.querySelectorAll('details:not([open])').length") == 0
+    # a wider page is made smaller, words and all
+    assert browser.evaluate("document.documentElement.scrollWidth") <= PAPER[0]
+    assert edges(browser, ".front")[3] <= PAPER[1]
+    browser.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    browser.call("Emulation.setEmulatedMedia", media="")
+    assert browser.evaluate("document.querySelectorAll('.part[open]').length") == 1

@@ -67,7 +67,7 @@ def stressed(bearing: BearingDrop, value: float, high: float) -> BearingDrop:
 
 def test_a_usual_drop_asks_for_a_lift_check_with_the_gaps_found(drop_result: DropResult) -> None:
     said = inspection_section(estimate(drop_result)).statements
-    assert [one.level for one in said] == ["notice"]
+    assert [one.level for one in said] == ["notice", "notice"]
     assert "NDE 275 µm; DE 285 µm" in said[0].text
 
 
@@ -77,7 +77,7 @@ def test_a_stress_whose_interval_reaches_the_static_limit_asks_for_a_look_at_the
     nde, de = simulated_bearings(drop_result)
     below = estimate(drop_result, bearings=(stressed(nde, 3.9e9, 4.19e9), de))
     above = estimate(drop_result, bearings=(stressed(nde, 3.9e9, 4.21e9), de))
-    assert len(inspection_section(below).statements) == 1
+    assert not any(one.level == "warning" for one in inspection_section(below).statements)
     said = inspection_section(above).statements[0]
     assert said.level == "warning"
     assert "NDE: look at balls and raceways" in said.text
@@ -87,7 +87,7 @@ def test_a_stress_whose_interval_reaches_the_static_limit_asks_for_a_look_at_the
 def test_a_model_that_does_not_fit_is_to_be_settled_before_anything_else(drop_result: DropResult) -> None:
     later = LaterMotion(bearing="DE", first=2e-4, first_time=0.01, later=3e-4, later_time=1.25, resolved=1e-6)
     said = inspection_section(estimate(drop_result, consistent=False, later=(later,))).statements
-    assert [one.level for one in said] == ["bad", "warning", "notice"]
+    assert [one.level for one in said] == ["bad", "warning", "notice", "notice"]
     assert "DE: look at the rest of the record" in said[1].text
     assert "at 1.25 s" in said[1].text
 

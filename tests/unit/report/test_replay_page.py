@@ -186,7 +186,7 @@ def test_contact_times_stand_side_by_side_and_missing_ones_are_dashes(agreement:
 
 
 def test_both_limits_of_the_gap_are_drawn_beside_the_measurement(drop: Estimate) -> None:
-    drawn = section(drop, "Orbit").figures[1].chart
+    drawn = section(drop, "Radial displacement").figures[0].chart
     names = ["simulated, lower gap", "simulated, upper gap", "measured"]  # the measured one on top
     assert [item.name for item in drawn.data if item.xaxis == "x2"] == names
     lower = next(item for item in drawn.data if item.name == names[0] and item.xaxis == "x2")

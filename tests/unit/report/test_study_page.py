@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tests.unit.web.browser import CHROMIUM, Browser
 
 from rotordrop.machine import example_machine
 from rotordrop.report.content import ReportContent
+from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.study_page import SHARES, spoken_value, study_page
 from rotordrop.study.plan import read_study
@@ -71,6 +75,57 @@ def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(
         assert at == pytest.approx(100.0 * share, abs=1.0)
     lines = [shape.x0 for shape in chart.layout.shapes if shape.xref == "x3"]
     assert_allclose(lines, [quantile(values, share).value for share in SHARES])
+
+
+def test_the_verdict_begins_with_the_loads_and_whirl_that_never_was_is_one_line(
+    page: ReportContent, results: StudyResults
+) -> None:
+    rare = page.summary[0].rows[0][3]
+    assert isinstance(rare, Quantity)
+    first = page.verdict[0].text
+    assert first.startswith("NDE: 99 % of the drops stay below a peak force of ")
+    assert rare.text in first and rare.interval_text in first
+    assert page.verdict[1].text.startswith("DE: 99 % of the drops")
+    assert sum("whirl" in one.text for one in page.verdict) == 1
+    never, once = (study_page(one, ["speed"]) for one in (results, whirled(results)))
+    count = [len(one.sections[2].figures) for one in (never, once)]
+    assert count == [3, 4]  # no figure of what happened in no drop
+    assert any(one.text.startswith("NDE: 0.5 %") and one.level == "warning" for one in once.verdict)
+
+
+def whirled(results: StudyResults) -> StudyResults:
+    """The same drops, one of them in backward whirl."""
+    share = np.zeros(DROPS)
+    share[7] = 0.4
+    return replace(results, numbers={**results.numbers, "NDE.backward_whirl": share})
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+def test_labels_of_the_percentiles_do_not_collide(results: StudyResults, tmp_path: Path) -> None:
+    """Half of the drops are alike, so that all but one percentile lie at one value."""
+    force = np.where(np.arange(DROPS) < 0.6 * DROPS, 2000.0, 2400.0) + np.linspace(0.0, 0.1, DROPS)
+    close = replace(results, numbers={**results.numbers, "NDE.peak_force": force})
+    write_page(study_page(close), tmp_path / "study.html")
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.open(f"file://{tmp_path / 'study.html'}")
+        browser.until("Number(document.documentElement.getAttribute('data-drawn')) >= 2")
+        boxes = browser.evaluate(
+            "[...document.querySelector('.chart').querySelectorAll('.annotation-text')]"
+            ".filter(one => one.textContent.endsWith('%')).map(one => one.getBoundingClientRect())"
+            ".map(one => [one.left, one.top, one.right, one.bottom])"
+        )
+        quiet = browser.messages()
+    finally:
+        browser.close()
+    assert len(boxes) == 6
+    apart = [
+        one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+        for k, one in enumerate(boxes)
+        for other in boxes[:k]
+    ]
+    assert all(apart)
+    assert quiet == []
 
 
 def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page: ReportContent) -> None:

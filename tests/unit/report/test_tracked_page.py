@@ -275,7 +275,9 @@ def test_the_event_is_written_as_a_person_would(estimate: Estimate) -> None:
 
 def test_every_curve_is_drawn_once(estimate: Estimate) -> None:
     content = estimate_page(estimate)
-    assert content.lead == 1 and content.sections[0].heading == "Bearing force"
+    front = [section.heading for section in content.sections[: content.lead]]
+    assert front == ["Bearing force", "Orbit", "What to do"]
+    assert all(section.folded for section in content.sections[content.lead :])
     drawn = {section.heading: len(section.figures) for section in content.sections}
     assert (drawn["Bearing force"], drawn["Displacement"]) == (1, 1)
 

@@ -17,8 +17,14 @@
   };
   var colours = new RegExp(Object.keys(dark).map(function (one) { return one.replace(/[.()]/g, "\\$&"); }).join("|"), "g");
   var night = window.matchMedia("(prefers-color-scheme: dark)");
-  var waiting = Array.prototype.slice.call(document.querySelectorAll(".chart"));
+  var hidden = "details:not([open])";
+  var charts = list(".chart");
   var drawn = [];
+
+  function list(selector) { return Array.prototype.slice.call(document.querySelectorAll(selector)); }
+  function waiting() {
+    return charts.filter(function (one) { return drawn.indexOf(one) < 0 && !one.closest(hidden); });
+  }
 
   function described(element, onDark) {
     var text = document.getElementById(element.id + "-data").textContent;
@@ -32,7 +38,7 @@
   }
 
   function drawNext() {
-    var element = waiting.shift();
+    var element = waiting()[0];
     if (!element) { document.documentElement.setAttribute("data-drawn", String(drawn.length)); return; }
     draw(element);
     window.setTimeout(drawNext, 0);
@@ -45,30 +51,49 @@
     });
   }
 
-  function resize(width, share) {
+  // on paper figures are drawn wide and then made smaller, so that words keep clear of each other; those of the front
+  // are flat, and all but the first stand beside words, so that the front is one page
+  function resize(onPaper) {
     drawn.forEach(function (element) {
-      var first = element.closest(".front") ? 1.0 : share;
-      var height = Math.round(first * Number(element.getAttribute("data-height")));
+      var front = element.closest(".front"), beside = element.closest(".front > :nth-child(n + 3)");
+      var width = onPaper ? (beside ? 535 : 985) : null;
+      var height = Math.round((onPaper ? (beside ? 0.56 : front ? 0.76 : 0.85) : 1.0) * Number(element.getAttribute("data-height")));
       element.style.height = height + "px";
-      Plotly.relayout(element, { width: width, height: height, autosize: width === null });
+      element.style.width = onPaper ? width + "px" : "";
+      element.style.zoom = onPaper ? "0.7" : "";
+      Plotly.relayout(element, { width: width, height: height, autosize: !onPaper });
     });
   }
 
-  function fold(open) {
-    Array.prototype.forEach.call(document.querySelectorAll("details"), function (part) { part.open = open; });
+  function unfold() {
+    var closed = list(hidden);
+    closed.forEach(function (part) { part.open = true; });
+    return closed;
   }
+
+  // a link into the appendix opens the part it leads to
+  function reveal() {
+    var part = location.hash && document.getElementById(location.hash.slice(1));
+    if (part && part.matches(hidden)) { part.open = true; part.scrollIntoView(); }
+  }
+  var opener = document.getElementById("unfold"), closed = [];
+  if (opener) { opener.addEventListener("click", unfold); }
+  list(".contents a").forEach(function (one) { one.addEventListener("click", function () { window.setTimeout(reveal, 0); }); });
+  window.addEventListener("hashchange", reveal);
+  document.addEventListener("toggle", drawNext, true);
 
   night.addEventListener("change", function () { redraw(night.matches); });
   window.addEventListener("beforeprint", function () {
-    while (waiting.length) { draw(waiting.shift()); }
+    closed = unfold();
+    waiting().forEach(draw);
     if (night.matches) { redraw(false); }
-    fold(true);
-    resize(695, 0.65);
+    resize(true);
   });
   window.addEventListener("afterprint", function () {
     if (night.matches) { redraw(true); }
-    fold(false);
-    resize(null, 1.0);
+    closed.forEach(function (part) { part.open = false; });
+    resize(false);
   });
+  reveal();
   drawNext();
 })();
