@@ -16,7 +16,7 @@ from rotordrop.record.record import sha256_of
 from rotordrop_bench.departures import departures
 from rotordrop_bench.drops import DROPS, SINCE, BenchDrop
 from rotordrop_bench.event import hidden_machine
-from rotordrop_bench.files import write_record
+from rotordrop_bench.files import TRUTH_FOLDER, write_record
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
 from rotordrop_bench.sensor_chain import SensorChain
@@ -29,7 +29,6 @@ LATEST_CONTACT = 0.1
 measured."""
 
 DROPS_FOLDER = "drops"
-TRUTH_FOLDER = "truth"
 
 
 def bench_recording(drop: BenchDrop) -> SyntheticDrop:

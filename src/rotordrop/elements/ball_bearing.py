@@ -14,6 +14,7 @@ from pydantic import Field, Strict
 from rotordrop.elements import values as V
 from rotordrop.elements.catalog.boundary import (
     CLASSES,
+    PRELOAD_CLASSES,
     PRELOAD_FACTOR,
     ClearanceClass,
     PreloadClass,
@@ -57,10 +58,11 @@ STATIC_STRESS = 4.2e9
 """Hertz stress [Pa] of the static load rating C0 of a ball bearing, ISO 76: the race is dented beyond it."""
 
 _CONFORMITY = 0.53
+"""Groove radius over ball diameter of a bearing in no catalogue [1], which reproduces the rigidities that FAG
+and GMN publish."""
 _NEEDED = ("ball_diameter", "ball_count", "pitch_diameter", "contact_angle")
 _ROWS = {1: "single", 2: "X"}
 _CLEARANCE = ("clearance", "clearance_class")
-_PRELOAD_CLASSES = ("light", "medium", "heavy")
 
 
 class BallBearing(RaceBearing):
@@ -170,11 +172,11 @@ class BallBearing(RaceBearing):
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Read ``preload = "light"``, ``clearance = "C3"``, ``rows = 1``, one conformity for both races."""
         preload, clearance = raw.get("preload"), raw.get("clearance")
-        if preload in _PRELOAD_CLASSES:
+        if preload in PRELOAD_CLASSES:
             raw["preload_class"] = raw.pop("preload")
         elif isinstance(preload, str) and preload.isalpha():
-            close = get_close_matches(preload, _PRELOAD_CLASSES, 1, 0.5)
-            hint = f"did you mean {close[0]!r}?" if close else f"classes are {', '.join(_PRELOAD_CLASSES)}"
+            close = get_close_matches(preload, PRELOAD_CLASSES, 1, 0.5)
+            hint = f"did you mean {close[0]!r}?" if close else f"classes are {', '.join(PRELOAD_CLASSES)}"
             told = f'{preload!r} is no preload class; {hint} Else give a force, "100 N"'
             raise Misfit(told, ("preload",))
         if clearance in CLASSES:

@@ -56,7 +56,7 @@ Name = Annotated[str, BeforeValidator(_name)]
 Channel = Annotated[str, BeforeValidator(_channel)]
 
 NODE_TOLERANCE = 1e-4
-"""A position this close to a node [m] means the node."""
+"""A position this close to a node [m] means the node (chosen)."""
 
 
 class Misfit(ValueError):

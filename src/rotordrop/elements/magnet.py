@@ -15,10 +15,11 @@ from rotordrop.known import NINETY, Known
 from rotordrop.physics import columns as L
 
 RIGID_FREQUENCY = 40.0
-"""Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out."""
+"""Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out
+(chosen)."""
 
 DAMPING_RATIO = 0.3
-"""Damping ratio [1] of that motion when the AMB damping is left out."""
+"""Damping ratio [1] of that motion when the AMB damping is left out (chosen)."""
 
 REMANENCE_TIME = 2e-3
 """Time in which the remanent force of a magnet decays, where nothing is known of it [s]."""

@@ -21,7 +21,7 @@ from rotordrop.elements.values import default
 from rotordrop.physics import columns as L
 
 LEAST_PLANE_DISTANCE = 1e-3
-"""Sensor planes closer than this [m] count as one."""
+"""Sensor planes closer than this [m] count as one (chosen)."""
 
 
 class Sensor(Placed):

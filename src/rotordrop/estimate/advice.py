@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 WORTH_SAYING = 0.95
-"""Half width left over the one there is from which a further number is not worth its measurement [1]."""
+"""Half width left over the one there is from which a further number is not worth its measurement
+[1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,18 +10,20 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.contacts import contact_intervals
 
 AFTER_CONTACT = 2e-3
-"""What of the flight after the first contacts belongs to the first window [s]."""
+"""What of the flight after the first contacts belongs to the first window [s] (chosen)."""
 
 WINDOWS = (0.02, 0.05, 0.2)
-"""Ends of the other windows [s from power-off]."""
+"""Ends of the other windows [s from power-off]: before two drops part, while they do, and all (chosen)."""
 
 COMPARABLE_SHARE = 0.1
-"""Two orbits are compared point by point until they differ by this share of the air gap [1]."""
+"""Two orbits are compared point by point until they differ by this share of the air gap [1]
+(chosen)."""
 
 RUNNING = 2e-3
-"""Length of the running mean behind the horizon [s]."""
+"""Length of the running mean behind the horizon [s] (chosen)."""
 
 CONTACTS_LISTED = 6
+"""First contacts of a bearing that are shown beside each other (chosen)."""
 
 TENFOLD = 33e-3
 """Time in which small differences of two drops grow tenfold [s]."""

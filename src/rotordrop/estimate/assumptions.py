@@ -81,7 +81,7 @@ def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
 
 
 SMALL_LOSS = 0.01
-"""Loss of a peak by the lag of a sensor that is mentioned [1]."""
+"""Loss of a peak by the lag of a sensor that is mentioned [1] (chosen)."""
 
 
 def _lag(problem: DropProblem) -> Iterator[tuple[str, str]]:

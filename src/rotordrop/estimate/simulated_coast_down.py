@@ -13,8 +13,9 @@ from rotordrop.spectrum.speed_profile import exact_speed_profile
 from rotordrop.spectrum.waterfall import PlanarSignal
 
 SPEED_STEP = 0.02
-"""Distance of the values [s] from which the profile of the exact speed is drawn."""
+"""Distance of the values [s] from which the profile of the exact speed is drawn (chosen)."""
 LEAST_KNOTS = 20
+"""Values of it at least, also of a coast-down of a few tenths of a second (chosen)."""
 
 
 def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDownSignal:

@@ -25,27 +25,29 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 FALLEN_SHARE = 0.35
-"""A rotor that sank by this share of the air gap has been dropped."""
+"""A rotor that sank by this share of the air gap has been dropped [1] (chosen)."""
 
 NEAREST_CONTACT = 0.6
 """A rotor closer than this to where it levitated, in nominal air gaps, touches nothing: what shakes it there
-is its own bending after the release."""
+is its own bending after the release (chosen)."""
 
 MODEL_ERROR = 1.5e-5
 """Standard uncertainty of the drop instant by what the release model leaves out [s]."""
 
 AFTER_FALL = 2.0
-"""How long after the fall a record is looked at for its first contact [s], before all of it is."""
+"""How long after the fall a record is looked at for its first contact [s], before all of it is (chosen)."""
 
 _BLOCK = 65536
+"""Samples that are looked at in one piece [1] (chosen): a megabyte or two of memory."""
 _CONTACT_FILTER = 1e-3
+"""Window of the curvature by which a contact is seen [s] (chosen)."""
 _NO_BEGINNING = "the levitated part before the drop is missing"
 
 _THROWN = 1.0
 """Range over the air gap that no levitated rotor has [1]: that of the limit C/D of ISO 14839-2."""
 
 _UNSURE = 3e-3
-"""How far the first guess of the drop may be off [s]."""
+"""How far the first guess of the drop may be off [s] (chosen): a lift that remains delays the fall."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -362,19 +364,21 @@ RINGING_ERROR = 4e-4
 """Standard uncertainty [s] by the velocity of the orbit and of the released sag at power-off."""
 
 RINGING = 5e-6
-"""Ringing of the released sag [m]; it lasts as long as the fall."""
+"""Ringing of the released sag [m] (chosen); it lasts as long as the fall."""
 
 INDEPENDENT = 4.0
-"""Readings of a plane during the fall that count as independent, because ringing is no white noise [1]."""
+"""Readings of a plane during the fall that count as independent, because ringing is no white noise [1]
+(chosen)."""
 
 MARGIN = 4e-4
-"""Time before the first contact that the parabola keeps away from [s]."""
+"""Time before the first contact that the parabola keeps away from [s] (chosen): it is seen in smoothed
+readings."""
 
 FEWEST = 20
-"""Samples that a parabola needs."""
+"""Samples that a parabola needs (chosen)."""
 
 EARLIEST = 5e-3
-"""Power-off may lie at most this long before the record begins [s]."""
+"""Power-off may lie at most this long before the record begins [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,7 +45,7 @@ _GOOD = 2.0
 """Mean square over the noise up to which a search counts as successful (chosen)."""
 
 _AHEAD = 10e-3
-"""Responses are tabulated so far ahead of a window that may grow [s]."""
+"""Responses are tabulated so far ahead of a window that may grow [s] (chosen)."""
 
 _STILL_FREE = 4.0
 """Mean square over the noise up to which the newest samples count as free fall (chosen): beyond, a contact

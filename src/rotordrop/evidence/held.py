@@ -58,10 +58,10 @@ _APPROACH, _AROUND = 30e-3, 0.15
 """How far back an approach is followed, and what counts as around [s] (chosen)."""
 
 _POINTS = 8192
-"""Samples of a stretch whose spectrum is taken; stretches overlap by half."""
+"""Samples of a stretch whose spectrum is taken; stretches overlap by half (chosen)."""
 
 _LINES = 5
-"""Lines listed of a channel."""
+"""Lines listed of a channel (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

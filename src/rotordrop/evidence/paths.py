@@ -231,7 +231,7 @@ def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
 
 
 _FOLLOWED = 2e-4
-"""Time between the angles by which a whirl is followed [s]."""
+"""Time between the angles by which a whirl is followed [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

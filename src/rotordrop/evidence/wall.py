@@ -61,7 +61,7 @@ _DOUBTFUL = 0.25
 """An air gap whose 90 % interval reaches this share of it to either side is not determined [1] (chosen)."""
 
 _BIN = 5e-3
-"""Length of a stretch that shows where a swinging rotor lies [s]."""
+"""Length of a stretch that shows where a swinging rotor lies [s] (chosen)."""
 
 _MOST_BINS = 400
 _INDEPENDENT = 4.0
@@ -74,7 +74,7 @@ _ALL, _BUT_RADIUS = (0, 1, 2, 3, 4, 5), (0, 1, 3, 4, 5)
 """Unknowns that a fit may move."""
 
 _SEARCHED = 2.0
-"""How long after the fall impacts are looked for to find the wall [s]."""
+"""How long after the fall impacts are looked for to find the wall [s] (chosen)."""
 
 _LYING = 0.75
 """A rotor further from a centre that is not yet sure than this share of the gap may lie on its race [1]."""

@@ -23,7 +23,8 @@ USUAL_GAP = (30e-6, 1.5e-3)
 """Air gaps of touchdown bearings [m], from small spindles to the largest machines."""
 
 RADIUS_DISTANCE = 2e-3
-"""Difference of the rotor's radius at a bearing and the shaft's outer radius there [m] that needs a word."""
+"""Difference of the rotor's radius at a bearing and the shaft's outer radius there [m] that needs a word
+(chosen)."""
 
 LEAST_SMOOTHING_SPEED = 5e-3
 """Smoothing speed of the friction [m/s] below which a drop takes many times as many steps."""

@@ -23,9 +23,9 @@ from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 
 _FORMAT_VERSION = "2.3.0"
 _CONE_CUTS = 8
-"""Cylinders that stand for one conical element."""
+"""Cylinders that stand for one conical element (chosen)."""
 _SOFT = 1e-3
-"""A layer with less than this share of the shaft's elastic modulus carries no load."""
+"""A layer with less than this share of the shaft's elastic modulus carries no load (chosen)."""
 _LAYER_MODULUS = 1.0
 _COEFFICIENT = re.compile(r"[kcm](xx|xy|yx|yy|zz)|frequency")
 _DISCS = ("DiskElement", "PointMass")

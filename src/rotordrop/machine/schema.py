@@ -9,12 +9,10 @@ from typing import Any
 from rotordrop.elements.catalog.boundary import CLASSES
 from rotordrop.elements.description import Description
 from rotordrop.elements.values import KIND_MARK, STATUSES
+from rotordrop.json_schema import DIALECT, TEXT
 from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
 from rotordrop.units import KINDS, format_quantity
-
-_DIALECT = "https://json-schema.org/draft/2020-12/schema"
-_TEXT = {"type": "string"}
 
 
 def machine_schema() -> dict[str, Any]:
@@ -48,7 +46,7 @@ def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
     for kind in sorted(kinds):
         parts[f"{kind}_number"] = _number(kind)
         parts[kind] = _value(kind)
-    return {"$schema": _DIALECT, "title": title} | {
+    return {"$schema": DIALECT, "title": title} | {
         key: value for key, value in schema.items() if key != "title"
     }
 
@@ -136,10 +134,10 @@ def _value(kind: str) -> dict[str, Any]:
         "range": {**pair, "description": RANGE},
         "lower": number,
         "upper": number,
-        "source": _TEXT,
+        "source": TEXT,
     }
     known: dict[str, Any] = {"value": number, "interval": pair, "standard_error": number, "range": pair}
-    known |= {"lower": number, "upper": number, "source": _TEXT, "status": {"enum": list(STATUSES)}}
+    known |= {"lower": number, "upper": number, "source": TEXT, "status": {"enum": list(STATUSES)}}
     return {
         "description": f"{kind.replace('_', ' ')}, for example {KINDS[kind].example}",
         "anyOf": [
@@ -152,12 +150,12 @@ def _value(kind: str) -> dict[str, Any]:
 
 def _add_shaft_table(rotor: dict[str, Any]) -> None:
     words = "CSV file with the shaft, in place of 'sections'"
-    rotor["properties"]["shaft_table"] = _TEXT | {"description": words}
+    rotor["properties"]["shaft_table"] = TEXT | {"description": words}
     rotor["required"] = [key for key in rotor.get("required", []) if key != "sections"]
     rotor["oneOf"] = [{"required": ["sections"]}, {"required": ["shaft_table"]}]
     table = {
         "type": "object",
-        "properties": {"unit": _TEXT, "values": {"type": "array", "items": {"type": "number"}}},
+        "properties": {"unit": TEXT, "values": {"type": "array", "items": {"type": "number"}}},
         "required": ["unit", "values"],
         "additionalProperties": False,
     }

@@ -23,7 +23,7 @@ _SUPPORTS = {"stiff": 2e8, "soft": 1e7}
 """Guess of the stiffness of a support that is only called stiff or soft, of a rotor of 60 kg [N/m]; that of
 others goes with their length, by the third root of the mass."""
 _SUPPORT_REACH = 7.0
-"""Factor to either side within which such a support lies."""
+"""Factor to either side within which such a support lies (chosen)."""
 _GAP_RANGE, _SUPPORT_RANGE = 1.2, 2.0
 _ONE_FOR_BOTH = 5.0
 """Factor to either side within which a support lies where one stiffness is given for both ends: those of one

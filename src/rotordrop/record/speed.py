@@ -19,7 +19,9 @@ BY_HAND_ERROR = 5e-3
 """Relative standard error of a speed given by hand [1]: a name plate or a display says no more."""
 
 _FEW = 5
+"""Readings without which those after the drop count too, and that a straight line needs [1] (chosen)."""
 _AFTER = 0.2
+"""Time after the drop whose readings then count [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

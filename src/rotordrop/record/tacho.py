@@ -23,13 +23,13 @@ MISSED = 1.5
 """Interval over the usual one from which a pulse is missing between [1]; its reciprocal for one too many."""
 
 MOST_FAULTY = 0.1
-"""Share of faulty intervals above which the channel carries no pulses of this shaft [1]."""
+"""Share of faulty intervals above which the channel carries no pulses of this shaft [1] (chosen)."""
 
 FINENESS = 2e-3
 """Share of a speed that the sampling of its two passages may leave open [1]; turns are joined for it."""
 
 SEVERAL = 5
-"""Samples a turn must have, for its pulses to be told apart [1]."""
+"""Samples a turn must have, for its pulses to be told apart [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

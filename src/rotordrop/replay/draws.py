@@ -16,6 +16,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
+from rotordrop.estimate.bearing_drop import LATE
 from rotordrop.evidence.initial_state import covariance_root
 from rotordrop.known import NINETY, Known
 from rotordrop.replay.first_impacts import FirstImpacts, Trial, drop_parameters, start_state, with_bearing
@@ -27,13 +28,13 @@ from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 
 FEWEST_DRAWS = 64
+"""Draws an interval is made of at least: three lie beyond either end of 90 % (chosen)."""
 CANDIDATES = 4
-"""Candidates drawn for every draw at most."""
+"""Candidates drawn for every draw at most (chosen)."""
 
 SPREAD_STEP = 2.5e-4
+"""Distance of the values [s] by which the spread of the draws is drawn (chosen)."""
 QUANTILES = (0.05, 0.95)
-LATE = (0.15, 0.2)
-"""Stretch of the mean force [s from power-off]."""
 
 
 @dataclass(frozen=True, kw_only=True)

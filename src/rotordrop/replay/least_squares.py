@@ -28,7 +28,7 @@ EASING = 5.0
 """Factors on the damping of a step when it fails, and under it when it succeeds [1]; chosen, not measured."""
 
 TRIALS = 6
-"""Steps that are tried from one point, each more damped than the one before."""
+"""Steps that are tried from one point, each more damped than the one before (chosen)."""
 
 WORST = 1e30
 """Cost of a point whose simulation does not get through."""

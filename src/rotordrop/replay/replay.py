@@ -68,6 +68,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.result import DropResult
 
 DURATION = 0.2
+"""Part of the drop that is replayed [s]: that of Neisi 2020."""
 IDENTIFIED_UNTIL = 0.06
 """Part of the drop that supports and friction are identified from at most [s]."""
 
@@ -75,6 +76,7 @@ KEPT_UNTIL = 7.5e-3
 """Draws must keep to the record this long after the later of the first contacts [s]."""
 
 FRICTION_DRAWS = 6
+"""Supports drawn about the fit, with each of which friction is swept too (chosen)."""
 STAGES = {"supports": 0.06, "friction": 0.6, "replay": 0.68, "draws": 0.7}
 """Share of the time at which each step begins [1]."""
 

@@ -38,7 +38,7 @@ LONGEST_WINDOW = 25e-3
 """End of the window of the last fit, with the friction of the sweep, after the later first contact [s]."""
 
 COARSE_WINDOWS = 3
-"""How many of them are searched with a coarse basis; the last is fitted again with the fine one."""
+"""How many of them are searched with a coarse basis; the last is fitted again with the fine one (chosen)."""
 
 WIDENING = 3.2
 """Factor on standard errors for what the linearised fit leaves out [1]: with 2, 78 % of the 90 % intervals of

@@ -19,7 +19,9 @@ from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl
 
 REDUCTION = Reduction(modes=16, attachment=True)
 _SPARE_MODES = 4
-_STANDSTILL = 1e-3  # of the first speed: forward and backward are told apart at this speed
+"""Modes computed beyond those asked for (chosen): a line that sinks with the speed comes from above."""
+_STANDSTILL = 1e-3
+"""Share of the first speed that stands for zero [1] (chosen): at rest forward and backward are one line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -287,7 +289,7 @@ def _between(speed: Array, amplitude: Array, k: int, level: float) -> float:
 
 
 MODES = 8
-"""Lowest modes that are looked at."""
+"""Lowest modes that are looked at (chosen)."""
 LEAST, MOST = 1e2, 1e11
 """Cross-coupled stiffness [N/m] from which, and up to which, the limit is sought."""
 POINTS, BEYOND = 26, 1.25

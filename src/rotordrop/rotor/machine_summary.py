@@ -113,13 +113,13 @@ def _push(machine: Machine, face: Face) -> float:
 
 
 FREQUENCY_DISTANCE = 0.15
-"""Relative distance of a support frequency and a rotor mode below which they shift each other."""
+"""Relative distance of a support frequency and a rotor mode below which they shift each other (chosen)."""
 
 HEAT_WINDOW = 0.2
 """Time [s] over which frictional heat is added up: the part of a drop the force is estimated for."""
 
 GROWTH_SHARE = 0.1
-"""Thermal growth of the race over the room it has from which heat counts."""
+"""Thermal growth of the race over the room it has from which heat counts (chosen)."""
 
 ASIDE = 0.5
 """Distance of a guess from the middle of its range from which it is mentioned, in standard deviations [1]."""

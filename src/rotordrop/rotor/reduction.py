@@ -32,6 +32,7 @@ from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.units import GRAVITY
 
 _DEPENDENT = 1e-8
+"""Share of a shape below which what is left of it beside the others is arithmetic [1] (chosen)."""
 
 _FEWEST_MODES = 6
 """Free-free modes, the two rigid ones included, at least."""

@@ -12,12 +12,10 @@ from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.campbell import response_peaks
+from rotordrop.rotor.campbell import REDUCTION, response_peaks
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 from rotordrop.rotor.suspension import suspension_of
 from rotordrop.rotor.whirl import unbalance_response, unbalance_run_up
-
-REDUCTION = Reduction(modes=16, attachment=True)
 
 RUN_UP_REDUCTION = Reduction(modes=8, attachment=True)
 """Basis of a run-up: every step takes a matrix exponential."""

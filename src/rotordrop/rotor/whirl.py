@@ -16,6 +16,7 @@ from rotordrop.rotor.suspension import PlanarMatrices, Support, planar_matrices
 
 LOWEST_FREQUENCY = 0.05  # [Hz]; slower motion is rigid drift of a free rotor
 CLEAR_DIRECTION = 0.05
+"""Whirl index below which an orbit is too flat to have a direction [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,7 +15,6 @@ from rotordrop.spectrum.line_settings import LineSettings
 from rotordrop.spectrum.line_spectra import FramePower, frame_power, order_power
 from rotordrop.spectrum.speed_profile import SpeedProfile
 
-TURN = 2.0 * math.pi
 BESIDE = 25.0
 """Band [Hz] on either side of a moving path whose power is its floor."""
 
@@ -64,7 +63,7 @@ class Clock:
         self.rate = sampling_rate / self.factor
         self.time: Array = self.signal_time[:: self.factor].copy()
         self.angle = None if self.signal_angle is None else self.signal_angle[:: self.factor].copy()
-        self.speed: Array = self._signal_speed[:: self.factor] / TURN
+        self.speed: Array = self._signal_speed[:: self.factor] / math.tau
         self.frame = min(settings.frame, samples / sampling_rate / 3.0)
 
     def at(self, time: Array, values: Array) -> Array:
@@ -73,7 +72,7 @@ class Clock:
 
     def rate_of(self, phase: Array) -> Array:
         """Frequency [Hz] of a phase [rad] at the times of lines."""
-        return cast(Array, np.gradient(phase) * self.rate / TURN)
+        return cast(Array, np.gradient(phase) * self.rate / math.tau)
 
     def reachable(self, phase: Array) -> Mask:
         """Where a phase [rad] runs at a frequency that is looked at."""
@@ -126,7 +125,7 @@ class Clock:
             turns=turns,
             highest_order=self.settings.highest_order,
             highest_frequency=self.highest_frequency,
-            lowest_speed=TURN * slowest,
+            lowest_speed=math.tau * slowest,
         )
         if frames is None:
             return None

@@ -12,7 +12,7 @@ from scipy.ndimage import label
 
 from rotordrop.arrays import Array, Mask
 from rotordrop.series import closed
-from rotordrop.spectrum._clock import BESIDE, TURN, Clock, View
+from rotordrop.spectrum._clock import BESIDE, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
 from rotordrop.spectrum.line_extraction import (
@@ -30,7 +30,7 @@ from rotordrop.spectrum.naming import LineKind
 from rotordrop.spectrum.speed_profile import SpeedProfile
 
 LASTING = 4
-"""Fewest frames [1] in which a line must be seen."""
+"""Fewest frames [1] in which a line must be seen (chosen)."""
 
 LAGS = (0.2, 0.2, 0.4, 0.8)
 """Times [s] over which the turning of an envelope is measured; 0.2 s is unambiguous to ± 2.5 Hz."""
@@ -39,10 +39,11 @@ SHORT_FRAME = 0.25
 """Share [1] of the usual frame in which brief lines are looked for."""
 
 BRIEF = 0.2
-"""Share of the signal [1] below which a line is brief."""
+"""Share of the signal [1] below which a line is brief (chosen)."""
 
 DECIDED = 2.0
-"""Lines of resolution [1] by which an order must move for it to be told from a steady line."""
+"""Lines of resolution [1] by which an order must move for it to be told from a steady line
+(chosen)."""
 
 LEFT_OVER = 0.25
 """Share of a peak's power [1] that may be left when its line is taken out."""
@@ -59,14 +60,17 @@ SKIRT = 0.03
 """Amplitude of a skirt at 1 Hz from its line, over that of the line [1]; it falls with the distance."""
 
 MOST_REFUSED = 60
+"""Peaks that turn out to be no lines, after which the search ends (chosen)."""
 BURST = 30.0
 """Amplitude over the usual one [1] from which a brief line is taken out before all others."""
 
 STEADY_PARTNERS = 3
+"""Strongest steady lines whose sums and differences with orders are looked for (chosen)."""
 SURE_COMBINATION = 25.0
 """Minus the logarithm of the chance of noise [1] for a sum or difference to be believed."""
 
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
+"""Orders they are combined with: what 1X and 2X make in a contact that is not linear."""
 
 
 @dataclass(frozen=True)
@@ -251,7 +255,7 @@ class LineSearch:
         clock = self._clock
         if of_orders:
             return cast(Array, clock.signal_angle if of_signal else clock.angle)
-        return TURN * (clock.signal_time if of_signal else clock.time)
+        return math.tau * (clock.signal_time if of_signal else clock.time)
 
     def _skirt(self, line: FoundLine) -> bool:
         """Whether a line is blurred and small beside a strong one: what is left of that one, not a line."""

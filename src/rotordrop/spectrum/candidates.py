@@ -11,7 +11,7 @@ Kind = Literal["order", "steady"]
 OrbitShape = Literal["any", "flat", "round"]
 
 EQUAL_ORDER = 0.002
-"""Relative tolerance of a rotor order [1]."""
+"""Relative tolerance of a rotor order [1] (chosen)."""
 
 MAINS_TOLERANCE = 0.003
 """How far the mains frequency may be off [1]."""

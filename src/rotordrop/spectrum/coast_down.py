@@ -53,6 +53,7 @@ LONGEST_BOUNCE = 0.1
 RACES_SPUN_UP = 1.0
 """Time [s] from which the speed law is fitted: before it the rotor hands spin to the races."""
 SHORTEST_LAW = 3.0
+"""Time [s] that is left for the fit at least (chosen)."""
 SENSOR_NOISE = 4e-7
 """Noise of a usual displacement sensor [m rms], added to a simulation before lines and orders are looked for:
 without it the search would find arithmetic, with less than a recording has what no recording shows."""
@@ -63,7 +64,9 @@ FORCE_OF_A_RECORD = (
     "as described when they are largest."
 )
 LINES_OF_A_SIMULATION = 24
+"""Lines looked for at most in a simulation (chosen)."""
 _SEED = 2020
+"""Of the noise that is added, the same for every simulation, so that its lines come out again."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

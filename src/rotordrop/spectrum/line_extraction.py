@@ -14,7 +14,6 @@ from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array, ComplexArray
 
-TURN = 2.0 * math.pi
 SHARPENING = 3
 """Passes over what the smoothing missed: each widens the band in which an amplitude is kept exactly."""
 

@@ -16,9 +16,9 @@ from scipy.signal import resample_poly
 from rotordrop.arrays import Array
 from rotordrop.spectrum.waterfall import hann_window
 
-TURN = 2.0 * math.pi
 UPSAMPLING = 3
 SPLINE_DEGREE = 5
+"""Finer sampling, and degree of the spline through it, before the signal is read at equal angles (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,7 @@ def order_power(
     [rad/s] (N,) at every sample. Frequencies above the highest [Hz] are not in the signal any more; frames
     that reach below the lowest speed [rad/s] are left out.
     """
-    angle = angle / TURN
+    angle = angle / math.tau
     slow = np.flatnonzero(speed < lowest_speed)
     end = float(angle[slow[0]] if slow.size else angle[-1])
     starts = np.arange(float(angle[0]), end - turns, turns / 2)
@@ -105,7 +105,7 @@ def order_power(
         middle[row] = np.interp(start + turns / 2, angle[near], time[near])
         cut = np.stack([map_coordinates(one, [place], order=SPLINE_DEGREE, prefilter=False) for one in fine])
         spectrum = rfft((cut - cut.mean(axis=1, keepdims=True)) * hann_window(points)).T
-        fastest = speed[min(first, len(time) - 1)] / TURN
+        fastest = speed[min(first, len(time) - 1)] / math.tau
         reach = min(coordinate.size, len(spectrum), int(highest_frequency / fastest * turns) + 1)
         power[row, :reach] = np.abs(spectrum[:reach]) ** 2 * (4.0 / points) ** 2
     return FramePower(time=middle, coordinate=coordinate, power=power)

@@ -96,7 +96,7 @@ EVEN = 1.0 / math.sqrt(12.0)
 """Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
 
 SWING_ERROR = 0.05
-"""How well the frequency of a wandering swing is known at any time [Hz]."""
+"""How well the frequency of a wandering swing is known at any time [Hz] (chosen)."""
 
 
 def find_lines(

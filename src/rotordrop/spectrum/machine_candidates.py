@@ -26,12 +26,14 @@ from rotordrop.spectrum.candidates import (
 )
 
 HIGHEST_MODE = 1000.0
+"""Highest frequency of a mode that is offered as a name [Hz] (chosen)."""
 MODE_TOLERANCE = 0.06
 """How far a mode may be off [1] because supports and contacts are known roughly."""
 LARGEST_SWING = 1.2
 """Amplitude [rad] up to which a swing is called a pendulum; beyond it the rotor bounces or whirls."""
 _REDUCTION = Reduction(modes=12, attachment=True)
 _SAME = 0.02
+"""Relative distance of two modes below which one name stands for both [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

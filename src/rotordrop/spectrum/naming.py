@@ -12,9 +12,10 @@ from rotordrop.spectrum.candidates import Candidate
 LineKind = Literal["order", "steady", "combination", "undecided"]
 
 SURE = 0.9
-"""Probability from which a line is given a candidate's name."""
+"""Probability from which a line is given a candidate's name [1] (chosen)."""
 
 WORTH_LISTING = 0.05
+"""Probability from which a candidate is listed [1] (chosen)."""
 UNKNOWN_WEIGHT = 10.0
 """Weight of "something not on the list", anywhere in the band, against one candidate of weight 1: with 10 a
 mode known to ± 20 Hz in a band of 1 kHz is only a question, one known to ± 3 Hz a name."""
@@ -26,7 +27,9 @@ STEADY_ERROR = 0.1
 """Error of its mean frequency [Hz] up to which it can."""
 
 ROUND_ORBIT = 0.8
+"""Roundness of the orbit of a whirl at least [1] (chosen); 1 is a circle, 0 a line."""
 FLAT_ORBIT = 0.6
+"""Roundness of the path of a swing at most [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,6 @@ from rotordrop.spectrum.rate import PASSED, reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import PlanarSignal
 
-TURN = 2.0 * math.pi
 LEAST_APART = 3.0
 """Turns per window by which two orders must differ to be told apart [1]."""
 
@@ -127,7 +126,7 @@ def track_orders(
             f"order tracking: orders {list(orders)} given, expected positive multiples of the speed"
         )
     centres = _centres(displacement.shape[0], sampling_rate, start_time, profile, wanted, settings)
-    fastest = float(np.abs(profile.speed).max()) / TURN
+    fastest = float(np.abs(profile.speed).max()) / math.tau
     highest = max([wanted.max() * fastest, *(float(line.frequency.max()) for line in steady_lines)])
     thin, thin_rate = reduce_rate(displacement, sampling_rate, highest)
     signal = _Signal(thin, thin_rate, start_time, profile, PASSED if thin_rate < sampling_rate else 1.0)
@@ -162,7 +161,7 @@ def _centres(
     """Middle [s] and length [s] of every window that fits into the signal and holds enough turns."""
     end = start + (samples - 1) / sampling_rate
     times = np.arange(start + settings.step, end, settings.step)
-    speed = np.abs(profile.speed_at(times)) / TURN
+    speed = np.abs(profile.speed_at(times)) / math.tau
     closest = float(np.diff(np.concatenate([[0.0], np.sort(orders)])).min())
     least = max(LEAST_APART / closest, 4.0)
     fitting = []
@@ -223,8 +222,8 @@ def _distinct(
     steady: Sequence[FrequencyPath], orders: Array, profile: SpeedProfile, centre: float, window: float
 ) -> list[FrequencyPath]:
     """Steady lines that differ enough from every order and from rest to be fitted beside them."""
-    speed = float(profile.speed_at(centre)) / TURN
-    sweep = orders * abs(float(profile.change_at(centre))) / TURN * window
+    speed = float(profile.speed_at(centre)) / math.tau
+    sweep = orders * abs(float(profile.change_at(centre))) / math.tau * window
     chosen = []
     for line in steady:
         frequency = float(line.frequency_at(centre))
@@ -254,8 +253,8 @@ def _separable(
     """Whether every steady line stays ``STEADY_APART`` turns per window away from an order within its
     window.
     """
-    place = orders * profile.speed_at(time)[:, None] / TURN
-    sweep = 0.5 * orders * np.abs(profile.change_at(time) * window)[:, None] / TURN
+    place = orders * profile.speed_at(time)[:, None] / math.tau
+    sweep = 0.5 * orders * np.abs(profile.change_at(time) * window)[:, None] / math.tau
     apart = np.ones((time.size, orders.size), dtype=np.bool_)
     for line in steady:
         distance = np.abs(place - line.frequency_at(time)[:, None]) - sweep

@@ -17,8 +17,6 @@ from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.orders import OrderTrack
 
-TURN = 2.0 * math.pi
-
 
 @dataclass(frozen=True, kw_only=True)
 class PassedResonance:
@@ -53,7 +51,7 @@ class PassedResonance:
             "order": self.order,
             "plane": self.plane,
             "time_s": self.time,
-            "speed_hz": self.speed / TURN,
+            "speed_hz": self.speed / math.tau,
             "frequency_hz": self.frequency,
             "frequency_error_hz": self.frequency_error,
             "width_hz": self.width,
@@ -120,7 +118,7 @@ class _Rise:
 
 
 def _curve(track: OrderTrack, column: int, order: float, lowest: float) -> _Curve | None:
-    frequency = order * track.speed / TURN
+    frequency = order * track.speed / math.tau
     known = track.separable[:, column]
     # Hidden ends say nothing about a rise: begin and end with amplitudes that are known.
     usable = np.flatnonzero(known & (frequency >= lowest))

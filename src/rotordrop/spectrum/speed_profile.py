@@ -23,7 +23,8 @@ MOST_BLOCKS = 800
 curvature within a block moves the speed by about 5e-6 of itself."""
 
 TURNING_SHARE = 0.02
-"""Share of the highest speed [1] above which the rotor counts as turning when the noise is judged."""
+"""Share of the highest speed [1] above which the rotor counts as turning when the noise is judged
+(chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

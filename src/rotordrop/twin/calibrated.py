@@ -35,7 +35,7 @@ from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, ide
 Progress = Callable[[str, float], None]
 
 CONFOUNDED = 0.9
-"""Correlation from which two parameters are reported as confounded [1]."""
+"""Correlation from which two parameters are reported as confounded [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from rotordrop.track.smoother import Smoothed, smooth
 
 DRAWING = "the rotor by its sections, from a drawing,"
 MOST_NAMED = 3
-"""Measurements that are named."""
+"""Measurements that are named (chosen)."""
 
 
 def value_of_information(

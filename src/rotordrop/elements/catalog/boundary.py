@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 PreloadClass = Literal["light", "medium", "heavy"]
+PRELOAD_CLASSES: tuple[PreloadClass, ...] = get_args(PreloadClass)
 PRELOAD_FACTOR = 2.0
 """Factor to which the preload of a class of one maker is known from that of others [1]."""
 
@@ -102,7 +103,7 @@ _RANGES = (
     (180, (2, 25), (20, 61), (53, 102), (91, 147), (135, 200)),
     (200, (2, 30), (25, 71), (63, 117), (107, 163), (150, 230)),
 )
-_LEAST_BORE = 6e-3
+_LEAST_BORE = 6e-3  # [m], where the table begins
 
 
 def clearance_range(group: ClearanceClass, bore: float) -> tuple[float, float] | None:

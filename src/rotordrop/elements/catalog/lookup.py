@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from rotordrop.elements.catalog.boundary import (
     DIMENSION_SERIES,
+    PRELOAD_CLASSES,
     PreloadClass,
     boundary_dimensions,
     known_bores,
@@ -21,7 +22,6 @@ from rotordrop.elements.catalog.designation import Designation, Kind, read_desig
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
 from rotordrop.known import NINETY
 
-_CLASSES: tuple[PreloadClass, ...] = ("light", "medium", "heavy")
 _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
 _FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
 _HYBRID_PRELOAD = 0.6
@@ -246,7 +246,7 @@ def _usual_preload(read: Designation, outside: float, angle: float) -> tuple[dic
         name: math.exp(
             sum(math.log(f * b.preload[name]) for f, b in zip(factors, same, strict=True)) / len(same)
         )
-        for name in _CLASSES
+        for name in PRELOAD_CLASSES
     }
     names = ", ".join(b.designation for b in same[:3]) + (" and others" if len(same) > 3 else "")
     return preload, f"carried over from listed bearings of the same size ({names}), within a factor of two"
@@ -298,7 +298,7 @@ def _conformities() -> dict[str, float]:
 
 
 def _by_class(values: list[float], factor: float = 1.0) -> dict[PreloadClass, float]:
-    return {name: value * factor for name, value in zip(_CLASSES, values, strict=True)}
+    return {name: value * factor for name, value in zip(PRELOAD_CLASSES, values, strict=True)}
 
 
 def _fag(row: dict[str, Any]) -> CatalogueBearing:

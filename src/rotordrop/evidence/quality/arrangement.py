@@ -25,13 +25,15 @@ if TYPE_CHECKING:
 Tone = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 MOST_TILT = 30.0
-"""A fall may lean this far from the vertical [deg]."""
+"""A fall may lean this far from the vertical [deg] (chosen)."""
 
 CLEAR_ORBIT = 3.0
-"""Forward over backward part of the orbit above which its sense is clear."""
+"""Forward over backward part of the orbit above which its sense is clear [1] (chosen)."""
 
 _AFTER_FALL = 0.06
+"""Time over which the change by a fall is averaged [s] (chosen)."""
 _SMALLEST_ORBIT = 3e-7
+"""Orbit below which its sense may be that of runout [m] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 DEAD_SHARE = 0.02
-"""A channel that moves by less than this share of the median of the others is dead."""
+"""A channel that moves by less than this share of the median of the others is dead (chosen)."""
 
 CLIPPED_RUN = 5
-"""Samples in a row at the very extreme of a channel that make clipping."""
+"""Samples in a row at the very extreme of a channel that make clipping (chosen)."""
 
 COARSE_STEP = 1e-6
-"""Quantisation coarser than this is worth a warning [m]."""
+"""Quantisation coarser than this is worth a warning [m] (chosen)."""
 
 _STUCK_SAMPLES = 5
 _BY_CHANCE = 1e-5
@@ -291,7 +291,7 @@ def _coarse(record: Record, channel: str, values: Array) -> Finding | None:
 
 
 FEWEST_ZEROS = 3
-"""Exact zeros in a row that make a block of them, among readings that are away from zero."""
+"""Exact zeros in a row that make a block of them, among readings that are away from zero (chosen)."""
 
 AWAY = 12.0
 """How far those readings are away from zero, in their own usual change from sample to sample [1]."""

@@ -72,7 +72,7 @@ _MIDDLE = 4.0
 steady motion jumps there by twice what it does at both ends."""
 
 _BESIDE = 64
-"""Places on either side that say how large jumps are there [1]."""
+"""Places on either side that say how large jumps are there [1] (chosen)."""
 
 _EXCHANGED = 50.0
 """By how much the squares of three jumps, in their variances, fall with two blocks exchanged back from where

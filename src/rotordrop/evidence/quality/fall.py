@@ -36,23 +36,25 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 GOOD_FIT = 2.0
-"""Mean square of the residual over the noise up to which the arrangement counts as confirmed."""
+"""Mean square of the residual over the noise up to which the arrangement counts as confirmed [1] (chosen)."""
 
 _BETTER = 3.0
+"""Ratio of two such mean squares from which the smaller one decides [1] (chosen)."""
 _NEAR_CONTACT = 6e-4
-"""The fit should reach this close to the first sudden acceleration [s]."""
+"""The fit should reach this close to the first sudden acceleration [s] (chosen)."""
 
 _POSSIBLE_LIFT = (-0.15, 0.8)
-"""Remanent over static lift that a magnetic bearing can have at power-off."""
+"""Remanent over static lift that a magnetic bearing can have at power-off [1] (chosen)."""
 
 _POSSIBLE_SIDEWAYS = 0.25
-"""Horizontal force over static lift that a magnetic bearing can have at power-off [1]."""
+"""Horizontal force over static lift that a magnetic bearing can have at power-off [1] (chosen)."""
 
 _AS_FALLING = 1.0
 """Horizontal force over static lift from which on no sensors turned so little that the fall still points down
 explain it [1]: the fall is too short to tell, or the rotor touched before."""
 
 _ANY_GAIN = (0.2, 1.8)
+"""Range of a gain that nobody knows [1] (chosen)."""
 
 _HOPELESS = 12.0
 """Mean square over the noise that the newest samples, searched once from the release as described, may have

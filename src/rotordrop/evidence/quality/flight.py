@@ -35,7 +35,7 @@ SHORTEST, LONGEST = 0.35, 1.7
 a longer one the beginning does."""
 
 MOST_FLIGHTS = 6
-"""Flights that are looked at, the longest ones [1]."""
+"""Flights that are looked at, the longest ones [1] (chosen)."""
 
 AFLOAT = 0.85
 """A rotor farther from the race than this share of its reach touches nothing [1]."""

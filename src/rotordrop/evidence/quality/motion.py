@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 PLAUSIBLE_MOTION = (0.4, 4.0)
-"""Range of a channel over a drop, in air gaps; outside it a unit or gain must be wrong."""
+"""Range of a channel over a drop, in air gaps; outside it a unit or gain must be wrong
+(chosen)."""
 
 _FACTORS = {
     1e6: "µm taken for m, or the like",
@@ -58,7 +59,9 @@ _CLEAR = 0.25
 """Logarithm of a factor from which on the fall tells a wrong clock from a wrong speed [1]."""
 
 _LONG_ENOUGH = 0.2
+"""Part of a drop that an estimate covers [s]."""
 _LOUD = 3e-6
+"""Hum, drift and noise from which on they are worth a word [m] (chosen): 1 % of a usual air gap."""
 
 _SLOW = 0.75
 """Share of what is left of levitated readings that a parabola in time explains, from which it drifts [1]."""

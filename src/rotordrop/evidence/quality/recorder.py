@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 SLOWEST = 2000.0
-"""Sampling rate a drop should have at least [Hz]."""
+"""Sampling rate a drop should have at least [Hz] (chosen)."""
 
 NO_FALL = 200.0
 """Sampling rate below which the whole fall of a rotor, some milliseconds, lies between two samples [Hz]."""

@@ -23,17 +23,19 @@ if TYPE_CHECKING:
     from rotordrop.record.record import Record
 
 MOST_LEAN = 25.0
-"""A rotor at rest may lie this far from straight below its levitated position [deg]."""
+"""A rotor at rest may lie this far from straight below its levitated position [deg] (chosen)."""
 
 _SOME_LEAN = 10.0
+"""From this lean on it is worth a word [deg] (chosen)."""
 
 _TURNED_LEAN = 65.0
 """A rest that leans less has turned sensors: exchanged or inverted ones turn it by a quarter [deg]."""
 
 DEPTH = (0.6, 1.7)
-"""How far it may lie below it, in nominal air gaps."""
+"""How far it may lie below it, in nominal air gaps (chosen)."""
 
 _VISIBLE_SWING = 4e-6
+"""Amplitude of a swing whose direction shows [m] (chosen): some times the noise of a good sensor."""
 
 _NO_DEPTH, _SAME_NOISE = 0.2, 0.2
 """A level that is not recorded: distance over the air gap, and noise over that of the record [1]."""
