@@ -88,10 +88,12 @@ def _told(job: Job) -> dict[str, Any]:
         if state is not None:
             spent = (state.get("ended") or time.time()) - state.get("started", time.time())
             states[verb] = {
-                key: state.get(key)
-                for key in ("state", "stage", "fraction", "left", "error", "options", "run")
+                key: state.get(key) for key in ("state", "stage", "fraction", "error", "options", "run")
             }
-            states[verb] |= {"spent": max(spent, 0.0), "result": None}
+            # between two words of a computation its time goes on falling
+            until = state.get("until")
+            left = None if until is None else max(until - time.time(), 0.0)
+            states[verb] |= {"spent": max(spent, 0.0), "left": left, "result": None}
             try:
                 found = published(job, verb)
                 states[verb]["result"] = found and found["run"]

@@ -249,7 +249,9 @@ def _told_progress(job: Job, verb: Verb, told: dict[str, Any]) -> Callable[[str,
         left = pace.left(now, fraction)
         if now - last >= BETWEEN_WORDS_S:
             last = now
-            write_state(job, verb, {**running, "stage": stage, "fraction": round(fraction, 4), "left": left})
+            until = None if left is None else time.time() + left
+            told = {**running, "stage": stage, "fraction": round(fraction, 4), "until": until}
+            write_state(job, verb, told)
 
     return progress
 

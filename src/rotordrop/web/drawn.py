@@ -15,11 +15,12 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.files import write_json
+from rotordrop.report.content import Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.record_quality import unseen_in
 from rotordrop.web.python_lines import course_lines, estimate_lines, look_lines, vector_lines, waterfall_lines
-from rotordrop.web.rows import content_json, quantity_json, row_of, shown_units
+from rotordrop.web.rows import content_json, quantity_json, row_of, shown_units, table_json
 from rotordrop.web.traces import write_traces
 from rotordrop.web.workspace import Job
 
@@ -62,6 +63,17 @@ def write_look(
         columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
     write_traces(made, "motion", seen.motion.time, columns)
     content = look_page(seen, drawn=False)
+    met = [(impact, impact.depth) for impact in seen.impacts] + [(one, one.distance) for one in seen.contacts]
+    impacts = [
+        (
+            one.plane,
+            one.time,
+            one.azimuth,
+            Quantity(value=beyond, kind="length", digits=3),
+            Quantity(value=one.approach, kind="velocity", digits=3),
+        )
+        for one, beyond in met
+    ]
     write_json(made / "document.json", seen.as_json(), sealed=True)
     write_json(
         made / "page.json",
@@ -92,30 +104,11 @@ def write_look(
                 for b, path in enumerate(seen.motion.paths)
             ],
             "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
-            "impacts": [
-                _impact(
-                    impact.plane,
-                    impact.time,
-                    impact.azimuth,
-                    Quantity(value=impact.depth, kind="length", digits=3),
-                    Quantity(value=impact.approach, kind="velocity", digits=3),
-                )
-                for impact in seen.impacts
-            ]
-            + [
-                _impact(
-                    one.plane,
-                    one.time,
-                    one.azimuth,
-                    Quantity(value=one.distance, kind="length", digits=3),
-                    Quantity(value=one.approach, kind="velocity", digits=3),
-                )
-                for one in seen.contacts
-            ],
-            "impact_columns": [
+            **_impacts(
+                impacts,
                 "beyond the air gap" if seen.drops else "from the usual place",
                 "radial velocity before",
-            ],
+            ),
             "findings": _findings(seen.findings),
             "not_seen": seen.not_seen,
             "command": _command(job, options, "look"),
@@ -156,7 +149,7 @@ def write_estimate(
         ends = None if gap is None else [gap.lower, gap.upper]
         places.append({"name": bearing.name, "gap": ends, **own, "peaks": shown})
     impacts = [
-        _impact(
+        (
             bearing.name,
             impact.peak_time,
             impact.azimuth,
@@ -189,8 +182,8 @@ def write_estimate(
                 "force": [_panel(force_panel(bearing, loads)) for bearing in estimate.bearings],
                 "stress": [_panel(stress_panel(bearing)) for bearing in estimate.bearings],
             },
-            "impacts": sorted(impacts, key=lambda impact: impact["time"]),
-            "impact_columns": ["peak force", "impulse"],
+            **_impacts(impacts, "peak force", "impulse"),
+            "assumptions": [one.sentence for one in content.assumptions],
             "restart": content_json(restart_page(card, drop)),
             "command": _command(job, options, "estimate"),
             "python": estimate_lines(job.read()["files"], options, [b.name for b in estimate.bearings]),
@@ -463,6 +456,12 @@ def _panel(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _impact(place: str, time: float, azimuth: float, *numbers: Quantity) -> dict[str, Any]:
-    shown = [quantity_json(one) for one in numbers]
-    return {"place": place, "time": time, "azimuth": azimuth, "numbers": shown}
+def _impacts(found: Iterable[tuple[str, float, float, Quantity, Quantity]], *columns: str) -> dict[str, Any]:
+    """Impacts in the order of time: place, time [s], azimuth [rad], and numbers as a table has them."""
+    ordered = sorted(found, key=lambda one: one[1])
+    shown = table_json(Table(columns, tuple(one[3:] for one in ordered)))
+    impacts = [
+        {"place": place, "time": time, "azimuth": azimuth, "numbers": numbers}
+        for (place, time, azimuth, *_), numbers in zip(ordered, shown["rows"], strict=True)
+    ]
+    return {"impacts": impacts, "impact_columns": shown["columns"]}

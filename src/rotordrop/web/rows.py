@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from rotordrop.ledger.book import LoggedDrop
-from rotordrop.report.content import Figure, Statement
+from rotordrop.report.content import Figure, Statement, Table
 from rotordrop.report.quantity import Quantity, System, display_unit
 from rotordrop.severity.numbers import LOADS
 
@@ -20,6 +20,8 @@ def content_json(part: Any) -> Any:
     """A report or a part of it without its pictures, its numbers written in both systems of units."""
     if isinstance(part, Quantity):
         return quantity_json(part)
+    if isinstance(part, Table):
+        return table_json(part)
     if isinstance(part, Statement):
         return {"text": part.sentence, "level": part.level}
     if isinstance(part, tuple):
@@ -27,6 +29,29 @@ def content_json(part: Any) -> Any:
     if not is_dataclass(part):
         return part
     return {item.name: content_json(getattr(part, item.name)) for item in fields(part)}
+
+
+def table_json(shown: Table) -> dict[str, Any]:
+    """A table in both systems of units, the unit of a column in its heading."""
+    in_units = {
+        system: Table(
+            shown.columns,
+            tuple(
+                tuple(replace(cell, system=system) if isinstance(cell, Quantity) else cell for cell in row)
+                for row in shown.rows
+            ),
+        ).with_units_above()
+        for system in SYSTEMS
+    }
+    heads = zip(*(in_units[system].columns for system in SYSTEMS), strict=True)
+    rows = [[content_json(cell) for cell in row] for row in shown.rows]
+    for system in SYSTEMS:
+        for told, row in zip(rows, in_units[system].rows, strict=True):
+            for cell, written in zip(told, row, strict=True):
+                if isinstance(written, Quantity):
+                    cell[system] = [written.text, written.interval_text]
+    columns = [dict(zip(SYSTEMS, head, strict=True)) for head in heads]
+    return {"columns": columns, "rows": rows, "caption": shown.caption, "note": shown.note}
 
 
 def quantity_json(quantity: Quantity) -> dict[str, Any]:

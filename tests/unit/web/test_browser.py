@@ -140,6 +140,25 @@ def test_the_empty_page_offers_a_simulated_drop_to_try(browser, tmp_path):
         quiet(browser)
 
 
+def test_a_file_that_cannot_be_read_is_shown_as_it_begins(browser, tmp_path):
+    """The error, ways out, and the lines of the file that it speaks of."""
+    bad = tmp_path / "export.csv"
+    bad.write_text("Zeit;A;B\n0;1;2\n0;<b>x</b>;3\n", encoding="utf-8")
+    with serving(tmp_path / "served") as server:
+        browser.open(server.address)
+        browser.until("!document.getElementById('empty').hidden")
+        send(browser, [bad])
+        browser.until("!document.getElementById('unread').hidden", 60)
+        browser.until("document.querySelectorAll('#unread li').length >= 3")
+        assert words(browser, "#unread li:nth-child(3)") == "0;<b>x</b>;3"
+        buttons = browser.evaluate(
+            "[...document.querySelectorAll('#status button')].map(one => one.innerText)"
+        )
+        assert buttons == ["Channels …", "Look again", "Remove"]
+        press(browser, "todrops")
+        browser.until("document.getElementById('unread').hidden && !document.getElementById('list').hidden")
+
+
 def test_two_cursors_notes_and_chosen_traces_and_their_address(browser, tmp_path, files):
     with serving(tmp_path / "served") as server:
         look_at(browser, server, list(files.values()))

@@ -20,7 +20,7 @@ from rotordrop.cli.app import run
 from rotordrop.files import digest_of_file, without_digest
 from rotordrop.web import running
 from rotordrop.web.child import Pace
-from rotordrop.web.running import Runner, published_run, result_folder, state_of
+from rotordrop.web.running import Runner, published_run, result_folder, state_of, write_state
 from rotordrop.web.workspace import Job, Workspace
 
 posix = pytest.mark.skipif(os.name != "posix", reason="locks are inherited on POSIX systems only")
@@ -158,6 +158,16 @@ def test_the_time_left_falls_steadily_and_forgets_the_loading_before_the_first_s
     assert len(known) == 38 and known == sorted(known, reverse=True)
     assert known[0] < 60.0 and known[18] == pytest.approx(20.0, abs=6.0) and known[-1] < 2.0
     assert pace.left(spent, 0.1) is None  # another fit begins
+
+
+def test_the_time_left_goes_on_falling_between_two_words_of_a_computation(served):
+    job = served.space.job(served.new_job({}))
+    write_state(job, "look", {"state": "running", "started": time.time(), "until": time.time() + 20.0})
+    seen = []
+    for _ in range(3):
+        seen.append(served.ask("GET", f"/api/jobs/{job.number}").told["states"]["look"]["left"])
+        time.sleep(0.05)
+    assert 19.0 < seen[0] < 20.0 and seen == sorted(seen, reverse=True) and seen[0] - seen[2] > 0.09
 
 
 def test_what_waits_is_cancelled_too(tmp_path, monkeypatch):

@@ -14,15 +14,20 @@ function drawOne(pen, place, { x, y }, { time, speed }, left, size) {
   pen.line([[cx, cy - radius], [cx, cy + radius]], tone.line);
   if (place.gap) { pen.circle(cx, cy, scale * place.gap[1], tone.limit, 1.2); }
   pen.line(x.map((_, i) => at(i)), faint(tone.estimated, 0.7), 1.2);
-  let last = null;
+  const named = []; // boxes of the labels: a shaft at rest would write all of them over each other
+  const clear = (box) => named.every((other) => box[2] <= other[0] || other[2] <= box[0] || box[3] <= other[1] || other[3] <= box[1]);
   x.forEach((v, i) => {
     if (v === null) { return; }
     const [px, py] = at(i);
     pen.circle(px, py, 1.6, null, 0, tone.estimated);
-    if ((i % Math.ceil(x.length / LABELS) === 0 || i === x.length - 1) && (!last || Math.hypot(px - last[0], py - last[1]) > 15)) {
-      last = [px, py];
+    if (i % Math.ceil(x.length / LABELS) === 0 || i === x.length - 1) {
+      const words = speed && speed[i] > 0 ? units.shown(speed[i], "speed", 3) : units.eventText(time[i] - zero()), width = 6 * words.length;
+      const places = [[px + 6, py - 4], [px - 6 - width, py - 4], [px + 6, py + 14], [px - 6 - width, py + 14]].map(([a, b]) => [a, b - 10, a + width, b + 2]);
+      const box = places.find(clear);
+      if (!box) { return; }
+      named.push(box);
       pen.circle(px, py, 3.2, tone.back, 1, tone.ink);
-      pen.text(speed && speed[i] > 0 ? units.shown(speed[i], "speed", 3) : units.eventText(time[i] - zero()), px + 6, py - 4, tone.ink, { size: 10 });
+      pen.text(words, box[0], box[3] - 2, tone.ink, { size: 10 });
     }
   });
   pen.text(`${place.name}, mean of ${units.timeText(time[1] - time[0], time[1] - time[0])}`, left + 6, 14, tone.ink, { size: 12, weight: "600" });

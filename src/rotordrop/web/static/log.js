@@ -15,8 +15,8 @@ const here = () => view.log.drops.filter((one) => one.machine === view.machine &
 const allowed = () => view.log.used.find((one) => one.machine === view.machine && one.bearings === view.bearings)?.allowed;
 
 // One figure: every drop in its order, a mark and an interval for every bearing, limits as lines.
-function trend(pen, [field, kind, title], top, bottom) {
-  const tone = colours(), drops = here(), f = units.factor(kind), box = { left: 64, right: pen.width - 14, top: top + 26, bottom: bottom - 46 };
+function trend(pen, [field, kind, title], left, right, top, bottom) {
+  const tone = colours(), drops = here(), f = units.factor(kind), box = { left: left + 64, right: right - 14, top: top + 26, bottom: bottom - 46 };
   const bearings = [...new Set(drops.flatMap((drop) => drop.numbers.map((one) => one.bearing)))], limit = view.limits[kind], most = allowed();
   const ends = drops.flatMap((drop) => drop.numbers.filter((one) => one.field === field).map((one) => one.upper / f));
   const high = 1.1 * Math.max(...ends, limit ? limit / f : 0, 0) || 1, slots = Math.max(drops.length, most || 0, 4);
@@ -51,7 +51,8 @@ function trend(pen, [field, kind, title], top, bottom) {
   pen.line([[box.left, box.bottom], [box.right, box.bottom]], tone.muted);
   pen.text("drop of the log, in the order they happened", (box.left + box.right) / 2, bottom - 4, tone.ink, { align: "center" });
 }
-const drawTrends = (pen) => FIGURES.forEach((one, i) => trend(pen, one, (i * pen.height) / 2, ((i + 1) * pen.height) / 2));
+// Side by side where there is room, else one above the other.
+const drawTrends = (pen) => FIGURES.forEach((one, i) => (pen.width > 1400 ? trend(pen, one, (i * pen.width) / 2, ((i + 1) * pen.width) / 2, 0, pen.height) : trend(pen, one, 0, pen.width, (i * pen.height) / 2, ((i + 1) * pen.height) / 2)));
 const picture = () => { const pen = svgPen(1000, 620, colours().back, `${view.machine}, bearings ${view.bearings}`); drawTrends(pen); return pen; };
 const name = () => `log ${view.machine} ${view.bearings}`.replace(/[^\w.-]+/g, "_");
 const csv = () => [`drop,date,bearing,quantity,${units.COLUMNS}`, ...here().flatMap((drop) => drop.numbers.map((one) =>

@@ -43,7 +43,9 @@ const TABS = {
     timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
   Numbers: () => {
     const page = state.estimate || state.look;
-    return [cards(page.cards), make("ul", { class: "statements", of: page.verdict.map(sentence) }), ...(state.estimate ? page.summary : []).map(table)];
+    const folded = page.verdict.filter((one) => page.assumptions?.includes(one.text)), list = (some) => make("ul", { class: "statements", of: some.map(sentence) });
+    return [cards(page.cards), list(page.verdict.filter((one) => !folded.includes(one))),
+      ...(folded.length ? [make("details", { of: [make("summary", { text: `${folded.length} more notes and assumptions` }), list(folded)] })] : []), ...(state.estimate ? page.summary : []).map(table)];
   },
   Quality: () => [findings(state.estimate?.findings || state.look.findings), make("p", { class: "small", text: (state.estimate || state.look).not_seen || "" }), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
   Restart: () => {
@@ -52,7 +54,7 @@ const TABS = {
     return [make("ul", { class: "statements", of: card.verdict.map(sentence) }), ...card.summary.map(table), ...card.sections.flatMap((part) => [
       make("h3", { class: "part", text: part.heading }), ...part.text.map((text) => make("p", { text })), ...part.tables.map(table)])];
   },
-  All: () => (state.estimate || state.look).sections.flatMap((part) => [make("h3", { class: "part", text: part.heading }),
+  All: () => (state.estimate || state.look).sections.filter((part) => part.text.length + part.statements.length + part.tables.length).flatMap((part) => [make("h3", { class: "part", text: part.heading }),
     ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
   Centre: centrelineTab,
   Compare: compareTab,
@@ -88,7 +90,7 @@ function showStatus() {
   if (running) {
     const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
     const stage = running.state === "waiting" ? "waiting for another computation" : running.stage || ({ look: "reading and checking the record", channels: "reading the record" }[verb] || "compiling and preparing");
-    const seconds = Math.round(running.left || 0), left = seconds ? `, about ${seconds} s left` : "";
+    const seconds = Math.round(running.left || 0), left = seconds ? `, this step about ${seconds} s more` : "";
     const bar = make("progress", { max: 1, "aria-label": stage, ...(share > 0 ? { value: share } : {}) });
     say(`${{ channels: "Channels", look: "Looking", estimate: "Estimating", waterfall: "Waterfall" }[verb]}: ${stage} (${Math.round(running.spent)} s${left})`, "notice", bar,
       make("button", { text: "Cancel", id: "cancel", on: { click: async () => { state.job = await server.cancel(state.job.id, verb); await refresh(); } } }));
@@ -117,20 +119,37 @@ function waysOut(error) {
   return [...(missing ? [way(`Choose ${missing[1]} …`, openFiles)] : [way("Channels …", () => channels(error))]), way("Look again", again), way("Remove", () => askRemoval(state.job))];
 }
 
+// A file that could not be read: what it begins with is the first thing that anybody looks at.
+const TEXTS = /\.(csv|txt|dat|tsv|asc|prn|log|lvm|toml)$/i, LARGEST_SHOWN = 8e6, SHOWN_CHARACTERS = 6000, SHOWN_LINES = 30;
+async function showUnread() {
+  const { id, files: sent, states: { look } } = state.job, unread = look?.state === "failed" && !state.look;
+  by("unread").hidden = !unread;
+  if (!unread) { return; }
+  const [role, file] = Object.entries(sent).find(([, one]) => look.error.startsWith(one.name)) || ["record", sent.record];
+  const key = `${id} ${file?.sha256}`;
+  if (!file || by("unread").dataset.of === key) { return; }
+  by("unread").dataset.of = key;
+  by("unread").replaceChildren(make("h3", { class: "part", text: `${file.name}, ${file.bytes} bytes` }));
+  if (!TEXTS.test(file.name) || file.bytes > LARGEST_SHOWN) { return; }
+  const text = await (await server.sentFile(id, role)).slice(0, SHOWN_CHARACTERS).text();
+  by("unread").append(make("p", { class: "small", text: "It begins with these lines:" }),
+    make("ol", { class: "begins", of: text.split(/\r?\n/).slice(0, SHOWN_LINES).map((line) => make("li", { of: [make("code", { text: line })] })) }));
+}
+
 // ---- jobs
 
 let shown = "";
 async function refresh() {
   const id = state.job.id;
   const job = await server.job(id);
-  if (state.job.id !== id) { return; }
+  if (state.job?.id !== id) { return; } // somebody went elsewhere meanwhile
   state.job = job;
   const done = (verb) => (job.states[verb] && job.states[verb].result) || "";
   const now = `${id} ${done("look")} ${done("estimate")}`;
   if (wantsFall === id && done("waterfall")) { wantsFall = ""; await showFall(); }
   if (now !== shown) {
     const [look, estimate] = await Promise.all(["look", "estimate"].map((verb) => (done(verb) ? server.page(id, verb) : null)));
-    if (state.job.id !== id) { return; }
+    if (state.job?.id !== id) { return; }
     shown = now;
     Object.assign(state, { look, estimate, panels: [] });
     if (state.othersOf !== id) { Object.assign(state, { othersOf: id, others: [] }); }
@@ -141,11 +160,13 @@ async function refresh() {
       const columns = look.places.map((place) => place.radius), [first, last] = span();
       Object.assign(state, { view: homeView(), cursor: null, impact: -1 });
       const found = await samples("look", columns, first, last, 2400);
-      if (state.job.id !== id || shown !== now) { return; }
+      if (state.job?.id !== id || shown !== now) { return; }
       state.overview = { time: found.time, data: { time: found.time, curves: columns.map((name) => ({ values: found[name] })) } };
       await asSeen();
     }
   }
+  await showUnread();
+  if (state.job?.id !== id) { return; }
   if (!showStatus()) { await askedChannels(); return; }
   setTimeout(() => { if (state.job && state.job.id === id) { refresh().catch(lost); } }, 400);
 }
@@ -247,6 +268,7 @@ async function route() {
   for (const id of ["todrops", "tomachines", "tolog"]) { if (id === place) { by(id).setAttribute("aria-current", "page"); } else { by(id).removeAttribute("aria-current"); } }
   leaveHome();
   leaveMachines();
+  by("unread").hidden = true;
   by("log").hidden = true;
   if (atDrop) {
     try { await openDrop(told); } catch (error) {
@@ -277,9 +299,12 @@ const openChosen = (list) => (list.length ? chooseFiles(list, sent).catch((error
 // What the recording holds is read by a process of its own, then asked.
 let wantsChannels = "";
 async function channels(words = "") {
-  wantsChannels = state.job.id;
+  const { id } = state.job;
+  wantsChannels = id;
   channelWords = words;
-  state.job = await server.begin(state.job.id, "channels", {});
+  const job = await server.begin(id, "channels", {});
+  if (state.job?.id !== id) { return; }
+  state.job = job;
   await refresh();
 }
 let channelWords = "", justSent = "";
@@ -288,7 +313,7 @@ async function askedChannels() {
   if (wantsChannels === id && told?.state === "done" && told.result) {
     wantsChannels = "";
     const found = await server.page(id, "channels");
-    if (state.job.id === id && (!channelWords || found.missing.length || !found.sensors.length)) { askChannels(found, channelWords, sent); }
+    if (state.job?.id === id && (!channelWords || found.missing.length || !found.sensors.length)) { askChannels(found, channelWords, sent); }
   } else if (look?.state === "failed" && justSent === id) {
     justSent = ""; // once for every sending: whoever closes the question is not asked again
     await channels(look.error);

@@ -24,8 +24,10 @@ const cellOf = (cell, first) => (typeof cell === "string"
   ? make(first ? "th" : "td", first ? { scope: "row", text: cell } : { text: cell })
   : make("td", { class: "number", of: number(cell) }));
 
+const headOf = (column) => (typeof column === "string" ? column : column[chosen()]);
+
 export function table({ caption, note, columns, rows }) {
-  const head = make("tr", { of: columns.map((text, i) => make("th", { scope: "col", text, class: rows[0] && typeof rows[0][i] !== "string" ? "number" : null })) });
+  const head = make("tr", { of: columns.map((column, i) => make("th", { scope: "col", text: headOf(column), class: rows[0] && typeof rows[0][i] !== "string" ? "number" : null })) });
   const body = rows.map((row) => make("tr", { of: row.map((cell, i) => cellOf(cell, i === 0)) }));
   const parts = [...(caption ? [make("caption", { text: caption })] : []), make("thead", { of: [head] }), make("tbody", { of: body })];
   return make("div", { class: "table", of: [make("table", { of: parts }), ...(note ? [make("p", { class: "small", text: note })] : [])] });
@@ -40,7 +42,7 @@ export function cards(list) {
 }
 
 export function impactTable(impacts, columns, here, timeOf, go) {
-  const head = make("tr", { of: ["place", "time", "azimuth", ...columns].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) });
+  const head = make("tr", { of: ["place", "time", "azimuth", ...columns.map(headOf)].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) });
   const rows = impacts.map((impact, i) => make("tr", {
     class: i === here ? "here" : null, "aria-current": i === here ? "true" : null, on: { click: () => go(i) },
     of: [make("th", { scope: "row", of: [make("button", { class: "link", text: impact.place, "aria-label": `Go to impact ${i + 1} at ${impact.place}`, on: { click: (event) => { event.stopPropagation(); go(i); } } })] }),

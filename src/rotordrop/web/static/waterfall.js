@@ -33,6 +33,7 @@ export async function openFall(id, page) {
     by("fallplane").replaceChildren(...page.planes.map((name, i) => make("option", { value: i, text: name })));
     by("fallpart").replaceChildren(...page.parts.map((part) => make("option", { value: part, text: PARTS[part] })));
     by("fallto").value = Number(page.highest.toPrecision(4));
+    fall.line = linesHere()[0] || null; // its course fills the figure beside the map from the beginning
   }
   await load();
 }
