@@ -24,7 +24,7 @@ from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimate.methods import Method
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
-from rotordrop.evidence.events import DropInstant, PowerOff
+from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json
@@ -226,7 +226,7 @@ class Estimate:
     """The machine as it was given."""
     record: Record
     """The recording."""
-    drop_instant: DropInstant | PowerOff
+    drop_instant: PowerOff
     """Power-off in record time."""
     speed: float
     """Speed at power-off [rad/s]."""

@@ -51,31 +51,38 @@ _UNSURE = 3e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class DropInstant:
+class PowerOff:
     """When the magnetic bearings let the rotor go."""
 
     value: float
     """Power-off, in record time [s]."""
     standard_error: float
     """Its standard uncertainty, noise and model together [s]."""
-    interval_90: tuple[float, float]
-    """Interval that holds it with 90 % probability [s]."""
+    contact: float
+    """End of the free fall [s]."""
     method: str
     """How it was found."""
+    notes: tuple[str, ...] = ()
+    """What to know about this value."""
+
+    def __float__(self) -> float:
+        return self.value
+
+    @property
+    def interval_90(self) -> tuple[float, float]:
+        """Interval that holds it with 90 % probability [s]."""
+        half = NINETY * self.standard_error
+        return self.value - half, self.value + half
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropInstant(PowerOff):
+    """The same where the record shows the levitated rotor before."""
+
     fall: Fall
     """The fit behind it, with remanent lift and misfit."""
     levitated: LevitatedModel
     """Readings of all sensors before the drop."""
-    notes: tuple[str, ...] = ()
-    """What to know about this value."""
-
-    @property
-    def contact(self) -> float:
-        """End of the free fall [s]."""
-        return self.fall.end
-
-    def __float__(self) -> float:
-        return self.value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +141,7 @@ def instant_of(fall: Fall, levitated: LevitatedModel, record: Record) -> DropIns
     return DropInstant(
         value=fall.instant,
         standard_error=error,
-        interval_90=(fall.instant - NINETY * error, fall.instant + NINETY * error),
+        contact=fall.end,
         method=f"{fall.rotor.description}; {error * record.sampling_rate:.2g} of a sample",
         fall=fall,
         levitated=levitated,
@@ -381,27 +388,6 @@ EARLIEST = 5e-3
 """Power-off may lie at most this long before the record begins [s] (chosen)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PowerOff:
-    """When the magnetic bearings let the rotor go, told by the fall alone."""
-
-    value: float
-    """Power-off, in record time [s]."""
-    standard_error: float
-    """Its standard uncertainty [s]."""
-    interval_90: tuple[float, float]
-    """Interval that holds it with 90 % probability [s]."""
-    contact: float
-    """First sudden acceleration [s]."""
-    method: str
-    """How it was found."""
-    notes: tuple[str, ...]
-    """What to know about this value."""
-
-    def __float__(self) -> float:
-        return self.value
-
-
 def begins_with_fall(record: Record, machine: Machine) -> bool:
     """Whether the rotor has fallen by a share of its gap before it could have levitated for 5 ms."""
     gaps = nominal_gaps(machine, record.whole)
@@ -444,11 +430,9 @@ def power_off_of_fall(record: Record, machine: Machine) -> PowerOff:
             f"{record.name}: power-off lies {-1e3 * value:.2f} ms before the record begins, at most "
             f"{1e3 * EARLIEST:g} ms can be bridged. Record with pre-trigger"
         )
-    instant = start + value
     return PowerOff(
-        value=instant,
+        value=start + value,
         standard_error=error,
-        interval_90=(instant - NINETY * error, instant + NINETY * error),
         contact=contact,
         method="fall with remanent lift, the rotor at rest vertically when it began",
         notes=(

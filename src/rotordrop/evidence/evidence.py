@@ -151,7 +151,7 @@ class Evidence:
         return sought(lambda: motion_of(whole, gaps=(None,) * len(whole.planes), angles_known=True))
 
     @cached_property
-    def power_off(self) -> DropInstant | PowerOff:
+    def power_off(self) -> PowerOff:
         """Power-off in record time, by the levitated motion and the fall, or by the fall alone.
 
         Raises
@@ -419,7 +419,7 @@ def read_evidence(
     tail: Record | None = None,
     *,
     name: str = "",
-    power_off: DropInstant | PowerOff | None = None,
+    power_off: PowerOff | None = None,
 ) -> Evidence:
     """Ask a record what it says before the first contact and at rest; the name is that of the record if
     empty.

@@ -339,7 +339,7 @@ def end_of_fall(time: Array, place: Array, gaps: Array) -> float:
 def initial_state_of(
     record: Record,
     model: DropModel,
-    release: DropInstant | PowerOff,
+    release: PowerOff,
     speed: float,
     angle: RotorAngle,
     gap: AirGap,

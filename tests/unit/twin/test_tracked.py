@@ -294,7 +294,6 @@ def test_without_tail_and_levitated_part_less_is_known(
     instant = PowerOff(
         value=known.value,
         standard_error=known.standard_error,
-        interval_90=known.interval_90,
         contact=known.contact,
         method="given",
         notes=(),
