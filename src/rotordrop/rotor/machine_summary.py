@@ -13,7 +13,7 @@ from rotordrop.elements.table import rows
 from rotordrop.elements.thermal import heat_figures, runaway
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
-from rotordrop.machine.plausibility import doubts
+from rotordrop.machine.plausibility import Doubt, doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rotor_on_race
@@ -126,19 +126,13 @@ ASIDE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachineWarning:
-    """One thing to know before trusting a result of this machine."""
+class MachineWarning(Doubt):
+    """One thing to know before trusting a result of this machine.
 
-    kind: str
-    """"limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load direction",
-    "shoulder of the race", "thermal runaway", "guess", or one of the doubts about the description itself."""
-    bearing: str
-    """Name of the touchdown bearing, or of the part of the machine."""
-    value: float
-    limit: float
-    """The two numbers compared, SI units."""
-    message: str
-    """What it means."""
+    Its kind is "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load
+    direction", "shoulder of the race", "thermal runaway", "guess", or one of the doubts.
+    """
+
     doubtful: bool = False
     """Whether the description itself looks wrong; else it is the drop model that ends there."""
 
