@@ -34,6 +34,10 @@ _SHARPEST_SWING = 0.7
 """Radial acceleration over gravity above which a reversal is an impact [1]: a swing along the race and the
 wrong centre of a circle give less."""
 
+_WINDOWED = 0.9 * SMOOTHING
+"""From the highest velocity to the lowest of a contact that lasts no time [s]: straight lines through
+`SMOOTHING` show it so, of impacts of 0.015 to 0.06 m/s (0.92 to 1.08 ms for one of 0.3 ms)."""
+
 _STRETCH = 256
 """Samples that are looked at together; chosen for time."""
 
@@ -53,7 +57,7 @@ class Impacts:
     deepest: NDArray[np.int64]
     """Deepest point, shape (K,)."""
     touched: NDArray[np.int64]
-    """Kink of the radial velocity before it, to about 0.3 ms, shape (K,)."""
+    """Begin of the contact before it, to about 0.3 ms, shape (K,)."""
     approach: Array
     rebound: Array
     """Largest radial velocity before and after, by straight lines over `SMOOTHING` [m/s], shape (K,)."""
@@ -70,35 +74,115 @@ def find_impacts(
     """
     radius = np.hypot(*path.T)
     speed = slope(radius, rate)
-    shortest = shortest_flight(gap)
-    early = round(0.25 * SMOOTHING * rate)  # a velocity over a window turns up to half of it before the kink
-    reach = max(int(max(2e-3, 1.5 * shortest) * rate), 1)
-    found: list[tuple[int, int, float, float]] = []
-    before: int | None = None
-    for at in peaks(radius, _NEAR * gap, max(0.5 * HOP * gap, 6.0 * noise)):
-        begin = max(at - round(_LONGEST_FALL * rate), 0) if before is None else before
-        fastest = begin + int(np.argmax(speed[begin : at + 1]))
-        left = begin if before is None else begin + int(np.argmin(speed[begin : fastest + 1]))
-        leaves = at + int(np.argmin(speed[at : at + reach + 1]))
-        approach, rebound = max(float(speed[fastest]), 0.0), max(float(-speed[leaves]), 0.0)
-        turned = (approach + rebound) * rate / max(leaves - fastest, 1)
-        flew = (fastest - left) / rate
-        hopped = float(radius[at] - np.min(radius[left : at + 1])) > 0.5 * HOP * gap
-        flight = flew > shortest and hopped and turned > _SHARPEST_SWING * GRAVITY
-        if flight:
-            gained = float(speed[fastest] - speed[left]) / flew
-            free = _free_acceleration(path, rate, gap, down, slice(left, fastest + 1))
-            flight = gained > _FREE * max(free, _LEAST_FREE * GRAVITY)
-        if flight or (falls and before is None):
-            found.append((at, min(fastest + early, at), approach, rebound))
-        before = at
-    columns = list(zip(*found, strict=True)) if found else [(), (), (), ()]
+    turns = _turns_of(radius, speed, rate, gap, noise)
+    contact = _Contact.of(turns)
+    found: list[tuple[_Turn, float]] = []
+    for number, turn in enumerate(turns):
+        touched = turn.fastest / rate + contact.aside(turn.approach)
+        if number == 0 and falls:
+            found.append((turn, touched))
+            continue
+        departed = max(-float(speed[turn.left]), 0.0)
+        flew = touched - turn.left / rate + contact.aside(departed)
+        if flew < shortest_flight(gap) or turn.hop < 0.5 * HOP * gap or turn.fastest <= turn.left:
+            continue
+        gained = float(speed[turn.fastest] - speed[turn.left]) * rate / (turn.fastest - turn.left)
+        free = _free_acceleration(path, rate, gap, down, slice(turn.left, turn.fastest + 1))
+        if turn.sharp and gained > _FREE * max(free, _LEAST_FREE * GRAVITY):
+            found.append((turn, touched))
     return Impacts(
-        deepest=np.array(columns[0], dtype=np.int64),
-        touched=np.array(columns[1], dtype=np.int64),
-        approach=np.array(columns[2], dtype=np.float64),
-        rebound=np.array(columns[3], dtype=np.float64),
+        deepest=np.array([turn.at for turn, _ in found], dtype=np.int64),
+        touched=np.array([min(round(at * rate), turn.at) for turn, at in found], dtype=np.int64),
+        approach=np.array([turn.approach for turn, _ in found], dtype=np.float64),
+        rebound=np.array([turn.rebound for turn, _ in found], dtype=np.float64),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Turn:
+    """A maximum of the distance from the centre, with the way to it."""
+
+    at: int
+    """Where [sample]."""
+    left: int
+    fastest: int
+    """Where the velocity is lowest, then highest, since the maximum before [samples]."""
+    approach: float
+    rebound: float
+    """Largest velocity before it, and after it [m/s]."""
+    hop: float
+    """How far the distance fell since the maximum before [m]."""
+    lasts: float
+    """From the highest velocity beside it to the lowest [s]."""
+    sharp: bool
+    """Whether it is turned more sharply than a swing."""
+
+
+def _turns_of(radius: Array, speed: Array, rate: float, gap: float, noise: float) -> list[_Turn]:
+    """The maxima near the race."""
+    reach = max(int(max(2e-3, 1.5 * shortest_flight(gap)) * rate), 1)
+    beside = max(int(0.5 * SMOOTHING * rate), 1)
+    found: list[_Turn] = []
+    for at in peaks(radius, _NEAR * gap, max(0.5 * HOP * gap, 6.0 * noise)):
+        begin = found[-1].at if found else max(at - round(_LONGEST_FALL * rate), 0)
+        fastest = begin + int(np.argmax(speed[begin : at + 1]))
+        left = begin + int(np.argmin(speed[begin : fastest + 1])) if found else begin
+        first = at - _until_turned(-speed[at::-1], beside)
+        last = at + _until_turned(speed[at:], beside)
+        lasts = (last - first) / rate
+        rebound = float(-np.min(speed[at : at + reach + 1]))
+        turned = max(float(speed[first]), 0.0) + max(float(-speed[last]), 0.0)
+        found.append(
+            _Turn(
+                at=at,
+                left=left,
+                fastest=fastest,
+                approach=max(float(speed[fastest]), 0.0),
+                rebound=max(rebound, 0.0),
+                hop=float(radius[at] - np.min(radius[left : at + 1])),
+                lasts=lasts,
+                sharp=turned > _SHARPEST_SWING * GRAVITY * max(lasts, 1.0 / rate),
+            )
+        )
+    return found
+
+
+def _until_turned(values: Array, beside: int) -> int:
+    """Where values that fall from the first on are lowest before they rise for `beside` samples."""
+    at = 0
+    while at + 1 < len(values):
+        ahead = at + 1 + int(np.argmin(values[at + 1 : at + 1 + beside]))
+        if values[ahead] >= values[at]:
+            break
+        at = ahead
+    return at
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Contact:
+    """How long the contacts of a path last: a rotor on its race swings about where it would rest there.
+
+    The velocity is largest where the rotor passes that place, ``asin(β g / v) β`` after a soft contact has
+    begun, with the inverse frequency ``β``; the window of the velocities brings it forward before a hard one.
+    """
+
+    beta: float
+    """Inverse frequency of the rotor on its contact [s]."""
+    forward: float
+    """How much earlier than without its window the velocity is largest [s]."""
+
+    @classmethod
+    def of(cls, turns: list[_Turn]) -> _Contact:
+        """That of the middle one of all sharp turns: half a period, with the window on either side."""
+        spans = [turn.lasts for turn in turns if turn.sharp]
+        lasts = float(np.median(spans)) if spans else _WINDOWED
+        half_period = math.sqrt(max(lasts**2 - _WINDOWED**2, 0.0))
+        return cls(beta=half_period / math.pi, forward=0.5 * (lasts - half_period))
+
+    def aside(self, velocity: float) -> float:
+        """How much later than the largest velocity [m/s] a contact begins, or earlier it ends [s]."""
+        share = min(self.beta * GRAVITY / max(velocity, 1e-9), 1.0)
+        return self.forward - self.beta * math.asin(share)
 
 
 def _free_acceleration(path: Array, rate: float, gap: float, down: Array, flight: slice) -> float:
