@@ -12,12 +12,6 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.touchdown_bearing import AIR_GAP
-from rotordrop.estimate.allowances import (
-    MODEL_FORCE_SIGMA,
-    MODEL_MEAN_FORCE_SIGMA,
-    MODEL_MEAN_STRESS_SIGMA,
-    MODEL_STRESS_SIGMA,
-)
 from rotordrop.estimate.bearing_drop import (
     LATE,
     AirGap,
@@ -38,6 +32,12 @@ from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.track.problem import DropProblem
+from rotordrop.twin.allowances import (
+    MODEL_FORCE_SIGMA,
+    MODEL_MEAN_FORCE_SIGMA,
+    MODEL_MEAN_STRESS_SIGMA,
+    MODEL_STRESS_SIGMA,
+)
 from rotordrop.twin.mixture import mixed
 
 INCONSISTENT_WIDENING = 2.0
@@ -173,10 +173,12 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
         # What the force of one sample gets wrong the next ones take back, or the readings would show it: the
         # errors of a mean are those of independent samples at most.
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
-        independent = forces.magnitude_sigma[late, b]
+        independent, length = forces.magnitude_sigma[late, b], forces.magnitude[late, b]
         spread = float(np.linalg.norm(independent)) / len(independent)
+        # An error across a force lengthens it, whatever its sign: no number of samples averages that out.
+        lengthened = float(np.mean(np.hypot(length, independent) - length))
         left_out = MODEL_MEAN_FORCE_SIGMA * late_mean
-        sigma = math.hypot(spread, left_out)
+        sigma = math.hypot(spread, lengthened, left_out)
         means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", left_out)
     return Loads(
         force=force,

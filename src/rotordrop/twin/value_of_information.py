@@ -9,11 +9,11 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.estimate.advice import WORTH_SAYING, Advice
-from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA
 from rotordrop.known import NINETY
 from rotordrop.track.forces import ForceHistory, force_gradient
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, smooth
+from rotordrop.twin.allowances import MODEL_FORCE_SIGMA
 
 DRAWING = "the rotor by its sections, from a drawing,"
 MOST_NAMED = 3

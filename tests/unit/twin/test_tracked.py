@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 
 from rotordrop.errors import IdentificationError, RecordError, UsageError
-from rotordrop.estimate.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA
-from rotordrop.estimate.bearing_drop import Origin
+from rotordrop.estimate.bearing_drop import LATE, Origin
 from rotordrop.estimate.document import combined, estimate_document
 from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.published import Drop, estimate_schema
@@ -37,6 +36,7 @@ from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import corrections_by_record, input_state_estimate
 from rotordrop.track.smoother import parameter_sample
+from rotordrop.twin.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA
 from rotordrop.twin.problems import Drops, drop_problem, tail_first
 from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.tracked import TrackedDrop, followed_drops, tracked_drop
@@ -192,14 +192,23 @@ def test_energies_of_the_impacts_hold_the_truth(tracked: Estimate, synthetic: Sy
 
 
 def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop: TrackedDrop) -> None:
-    """What the record does not know of the force, it does not know of its mean."""
+    """Small errors of samples cancel, large ones lengthen the force."""
     forces = workshop.forces
-    worse = replace(forces, magnitude_sigma=100.0 * forces.magnitude_sigma)
-    mean, much = (twin_loads(one, 0, 1.0).means["mean_force_0p15_0p2_N"] for one in (forces, worse))
-    allowance = mean.allowance_90 or 0.0
-    assert allowance == pytest.approx(NINETY * MODEL_MEAN_FORCE_SIGMA * mean.value)
-    by_record = math.sqrt((mean.high - mean.value) ** 2 - allowance**2)
-    assert math.sqrt((much.high - much.value) ** 2 - allowance**2) == pytest.approx(100.0 * by_record)
+
+    def by_record(size: float) -> float:
+        scaled = replace(forces, magnitude_sigma=size * forces.magnitude_sigma)
+        mean = twin_loads(scaled, 0, 1.0).means["mean_force_0p15_0p2_N"]
+        allowance = mean.allowance_90 or 0.0
+        assert allowance == pytest.approx(NINETY * MODEL_MEAN_FORCE_SIGMA * mean.value)
+        return math.sqrt((mean.high - mean.value) ** 2 - allowance**2)
+
+    cancelled = 1e3 * by_record(1e-3)
+    assert 100.0 * by_record(1e-2) == pytest.approx(cancelled, rel=1e-2)
+    late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
+    length, sigma = forces.magnitude[late, 0], 100.0 * forces.magnitude_sigma[late, 0]
+    lengthened = NINETY * float(np.mean(np.hypot(length, sigma) - length))
+    assert lengthened > 10.0 * cancelled
+    assert by_record(100.0) == pytest.approx(math.hypot(100.0 * cancelled, lengthened), rel=1e-2)
 
 
 def test_impulses_of_the_impacts_add_up_to_the_impulse_of_the_force(
