@@ -14,26 +14,43 @@ from rotordrop.spectrum.naming import LineKind
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FoundLine:
-    """A line that was found; fields as in `rotordrop.spectrum.lines.Line`, and what the search goes
-    on with.
-    """
+class SeenLine:
+    """Where and when a line of a coast-down is seen."""
 
     kind: LineKind
+    """Follows the speed, stands still, both (sum or difference of an order and a steady line), or the speed
+    changes too little to say."""
     frequency: float
     frequency_error: float
+    """Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
+    than the resolution of that time, which is one over it, divided by √12."""
     order: float | None
     order_error: float | None
+    """Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for
+    a steady line."""
     drift: tuple[float, float]
+    """Lowest and highest frequency of a steady line over its time [Hz]."""
     width: float
+    """Full width at half power [Hz], without that of the frame; 0 when it is below the resolution."""
+    floor: float
+    """Local noise floor [m] where it was found."""
+    ratio: float
+    """Amplitude over the local floor where it was found [1]."""
+    first_seen: float
+    last_seen: float
+    """[s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FoundLine(SeenLine):
+    """A line that was found, with what the search goes on with."""
+
     amplitude: Array
     forward: Array
     backward: Array
-    floor: float
-    ratio: float
-    first_seen: float
-    last_seen: float
+    """Amplitudes along x and y, and radii of the parts that turn with the spin and against it [m]."""
     existence: float
+    """Probability that it is one [1]."""
     time: Array
     path: Array
     """The frequency that it follows [Hz], shape (N,)."""

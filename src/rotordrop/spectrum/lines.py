@@ -4,46 +4,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from rotordrop.errors import RecordError
-from rotordrop.spectrum._found_line import FoundLine
+from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
 from rotordrop.spectrum.candidates import Candidate, harmonic_candidates
 from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
-from rotordrop.spectrum.naming import LineEvidence, LineKind, Name, name_line
+from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.rate import reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class Line(SeenLine):
     """One line of a coast-down, with its name and the reason for it."""
 
-    kind: LineKind
-    """Follows the speed, stands still, both (sum or difference of an order and a steady line), or the speed
-    changes too little to say."""
     label: str
     """Its name, or "unnamed"."""
     named: bool
     confidence: float
     """Probability that line and name are right [1]."""
     reason: str
-    frequency: float
-    frequency_error: float
-    """Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
-    than the resolution of that time, which is one over it, divided by √12."""
-    order: float | None
-    order_error: float | None
-    """Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for
-    a steady line."""
-    drift: tuple[float, float]
-    """Lowest and highest frequency of a steady line over its time [Hz]."""
-    width: float
-    """Full width at half power [Hz], without that of the frame; 0 when it is below the resolution."""
     amplitude: float
     """Zero-to-peak [m], in the plane and direction where it is largest, root mean square over its time."""
     amplitude_xy: dict[str, tuple[float, float]]
@@ -51,13 +36,6 @@ class Line:
     forward: dict[str, float]
     backward: dict[str, float]
     """Radii of the forward and backward turning parts [m] in each plane, root mean square over its time."""
-    floor: float
-    """Local noise floor [m] where it was found."""
-    ratio: float
-    """Amplitude over the local floor where it was found [1]."""
-    first_seen: float
-    last_seen: float
-    """[s]."""
     path: FrequencyPath
     """Its frequency over time [Hz]."""
     name: Name
@@ -277,26 +255,18 @@ def _line(found: FoundLine, plane: str, name: Name) -> Line:
     order_error = found.order_error
     if found.order is not None and order_error is not None:
         order_error = max(order_error, least * found.order / found.frequency)
+    seen = {one.name: getattr(found, one.name) for one in fields(SeenLine)}
+    errors = {"frequency_error": max(found.frequency_error, least), "order_error": order_error}
     return Line(
-        kind=found.kind,
+        **{**seen, **errors},
         label=name.label,
         named=name.named,
         confidence=name.confidence * found.existence,
         reason=name.reason,
-        frequency=found.frequency,
-        frequency_error=max(found.frequency_error, least),
-        order=found.order,
-        order_error=order_error,
-        drift=found.drift,
-        width=found.width,
         amplitude=float(found.amplitude.max()),
         amplitude_xy={plane: (float(found.amplitude[0]), float(found.amplitude[1]))},
         forward={plane: float(found.forward[0])},
         backward={plane: float(found.backward[0])},
-        floor=found.floor,
-        ratio=found.ratio,
-        first_seen=found.first_seen,
-        last_seen=found.last_seen,
         path=found.path_of_frequency(),
         name=name,
     )
