@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,24 +26,31 @@ CLOSE_ENOUGH = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExponentialFit:
-    """Exponential coast-down ``ω = ω_0 e^(−(t − t_0)/τ)`` fitted to a recorded speed."""
+class FittedLaw:
+    """A law of the speed, fitted to a recorded coast-down."""
 
     initial_speed: Known
-    """ω_0 [rad/s] at ``start``."""
-    time_constant: Known
-    """τ [s]."""
+    """[rad/s] at ``start``."""
     start: float
     end: float
     """Window of the fit [s]."""
+    residual_rms: float
+    """Size of the recorded speed about the law [rad/s]."""
+    noise: float
+    """What of it is noise of the recording [rad/s]; the rest says that the law is another."""
+    statement: str
+    """Whether the law holds, in a sentence."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExponentialFit(FittedLaw):
+    """Exponential coast-down ``ω = ω_0 e^(−(t − t_0)/τ)`` fitted to a recorded speed."""
+
+    time_constant: Known
+    """τ [s]."""
     time: Array
     residual: Array
     """Recorded minus fitted speed [rad/s] over time [s], shape (K,)."""
-    residual_rms: float
-    """Size of the residual [rad/s]."""
-    noise: float
-    """What of the residual is noise of the recording [rad/s]; the rest says the law is not exponential."""
-    statement: str
 
     def speed_at(self, time: ArrayLike) -> Array:
         """Fitted speed [rad/s] at times [s]."""
@@ -52,7 +59,7 @@ class ExponentialFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DragFit:
+class DragFit(FittedLaw):
     """Deceleration ``−(constant + linear ω + quadratic ω²)`` fitted to a recorded speed."""
 
     constant: Known
@@ -63,17 +70,8 @@ class DragFit:
     quadratic: Known
     """Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
     file's ``aero_quadratic``."""
-    initial_speed: Known
-    """[rad/s] at ``start``."""
     correlation: Array
     """Of initial speed, constant, linear, quadratic, in this order [1], shape (4, 4)."""
-    start: float
-    end: float
-    """Window of the fit [s]."""
-    residual_rms: float
-    noise: float
-    """Of the recorded speed about the fit, and of the recording itself [rad/s]."""
-    statement: str
 
     def speed_at(self, time: ArrayLike) -> Array:
         """Fitted speed [rad/s] at times [s] from ``start`` on; standstill is kept."""
@@ -103,19 +101,15 @@ def fit_exponential(
 
     fit = _fit(model, omega, scale, lower=np.array([0.0, 1e-6]))
     residual = omega - model(fit.parameters)
-    noise = neighbour_noise(omega)
-    values = _values(fit, scale, ("rad/s", "s"), np.array([0.0, 0.0]))
-    rms = float(np.sqrt(np.mean(residual**2)))
+    initial, constant = _values(fit, scale, ("rad/s", "s"), np.zeros(2))
     return ExponentialFit(
-        initial_speed=values[0],
-        time_constant=values[1],
+        initial_speed=initial,
+        time_constant=constant,
         start=start,
         end=float(t[-1]),
         time=t,
         residual=residual,
-        residual_rms=rms,
-        noise=noise,
-        statement=_law_statement("One time constant", rms, noise, float(omega.max())),
+        **_left_over("One time constant", residual, omega),
     )
 
 
@@ -141,20 +135,18 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | No
         return expected(_drag_solution(p, t - start))
 
     fit = _fit(model, omega, scale, lower=np.zeros(4))
-    noise = neighbour_noise(omega)
-    rms = float(np.sqrt(np.mean((omega - model(fit.parameters)) ** 2)))
-    values = _values(fit, scale, ("rad/s", "rad/s²", "1/s", "1/rad"), np.zeros(4))
+    initial, constant, linear, quadratic = _values(
+        fit, scale, ("rad/s", "rad/s²", "1/s", "1/rad"), np.zeros(4)
+    )
     return DragFit(
-        initial_speed=values[0],
-        constant=values[1],
-        linear=values[2],
-        quadratic=values[3],
+        initial_speed=initial,
+        constant=constant,
+        linear=linear,
+        quadratic=quadratic,
         correlation=fit.correlation,
         start=start,
         end=float(t[-1]),
-        residual_rms=rms,
-        noise=noise,
-        statement=_law_statement("Dry, linear and quadratic drag", rms, noise, float(omega.max())),
+        **_left_over("Dry, linear and quadratic drag", omega - model(fit.parameters), omega),
     )
 
 
@@ -334,9 +326,13 @@ def _drag_solution(parameters: Array, time: Array) -> Array:
     return np.maximum(speed, 0.0)
 
 
-def _law_statement(law: str, rms: float, noise: float, highest: float) -> str:
-    hertz = 2.0 * math.pi
-    text = f"{law}: residual {rms / hertz:.2g} Hz rms, noise of the speed {noise / hertz:.2g} Hz"
-    if rms > max(1.5 * noise, CLOSE_ENOUGH * highest):
-        return f"{text}; the speed does not follow this law."
-    return f"{text}; the speed follows this law."
+def _left_over(law: str, residual: Array, omega: Array) -> dict[str, Any]:
+    """What a law leaves of recorded speeds [rad/s], by the fields of `FittedLaw`."""
+    rms, noise = float(np.sqrt(np.mean(residual**2))), neighbour_noise(omega)
+    follows = not rms > max(1.5 * noise, CLOSE_ENOUGH * float(omega.max()))
+    return {
+        "residual_rms": rms,
+        "noise": noise,
+        "statement": f"{law}: residual {rms / math.tau:.2g} Hz rms, noise of the speed "
+        f"{noise / math.tau:.2g} Hz; the speed {'follows' if follows else 'does not follow'} this law.",
+    }
