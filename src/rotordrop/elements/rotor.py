@@ -483,6 +483,7 @@ def element_factors(rotor: Rotor) -> tuple[Array, Array]:
             f"rotor.mass_to_ends = {ends:.3g} and mass_to_de = {de:.3g} leave no mass at "
             f"{1e3 * middles[int(density.argmin())]:.4g} mm from the NDE end; expected smaller ones"
         )
+    # a third is the mean of s² along the beam: the ends stiffen against the middle, not the whole beam
     return density, np.exp(stiff_de * s + stiff_ends * (s**2 - 1.0 / 3.0))
 
 

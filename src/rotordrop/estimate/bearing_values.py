@@ -49,6 +49,7 @@ def equivalent_stiffness(
     softer, stiffer = (own, own) if within is None else sorted(map(races, within))
     value = _series(support.value, own)
     low, high = support.interval_90 or (support.value, support.value)
+    # two springs in series: their errors count as independent, each by the ends of its own interval
     down = math.hypot(value - _series(low, own), value - _series(support.value, softer))
     up = math.hypot(_series(high, own) - value, _series(support.value, stiffer) - value)
     return replace(

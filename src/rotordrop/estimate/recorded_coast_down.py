@@ -138,6 +138,7 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
         float(share) * 0.5 * numbers_of(bearing).drag_diameter
         for bearing, share in zip(machine.touchdown_bearings, shares, strict=True)
     )
+    # races that have spun up turn with the rotor: what slows it slows them too
     races = sum(float(bearing.race.inertia) for bearing in machine.touchdown_bearings)
     turning = build_rotor_fe(machine).polar_inertia + races
     values = {

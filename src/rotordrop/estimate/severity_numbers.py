@@ -112,7 +112,7 @@ def _fatigue(
     time = bearing.force.time
     spin = np.where(time >= bearing.impacts[0].start, speed, 0.0)
     low, high = bearing.peak_force.interval_90 or (bearing.peak_force.value, bearing.peak_force.value)
-    factor = (high / bearing.peak_force.value) ** 3
+    factor = (high / bearing.peak_force.value) ** 3  # as the life goes with the load
     names = ("fatigue_by_segments", "fatigue_by_16281", "fatigue_by_rainflow")
     for name, share in zip(names, fatigue_shares(ratings, time, loads, spin), strict=True):
         least = 0.0 if name != "fatigue_by_rainflow" else (low / bearing.peak_force.value) ** 3 * share

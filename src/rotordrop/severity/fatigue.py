@@ -78,6 +78,7 @@ def share_by_segments(
     """
     step = np.diff(time)
     turned = np.concatenate([[0.0], np.cumsum(0.5 * (spin[1:] + spin[:-1]) * step)])
+    # balls that roll on both races turn with the mean of their surface speeds; the outer race stands
     cage = 0.5 * (1.0 - row.gamma) * turned
     at = np.linspace(0.0, 2.0 * np.pi, row.balls, endpoint=False)
     place = cage[:, None] + at  # where each ball is in space
@@ -124,6 +125,7 @@ def share_by_16281(row: BallRow, time: Array, loads: Array, spin: Array) -> floa
 
     As if every instant's load zone had been rolled over whole turns. Shapes as in `share_by_segments`.
     """
+    # every point of the turning ring meets all loads; the standing ring fails first where its load is highest
     inner = np.mean(loads**LOAD_EXPONENT, axis=1) ** (1.0 / LOAD_EXPONENT) / row.inner
     outer = (
         np.mean(loads ** (LOAD_EXPONENT * WEIBULL), axis=1) ** (1.0 / (LOAD_EXPONENT * WEIBULL)) / row.outer

@@ -135,6 +135,7 @@ def _point_stiffness(D_w: float, rolling: float, conformity: float, hybrid: bool
     """Stiffness [N/m^1.5] of a ball on its groove, whose radius in the plane of rolling is given [m]."""
     across = conformity * D_w / (2.0 * conformity - 1.0)
     ratio = across / rolling
+    # fits of Brewe and Hamrock to the axes of the contact ellipse and to both elliptic integrals
     shape = 1.0339 * ratio**0.636
     first, second = 1.0003 + 0.5968 / ratio, 1.5277 + 0.6023 * math.log(ratio)
     modulus, poisson = (315e9, 0.26) if hybrid else (208e9, 0.3)
