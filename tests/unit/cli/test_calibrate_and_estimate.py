@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,12 +24,13 @@ from rotordrop.evidence.look import look
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine, example_path, load_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.machine.saving import machine_text
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
 from rotordrop.spectrum.indentation import find_settling
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
-from rotordrop.twin.search import is_calibrated
+from rotordrop.twin.search import Candidate, Search, is_calibrated, track_drops
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))
@@ -37,6 +38,21 @@ TAIL = str(example_record_path("lp400_drop_060_tail"))
 USAGE = UsageError.exit_code
 SHORT = 0.03
 """Window of the tests [s]: the verbs are tested here, the estimator elsewhere."""
+
+
+@pytest.fixture(scope="module")
+def fitted_once() -> Callable[[Search, Machine], Candidate]:
+    """The fit of a calibration, made once for each machine and set of drops."""
+    found: dict[tuple[str, ...], Candidate] = {}
+
+    def fit(search: Search, machine: Machine) -> Candidate:
+        drops = (str(one.record.sha256) for one in search.drops.evidence)
+        key = (machine_text(machine), *drops)
+        if key not in found:
+            found[key] = track_drops(search, machine)
+        return found[key]
+
+    return fit
 
 
 @pytest.fixture(scope="module")
@@ -52,11 +68,17 @@ def shortened() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def folder(shortened: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(
+    shortened: None,
+    fitted_once: Callable[[Search, Machine], Candidate],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
     """Where a calibration has written its machine and its JSON."""
     place = tmp_path_factory.mktemp("calibration")
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(place / "calibrated.toml")]
-    assert run([*arguments, "--json", str(place / "calibration.json")]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rotordrop.twin.calibrated.track_drops", fitted_once)
+        assert run([*arguments, "--json", str(place / "calibration.json")]) == 0
     return place
 
 
@@ -215,8 +237,13 @@ def test_an_estimate_inconsistent_with_its_record_is_written_and_ends_with_its_o
 
 
 def test_a_calibration_inconsistent_with_its_drops_is_not_written(
-    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    shortened: None,
+    fitted_once: Callable[[Search, Machine], Candidate],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.setattr("rotordrop.twin.calibrated.track_drops", fitted_once)
     monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", inconsistent)
     output = tmp_path / "calibrated.toml"
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]

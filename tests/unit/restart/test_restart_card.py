@@ -338,7 +338,7 @@ def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
     estimate, file, out = (tmp_path / name for name in ("drop.json", "m.toml", "card.json"))
     write_json(estimate, one.as_json(), sealed=True)
     save_machine(machine, file)
-    call = ["restart", str(file), str(estimate), "--drops", "20", "--json", str(out), "--check", "lift=good"]
+    call = ["restart", str(file), str(estimate), "--drops", "2", "--json", str(out), "--check", "lift=good"]
     assert run([*call, "--report", str(tmp_path / "card.html")]) == 0
     card = read_document(out)
     assert card["next_drops"][0]["speed"] == pytest.approx(2 * math.pi * 80.0)
