@@ -243,4 +243,5 @@ def _common(first: str, second: str, axes: str) -> str | None:
     before, behind = first[: places[0]], first[places[0] + 1 :]
     if axes == "12" and re.search(r"[0-9]", before + behind) and not _KKS.search(before):
         return None
-    return _SENSOR.sub("", before + behind).strip(" _-")
+    left = re.sub(r" {2,}", " ", before + behind)  # of "Weg A oben" without its A
+    return _SENSOR.sub("", left).strip(" _-")

@@ -267,6 +267,7 @@ def test_a_sensor_takes_the_channel_of_its_name_without_counter_and_prefix(machi
         (("V13", "W13", "V24", "W24"), ("13", "24")),
         (("DE 45L", "DE 45R", "NDE 45L", "NDE 45R"), ("NDE 45", "DE 45")),
         (("Brg 1 Left", "Brg 1 Right", "Status", "Brg 2 Left", "Brg 2 Right"), ("Brg 1", "Brg 2")),
+        (("Weg A oben", "Weg B oben", "Weg A unten", "Weg B unten"), ("Weg oben", "Weg unten")),
         (("Ch1 X", "Ch2 Y", "Ch3 X", "Ch4 Y"), ("plane 1", "plane 2")),
         (("1MAD10CY011", "1MAD10CY012", "1MAD20CY011", "1MAD20CY012"), ("1MAD10CY01", "1MAD20CY01")),
     ],

@@ -61,6 +61,11 @@ WAYS = {
         decimal=",",
         names=["Datum", "Uhrzeit", *(f"{n} [µm]" for n in NAMES), "Drehzahl [Hz]"],
     ),
+    "German date beside seconds": table(
+        lambda i: ["16.10.2019", f"{i * STEP:.5f}".replace(".", ",")],
+        decimal=",",
+        names=["Datum", "Zeit [s]", *(f"{n} [µm]" for n in NAMES), "Drehzahl [Hz]"],
+    ),
     "time of day": table(lambda i: [clock(i)]),
     "thousands with commas": table(seconds, thousands=",", scale=1000, digits=2).replace("[um]", "[nm]"),
     "quoted thousands": table(seconds, separator=",").replace("-126.75", '"-126.75"'),

@@ -206,6 +206,8 @@ def _clock(
     Several columns of one name give the time of the columns behind each.
     """
     step = parse_quantity(profile.time.step, "time") if profile.time.step else head.step
+    if stamped is not None and not np.ptp(stamped) > 0.0:
+        stamped = None  # the date of a column of its own is no clock
     at = _time_columns(columns, table, stamped is not None, step, profile, path)
     if at:
         units = [profile.time.unit or columns[i][2] or head.time_unit for i in at]
