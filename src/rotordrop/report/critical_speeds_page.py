@@ -196,8 +196,10 @@ def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: floa
         figures = []
         for number, crossing in enumerate(ordered[:ON_CARD], start=1):
             one, hertz = judged.get(crossing), crossing.speed / TURN
-            margin = "" if one is None else f"; margin {100.0 * one.margin:.1f} %, API 617 {one.verdict}"
-            note = f"{written(60.0 * hertz, 0)} rpm; damping {100.0 * crossing.damping_ratio:.2f} %{margin}"
+            margin = "" if one is None else f"; margin {100.0 * one.margin:.1f}\u00a0%, API 617 {one.verdict}"
+            note = (
+                f"{written(60.0 * hertz, 0)} rpm; damping {100.0 * crossing.damping_ratio:.2f}\u00a0%{margin}"
+            )
             label = f"Critical speed {number}, {crossing.direction}"
             figures.append(fact(label, hertz, "frequency", note=note))
         cards.append(Card(_held(name), tuple(figures)))

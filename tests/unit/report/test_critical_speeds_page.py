@@ -94,5 +94,5 @@ def test_the_cards_hold_the_critical_speeds_forward_ones_first():
     assert card.title == "In its AMBs"
     assert [one.value.text for one in card.figures] == ["120.0 Hz", "548.4 Hz", "90.00 Hz"]
     assert card.figures[0].label == "Critical speed 1, forward"
-    assert "7\u202f200 rpm; damping 2.50 %; margin" in card.figures[0].note
+    assert "7\u202f200 rpm; damping 2.50\u00a0%; margin" in card.figures[0].note
     assert "margin" not in card.figures[2].note

@@ -96,7 +96,8 @@ async function one() {
   const focused = document.activeElement?.id;
   by("machines").replaceChildren(make("h2", { class: "machinename", text: nameOf(jobs) }), make("div", { class: "tabs", role: "tablist", of: tabs }), make("div", { id: "machinepanel", role: "tabpanel", tabindex: "0", "aria-label": TABS[verb][0], of: made }));
   if (focused) { by(focused)?.focus(); }
-  say(`${jobs[0].files.machine.name}; ${jobs.filter((job) => job.files.record).length} drops of this machine are kept.`, "notice");
+  const kept = jobs.filter((job) => job.files.record).length;
+  say(`${jobs[0].files.machine.name}; ${kept === 1 ? "1 drop of this machine is" : `${kept} drops of this machine are`} kept.`, "notice");
 }
 
 async function load() {
