@@ -365,7 +365,8 @@ def waterfall(
     )
     if output is not None:
         write_findings(found, output)
-    deliver(found.as_json(), json, page, report=report, data=data)
+    content = {"simulated_record": bool(simulated), **found.as_json()}
+    deliver(content, json, page, report=report, data=data)
 
 
 def _signal(

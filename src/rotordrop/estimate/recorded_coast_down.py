@@ -11,7 +11,7 @@ from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.evidence import known, read_evidence
+from rotordrop.evidence.evidence import Missing, known, read_evidence
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.known import NINETY, Known
@@ -41,8 +41,8 @@ class RecordedPlane:
     """What they say about the bearings."""
     bearing: int
     """Which of them."""
-    sideways: float
-    """Where the rotor rests horizontally [m]; displacements count from there."""
+    centre: Array
+    """Where displacements count from [m], shape (2,)."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -53,8 +53,7 @@ class RecordedPlane:
         """Displacement (x, y) [m] of a part, shape (K, 2)."""
         along = along_sensors(self.signals[key], self.sensors) - self.sensing.settled_bend
         moved: Array = np.einsum("cs,ns->nc", self.sensing.to_bearings[self.bearing], along)
-        moved[:, 0] -= self.sideways
-        return moved
+        return moved - self.centre
 
 
 def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
@@ -62,7 +61,8 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
 
     The settled rotor lies straight below the centre: horizontally the centre is where it rests, vertically it
     is the zero of the sensors, from which the rest also gives the air gap, as in an estimate of the drop. The
-    levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap.
+    levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap;
+    in one that ends before, both are those of a look at it, where it determines them.
     """
     evidence = read_evidence(build_drop_model(machine), record)
     off, names = evidence.power_off.value, evidence.model.bearing_names
@@ -70,26 +70,33 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     first = int(np.searchsorted(record.time, off))
     try:
         gap = identify_air_gap(known(evidence.lying), evidence.base, sensing)
-        sideways = gap.rest.sideways
-        gaps, errors = gap.value, dict(zip(names, map(float, gap.standard_error), strict=True))
+        centres = np.column_stack([gap.rest.sideways, np.zeros(len(names))])
+        gaps, sigmas = gap.value, gap.standard_error
         centre = (
             f"above the rest of the last {gap.rest.end - gap.rest.start:.3g} s, at the height of sensor zero"
         )
     except IdentificationError as error:
-        sideways = np.zeros(len(names))
-        gaps = np.array([float(bearing.air_gap) for bearing in machine.touchdown_bearings])
-        errors = None
-        centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
+        walls = {} if isinstance(evidence.motion, Missing) else evidence.motion.walls
+        if set(names) <= {name for name, wall in walls.items() if wall.determined}:
+            circles = np.array([walls[sensor.bearing].centre for sensor in record.sensors])
+            along = np.sum(record.directions * circles, axis=1) - sensing.settled_bend
+            centres = sensing.at_bearings(along)
+            gaps, sigmas = (np.array([getattr(walls[n], of) for n in names]) for of in ("gap", "gap_error"))
+            centre = f"of the circle in which the record shows the shaft: {error}"
+        else:
+            centres, sigmas = np.zeros((len(names), 2)), None
+            gaps = np.array([float(bearing.air_gap) for bearing in machine.touchdown_bearings])
+            centre = f"taken as the zero of the sensors, the air gap from the machine file: {error}"
     # A speed given by hand says from where the rotor fell, not how it slowed down.
     measured = record.measured_speed
     time, speed = (None, None) if measured is None else (measured[0] - off, measured[1])
     return CoastDownSignal(
         planes={
-            name: RecordedPlane(record.signals[first:], record.sensors, sensing, b, float(sideways[b]))
+            name: RecordedPlane(record.signals[first:], record.sensors, sensing, b, centres[b])
             for b, name in enumerate(names)
         },
         air_gap=dict(zip(names, map(float, gaps), strict=True)),
-        air_gap_error=errors,
+        air_gap_error=None if sigmas is None else dict(zip(names, map(float, sigmas), strict=True)),
         centre=centre,
         sampling_rate=record.sampling_rate,
         start_time=float(record.time[first]) - off,

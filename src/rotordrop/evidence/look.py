@@ -480,6 +480,7 @@ def _rows(of: Callable[[Any], Iterable[Any]], **columns: Part) -> Part:
 _DOCUMENT: dict[str, Part] = {
     "record": _read_off(TEXT, "record.name"),
     "sha256": _read_off(TEXT, "record.sha256"),
+    "simulated_record": _read_off(FLAG, "record.is_simulated"),
     "channels": _rows(
         lambda seen: seen.record.sensors,
         name=_read_off(TEXT, "name"),

@@ -66,6 +66,11 @@ class Motion:
     floats: NDArray[np.bool_]
     notes: tuple[str, ...]
 
+    @property
+    def walls(self) -> dict[str, Wall]:
+        """The circle in which the shaft moves, by the bearing that is nearest."""
+        return {path.name: path.wall for path in self.paths}
+
 
 def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: bool) -> Motion:
     """Find down, centre and gap in every plane.
