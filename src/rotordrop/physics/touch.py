@@ -1,7 +1,7 @@
 """Rotor in a round bore: normal force, friction and their derivatives from the motion against the bore.
 
 The numbers of a contact are a short array that only this module reads; its last entries are the law of
-`rotordrop.physics.contact`, the columns of `rotordrop.rotor.layout` hold it.
+`rotordrop.physics.contact`, the columns of `rotordrop.physics.columns` hold it.
 """
 
 from __future__ import annotations
