@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 FORMATS = (".h5", ".nc", ".csv", ".mat", ".parquet")
 """Suffixes of the files that histories can be written to."""
+SIMULATED_COLUMN = "simulated"
+"""Heading of the last column of a CSV file with numbers of a simulated record; it says yes in every row."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,6 +100,11 @@ def loads_of_balls(estimate: Estimate, name: str) -> Array:
     return numbers_of(estimate.machine.bearing(name)).element_loads_under(bearing.force_vector)
 
 
+def _marks(estimate: Estimate) -> dict[str, str]:
+    """What every file says of a simulated record; nothing of a measured one."""
+    return {"simulated_record": "yes"} if estimate.simulated_record else {}
+
+
 def as_dataframe(estimate: Estimate) -> pandas.DataFrame:
     """Histories as a table with columns (bearing, quantity), indexed by time [s]; units in ``attrs``."""
     import pandas
@@ -107,7 +114,7 @@ def as_dataframe(estimate: Estimate) -> pandas.DataFrame:
         {(c.bearing, c.quantity): c.values for c in columns}, index=pandas.Index(time, name="time")
     )
     frame.columns.names = ["bearing", "quantity"]
-    frame.attrs = {"units": {c.quantity: c.unit for c in columns}, "drop": estimate.name}
+    frame.attrs = {"units": {c.quantity: c.unit for c in columns}, "drop": estimate.name} | _marks(estimate)
     return frame
 
 
@@ -125,6 +132,7 @@ def as_dataset(estimate: Estimate) -> xarray.Dataset:
         values = np.stack([found[n].values if n in found else missing for n in names], axis=1)
         variables[quantity] = (("time", "bearing"), values, {"units": one.unit, "long_name": one.text})
     attributes = {"drop": estimate.name, "machine": estimate.machine.name, "verdict": estimate.sentence}
+    attributes |= _marks(estimate)
     data = xarray.Dataset(variables, coords={"time": time, "bearing": names}, attrs=attributes)
     data["time"].attrs = {"units": "s", "long_name": "time from power-off"}
     return data
@@ -158,8 +166,11 @@ def _csv(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pat
     """Comma and decimal point; the first line says the columns with their units."""
     table = np.column_stack([time, *(c.values for c in columns)])
     header = ",".join(["time [s]", *(c.label for c in columns)])
+    row = ",".join(["%.9g"] * table.shape[1])
+    if estimate.simulated_record:
+        header, row = f"{header},{SIMULATED_COLUMN}", f"{row},yes"
     with atomic_path(path) as temporary:
-        np.savetxt(temporary, table, delimiter=",", header=header, comments="", fmt="%.9g", encoding="utf-8")
+        np.savetxt(temporary, table, header=header, comments="", fmt=row, encoding="utf-8")
 
 
 def _mat(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
@@ -167,6 +178,7 @@ def _mat(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pat
     from scipy.io import savemat
 
     content: dict[str, Any] = {"time": time, "drop": estimate.name, "machine": estimate.machine.name}
+    content |= _marks(estimate)
     for c in columns:
         content.setdefault(re.sub(r"\W", "_", f"b_{c.bearing}"), {})[c.quantity[:31]] = c.values
     content["units"] = {c.quantity[:31]: c.unit for c in columns} | {"time": "s"}
@@ -180,7 +192,8 @@ def _parquet(estimate: Estimate, time: Array, columns: tuple[Column, ...], path:
 
     fields = {"time [s]": time} | {c.label: c.values for c in columns}
     with atomic_path(path) as temporary:
-        parquet.write_table(pyarrow.table(fields), temporary)
+        marked = pyarrow.table(fields).replace_schema_metadata(_marks(estimate))
+        parquet.write_table(marked, temporary)
 
 
 def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
@@ -193,6 +206,7 @@ def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pa
         file.attrs["format"] = "rotordrop histories 1"
         file.attrs["drop"], file.attrs["machine"] = estimate.name, estimate.machine.name
         file.attrs["verdict"] = estimate.sentence
+        file.attrs.update(_marks(estimate))
         file.attrs["record_sha256"] = estimate.record.sha256
         file["time"] = time
         file["time"].attrs.update({"units": "s", "long_name": "time from power-off"})

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.estimate.histories import SIMULATED_COLUMN
 from rotordrop.files import make_folder, write_text
 from rotordrop.report.content import Cell, ReportContent, Table
 from rotordrop.report.quantity import Quantity
@@ -21,7 +22,8 @@ def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
     """Write the tables and figures of a report as CSV into a folder, which is made; give the files.
 
     Quantities are in SI units, with the ends of their interval where they have one. A figure becomes pairs of
-    columns, x and y of every line as it is drawn; a picture has its value as a third.
+    columns, x and y of every line as it is drawn; a picture has its value as a third. What comes from a
+    simulation has a last column that says so.
     """
     folder = Path(folder)
     make_folder(folder)
@@ -31,6 +33,8 @@ def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
         path, k = folder / f"{stem}.csv", 2
         while path in written:
             path, k = folder / f"{stem}_{k}.csv", k + 1
+        if content.simulated:
+            rows = [[*row, "yes" if k else SIMULATED_COLUMN] for k, row in enumerate(rows)]
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows(rows)
         write_text(path, text.getvalue())

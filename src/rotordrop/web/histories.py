@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from rotordrop.errors import UsageError
+from rotordrop.estimate.histories import SIMULATED_COLUMN
 from rotordrop.web.desk import Desk, NotThereError, number, of_file
 from rotordrop.web.workspace import labelled
 
@@ -94,7 +95,7 @@ def _asked_window(
 def _page_of(folder: Path) -> dict[str, Any]:
     """What the routes need of the content of a page."""
     found: dict[str, Any] = json.loads((folder / "page.json").read_text(encoding="utf-8"))
-    return {key: found[key] for key in ("traces", "planes", "parts", "labels") if key in found}
+    return {key: found[key] for key in ("traces", "planes", "parts", "labels", "simulated") if key in found}
 
 
 async def csv(desk: Desk, request: Request) -> Response:
@@ -103,18 +104,19 @@ async def csv(desk: Desk, request: Request) -> Response:
 
     folder = await desk.found(request)
     traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
-    labels = _page_of(folder).get("labels", {})  # an earlier version wrote none
+    page = _page_of(folder)
+    labels, simulated = page.get("labels", {}), page.get("simulated")  # an earlier version wrote no labels
     first, last = np.searchsorted(traces.time, start), np.searchsorted(traces.time, end, side="right")
 
     async def table() -> AsyncIterator[str]:
-        yield (
-            ",".join(["time [s]", *(labels.get(traces.columns[row], traces.columns[row]) for row in rows)])
-            + "\n"
-        )
+        heads = ["time [s]", *(labels.get(traces.columns[row], traces.columns[row]) for row in rows)]
+        yield ",".join([*heads, SIMULATED_COLUMN] if simulated else heads) + "\n"
         for begin in range(int(first), int(last), CSV_ROWS):
             stop = min(begin + CSV_ROWS, int(last))
             columns = [[repr(float(time)) for time in traces.time[begin:stop]]]
             columns += [[f"{value:.9g}" for value in traces.values[row, begin:stop].tolist()] for row in rows]
+            if simulated:
+                columns.append(["yes"] * (stop - begin))
             yield "".join(",".join(line) + "\n" for line in zip(*columns, strict=True))
             await asyncio.sleep(0)
 

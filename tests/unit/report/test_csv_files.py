@@ -1,6 +1,7 @@
 """Tables and figures of a report as CSV: units, intervals, pairs of columns, names that do not clash."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -59,6 +60,12 @@ def test_lines_stand_beside_each_other_and_a_picture_point_by_point(tmp_path):
     ]
     assert rows_of(picture)[1:3] == [["1", "10", "0"], ["2", "10", "1"]]
     assert rows_of(picture)[-1] == ["3", "20", "5"]
+
+
+def test_what_was_simulated_is_marked_in_every_row(tmp_path):
+    for path in write_data(replace(content(), simulated="A simulated record."), tmp_path):
+        head, *rows = rows_of(path)
+        assert head[-1] == "simulated" and {row[-1] for row in rows} == {"yes"}
 
 
 @pytest.mark.parametrize("verb", ["critical-speeds"])

@@ -46,13 +46,15 @@ def test_histories_are_written_and_read_back(estimate, tmp_path, suffix):
         with h5py.File(path) as file:
             found = file["force"][:, list(file["bearing"].asstr()).index("DE")]
             assert file["force"].attrs["units"] == "N"
+            assert file.attrs["simulated_record"] == "yes"
     elif suffix == ".mat":
         content = loadmat(path, simplify_cells=True)
         found = content["b_DE"]["force"]
-        assert content["units"]["stress"] == "Pa"
+        assert content["units"]["stress"] == "Pa" and content["simulated_record"] == "yes"
     else:
         with path.open(encoding="utf-8") as stream:
             rows = list(csv.reader(stream))
+        assert rows[0][-1] == "simulated" and {row[-1] for row in rows[1:]} == {"yes"}
         found = [float(row[rows[0].index("DE force [N]")]) for row in rows[1:]]
     np.testing.assert_allclose(found, wanted, rtol=1e-8)
 
@@ -66,9 +68,9 @@ def test_parquet_is_written(estimate, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
     path = tmp_path / "histories.parquet"
     estimate.save(path)
-    np.testing.assert_array_equal(
-        parquet.read_table(path)["DE force [N]"], estimate.bearing("DE").force.values
-    )
+    table = parquet.read_table(path)
+    np.testing.assert_array_equal(table["DE force [N]"], estimate.bearing("DE").force.values)
+    assert table.schema.metadata[b"simulated_record"] == b"yes"
 
 
 def test_parquet_without_its_package_says_what_it_needs(estimate, tmp_path, monkeypatch):

@@ -54,9 +54,10 @@ def test_a_table_holds_every_sample_of_a_window(served, looked, files):
     seen = look(files["record"], machine=load_machine(files["machine"]))
     text = served.ask("GET", f"/api/jobs/{looked}/look/csv?column=x0&column=y0&start=0&end=1").text
     head, *rows = text.strip().split("\n")
-    assert head == "time [s],NDE x [m],NDE y [m]"
+    assert head == "time [s],NDE x [m],NDE y [m],simulated"
     inside = (seen.motion.time >= 0) & (seen.motion.time <= 1)
-    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    assert all(row.endswith(",yes") for row in rows)
+    table = np.array([[float(cell) for cell in row.split(",")[:-1]] for row in rows])
     np.testing.assert_array_equal(table[:, 0], seen.motion.time[inside])
     np.testing.assert_allclose(table[:, 1:], seen.motion.paths[0].position[inside], rtol=1e-7, atol=1e-18)
 
