@@ -45,6 +45,7 @@ from rotordrop.twin.tracked_loads import (
     INCONSISTENT,
     INCONSISTENT_WIDENING,
     OF_CROSS_CHECK,
+    OF_ITS_ERROR,
     check_without_contact_law,
     is_beyond_factor,
     loads_of_cross_check,
@@ -455,8 +456,8 @@ def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop
     assert given.peak_force.value == check.peak[0] == given.force.values.max()
     assert given.peak_force.known.status == OF_CROSS_CHECK
     low, high = given.peak_force.interval_90 or (math.nan, math.nan)
-    twice = 2.0 * check.peak_error[0]
-    assert (low, high) == pytest.approx(((1.0 - twice) * check.peak[0], (1.0 + twice) * check.peak[0]))
+    half = OF_ITS_ERROR * check.peak_error[0]
+    assert (low, high) == pytest.approx(((1.0 - half) * check.peak[0], (1.0 + half) * check.peak[0]))
     assert given.force_band.upper.max() == pytest.approx(high)
     assert low < own.peak_force.value < high
     assert {one.origin for one in (given.peak_force, given.peak_stress)} == {Origin.CROSS_CHECK}
