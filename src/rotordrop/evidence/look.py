@@ -62,8 +62,11 @@ from rotordrop.units import in_si
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
+RELEASE_ERROR = 2e-3
+"""Half width to which a look knows the release [s]."""
+
 BEFORE_RELEASE = 4e-3
-"""Distance from the release [s], which a look knows to about 2 ms, up to which the rotor surely floats."""
+"""Distance from the release [s], known to `RELEASE_ERROR`, up to which the rotor surely floats."""
 
 INDEX_WINDOW = 0.2
 """Time from the release on over which the indices are taken [s], or to the end where that comes first."""
@@ -158,8 +161,12 @@ class Look:
                 return None
         return touched[0][2]
 
-    def timeline(self) -> tuple[tuple[float, str], ...]:
-        """Events in the order of time: time [s] and words."""
+    def timeline(self, origin_error: float = 0.0) -> tuple[tuple[float, str], ...]:
+        """Events in the order of time: time [s] and words.
+
+        Who shows the times from another instant than the start of the record gives the half width of the 90 %
+        interval of that instant [s], which the intervals then hold.
+        """
         events = [(float(self.record.time[0]), f"record begins{', rotor levitated' if self.drops else ''}")]
         if not self.drops:
             events.append((float(self.record.time[-1]), "record ends"))
@@ -173,7 +180,8 @@ class Look:
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:
-                half = 0.5e3 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
+                own = 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
+                half = 1e3 * math.hypot(own, origin_error)
                 events.append((plane.touch, f"first touch at {plane.plane} (± {half:.2g} ms)"))
         events += [
             (

@@ -194,6 +194,8 @@ class ReportContent:
     """How many of the sections stand with the headline numbers, before the notes: the first printed page."""
     ends: tuple[str, str] | None = None
     """Names of the first and the last bearing, between which one looks."""
+    counted_from: str = "power-off"
+    """The instant from which the figures count time."""
 
     @property
     def notes(self) -> tuple[Statement, ...]:

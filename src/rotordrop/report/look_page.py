@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -38,7 +39,9 @@ ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
 VAGUE = 0.05
 """A length whose 90 % interval reaches further to either side is shown as a range [1] (chosen)."""
-SENSOR_PLANES = "Displacement in the planes of the sensors; time counts from the release."
+RELEASE = f"the release (± {1e3 * RELEASE_ERROR:g} ms)"
+"""What a look counts time from."""
+SENSOR_PLANES = f"Displacement in the planes of the sensors; time counts from {RELEASE}."
 
 
 def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
@@ -66,6 +69,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
+        counted_from=RELEASE,
         lead=1 if drawn else 0,
         summary=(table(seen.timeline(), timeline, "What happened when"),),
         sections=(
@@ -123,6 +127,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
             *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=(),
+        counted_from="the start of the record",
         summary=tuple(summary),
         sections=(
             *(() if spectra is None else (spectra,)),
@@ -196,8 +201,8 @@ def _verdict(seen: Look) -> list[Statement]:
     ends = (
         "." if contact is None else f"; the last one at {format_moment(contact)}, in contact from there on."
     )
-    release = f"The rotor was released at {format_moment(drop.release)} of the record (± 2 ms)"
-    said = [f"{release}, {len(seen.impacts)} impacts{ends}"]
+    release = f"{format_moment(drop.release)} of the record (± {1e3 * RELEASE_ERROR:g} ms)"
+    said = [f"The rotor was released at {release}, {len(seen.impacts)} impacts{ends}"]
     if len(seen.planes) > 1:
         first = seen.first_end
         said.append(
@@ -281,11 +286,15 @@ def _figures(seen: Look) -> tuple[Section, ...]:
         for motion in one.motions
     ]
     until = f" until {ORBIT_UNTIL:g} s after the release" if time[-1] > ORBIT_UNTIL else ""
-    return (
+    sections = (
         orbit_section(bearings, first, until),
         motion_section(bearings, "measured", SENSOR_PLANES),
         *appendix([radial_section(bearings)]),
     )
+    for figure in (figure for section in sections for figure in section.figures):
+        for axis in figure.chart.select_xaxes():
+            axis.title.text = (axis.title.text or "").replace("power-off", RELEASE) or None
+    return sections
 
 
 def _impacts(seen: Look) -> Table:

@@ -49,6 +49,7 @@ def write_look(
     seen: Look, job: Job, made: Path, options: Mapping[str, Any], machine: Machine | None = None
 ) -> None:
     """Write what a look shows: motion of every plane with the speed, and its page as JSON."""
+    from rotordrop.evidence.look import RELEASE_ERROR
     from rotordrop.report.look_page import look_page
     from rotordrop.report.rotor_drawing import rotor_outline
 
@@ -93,6 +94,7 @@ def write_look(
             "marks": [] if seen.record.marks is None else seen.record.marks[:MOST_MARKS].tolist(),
             "rotor": None if machine is None else rotor_outline(machine),
             "labels": labels,
+            "counted_from": content.counted_from,
             "zero": seen.drops[0].release if seen.drops else float(seen.motion.time[0]),
             "places": [
                 {
@@ -103,7 +105,10 @@ def write_look(
                 }
                 for b, path in enumerate(seen.motion.paths)
             ],
-            "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
+            "timeline": [
+                {"time": time, "words": words}
+                for time, words in seen.timeline(RELEASE_ERROR if seen.drops else 0.0)
+            ],
             **_impacts(
                 impacts,
                 "beyond the air gap" if seen.drops else "from the usual place",

@@ -50,6 +50,19 @@ def test_a_look_on_the_page_says_what_a_look_in_python_says(served, looked, file
     )
 
 
+def test_a_first_touch_counted_from_the_release_has_the_interval_of_both(served, looked, files):
+    seen = look(files["record"], machine=load_machine(files["machine"]))
+    page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
+    assert page["counted_from"] == "the release (± 2 ms)"
+    words = [one["words"] for one in page["timeline"] if one["words"].startswith("first touch at ")]
+    assert len(words) == len(seen.planes)
+    for plane in seen.planes:
+        low, high = plane.touch_interval_90
+        half = 1e3 * np.hypot(0.5 * (high - low), 2e-3)
+        assert f"first touch at {plane.plane} (± {half:.2g} ms)" in words
+        assert half >= 2.0 > 500.0 * (high - low)
+
+
 def test_a_table_holds_every_sample_of_a_window(served, looked, files):
     seen = look(files["record"], machine=load_machine(files["machine"]))
     text = served.ask("GET", f"/api/jobs/{looked}/look/csv?column=x0&column=y0&start=0&end=1").text

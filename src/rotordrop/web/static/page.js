@@ -11,7 +11,7 @@ import { redoLog, redrawLog, showLog } from "./log.js";
 import { drawAll, FIGURES, isShown, lines, loadView, traces } from "./panels.js";
 import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
-import { by, events, files, homeView, impacts, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
+import { by, events, files, homeView, impacts, origin, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
 import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
 import { cutFiles, drawFall, fallFiles, fallSeen, fallWanted, openFall } from "./waterfall.js";
 import * as units from "./units.js";
@@ -40,6 +40,7 @@ const TABS = {
   Events: () => [...(notes().length ? [make("h3", { class: "part", text: "Notes" }), make("ol", { class: "timeline", of: notes().map((note) => make("li", { of: [
       make("button", { class: "link", text: units.eventText(note.time), on: { click: () => { state.cursor = note.time; setView({ from: note.time - 0.05, to: note.time + 0.1 }); } } }), make("span", { text: note.text }),
       make("button", { class: "link", text: "✕", "aria-label": `Remove the note ${note.text}`, on: { click: () => keepNotes(notes().filter((one) => one !== note)).catch(lost) } })] })) }), make("h3", { class: "part", text: "Events" })] : []),
+    make("p", { class: "small", text: `Times count from ${origin()}.` }),
     timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
   Numbers: () => {
     const page = state.estimate || state.look;
@@ -187,7 +188,7 @@ async function keepNotes(list) {
 function askNote() {
   if (!state.job || state.cursor === null) { say("Point at a trace first: a note stands at the cursor.", "notice"); return; }
   const time = state.cursor;
-  by("instantwhen").textContent = `At ${units.eventText(time)} from power-off`;
+  by("instantwhen").textContent = `At ${units.eventText(time)} from ${origin()}`;
   by("instanttext").value = "";
   by("instant").showModal();
   by("instanttext").focus();

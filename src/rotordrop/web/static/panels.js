@@ -4,7 +4,7 @@ import { makeOrbits, setCursor, setMark, setView, setWindow, zoom } from "./curs
 import { colours, faint, keep, keepPng, keepSvg, levelKeys, placeColour, svgPen, tracePicture } from "./figures.js";
 import { clearPlots, drawOverview, drawPanel, follow, stripOn } from "./plots.js";
 import * as server from "./server.js";
-import { by, events, fileName, files, homeView, impacts, samples, say, shift, showLines, span, state, uprights, usesEstimate, zero } from "./state.js";
+import { by, events, fileName, files, homeView, impacts, origin, samples, say, shift, showLines, span, state, uprights, usesEstimate, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -126,7 +126,7 @@ function picture(panel) {
   }
   const room = 0.06 * (high - low || 1);
   tracePicture(pen, { title: `${state.job.name}: ${panel.title}`, curves, bands, levels: panel.levels.map((level) => ({ ...level, value: level.value / f })),
-    uprights: uprights().map((one) => ({ ...one, at: one.time / scale })), x: { low: state.view.from / scale, high: state.view.to / scale, label: `time from power-off [${name}]` },
+    uprights: uprights().map((one) => ({ ...one, at: one.time / scale })), x: { low: state.view.from / scale, high: state.view.to / scale, label: `time from ${origin()} [${name}]` },
     y: { low: panel.fromZero ? 0 : low - room, high: high + room, label: `${panel.axis} [${units.unit(panel.kind)}]` } });
   return pen;
 }
@@ -155,7 +155,7 @@ export function drawAll() {
   by("panels").replaceChildren(...state.panels.map((panel) => panelFrame(panel, tone)));
   by("panels").style.setProperty("--count", state.panels.length);
   for (const panel of state.panels) {
-    drawPanel({ ...panel, curves: panel.drawn, lowest: panel === state.panels.at(-1) }, state.view, { window: setWindow, cursor: setCursor, mark: setMark, uprights: uprights().map((one) => (panel === state.panels[0] ? one : { ...one, text: "" })), zoom, home: () => setView(homeView()) });
+    drawPanel({ ...panel, curves: panel.drawn, lowest: panel === state.panels.at(-1) }, state.view, { origin: origin(), window: setWindow, cursor: setCursor, mark: setMark, uprights: uprights().map((one) => (panel === state.panels[0] ? one : { ...one, text: "" })), zoom, home: () => setView(homeView()) });
   }
   const [scale, name] = units.timeScale(state.view.to - state.view.from);
   by("from").value = Number((state.view.from / scale).toPrecision(6));
@@ -166,7 +166,7 @@ export function drawAll() {
   requestAnimationFrame(() => follow(state.cursor));
 }
 
-const strip = () => ({ ...state.overview, view: state.view, span: span(), impacts: impacts().map((one) => one.time),
+const strip = () => ({ ...state.overview, origin: origin(), view: state.view, span: span(), impacts: impacts().map((one) => one.time),
   events: events(), uprights: uprights() });
 export function drawStrip() { if (state.overview) { drawOverview(by("overview"), strip()); } }
 const stripPicture = () => {

@@ -69,7 +69,7 @@ export function drawPanel(panel, view, on) {
     cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, y: false, points: { show: false } },
     scales: { x: { time: false, range: () => [view.from / scale, view.to / scale] }, y: { range } },
     padding: [8, 16, panel.lowest ? 0 : 4, 0],
-    axes: [{ ...axis, size: panel.lowest ? 26 : 3, values: panel.lowest ? values(8) : () => [], gap: 2, ...(panel.lowest ? { label: `time from power-off [${timeName}]`, labelSize: 16, labelGap: 0 } : {}) },
+    axes: [{ ...axis, size: panel.lowest ? 26 : 3, values: panel.lowest ? values(8) : () => [], gap: 2, ...(panel.lowest ? { label: `time from ${on.origin} [${timeName}]`, labelSize: 16, labelGap: 0 } : {}) },
       { ...axis, size: 54, values: values(8), label: `${panel.axis} [${unit(panel.kind)}]`, labelSize: 16, labelGap: 0, gap: 3 }],
     series, bands,
     hooks: {
@@ -114,7 +114,7 @@ export function follow(cursor) {
 // data: {time, curves: [{values}]}; events: [{time, words}]
 export const drawOverview = (canvas, told) => stripOn(canvasPen(canvas), told);
 
-export function stripOn(pen, { data, events, impacts, view, span, uprights }) {
+export function stripOn(pen, { data, events, impacts, view, span, uprights, origin }) {
   const tone = colours(), top = 4, bottom = pen.height - 16;
   const px = (t) => ((t - span[0]) / (span[1] - span[0])) * pen.width;
   let high = 0;
@@ -133,5 +133,5 @@ export function stripOn(pen, { data, events, impacts, view, span, uprights }) {
   const [scale, name] = timeScale(span[1] - span[0]);
   pen.text(`${written(span[0] / scale, 3)} ${name}`, 2, pen.height - 3, tone.muted, { size: 10 });
   pen.text(`${written(span[1] / scale, 3)} ${name}`, pen.width - 2, pen.height - 3, tone.muted, { size: 10, align: "right" });
-  pen.text("time from power-off, radius in every plane", pen.width / 2, pen.height - 3, tone.muted, { size: 10, align: "center" });
+  pen.text(`time from ${origin}, radius in every plane`, pen.width / 2, pen.height - 3, tone.muted, { size: 10, align: "center" });
 }
