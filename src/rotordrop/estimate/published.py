@@ -473,8 +473,14 @@ def drops_of(content: Mapping[str, Any], place: str) -> dict[str, Drop]:
         If it is no document of an estimate, or one of another version.
     """
     if (found := content.get("format")) != FORMAT:
+        if {"no_fall", "not_seen"} <= content.keys():
+            raise UsageError(
+                f"{place} is the JSON of 'rotordrop look', which holds no forces; expected an estimate. Give "
+                f"a file that '{MADE_BY}' wrote."
+            )
+        stands = "there is no format" if found is None else f"the format is {found!r}"
         raise UsageError(
-            f"{place}: the format is {found!r}; expected {FORMAT!r}. Give a file that '{MADE_BY}' of this "
+            f"{place}: {stands}; expected {FORMAT!r}. Give a file that '{MADE_BY}' of this "
             "version wrote, or estimate the drop anew."
         )
     if "drops" in content:

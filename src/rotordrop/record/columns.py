@@ -232,7 +232,7 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     ]
     profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
     profile, speed = _with_speed(recording, profile, used if sensors else [])
-    if speed is None:
+    if speed is None and sensors:  # a look needs none
         missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
     units = {
         channel.label: profile.units.get(channel.label) or channel.unit or profile.unit
@@ -255,7 +255,9 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         found.append(f"channel {channel.label}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
     found += [f"sensor {name}: channel {label}" for name, label in mapped.items()]
     found += [f"plane {name}: {text}" for name, text in planes.items() if not sensors]
-    found += [f"shaft speed: {speed}"] if speed else []
+    found.append(
+        f"shaft speed: {speed or 'not known; an estimate needs --speed-channel, --pulses or --speed'}"
+    )
     return Guess(profile=profile, found=tuple(found), missing=tuple(missing))
 
 

@@ -21,7 +21,8 @@ _NEAR = 0.85
 """A contact turns the rotor back at this share of the gap or beyond [1]."""
 
 HOP = 0.05
-"""A rotor that left its race by less than this share of the gap has not left it [1] (chosen)."""
+"""A flight is at least as long as a hop of this height over the gap under gravity, and leaves the race by
+half of it [1] (chosen)."""
 
 _FREE, _LEAST_FREE = 0.8, 0.3
 """Least mean acceleration in a flight over that of a free body, and least of that over gravity [1] (both from
@@ -46,7 +47,7 @@ LASTING = 0.05
 
 
 def shortest_flight(gap: float) -> float:
-    """Shortest flight that ends in an impact [s]: gravity moves the rotor by `HOP` of the gap in it."""
+    """Shortest flight that ends in an impact [s]: as long as a hop of `HOP` of the gap under gravity."""
     return math.sqrt(8.0 * HOP * gap / GRAVITY)
 
 
@@ -68,9 +69,10 @@ def find_impacts(
 ) -> Impacts:
     """Find the impacts of a path (N, 2) from the centre: back on the race after a flight, and turned sharply.
 
-    A flight lasts as long as gravity needs to take the rotor off the race by `HOP` of the gap, and is
-    accelerated like that of a free body. Shorter hops belong to the impact before; a rotor that swings along
-    its race, or shakes with it, makes none. The first reversal of a path that begins with the fall is one.
+    A flight lasts at least as long as a hop of `HOP` of the gap under gravity, leaves the race by half of
+    that, and is accelerated like that of a free body. Shorter hops belong to the impact before; a rotor that
+    swings along its race, or shakes with it, makes none. The first reversal of a path that begins with the
+    fall is one.
     """
     radius = np.hypot(*path.T)
     speed = slope(radius, rate)

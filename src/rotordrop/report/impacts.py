@@ -11,17 +11,25 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop.estimate.bearing_drop import BearingDrop, Impact
-from rotordrop.record.impacts import HOP
+from rotordrop.record.impacts import HOP, shortest_flight
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity, places_of
 from rotordrop.report.style import MUTED, axis_title, curve, panels, square
 
 LISTED = 24
-IMPACT_RULE = (
-    f"An impact is a return to the race after a flight that takes the rotor {HOP:.0%} of the air gap off it; "
-    "shorter hops belong to the impact before, and a swing along the race is none."
-)
 LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
+
+
+def impact_rule(gaps: Sequence[float]) -> str:
+    """The rule of `find_impacts` in words, with the shortest flight for these air gaps [m]."""
+    times = dict.fromkeys(f"{1e3 * shortest_flight(gap):.2g}" for gap in sorted(gaps))
+    after = f"at least {' to '.join([*times][:: max(len(times) - 1, 1)])} ms" if times else "a time"
+    return (
+        f"An impact is a return to the race after {after} of free flight, as long as a hop of {HOP:.0%} of "
+        f"the air gap under gravity lasts, in which the rotor leaves the race by {0.5 * HOP:.1%} of the gap "
+        "or more; the first touch of a fall is one too. Shorter hops belong to the impact before, and a "
+        "swing along the race is none."
+    )
 
 
 def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
@@ -34,6 +42,7 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
     count = sum(after for *_, after in impacts)
     strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
     left_out = len(impacts) - len(strongest)
+    gaps = [0.5 * (one.air_gap.lower + one.air_gap.upper) for one in bearings if one.air_gap is not None]
     rest = f" {left_out} weaker ones are left out." if left_out else ""
 
     def number(label: str, field: str, kind: str) -> Column:
@@ -55,7 +64,7 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         sorted(strongest, key=lambda item: item[1].peak_time),
         columns,
         f"Contacts ({len(strongest)} of {len(impacts)}), {count} of them impacts",
-        f"Azimuth counter-clockwise from +x, −90° is the bottom. {IMPACT_RULE}{rest}",
+        f"Azimuth counter-clockwise from +x, −90° is the bottom. {impact_rule(gaps)}{rest}",
     )
 
 

@@ -24,7 +24,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.drop_sections import motion_section, orbit_section, radial_section
-from rotordrop.report.impacts import IMPACT_RULE
+from rotordrop.report.impacts import impact_rule
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.record_quality import quality_statements, record_quality_section
 from rotordrop.report.style import axis_title, curve, panels
@@ -118,7 +118,11 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     spectra = Section("Spectrum", figures=tuple(_spectrum(level) for level in seen.levels)) if drawn else None
     return ReportContent(
         title=f"A look at {record.name}",
-        subtitle="no drop in this record",
+        subtitle=(
+            "no drop in this record"
+            if seen.motion.paths
+            else "a drop is not determined: no pair of channels shows a plane"
+        ),
         facts=facts,
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         verdict=(
@@ -307,6 +311,7 @@ def _impacts(seen: Look) -> Table:
         Column("and after", "rebound", "velocity"),
     )
     note = f"The first {MOST_LISTED} of {len(seen.impacts)}." if len(seen.impacts) > MOST_LISTED else ""
+    rule = impact_rule([path.gap for path in seen.motion.paths])
     return table(
-        seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{IMPACT_RULE} {note}".strip()
+        seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{rule} {note}".strip()
     )

@@ -60,6 +60,13 @@ def test_everything_missing_is_asked_for_at_once(strange, tmp_path, capsys):
     assert load_profile(profile).speed.constant == "60 Hz"
 
 
+def test_a_profile_for_looks_needs_no_speed(strange, tmp_path, capsys):
+    profile = tmp_path / "recorder.toml"
+    assert run(["profile", str(strange), "--unit", "um", "-o", str(profile)]) == 0
+    assert "shaft speed: not known; an estimate needs --speed-channel" in capsys.readouterr().out
+    assert load_profile(profile).planes == {"1": "X1, Y1", "2": "X2, Y2"}
+
+
 def test_every_missing_channel_is_named_in_one_message(strange):
     asked = (
         r'\(4 sensors have none\); it has X1, Y1, X2, Y2\. .*likeliest --map "NDE: X1, Y1" --map "DE: X2, Y2"'

@@ -11,6 +11,7 @@ import pytest
 
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
+from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
 from rotordrop.machine import example_path
@@ -80,6 +81,8 @@ def test_release_impacts_and_contact_of_a_bouncing_point(angles, tmp_path):
         assert plane.largest == pytest.approx(GAP, abs=3e-6)
     assert seen.speed == pytest.approx(120 * np.pi)
     assert seen.findings == ()
+    (listed,) = (one for part in look_page(seen, drawn=False).sections for one in part.tables)
+    assert "after at least 3.2 ms of free flight" in listed.note  # up 5 % of 250 µm and down again
 
 
 def test_the_gap_comes_from_the_depth_of_the_rest_where_it_is_not_given(tmp_path):
@@ -324,6 +327,9 @@ def test_a_single_channel_shows_its_level(tmp_path, capsys):
     assert run(["look", str(file), "--report", str(tmp_path / "one.html")]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "holds 1 channels that can be displacements" in told and "VE-101X [um] 3" in told
+    assert "a drop is not determined: no pair of channels" in told and "no drop in this record" not in told
+    with pytest.raises(UsageError, match=r"one\.json is the JSON of 'rotordrop look', which holds no forces"):
+        drops_of(look(file).as_json(), "one.json")
     assert "Spectrum of VE-101X" in (tmp_path / "one.html").read_text()
     (level,) = look(file).levels
     assert max(level.lines, key=lambda line: line[1]) == pytest.approx((50.0, 20.0), rel=0.05)
