@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import html
 import io
 import re
 from collections.abc import Iterator
@@ -17,13 +18,16 @@ from rotordrop.files import make_folder, write_text
 from rotordrop.report.content import Cell, ReportContent, Table
 from rotordrop.report.quantity import Quantity
 
+_SAME = 1e-6
+"""Places on the paper that are nearer are the same [1]: they differ by rounding."""
+
 
 def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
     """Write the tables and figures of a report as CSV into a folder, which is made; give the files.
 
     Quantities are in SI units, with the ends of their interval where they have one. A figure becomes pairs of
-    columns, x and y of every line as it is drawn; a picture has its value as a third. What comes from a
-    simulation has a last column that says so.
+    columns, x and y of every line as it is drawn, headed by the title of its panel where it has one; a
+    picture has its value as a third. What comes from a simulation has a last column that says so.
     """
     folder = Path(folder)
     make_folder(folder)
@@ -96,11 +100,38 @@ def _figure(chart: Any) -> list[list[str]]:
             height = np.asarray(trace.z)
             values["x"], values["y"] = (grid.ravel() for grid in np.meshgrid(values["x"], values["y"]))
             values["z"] = height.ravel()
+        panel = _panel(chart, trace)
         for axis, along in values.items():
-            title = "value"
-            if axis != "z":
-                reference = getattr(trace, f"{axis}axis", None) or axis
-                title = str(chart.layout[f"{axis}axis{reference[1:]}"].title.text or axis)
+            title = "value" if axis == "z" else _axis_title(chart, trace, axis)
             texts = (f"{v:.9g}" if isinstance(v, int | float | np.number) else str(v) for v in along)
-            columns.append([f"{trace.name or 'line'}: {title}", *texts])
+            columns.append([f"{panel}{trace.name or 'line'}: {title}", *texts])
     return [list(row) for row in zip_longest(*columns, fillvalue="")]
+
+
+def _axis(chart: Any, trace: Any, axis: str) -> Any:
+    reference = getattr(trace, f"{axis}axis", None) or axis
+    return chart.layout[f"{axis}axis{reference[1:]}"]
+
+
+def _axis_title(chart: Any, trace: Any, axis: str) -> str:
+    """Title with unit; panels of one row or column share one, written at its edge."""
+    own = _axis(chart, trace, axis)
+    alike = chart.select_xaxes() if axis == "x" else chart.select_yaxes()
+    texts = (one.title.text for one in (own, *alike) if one.domain == own.domain)
+    return html.unescape(str(next(filter(None, texts), axis)))
+
+
+def _panel(chart: Any, trace: Any) -> str:
+    """Title of the panel that a trace is in, or else of the one above it; empty where it has none."""
+    across, up = (_axis(chart, trace, axis).domain for axis in ("x", "y"))
+    if across is None or up is None:
+        return ""
+    above = [
+        (note.y, note.text)
+        for note in chart.layout.annotations
+        if note.xref == note.yref == "paper"
+        and note.text
+        and abs(note.x - sum(across) / 2.0) < _SAME
+        and note.y > up[1] - _SAME
+    ]
+    return f"{html.unescape(min(above)[1])}: " if above else ""

@@ -12,6 +12,7 @@ from rotordrop.machine import example_path
 from rotordrop.report.content import Figure, ReportContent, Section, Table
 from rotordrop.report.csv_files import write_data
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.style import panels
 
 
 def rows_of(path):
@@ -60,6 +61,26 @@ def test_lines_stand_beside_each_other_and_a_picture_point_by_point(tmp_path):
     ]
     assert rows_of(picture)[1:3] == [["1", "10", "0"], ["2", "10", "1"]]
     assert rows_of(picture)[-1] == ["3", "20", "5"]
+
+
+def test_columns_of_several_panels_name_the_panel_and_the_titles_they_share(tmp_path):
+    chart = panels(["NDE & co", "DE", "", ""], rows=2, columns=2)
+    for row, column in ((1, 1), (1, 2), (2, 2)):
+        chart.add_trace(go.Scatter(x=[0.0], y=[1.0], name="simulated"), row=row, col=column)
+    chart.update_xaxes(title_text="time [ms]", row=2)
+    chart.update_yaxes(title_text="displacement x [µm]", row=1, col=1)
+    chart.update_yaxes(title_text="displacement y [µm]", row=2, col=1)
+    figure = Figure(chart=chart, caption="", name="displacement")
+    only = ReportContent(title="t", sections=(Section(heading="s", figures=(figure,)),))
+    (path,) = write_data(only, tmp_path)
+    assert rows_of(path)[0] == [
+        "NDE & co: simulated: time [ms]",
+        "NDE & co: simulated: displacement x [µm]",
+        "DE: simulated: time [ms]",
+        "DE: simulated: displacement x [µm]",
+        "DE: simulated: time [ms]",
+        "DE: simulated: displacement y [µm]",
+    ]
 
 
 def test_what_was_simulated_is_marked_in_every_row(tmp_path):
