@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotordrop.files import write_text
 from rotordrop.report.content import ReportContent
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, unbroken
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -121,6 +121,7 @@ def _environment() -> Environment:
         loader=FunctionLoader(lambda name: _text("templates", name)),
         autoescape=True,
         undefined=StrictUndefined,
+        finalize=lambda cell: unbroken(cell) if type(cell) is str else cell,
         trim_blocks=True,
         lstrip_blocks=True,
     )

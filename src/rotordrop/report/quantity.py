@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -53,7 +54,7 @@ ALL_OF_IT = 0.01
 """Part of a half width below which the record has none of it [1]."""
 PLACES_OF_SCIENCE = (-4, 7)
 FIXED_PLACES = {"count": 0, "probability": 1}
-THIN_SPACE = "\u202f"
+THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
 _OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
 
 
@@ -241,6 +242,28 @@ def written(value: float, places: int | None) -> str:
         if text.startswith("-0") and not text.strip(f"-0.{THIN_SPACE}")
         else text.replace("-", "−")
     )
+
+
+_UNITS = {unit for scales in (DISPLAY, IN_OTHER_UNITS) for _, unit in scales.values()} | {
+    unit for kind in KINDS.values() for _, unit in kind.scales
+}
+_NUMBER_AND_UNIT = re.compile(
+    r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) ("
+    + "|".join(re.escape(unit) for unit in sorted(_UNITS | {"rpm"}, key=len, reverse=True) if unit)
+    + r")(?![\w/])|(?<=±) (?=\d)"
+)
+
+
+def unbroken(text: str) -> str:
+    r"""The text with no-break spaces between a number and its unit, and after ±.
+
+    Examples
+    --------
+    >>> from rotordrop.report.quantity import unbroken
+    >>> unbroken("9 to 50 % at 3 N s/m").split(" ")
+    ['9', 'to', '50\xa0%', 'at', '3\xa0N\xa0s/m']
+    """
+    return _NUMBER_AND_UNIT.sub(lambda found: found[0].replace(" ", NO_BREAK), text)
 
 
 def with_error(value: float, error: float | None, unit: str) -> str:

@@ -256,7 +256,11 @@ def _influence_section(results: StudyResults) -> tuple[Section, ...]:
     def part(what: str, field: str) -> Column:
         def text(name: str) -> str:
             share: Known | None = getattr(found[what][name], field)
-            return "–" if share is None else percent(share, "{:.0f} % ({:.0f} to {:.0f} %)")
+            if share is None:
+                return "–"
+            # the estimate of a share near none goes below it, which no share does
+            value, low, high = (max(100.0 * one, 0.0) for one in (share.value, share.low, share.high))
+            return f"{value:.0f} % ({low:.0f} to {high:.0f} %)"
 
         return Column(what if field == "alone" else f"{what}, with all others", text)
 

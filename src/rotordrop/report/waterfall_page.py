@@ -22,7 +22,7 @@ from rotordrop.report.content import (
     fact,
     table,
 )
-from rotordrop.report.quantity import Quantity, shown, with_error, written
+from rotordrop.report.quantity import NO_BREAK, Quantity, shown, with_error, written
 from rotordrop.report.style import TURN
 from rotordrop.report.waterfall_figure import (
     displacement_history_figure,
@@ -55,7 +55,6 @@ LINES_NOTE = (
     "the multiple of the rotor's speed."
 )
 LINES = "Lines"
-NO_BREAK = "\u00a0"
 _COMPONENTS = {
     "x": "horizontal",
     "y": "vertical",

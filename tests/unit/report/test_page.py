@@ -141,8 +141,8 @@ def test_the_figures_of_the_page_hold_the_numbers() -> None:
 
 def test_numbers_stand_beside_their_interval_and_the_record_is_called_simulated() -> None:
     text = " ".join(read(render_page(content())).text)
-    assert "3\u202f333 N" in text
-    assert "90 %: 3\u202f180 to 3\u202f490 N" in text
+    assert "3\u202f333\u00a0N" in text
+    assert "90\u00a0%: 3\u202f180 to 3\u202f490\u00a0N" in text
     assert "This record is simulated." in text
     assert "peak (zero to peak)" in text
 

@@ -60,7 +60,13 @@ def test_what_matters_stands_first_in_words_and_in_one_table(page: ReportContent
     assert found.rows[0][0] == "dynamic friction coefficient, every bearing"
     assert found.columns[1:3] == ("NDE peak force", "NDE peak stress")
     share = str(found.rows[0][1])
-    assert int(share.partition(" ")[0]) > 80 > int(str(found.rows[1][1]).partition(" ")[0].replace("−", "-"))
+    assert int(share.partition(" ")[0]) > 80 > int(str(found.rows[1][1]).partition(" ")[0])
+
+
+def test_a_share_of_the_variance_is_never_below_none(page: ReportContent) -> None:
+    cells = [str(cell) for row in page.sections[0].tables[0].rows for cell in row[1:]]
+    assert any("(0 to" in cell for cell in cells)
+    assert not any("-" in cell for cell in cells)
 
 
 def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(

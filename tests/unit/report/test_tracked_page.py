@@ -222,7 +222,7 @@ def test_the_page_is_complete_and_small(estimate: Estimate) -> None:
     assert len(html.encode()) < 6_000_000
     assert estimate.record.sha256 in html
     assert html.count('class="chart"') >= 12
-    assert "60.00 Hz (3\u202f600 rpm)" in html
+    assert "60.00\u00a0Hz (3\u202f600\u00a0rpm)" in html
 
 
 def test_no_colour_is_a_row_of_numbers_and_no_axis_matches_itself(estimate: Estimate) -> None:

@@ -16,8 +16,9 @@ export const sentence = ({ text, level }) => make("li", {
   class: level, of: [make("span", { class: "badge", text: BADGES[level] || level }), make("span", { text })]
 });
 
+// No line breaks between a number and its unit.
 const number = (cell) => {
-  const [text, interval] = cell[chosen()];
+  const [text, interval] = cell[chosen()].map((one) => one && one.replace(/(\d) (?=[^\d\s(]+( \(|$))/g, "$1\u00a0"));
   return [make("span", { class: "value", text }), ...(interval ? [make("span", { class: "interval", text: interval })] : [])];
 };
 const cellOf = (cell, first) => (typeof cell === "string"
