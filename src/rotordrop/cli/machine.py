@@ -329,8 +329,10 @@ def convert(
     }
     for given, path, what in (
         (designation, "touchdown_bearings.bearing.designation", "touchdown bearings"),
+        (designation, "touchdown_bearings.bore_radius", "their bores"),
         (gap, "touchdown_bearings.air_gap", "air gap"),
         (speed, "speed.nominal", "nominal speed"),
+        (speed, "balance_grade.at_speed", "speed of the balance grade"),
     ):
         if given is None:
             made_up[path] = what

@@ -38,7 +38,7 @@ def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
         title=f"Rotor from {name}",
         subtitle=imported.source,
         verdict=tuple(Statement(note) for note in imported.notes)
-        or (Statement("Everything in the file was taken over.", "good"),),
+        or (Statement("All of the rotor in the file was taken over.", "good"),),
         summary=(named_values("rotor", rows), mode_table(modes, "rotor held", SHOWN)),
     )
 

@@ -186,7 +186,9 @@ def test_what_nobody_gave_is_marked_in_the_file_and_said(tmp_path, capsys):
     assert "made up, marked in the file: " in said
     assert "nominal speed" in said and "air gap" not in said
     lines = target.read_text(encoding="utf-8").splitlines()
-    for key, marked in (("designation", True), ("nominal", True), ("angle", True), ("air_gap", False)):
+    assert "their bores" in said and "speed of the balance grade" in said
+    made_up = ("designation", "bore_radius", "nominal", "at_speed", "angle")
+    for key, marked in (*((key, True) for key in made_up), ("air_gap", False)):
         found = [line for line in lines if line.startswith(f"{key} = ")]
         assert found and all(("made up" in line) == marked for line in found), key
     assert load_machine(target).touchdown_bearings[0].air_gap.value == pytest.approx(0.3e-3)
