@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,8 +82,8 @@ class HeldContact:
     """Radial velocities before and after, by straight lines over 1 ms [m/s], both positive outwards and
     inwards."""
     velocity_change: tuple[float, float]
-    """Bounds of the change of velocity, which is the impulse per mass that takes part [m/s]: noise, and what
-    the magnets can have done during the turn."""
+    """Bounds of the change of velocity by the race, which is its impulse per mass that takes part [m/s]:
+    noise, what the magnets can have done during the turn, and above also what drove the rotor out."""
     impulse: tuple[float, float] | None
     """Bounds of the impulse [N s], between the mass that a rigid rotor has at this plane and all of it; None
     without a machine."""
@@ -193,10 +194,13 @@ def held_contacts(
     def contacts(
         floor: float, sharper: float, returned: float, marred: Callable[[int], float]
     ) -> Iterator[HeldContact]:
-        for at in peaks(distance, floor, max(0.1 * floor, 6.0 * noise)):
+        tops = peaks(distance, floor, max(0.1 * floor, 6.0 * noise))
+        # between two turns the rotor is furthest from the race: what is beyond belongs to the other turn
+        parted = [before + int(np.argmin(distance[before:then])) for before, then in pairwise(tops)]
+        for at, came_from, goes_to in zip(tops, [0, *parted], [*parted, len(distance)], strict=False):
             outward, begin = away[at] / distance[at], max(at - back, 0)
-            speed, here = velocity[begin : at + turn + 1] @ outward, at - begin
-            fastest = max(here - turn, 0)
+            speed, here = velocity[begin : min(at + turn, goes_to) + 1] @ outward, at - begin
+            fastest = max(here - turn, came_from - begin, 0)
             fastest += int(np.argmax(speed[fastest : here + 1]))
             leaves = here + int(np.argmin(speed[here:]))
             outwards = accelerated[begin : at + turn + 1] @ outward
@@ -208,8 +212,13 @@ def held_contacts(
             least, most = sorted((approach, departure))
             if gentle or least <= max(returned * most, 0.0) or most + least <= 10.0 * doubt:
                 continue
-            half = NINETY * math.sqrt(2.0) * doubt + usually * (leaves - fastest) / rate
-            change = (max(approach + departure - half, 0.0), approach + departure + half)
+            half, lasts = NINETY * math.sqrt(2.0) * doubt, (leaves - fastest) / rate
+            # what drove the rotor on its way, a surge say, may drive it against the race too, and a straight
+            # line rounds off half its length on either side
+            change = (
+                max(approach + departure - half - usually * lasts, 0.0),
+                approach + departure + half + max(usually, came) * (lasts + SMOOTHING),
+            )
             kink = min(begin + fastest + round(0.25 * SMOOTHING * rate), at)
             yield HeldContact(
                 plane=plane,

@@ -149,23 +149,28 @@ def _scale(level: Level) -> tuple[float, str]:
 
 def _contact_table(seen: Look) -> Table:
     def bounds(row: HeldContact) -> str:
-        if row.impulse is None:
-            low, high = row.velocity_change
-            return f"{low:.2g} to {high:.2g} N s/kg"
-        return "{:.2g} to {:.2g} N s".format(*row.impulse)
+        low, high = row.velocity_change if row.impulse is None else row.impulse
+        return f"{low:.2g} to {high:.2g}"
 
+    described = seen.contacts[0].impulse is not None
     columns = (
         Column("plane", "plane"),
         Column("record time", lambda row: format_moment(row.time, 4)),
         Column("direction", lambda row: f"{degrees(row.azimuth):.0f}°"),
         Column("from the usual place", "distance", "length"),
-        Column("approaches with", "approach", "velocity"),
-        Column("departs with", "departure", "velocity"),
-        Column("impulse", bounds),
+        Column("approaches with about [m/s]", lambda row: f"{row.approach:.2g}"),
+        Column("departs with about [m/s]", lambda row: f"{row.departure:.2g}"),
+        Column("impulse [N s]" if described else "impulse per kg of moving mass [N s/kg]", bounds),
     )
     note = (
         "A contact turns the rotor back at least three times as sharply as it came, far outside of its usual "
-        "orbit. Direction counter-clockwise from +x, −90° is the bottom."
+        "orbit. Direction counter-clockwise from +x, −90° is the bottom. Velocities by straight lines over "
+        "1 ms, which round off a turn and make them too small. "
+        + (
+            "Impulse between the mass that a rigid rotor has at the plane and all of it."
+            if described
+            else "The moving mass is what of the rotor takes part at this plane; a machine file bounds it."
+        )
     )
     more = f" The first {MOST_LISTED} of {len(seen.contacts)}." if len(seen.contacts) > MOST_LISTED else ""
     return table(

@@ -286,6 +286,46 @@ def test_a_held_rotor_that_touches_is_an_event(tmp_path, machine):
     jsonschema.validate(json.loads(json.dumps(seen.as_json(), allow_nan=False)), look_schema())
 
 
+def surging(natural: float, damping: float, begins: float = 1.0, until: float = 3.0):
+    """A mass on magnets, from rest, that a surge of 20 ms presses against a race of 250 µm.
+
+    Time, path, and per contact when it begins, the velocities before and after, and the impulse over the mass.
+    """
+    rate, steps = 20_000.0, 10
+    time, path, touched = np.arange(int(until * rate)) / rate, [], []
+    omega, place, speed, inside = 2 * np.pi * natural, 0.0, 0.0, None
+    for now in time:
+        path.append(place)
+        for step in range(steps):
+            since = now + step / (rate * steps) - begins
+            push = 151.7 * np.sin(np.pi * since / 0.02) if 0.0 < since < 0.02 else 0.0
+            depth = place - 250e-6
+            race = max(6.7e6 * depth + 270.0 * speed, 0.0) if depth > 0.0 else 0.0
+            if depth > 0.0:
+                inside = [now, speed, 0.0, 0.0] if inside is None else inside
+                inside[3] += race / (rate * steps)
+            elif inside is not None:
+                touched.append((inside[0], inside[1], -speed, inside[3]))
+                inside = None
+            speed += (push - race - omega**2 * place - 2 * damping * omega * speed) / (rate * steps)
+            place += speed / (rate * steps)
+    unbalance = 2.0 * np.exp(2j * np.pi * 150.0 * time) * (1.0 - np.exp(-time / 4e-3)) * 1e-6
+    noise = 0.4e-6 * np.random.default_rng(0).standard_normal((len(time), 2))
+    return time, np.column_stack([path + unbalance.real, unbalance.imag]) + noise, touched
+
+
+def test_a_second_contact_has_its_own_time_and_velocities():
+    """Its approach was sought in the contact before: it stood inside of that, with its impulse."""
+    time, path, touched = surging(40.0, 0.1)
+    found = held_contacts("A", time, path, 20_000.0)
+    assert 2 <= len(found) <= len(touched)
+    for one, (begins, approach, departure, impulse) in zip(found, touched, strict=False):
+        assert one.time == pytest.approx(begins, abs=0.5e-3)
+        assert (one.approach, one.departure) == pytest.approx((approach, departure), rel=0.2)
+        assert one.velocity_change[0] < approach + departure < one.velocity_change[1]
+        assert one.velocity_change[0] < impulse < one.velocity_change[1]
+
+
 def test_a_machine_file_bounds_the_impulse_of_a_contact(machine):
     low, high = masses_at(machine, machine.sensors[0].node)
     assert 0.1 * machine.rotor.mass < low < machine.rotor.mass == pytest.approx(high, rel=1e-9)
