@@ -24,6 +24,14 @@ _SLOWEST_FALL = 0.2
 BEYOND = 0.06
 """A kink so far beyond the air gap, over it, is not that of the first touch [1] (chosen)."""
 
+_LASTS, _STAYS = 0.1, 0.5
+"""A dropped rotor is away, on average over this time [s], by this share of its largest distance [1]; one that
+its magnets catch swings back (chosen: a mass on magnets of 40 Hz and a tenth
+of the critical damping that rubs for 20 ms reaches 0.37, one that bounces half as fast as it falls 0.8)."""
+
+_LEAST_FALL = 15e-6
+"""A dropped rotor goes at least this far [m]: half the smallest usual air gap (chosen)."""
+
 Gap = tuple[float, float]
 """An air gap and its standard error [m]."""
 
@@ -203,6 +211,16 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
             "bearings swings like that: give the recording of the drop (a settled tail belongs to "
             "'estimate --tail'), or check unit and sampling rate"
         )
+    window, largest = round(_LASTS * rate), np.percentile(away, 99.9, axis=0)
+    if len(away) - sunk > window:
+        summed = np.cumsum(np.pad(away, ((1, 0), (0, 0))), axis=0)
+        stays = np.max(summed[window:] - summed[:-window], axis=0) / window
+        if np.all(stays < _STAYS * largest) or np.any(reach < _LEAST_FALL):
+            raise NothingFallsError(
+                f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(largest)):.3g} µm "
+                f"and is back within {1e3 * _LASTS:.0f} ms, or by {1e6 * float(np.min(reach)):.3g} µm for "
+                f"longer; a dropped rotor goes {1e6 * _LEAST_FALL:.0f} µm at least and stays there"
+            )
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk
 
