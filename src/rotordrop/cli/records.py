@@ -376,11 +376,10 @@ def _signal(
     from rotordrop.estimate.recorded_coast_down import recorded_coast_down
     from rotordrop.estimate.simulated_coast_down import simulated_coast_down
     from rotordrop.record.record import read_record
-    from rotordrop.report.content import SIMULATED_RECORD
+    from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
     from rotordrop.simulate.coast_down_file import is_coast_down
 
     if is_coast_down(path):
-        text = "Everything on this page is computed from the machine description; nothing was measured."
-        return simulated_coast_down(path, machine), text
+        return simulated_coast_down(path, machine), SIMULATED_MACHINE
     record = read_record(path, machine, profile=profile, mapping=mapping)
     return recorded_coast_down(machine, record), SIMULATED_RECORD if record.is_simulated else ""

@@ -11,7 +11,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.known import Known
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Channel, Recording, listed
+from rotordrop.record.recording import FULL_SCALE, Channel, Recording, channels_in_words, listed
 from rotordrop.units import parse_quantity
 
 _LENGTHS = ("m", "mm", "um", "nm", "mil", "in", "V", "mV", FULL_SCALE, "")
@@ -86,8 +86,8 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         if len(labels) < 2:
             have = listed(f"{channel.label} in {channel.unit or '?'}" for channel in recording.channels)
             raise UnpairedError(
-                f"the recording holds {len(labels)} channels that can be displacements (in a unit of length "
-                f"or in volts); a plane needs two. It has {have}: export two of a plane together"
+                f"the recording holds {channels_in_words(len(labels))} that can be displacements (in a unit "
+                f"of length or in volts); a plane needs two. It has {have}: export two of a plane together"
             )
         raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
@@ -154,7 +154,7 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
         if len(members) != len(entries):
             known = listed(dict.fromkeys(sensor.bearing or "" for sensor in sensors))
             raise UsageError(
-                f"the plane {name!r} names {len(entries)} channels; the machine has "
+                f"the plane {name!r} names {channels_in_words(len(entries))}; the machine has "
                 + (f"{len(members)} sensors there ({stand})" if members else f"the planes {known}")
             )
         for place, (channel, angle) in enumerate(entries):

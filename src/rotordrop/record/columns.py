@@ -16,7 +16,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.record.arrangement import fitting, pairs_of, plain, sensors_of_planes
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, listed
+from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, called, listed
 from rotordrop.units import format_quantity, parse_quantity
 
 _SPEED_NAMES = re.compile(
@@ -252,9 +252,10 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     for channel in recording.channels:
         span = f"{channel.values.min():.4g} to {channel.values.max():.4g} {channel.unit or '(no unit)'}"
         rate = (len(channel.time) - 1) / max(float(channel.time[-1] - channel.time[0]), 1e-12)
-        found.append(f"channel {channel.label}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
-    found += [f"sensor {name}: channel {label}" for name, label in mapped.items()]
-    found += [f"plane {name}: {text}" for name, text in planes.items() if not sensors]
+        named = called("channel", channel.label)
+        found.append(f"{named}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
+    found += [f"sensor {name}: {called('channel', label)}" for name, label in mapped.items()]
+    found += [f"{called('plane', name)}: {text}" for name, text in planes.items() if not sensors]
     found.append(
         f"shaft speed: {speed or 'not known; an estimate needs --speed-channel, --pulses or --speed'}"
     )

@@ -109,6 +109,16 @@ def recording_of(
     return Recording(channels=tuple(channels), metadata=dict(metadata or {}), notes=notes, warnings=warnings)
 
 
+def channels_in_words(count: int) -> str:
+    """A number of channels, as "1 channel"."""
+    return f"{count} channel{'' if count == 1 else 's'}"
+
+
+def called(what: str, name: str) -> str:
+    """A name after the word for what it is, unless it begins with it: "channel X1", but "channel 1"."""
+    return name if name.lower().startswith(what) else f"{what} {name}"
+
+
 def listed(names: Iterable[str], most: int = 8) -> str:
     """Names in a message: eight of them and how many more there are."""
     known = list(names)

@@ -15,7 +15,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.record.profile import Profile
 from rotordrop.record.record import BY_HAND, SPEED_SOURCE, open_record
-from rotordrop.record.recording import recording_of
+from rotordrop.record.recording import called, recording_of
 from rotordrop.record.writers import write_hdf5
 
 LICENCES = ("CC0-1.0", "CC-BY-4.0", "CC-BY-SA-4.0")
@@ -106,7 +106,7 @@ def share_record(
         files=digests,
         channels={names[name]: name for name in shared.channel_names},
         left_out=(
-            *(f"channel {name}" for name in dropped),
+            *(called("channel", name) for name in dropped),
             *(f"entry {key}" for key in record.metadata),
             path.name,
         ),

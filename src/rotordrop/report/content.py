@@ -24,7 +24,7 @@ SIMULATED_RECORD = (
 """What every report on a bundled record says."""
 
 
-SIMULATED_MACHINE = "Everything on this page is computed from the machine description; nothing was measured."
+SIMULATED_MACHINE = "Everything here is computed from the machine description; nothing was measured."
 """What every report on a simulation says."""
 
 

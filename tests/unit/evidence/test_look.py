@@ -377,7 +377,7 @@ def test_a_single_channel_shows_its_level(tmp_path, capsys):
     np.savetxt(file, table, delimiter=",", header="time [s],VE-101X [um]", comments="")
     assert run(["look", str(file), "--report", str(tmp_path / "one.html")]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "holds 1 channels that can be displacements" in told and "VE-101X [um] 3" in told
+    assert "holds 1 channel that can be displacements" in told and "VE-101X [um] 3" in told
     assert "a drop is not determined: no pair of channels" in told and "no drop in this record" not in told
     with pytest.raises(UsageError, match=r"one\.json is the JSON of 'rotordrop look', which holds no forces"):
         drops_of(look(file).as_json(), "one.json")

@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Recording
+from rotordrop.record.recording import FULL_SCALE, Recording, channels_in_words
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -32,14 +32,14 @@ def read_wav(path: Path, profile: Profile) -> Recording:
     data = blocks[b"data"]
     if not count or not rate or align * 8 != count * bits or len(data) % align:
         raise RecordError(
-            f"{path}: {len(data)} bytes of samples do not divide into {count} channels of {bits} bits; "
-            "the file is damaged, copy it again"
+            f"{path}: {len(data)} bytes of samples do not divide into {channels_in_words(count)} of {bits} "
+            "bits; the file is damaged, copy it again"
         )
     samples = _samples(data, kind, bits, path).reshape(-1, count)
     factor, unit = (1.0, FULL_SCALE) if profile.full_scale is None else split_quantity(profile.full_scale)
     names = profile.text.names or tuple(f"channel {number + 1}" for number in range(count))
     if len(names) != count:
-        raise RecordError(f"{path} has {count} channels and the profile names {len(names)}")
+        raise RecordError(f"{path} has {channels_in_words(count)} and the profile names {len(names)}")
     time = np.arange(len(samples), dtype=np.float64) / rate
     if unit == FULL_SCALE:  # shares have no unit, whatever the profile calls them
         profile = profile.model_copy(update={"units": {}})
