@@ -147,6 +147,14 @@ def test_numbers_stand_beside_their_interval_and_the_record_is_called_simulated(
     assert "peak (zero to peak)" in text
 
 
+def test_the_verdict_of_a_first_page_says_how_many_problems_stand_below() -> None:
+    said = tuple(Statement(f"problem {k}", "bad") for k in range(3))
+    html = render_page(ReportContent(title="t", verdict=said, sections=(Section("s"),), lead=1))
+    assert html.index('<a href="#notes">2 more problems</a>') < html.index('id="notes"')
+    alone = render_page(ReportContent(title="t", verdict=said[:1], sections=(Section("s"),), lead=1))
+    assert "more problem" not in alone
+
+
 def test_a_page_of_many_figures_stays_small() -> None:
     many = content()
     sections = many.sections * 25
