@@ -11,7 +11,7 @@ from tests.unit.web.browser import CHROMIUM, Browser
 
 from rotordrop.estimate.bearing_drop import History
 from rotordrop.estimate.estimate import Estimate
-from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement
+from rotordrop.report.content import Card, Figure, KeyFigure, ReportContent, Section, Statement, Table
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
@@ -124,3 +124,21 @@ def test_the_first_printed_page_is_the_one_to_send_and_the_rest_an_appendix(
     browser.evaluate("window.dispatchEvent(new Event('afterprint'))")
     browser.call("Emulation.setEmulatedMedia", media="")
     assert browser.evaluate("document.querySelectorAll('.part[open]').length") == 1
+
+
+def test_a_table_of_many_numbers_fits_a_narrow_screen(browser: Browser, tmp_path: Path) -> None:
+    kinds = ("force", "pressure", "length", "impulse", "speed", "time", "energy")
+    number = {"force": 3333.0, "pressure": 2009e6, "length": 312e-6, "speed": 377.0}
+    values = [
+        Quantity(value=at, kind=kind, interval_90=(0.93 * at, 1.07 * at))
+        for kind in kinds
+        for at in (number.get(kind, 0.51),)
+    ]
+    wide = Table(("drop", *kinds), (("drop_1.h5", *values),), "DE")
+    write_page(ReportContent(title="Comparison", summary=(wide,)), tmp_path / "page.html")
+    browser.call("Emulation.setEmulatedMedia", media="screen")
+    browser.size(820, 900)
+    browser.open(f"file://{tmp_path / 'page.html'}")
+    box = "document.querySelector('.table')"
+    browser.until(f"{box} && {box}.scrollWidth <= {box}.clientWidth", 20.0)
+    assert edges(browser, ".table")[2] <= 820
