@@ -13,7 +13,6 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from rotordrop.errors import UsageError
-from rotordrop.estimate.histories import SIMULATED_COLUMN
 from rotordrop.web.desk import Desk, NotThereError, number, of_file
 from rotordrop.web.workspace import labelled
 
@@ -101,6 +100,8 @@ def _page_of(folder: Path) -> dict[str, Any]:
 async def csv(desk: Desk, request: Request) -> Response:
     """Every sample of a window as a table, in SI units."""
     import numpy as np
+
+    from rotordrop.estimate.histories import SIMULATED_COLUMN
 
     folder = await desk.found(request)
     traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
