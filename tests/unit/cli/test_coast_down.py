@@ -248,7 +248,7 @@ def test_the_page_of_a_coast_down_states_maxima_and_certificate(machine, tmp_pat
     assert run([*arguments, "--report", str(page), "--json", str(numbers)]) == 0
     text = page.read_text()
     for expected in (
-        "Does 0.2 s hold the maximum?",
+        "Does 0.2\u00a0s hold the maximum?",
         "Second by second",
         "Largest Hertz stress",
         "Friction law",

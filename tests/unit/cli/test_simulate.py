@@ -49,7 +49,7 @@ def test_a_drop_from_the_centre_reaches_every_output(tmp_path, capsys):
             found["peak_stress_Pa"]["value"], rel=1e-3
         )
         assert "mean_force_0p15_0p2_N" not in found
-    assert "everything on this page is computed" in files["drop.html"].read_text().lower()
+    assert "everything here is computed" in files["drop.html"].read_text().lower()
 
 
 def test_the_first_contact_of_a_centred_drop_is_that_of_free_fall(capsys):
