@@ -6,8 +6,8 @@ BENCH is a folder of ``rotordrop-bench make``, ESTIMATES what ``studies/dropbenc
 An interval is made of what the record leaves open and of an allowance, as independent errors; for every
 number the script gives half width and coverage with the allowance of the estimates and with the one chosen,
 and the standard deviations left out that would have held 85, 90 and 95 % of the truths. The ensemble to
-choose on: the first 39 drops of the bench that were estimated (`seen`), and the machines of
-``studies/tracked/noise``. To check on: the rest of the bench. Writes ``results.md``.
+choose on: the first 39 drops of the bench that were estimated (`seen`). To check on: the rest of the bench.
+Writes ``results.md``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from rotordrop.twin.allowances import (
     MODEL_STRESS_SIGMA,
 )
 
-STUDIES = Path(__file__).parent.parent
 NUMBERS = {
     "peak_force_N": ("peak_force_N", 1.0),
     "peak_stress_Pa": ("max_stress_MPa", 1e6),
@@ -83,19 +82,6 @@ def scored(field: str, value: dict[str, Any], truth: float) -> Row:
     return field, abs(value["value"] - truth) / size, np.sqrt(max(whole**2 - allowance**2, 0.0)), allowance
 
 
-def of_calibrated() -> Iterator[Row]:
-    """Numbers of machines that were calibrated blind, right in structure."""
-    for file in sorted((STUDIES / "tracked" / "noise").glob("*_none.json")):
-        for drop in json.loads(file.read_text())["drops"]:
-            for values in drop.get("bearings", {}).values():
-                for field in NUMBERS:
-                    if field in values:
-                        allowance = NINETY * EARLIER[field] * abs(values[field]["estimate"])
-                        value = {"value": values[field]["estimate"], "allowance_90": allowance}
-                        value["interval_90"] = values[field]["interval_90"]
-                        yield scored(field, value, values[field]["truth"])
-
-
 def line(ensemble: str, field: str, rows: list[Row]) -> str:
     """One line of the table."""
     error, record, allowance = np.array([row[1:] for row in rows]).T
@@ -117,7 +103,6 @@ def main() -> None:
     folders = parser.parse_args()
     ensembles = {
         "chosen on: bench": list(of_bench(folders.bench, folders.estimates, chosen_on=True)),
-        "chosen on: calibrated": list(of_calibrated()),
         "checked on: bench": list(of_bench(folders.bench, folders.estimates, chosen_on=False)),
     }
     lines = [

@@ -12,6 +12,7 @@ from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import Wall, find_wall
+from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.impacts import find_impacts, lasting_from
 from rotordrop.record.record import Record
@@ -26,11 +27,14 @@ BEYOND = 0.06
 
 _LASTS, _STAYS = 0.1, 0.5
 """A dropped rotor is away, on average over this time [s], by this share of its largest distance [1]; one that
-its magnets catch swings back (chosen: a mass on magnets of 40 Hz and a tenth
-of the critical damping that rubs for 20 ms reaches 0.37, one that bounces half as fast as it falls 0.8)."""
+its magnets catch swings back.
 
-_LEAST_FALL = 15e-6
-"""A dropped rotor goes at least this far [m]: half the smallest usual air gap (chosen)."""
+Chosen: a mass on magnets of 40 Hz and a tenth of critical damping that rubs for 20 ms reaches 0.37, one that
+bounces half as fast as it falls 0.8.
+"""
+
+_LEAST_FALL = 0.5 * USUAL_GAP[0]
+"""A dropped rotor goes at least this far [m] (chosen)."""
 
 Gap = tuple[float, float]
 """An air gap and its standard error [m]."""

@@ -54,9 +54,9 @@ OF_CROSS_CHECK: Status = "of the cross-check: the model does not fit the record"
 """Status of a number that does not rest on the twin, because the twin lost the record."""
 CUT: Status = "the estimated part ends during this contact"
 """Status of the numbers of an impact that goes on behind the end of the window."""
-OF_ITS_ERROR = 2.6
-"""Half width of a number of the cross-check over the error it makes on drops that the model fits, where the
-twin lost the record [1].
+LOST_WIDENING = 2.6
+"""Half width of a number of the cross-check, where the twin lost the record, over the error that it makes on
+drops that the model fits [1].
 
 Source: of the peak forces of eight hidden machines told in twelve numbers it holds nine in ten, 13 of 14; of
 seven others, too (``studies/twelve_numbers``).
@@ -344,9 +344,9 @@ def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
         means["mean_force_0p15_0p2_N"] = replace(held, status=mean.status)
     return Loads(
         force=force,
-        force_band=_band(force, OF_ITS_ERROR * peak_error * force.values),
+        force_band=_band(force, LOST_WIDENING * peak_error * force.values),
         stress=stress,
-        stress_band=_band(stress, OF_ITS_ERROR * stress_error * stress.values),
+        stress_band=_band(stress, LOST_WIDENING * stress_error * stress.values),
         peak_force=_checked_peak(force, peak_error, "N"),
         peak_stress=_checked_peak(stress, stress_error, "Pa"),
         means=means,
@@ -367,7 +367,7 @@ def _checked_peak(history: History, error: float, unit: str) -> Peak:
 
 
 def _lost(value: float, error: float, unit: str) -> Known:
-    half = OF_ITS_ERROR * error
+    half = LOST_WIDENING * error
     return Known(
         value=value,
         status=OF_CROSS_CHECK,

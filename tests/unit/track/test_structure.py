@@ -204,6 +204,18 @@ def test_the_sensitivity_of_such_a_machine_is_that_of_finite_differences(extende
     assert errors.max() < 5e-3
 
 
+def test_of_a_slow_clock_a_sample_lasts_longer(extended_flight):
+    """A second of the record that lasts 1.01 s: the rotor turns by 1 % more from sample to sample."""
+    problem, layout = extended_flight, extended_flight.model.layout
+    turns = []
+    for slow in (0.0, 0.01):
+        y, theta = start_of(problem.model, -60e-6), theta_of(problem)
+        theta[[u.path for u in problem.unknowns].index("clock_error")] = slow
+        after, _, _ = advanced(problem, y, theta, 8)
+        turns.append(after[layout.rotor_angle] - y[layout.rotor_angle])
+    assert turns[0] > 0.0 and turns[1] / turns[0] == pytest.approx(1.01, rel=1e-5)
+
+
 @pytest.fixture(scope="module")
 def lagging(lp400: Machine, prepared: Evidence) -> DropProblem:
     return drop_problem(build_drop_model(sensing(lp400), COARSE_BASIS), prepared, until=0.003)

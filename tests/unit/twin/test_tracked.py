@@ -44,8 +44,8 @@ from rotordrop.twin.tracked_estimate import cross_checked, estimate_of
 from rotordrop.twin.tracked_loads import (
     INCONSISTENT,
     INCONSISTENT_WIDENING,
+    LOST_WIDENING,
     OF_CROSS_CHECK,
-    OF_ITS_ERROR,
     check_without_contact_law,
     is_beyond_factor,
     loads_of_cross_check,
@@ -456,7 +456,7 @@ def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop
     assert given.peak_force.value == check.peak[0] == given.force.values.max()
     assert given.peak_force.known.status == OF_CROSS_CHECK
     low, high = given.peak_force.interval_90 or (math.nan, math.nan)
-    half = OF_ITS_ERROR * check.peak_error[0]
+    half = LOST_WIDENING * check.peak_error[0]
     assert (low, high) == pytest.approx(((1.0 - half) * check.peak[0], (1.0 + half) * check.peak[0]))
     assert given.force_band.upper.max() == pytest.approx(high)
     assert low < own.peak_force.value < high
