@@ -329,7 +329,7 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
     recording = read_recording(path, rules_of(profile, ()))
     channels = [one for one in recording.channels if len(one.values) >= _FEWEST and np.ptp(one.time) > 0.0]
     if not channels:
-        raise UnpairedError(why)
+        raise UnpairedError(f"{why}. No channel has the {_FEWEST} readings that show a level alone")
     time = channels[0].time
     record = Record(
         time=time,
@@ -561,6 +561,7 @@ _DOCUMENT: dict[str, Part] = {
         mean=_read_off(NUMBER, "mean"),
         rms=_read_off(NUMBER, "rms"),
         peak_to_peak=_read_off(NUMBER, "peak_to_peak"),
+        resolution_Hz=_read_off(NUMBER, "resolution"),
         lines=_rows(
             lambda level: level.lines, frequency_Hz=(NUMBER, itemgetter(0)), amplitude=(NUMBER, itemgetter(1))
         ),

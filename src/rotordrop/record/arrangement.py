@@ -81,13 +81,22 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         planes = [(name, [(channel, None) for channel in pair]) for name, pair in pairs]
         spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair in pairs)
         notes = (f"planes by the {guessed} of the channels ({spoken}), their sensors taken as perpendicular",)
+        paired = {id(channel) for _, pair in pairs for channel in pair}
+        left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
+        left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
+        if pairs and left:
+            notes += (
+                f'in no plane, and not looked at: {listed(left)}; say which look at one, as --map "PLANE: '
+                'CHANNEL 0 deg, CHANNEL 90 deg"',
+            )
     if not planes:
         labels = [channel.label for channel in recording.channels if _may_read(channel)]
         if len(labels) < 2:
             have = listed(f"{channel.label} in {channel.unit or '?'}" for channel in recording.channels)
             raise UnpairedError(
                 f"the recording holds {channels_in_words(len(labels))} that can be displacements (in a unit "
-                f"of length or in volts); a plane needs two. It has {have}: export two of a plane together"
+                f"of length or in volts); a plane needs two. It has {have}: export the "
+                "displacements of a plane together"
             )
         raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees
+from math import degrees, floor, log10
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
+from rotordrop.evidence.held import LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -108,11 +109,15 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         Column("r.m.s. about it", lambda row: f"{_scale(row)[0] * row.rms:.3g}"),
         Column("peak to peak", lambda row: f"{_scale(row)[0] * row.peak_to_peak:.3g}"),
         Column(
-            "strongest lines [Hz] (amplitude, zero to peak)",
-            lambda row: ", ".join(f"{at:.4g} ({_scale(row)[0] * size:.2g})" for at, size in row.lines) or "–",
+            "lines above the noise [Hz] (amplitude, zero to peak), strongest first",
+            _lines,
         ),
     )
-    summary = [table(seen.levels, levels, "Levels, in the unit of each channel")]
+    stands_out = (
+        f"A line is at least {LINE_ABOVE:g} times the median of the spectrum within {LINE_AROUND} points to "
+        "either side (chosen); its frequency is known to half the spacing of the points (±)."
+    )
+    summary = [table(seen.levels, levels, "Levels, in the unit of each channel", stands_out)]
     if seen.contacts:
         summary.insert(0, _contact_table(seen))
     spectra = Section("Spectrum", figures=tuple(_spectrum(level) for level in seen.levels)) if drawn else None
@@ -145,6 +150,14 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
 def _scale(level: Level) -> tuple[float, str]:
     """Factor and unit in which a channel is shown: metres as micrometres."""
     return (1e6, "µm") if level.unit == "m" else (1.0, level.unit or "?")
+
+
+def _lines(level: Level) -> str:
+    """The lines of a channel: frequency with as many places as its error, and amplitude."""
+    places = max(1 - floor(log10(level.resolution)), 0)
+    known = f" ± {level.resolution:.{places}f}"
+    lines = (f"{at:.{places}f}{known} ({_scale(level)[0] * size:.3g})" for at, size in level.lines)
+    return ", ".join(lines) or "–"
 
 
 def _contact_table(seen: Look) -> Table:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.errors import UsageError
+from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
@@ -209,6 +209,11 @@ def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
     alone = look(file, gap=GAP)
     assert re.search(r"no two channels of alpha, bravo, c, d, Speed are a pair.*--map", alone.no_fall)
     assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
+    file.write_text(
+        text.replace("alpha", "a1").replace("bravo", "a2").replace(",c ", ",a3 ").replace(",d ", ",a4 ")
+    )
+    assert any("in no plane, and not looked at: a3, a4; say" in note for note in look(file).notes)
+    file.write_text(text)
     seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
     assert [plane.plane for plane in seen.planes] == ["left", "right"]
     with pytest.raises(UsageError, match=r"there is no channel 'e'; write \"PLANE: .*there are alpha, bravo"):
@@ -223,8 +228,9 @@ def test_a_levitated_record_shows_levels_and_no_contact(tmp_path):
     seen = look(written(tmp_path / "drop.csv", time, {"NDE": still, "DE": still}))
     assert "nothing falls in the record: the shaft strays by " in seen.no_fall
     assert (seen.drops, seen.impacts, seen.contacts, seen.planes) == ((), (), (), ())
-    strongest = max(seen.levels[0].lines, key=lambda line: line[1])
-    assert strongest == pytest.approx((60.0, 5e-6), rel=0.15)  # between two lines
+    level = seen.levels[0]  # 60 Hz lies between two points of the spectrum
+    assert len(level.lines) == 1 and level.lines[0][1] == pytest.approx(5e-6, rel=0.02)
+    assert level.lines[0][0] == pytest.approx(60.0, abs=0.2 * level.resolution)
     assert 10e-6 < seen.levels[0].peak_to_peak < 10e-6 + 10 * NOISE
     jsonschema.validate(seen.as_json(), look_schema())
 
@@ -384,6 +390,13 @@ def test_a_single_channel_shows_its_level(tmp_path, capsys):
     assert "Spectrum of VE-101X" in (tmp_path / "one.html").read_text()
     (level,) = look(file).levels
     assert max(level.lines, key=lambda line: line[1]) == pytest.approx((50.0, 20.0), rel=0.05)
+
+
+def test_a_record_too_short_for_a_level_says_so(tmp_path):
+    file = tmp_path / "short.csv"
+    file.write_text("time [s],Force [N]\n" + "".join(f"{k * 1e-3:.3f},{k % 3}\n" for k in range(12)))
+    with pytest.raises(UnpairedError, match=r"No channel has the 16 readings that show a level alone"):
+        look(file)
 
 
 def test_the_bundled_drop_with_and_without_its_machine(machine):
