@@ -33,10 +33,12 @@ from rotordrop.report.waterfall_figure import (
 )
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW
 from rotordrop.spectrum.indentation import held_maximum
+from rotordrop.spectrum.orders import LEAST_APART, STANDARD_SETTINGS, STEADY_APART
 
 if TYPE_CHECKING:
     from rotordrop.spectrum.coast_down import CoastDownAnalysis, PlaneAnalysis, SpeedLaw
     from rotordrop.spectrum.lines import Line
+    from rotordrop.spectrum.orders import OrderTrack
 
 NO_SPEED = (
     "The record has no speed that falls: whether a line follows it stays open, and there are no tracked "
@@ -55,6 +57,8 @@ LINES_NOTE = (
     "the multiple of the rotor's speed."
 )
 LINES = "Lines"
+_IN_WHOLE_SECONDS = 10.0
+"""Time from which on whole seconds say when a line was seen [s] (chosen)."""
 _COMPONENTS = {
     "x": "horizontal",
     "y": "vertical",
@@ -136,7 +140,8 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     count, unnamed = len(analysis.lines), sum(not line.named for line in analysis.lines)
     which = "it" if unnamed == 1 else "them"
     why = f": nothing in the machine description or the mains explains {which} well enough" if unnamed else ""
-    said.append(Statement(f"{count} lines found, {count - unnamed} named, {unnamed} without a name{why}."))
+    lines = f"{count} line{'' if count == 1 else 's'} found"
+    said.append(Statement(f"{lines}, {count - unnamed} named, {unnamed} without a name{why}."))
     said += [Statement(text) for text in analysis.force_statements()]
     if analysis.signal.profile is None:
         said.append(Statement(NO_SPEED, "warning"))
@@ -165,9 +170,11 @@ def _standstill(stop: Known) -> str:
 
 def line_table(analysis: CoastDownAnalysis) -> Table:
     """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
+    longest = max((line.last_seen for line in analysis.lines), default=0.0)
+    places = 0 if longest >= _IN_WHOLE_SECONDS else 2
 
     def seen(line: Line) -> str:
-        return f"{line.first_seen:.0f} to {line.last_seen:.0f} s".replace(" ", NO_BREAK)
+        return f"{line.first_seen:.{places}f} to {line.last_seen:.{places}f} s".replace(" ", NO_BREAK)
 
     columns = (
         Column("name", "label"),
@@ -216,7 +223,8 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
         if plane.track is not None:
             caption = (
                 f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor really "
-                "turned through. Gaps: a steady line lies too close to tell it from the order."
+                f"turned through, over windows of {plane.track.revolutions:g} turns. Gaps: a steady line "
+                "lies too close to tell it from the order."
             )
             chart = order_figure(plane.track, name)
             figures.append(Figure(chart, caption + ("" if analysis.signal.recorded else AS_READ)))
@@ -224,10 +232,11 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
     found = [(name, resonance) for name, plane in tracked for resonance in plane.resonances]
     rows = [row for row in found if row[1].certain]
     crossed = len(found) - len(rows)
+    short = next((_short(plane.track) for _, plane in tracked if plane.track is not None), ())
     if not rows:
         but = f", but where it crosses a steady line ({crossed} times)" if crossed else ""
         none = Statement(f"No order rises above its surroundings on the way down{but}.")
-        return Section(heading, statements=(none,), figures=tuple(figures))
+        return Section(heading, statements=(*short, none), figures=tuple(figures))
     columns = (
         Column("plane", lambda row: row[0]),
         Column("order", lambda row: f"{row[1].order:g}X"),
@@ -241,7 +250,29 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
     left_out = (
         f"{crossed} more rises are left out: a steady line crosses the order there and makes part of them."
     )
-    return Section(heading, (left_out,) if crossed else (), figures=tuple(figures), tables=(passed,))
+    return Section(
+        heading,
+        (left_out,) if crossed else (),
+        statements=short,
+        figures=tuple(figures),
+        tables=(passed,),
+    )
+
+
+def _short(track: OrderTrack) -> tuple[Statement, ...]:
+    """What the orders of a short signal cannot tell."""
+    if track.revolutions >= STANDARD_SETTINGS.revolutions:
+        return ()
+    close, steady = (turns / track.revolutions for turns in (LEAST_APART, STEADY_APART))
+    have = ", ".join(f"{order:g}X" for order in track.orders)
+    return (
+        Statement(
+            f"The signal is short: orders ({have}) are tracked over {track.revolutions:.3g} turns in place "
+            f"of {STANDARD_SETTINGS.revolutions:g}. Two orders less than {close:.2g}X apart, and an "
+            f"order and a steady line less than {steady:.2g}X apart, are not told apart.",
+            "notice",
+        ),
+    )
 
 
 def law_table(law: SpeedLaw) -> Table:

@@ -30,7 +30,7 @@ from rotordrop.spectrum.indentation import (
 )
 from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.lines import Line, find_lines
-from rotordrop.spectrum.orders import OrderTrack, track_orders
+from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
 from rotordrop.spectrum.resonances import PassedResonance, find_resonances
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import (
@@ -239,7 +239,18 @@ def _plane(
         others = [
             line.path for line in lines if line.kind in ("steady", "combination") and name in line.forward
         ]
-        track = track_orders(read, rate, signal.profile, orders=ORDERS, start_time=start, steady_lines=others)
+        ends = np.array([start, start + (moved.shape[0] - 1) / rate])
+        turns = abs(float(np.diff(signal.profile.angle_at(ends))[0])) / math.tau
+        orders, tracking = tracking_for(turns, ORDERS)
+        track = track_orders(
+            read,
+            rate,
+            signal.profile,
+            orders=orders,
+            start_time=start,
+            steady_lines=others,
+            settings=tracking,
+        )
         modes = [candidate for candidate in candidates if not candidate.family.startswith("mains")]
         resonances = find_resonances(track, name, candidates=modes)
     return PlaneAnalysis(
@@ -341,6 +352,7 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
             "time_s": track.time.tolist(),
             "speed_hz": (track.speed / (2.0 * np.pi)).tolist(),
             "orders": track.orders.tolist(),
+            "turns_per_window": track.revolutions,
             "major_axis_zero_to_peak_m": track.major_axis.tolist(),
         }
     return found

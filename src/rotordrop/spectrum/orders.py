@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.rate import PASSED, reduce_rate
 from rotordrop.spectrum.speed_profile import SpeedProfile
 from rotordrop.spectrum.waterfall import PlanarSignal
+
+FEWEST_TURNS = 4.0
+"""Turns of the rotor in the shortest window [1] (chosen)."""
 
 LEAST_APART = 3.0
 """Turns per window by which two orders must differ to be told apart [1]."""
@@ -40,15 +43,50 @@ class TrackingSettings:
     """Degree of the polynomial an amplitude may follow within a window [1]."""
 
     def __post_init__(self) -> None:
-        if self.revolutions < 4.0 or self.longest_window <= 0.0 or self.step <= 0.0 or self.degree < 0:
+        if (
+            self.revolutions < FEWEST_TURNS
+            or self.longest_window <= 0.0
+            or self.step <= 0.0
+            or self.degree < 0
+        ):
             raise UsageError(
                 f"order tracking: {self.revolutions:g} turns per window, longest window "
                 f"{self.longest_window:g} s, step {self.step:g} s, degree {self.degree}; expected at least "
-                f"4 turns, positive times and a degree of 0 or more"
+                f"{FEWEST_TURNS:g} turns, positive times and a degree of 0 or more"
             )
 
 
 STANDARD_SETTINGS = TrackingSettings()
+
+_FEWEST_WINDOWS = 2.0
+"""Windows that lie in a signal side by side, at least, as long as they can be shortened [1] (chosen): of one
+alone no change of an amplitude is seen."""
+
+_FEWEST_CENTRES = 4
+"""Amplitudes that are taken along a short signal, about [1] (chosen)."""
+
+
+def tracking_for(
+    turns: float, orders: Sequence[float], settings: TrackingSettings = STANDARD_SETTINGS
+) -> tuple[tuple[float, ...], TrackingSettings]:
+    """Orders and settings for a signal of so many turns of the rotor.
+
+    Windows are halved until a short signal holds two, down to the turns that tell the orders apart. A signal
+    that is too short for one window of all orders has the whole ones left, which 4 turns tell apart.
+    """
+    wanted = tuple(orders)
+    if turns < _least_turns(wanted):
+        wanted = tuple(order for order in wanted if float(order).is_integer()) or wanted
+    revolutions, least = settings.revolutions, _least_turns(wanted)
+    while revolutions > least and turns < _FEWEST_WINDOWS * revolutions:
+        revolutions = max(0.5 * revolutions, least)
+    return wanted, replace(settings, revolutions=revolutions)
+
+
+def _least_turns(orders: Sequence[float] | Array) -> float:
+    """Turns per window below which some of the orders are not told apart [1]."""
+    closest = float(np.diff(np.concatenate([[0.0], np.sort(orders)])).min())
+    return max(LEAST_APART / closest, FEWEST_TURNS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +106,8 @@ class OrderTrack:
     """Of the magnitude [m], from what the window left unexplained, shape (F, O, 2)."""
     window: Array
     """Length of the window each row was taken from [s], shape (F,)."""
+    revolutions: float
+    """Turns of the rotor in a window that the longest one does not shorten [1]."""
     separable: NDArray[np.bool_]
     """False where a steady line lies within the window's resolution of the order: the amplitude then holds
     both, shape (F, O)."""
@@ -126,16 +166,17 @@ def track_orders(
             f"order tracking: orders {list(orders)} given, expected positive multiples of the speed"
         )
     centres = _centres(displacement.shape[0], sampling_rate, start_time, profile, wanted, settings)
+    if not centres:
+        duration = displacement.shape[0] / sampling_rate
+        raise RecordError(
+            f"order tracking: the signal of {duration:.2f} s holds no whole window"
+            f" of {settings.revolutions:g} turns; give a longer signal or fewer turns per window"
+        )
     fastest = float(np.abs(profile.speed).max()) / math.tau
     highest = max([wanted.max() * fastest, *(float(line.frequency.max()) for line in steady_lines)])
     thin, thin_rate = reduce_rate(displacement, sampling_rate, highest)
     signal = _Signal(thin, thin_rate, start_time, profile, PASSED if thin_rate < sampling_rate else 1.0)
     rows = [_window_fit(signal, wanted, steady_lines, settings.degree, t, w) for t, w in centres]
-    if not rows:
-        raise RecordError(
-            f"order tracking: the signal of {len(thin) / thin_rate:.2f} s holds no whole window"
-            f" of {settings.revolutions:g} turns; give a longer signal or fewer turns per window"
-        )
     time = np.array([t for t, _ in centres])
     window = np.array([w for _, w in centres])
     speed = profile.speed_at(time)
@@ -146,6 +187,7 @@ def track_orders(
         amplitude=np.array([row[0] for row in rows]),
         standard_error=np.array([row[1] for row in rows]),
         window=window,
+        revolutions=settings.revolutions,
         separable=_separable(wanted, time, profile, window, steady_lines),
     )
 
@@ -160,10 +202,12 @@ def _centres(
 ) -> list[tuple[float, float]]:
     """Middle [s] and length [s] of every window that fits into the signal and holds enough turns."""
     end = start + (samples - 1) / sampling_rate
-    times = np.arange(start + settings.step, end, settings.step)
+    least = _least_turns(orders)
+    fastest = max(float(np.abs(profile.speed).max()) / math.tau, 1e-300)
+    room = end - start - min(max(settings.revolutions, least) / fastest, settings.longest_window)
+    step = min(settings.step, room / _FEWEST_CENTRES) if room > 0.0 else settings.step
+    times = np.arange(start + step, end, step)
     speed = np.abs(profile.speed_at(times)) / math.tau
-    closest = float(np.diff(np.concatenate([[0.0], np.sort(orders)])).min())
-    least = max(LEAST_APART / closest, 4.0)
     fitting = []
     for t, n in zip(times.tolist(), speed.tolist(), strict=True):
         if n <= 0.0:

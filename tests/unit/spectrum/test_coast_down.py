@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.unit.spectrum.synthetic import TURN, CoastDown
 
+from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.spectrum.candidates import order_candidates
 from rotordrop.spectrum.coast_down import CoastDownAnalysis, CoastDownSignal, analyse_coast_down
 
@@ -63,6 +64,26 @@ def test_the_document_holds_the_numbers_put_in(analysis: CoastDownAnalysis) -> N
     for fall in plane["waterfalls"]:
         assert len(fall["frequency_hz"]) == len(fall["rms_over_frames_m"])
         assert fall["resolution_hz"] == pytest.approx(1000.0 / fall["points"])
+
+
+def test_a_signal_of_a_few_turns_says_what_its_orders_cannot_tell() -> None:
+    down = CoastDown(sampling_rate=5000.0, duration=0.3, noise=0.1e-6)
+    down.xy += 20e-6 * np.column_stack([np.cos(down.angle), np.sin(down.angle)])
+    signal = CoastDownSignal(
+        planes={"DE": down.xy},
+        air_gap={"DE": 285e-6},
+        sampling_rate=5000.0,
+        start_time=0.0,
+        profile=down.exact(),
+        speed_time=down.time,
+        speed=down.speed,
+        recorded=True,
+    )
+    found = analyse_coast_down(signal, ())
+    assert found.as_json()["planes"]["DE"]["orders"]["turns_per_window"] == 6.0
+    page = waterfall_page(found, title="short")
+    (section,) = (one for one in page.sections if one.heading == "Orders and resonances")
+    assert any("over 6 turns in place of 24" in said.text for said in section.statements)
 
 
 def test_without_speed_nothing_is_said_of_orders() -> None:

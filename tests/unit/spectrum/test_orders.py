@@ -8,7 +8,7 @@ from tests.unit.spectrum.synthetic import TURN, CoastDown
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.frequency_path import FrequencyPath, steady_path
-from rotordrop.spectrum.orders import TrackingSettings, track_orders
+from rotordrop.spectrum.orders import TrackingSettings, track_orders, tracking_for
 from rotordrop.spectrum.speed_profile import exact_speed_profile
 from rotordrop.spectrum.waterfall import waterfalls
 
@@ -119,6 +119,28 @@ def test_close_orders_need_more_turns_and_stop_earlier():
     halves = track_orders(down.xy, down.sampling_rate, down.exact(), orders=(0.5, 1.0, 1.5), settings=short)
     assert halves.speed.min() > whole.speed.min()
     assert (halves.window * halves.speed / TURN).min() >= 6.0 - 1e-9
+
+
+@pytest.mark.parametrize(
+    ("turns", "orders", "revolutions"),
+    [
+        (60.0, (0.5, 1.0, 2.0), 24.0),
+        (40.0, (0.5, 1.0, 2.0), 12.0),
+        (7.0, (0.5, 1.0, 2.0), 6.0),
+        (5.0, (1.0, 2.0), 4.0),
+    ],
+)
+def test_a_short_signal_is_tracked_over_fewer_turns(turns, orders, revolutions):
+    down = CoastDown(duration=turns / 60.0, sampling_rate=5000.0, noise=0.0)
+    down.xy += 3e-6 * np.column_stack([np.cos(down.angle), np.sin(down.angle)])
+    turned = float(down.angle[-1] - down.angle[0]) / TURN
+    wanted, settings = tracking_for(turned, (0.5, 1.0, 2.0))
+    assert (wanted, settings.revolutions) == (orders, revolutions)
+    track = track_orders(down.xy, down.sampling_rate, down.exact(), orders=wanted, settings=settings)
+    assert track.revolutions == revolutions and len(track.time) >= 3
+    assert track.major_axis[:, track.of(1.0)] == pytest.approx(np.full(len(track.time), 3e-6), rel=5e-3)
+    with pytest.raises(RecordError, match="no whole window of 24 turns"):
+        track_orders(down.xy[: int(20.0 / 60.0 * 5000.0)], down.sampling_rate, down.exact())
 
 
 def test_wrong_calls_are_refused():
