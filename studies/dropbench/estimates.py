@@ -1,11 +1,14 @@
 """Estimates of the drops of a bench by this package, one process each, and their table.
 
 Usage: python studies/dropbench/estimates.py BENCH ESTIMATES [--only NAME ...] [--limit SECONDS]
-    [--table NAME]
+    [--table NAME] [--calibrated]
 
 BENCH is a folder of 'rotordrop-bench make'. Estimates that are there already stay; a drop that the estimator
 refuses leaves NAME.txt with its reason. Stops by itself after the limit; call it again to go on. Writes
 ``results/NAME.json`` and ``results/NAME.md`` over all estimates there are of the drops chosen.
+
+With ``--calibrated`` each machine is calibrated first, on two more drops of the same hidden machine at the
+two other speeds of its rotor; its drop of the bench is then estimated with the machine file that came out.
 """
 
 from __future__ import annotations
@@ -16,37 +19,67 @@ import resource
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
 from rotordrop.known import NINETY
 from rotordrop_bench import score_bench, score_estimate
-from rotordrop_bench.drops import SINCE
-from rotordrop_bench.make import chosen_drops, truth_path
+from rotordrop_bench.drops import SINCE, SPEEDS, BenchDrop
+from rotordrop_bench.files import write_record
+from rotordrop_bench.make import bench_recording, chosen_drops, truth_path
 
 HERE = Path(__file__).parent
 STEP = 5
+CALIBRATION_SEEDS = (20000, 30000)
+"""Added to the seed of a drop for the two on which its machine is calibrated."""
 SILENT = 0.05
 """Relative error of a peak force beyond which its interval must not miss it without a word [1]."""
 SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m", "parameters")
 
 
-def estimated(bench: Path, out: Path, name: str) -> float:
+def estimated(bench: Path, out: Path, name: str, machine: Path) -> float:
     """Estimate one drop; processor time it took [s]."""
     place = bench / "drops" / name
     tail = ["--tail", str(place / "tail.csv")] if (place / "tail.csv").is_file() else []
-    call = ["estimate", str(place / "machine.toml"), str(place / "record.csv"), *tail]
+    call = ["estimate", str(machine), str(place / "record.csv"), *tail, "--json", str(out / f"{name}.json")]
+    return called(call, out / f"{name}.json", out / f"{name}.txt")
+
+
+def calibrated(bench: Path, out: Path, drop: BenchDrop) -> Path:
+    """The machine of a drop, calibrated on two other drops; the file is not there where it was refused."""
+    machine, place = out / f"{drop.name}.toml", out / drop.name
+    if machine.is_file():
+        return machine
+    place.mkdir(exist_ok=True)
+    calls: tuple[list[str], list[str]] = ([], [])
+    others = [speed for speed in SPEEDS[drop.rotor] if speed != drop.speed]
+    for i, speed in enumerate(others):
+        made = bench_recording(replace(drop, speed=speed, drop_seed=drop.drop_seed + CALIBRATION_SEEDS[i]))
+        for files, record, kind in zip(calls, (made.record, made.tail), ("record", "tail"), strict=True):
+            if record is not None:
+                file = place / f"{kind}_{i + 1}.csv"
+                write_record(record, file)
+                files.append(str(file))
+    tails = [part for file in calls[1] for part in ("--tail", file)]
+    known = str(bench / "drops" / drop.name / "machine.toml")
+    call = ["calibrate", known, *calls[0], *tails, "--output", str(machine), "--even-if-inconsistent"]
+    spent = called(call, machine, out / f"{drop.name}.txt")
+    print(f"{drop.name} calibrated: {spent:.0f} s of processor time", flush=True)
+    return machine
+
+
+def called(arguments: list[str], written: Path, reason: Path) -> float:
+    """Call the program; where it did not write its file, leave what it said. Processor time it took [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
-        [sys.executable, "-m", "rotordrop", *call, "--json", str(out / f"{name}.json")],
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-m", "rotordrop", *arguments], capture_output=True, text=True, check=False
     )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    if not (out / f"{name}.json").is_file():
-        (out / f"{name}.txt").write_text(f"exit code {done.returncode}\n{done.stderr}")
+    if not written.is_file():
+        reason.write_text(f"exit code {done.returncode}\n{done.stderr}")
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
@@ -86,7 +119,7 @@ def table(bench: Path, out: Path, names: list[str]) -> tuple[str, dict[str, Any]
     return "\n".join(lines) + "\n", scores.as_json()
 
 
-def _silent(bench: Path, out: Path, drops: list[dict[str, Any]]) -> str:
+def _silent(bench: Path, out: Path, drops: Sequence[dict[str, Any]]) -> str:
     """How many peaks are silent, and how many the stated widths would leave so by chance."""
     found, chance, normal = 0, 0.0, NormalDist()
     consistent = [drop["name"] for drop in drops if drop["consistent"]]
@@ -118,17 +151,25 @@ def main() -> None:
     parser.add_argument("--only", action="append", default=[])
     parser.add_argument("--limit", type=float, default=float("inf"))
     parser.add_argument("--table", default="table")
+    parser.add_argument("--calibrated", action="store_true")
     arguments = parser.parse_args()
     out = arguments.estimates
     out.mkdir(parents=True, exist_ok=True)
     started = time.monotonic()
-    names = [drop.name for drop in chosen_drops(arguments.only)]
+    drops = chosen_drops(arguments.only)
+    names = [drop.name for drop in drops]
     # in steps through the list, so that the part that is done says something of every family
-    for name in [name for first in range(STEP) for name in names[first::STEP]]:
+    for drop in [drop for first in range(STEP) for drop in drops[first::STEP]]:
+        name = drop.name
         done = (out / f"{name}.json").is_file() or (out / f"{name}.txt").is_file()
         if done or time.monotonic() - started > arguments.limit:
             continue
-        print(f"{name}: {estimated(arguments.bench, out, name):.0f} s of processor time", flush=True)
+        machine = arguments.bench / "drops" / name / "machine.toml"
+        if arguments.calibrated:
+            machine = calibrated(arguments.bench, out, drop)
+        if machine.is_file():
+            spent = estimated(arguments.bench, out, name, machine)
+            print(f"{name}: {spent:.0f} s of processor time", flush=True)
     there = [n for n in names if (out / f"{n}.json").is_file() or (out / f"{n}.txt").is_file()]
     text, scores = table(arguments.bench, out, there)
     (HERE / "results").mkdir(exist_ok=True)
