@@ -98,6 +98,9 @@ Data = Annotated[
 ]
 Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
 TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
+Film = Annotated[
+    Path | None, file_option("--film", "Write a film of orbit and force, slowed down, as animated GIF.")
+]
 Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
 Profile = Annotated[Path | None, file_option("--profile", "Profile of the recorder, for its tails too.")]
 Tail = Annotated[

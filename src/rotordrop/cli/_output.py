@@ -23,7 +23,7 @@ STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 """Columns of what is printed to a file or a pipe; chosen, not measured."""
 
-OUTPUTS = ("json", "report", "output", "share")
+OUTPUTS = ("json", "report", "film", "output", "share")
 """Parameters of the verbs that name files to write; other paths are read."""
 FILLED = ("target", "folder", "data")
 """Parameters that name a folder to fill, or a file that is never replaced unasked."""

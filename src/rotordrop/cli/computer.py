@@ -29,6 +29,7 @@ EXTRAS = {
     "io": ("recordings of TDMS and Excel, shaft tables of Excel", ("npTDMS", "openpyxl")),
     "xarray": ("to_xarray(), to_dataframe()", ("xarray", "h5netcdf")),
     "parquet": ("histories as Parquet", ("pyarrow",)),
+    "film": ("films of drops", ("pillow",)),
     "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),
     "cluster": ("studies on a Dask cluster", ("distributed",)),
     "serve": ("the page of 'rotordrop serve'", ("starlette", "uvicorn")),

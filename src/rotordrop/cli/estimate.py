@@ -45,6 +45,7 @@ def estimate(
     report: Annotated[
         Path | None, file_option("--report", "Write the report, one offline HTML file per drop.")
     ] = None,
+    film: options.Film = None,
     since: Annotated[
         Path | None, file_option("--since", "Earlier estimate (.json), for what changed.")
     ] = None,
@@ -74,6 +75,7 @@ def estimate(
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_summary
     from rotordrop.report.estimate_screen import estimate_screen
+    from rotordrop.report.film import require_film, write_film
     from rotordrop.report.origin import origin_here
     from rotordrop.report.page import write_page
     from rotordrop.twin.search import is_calibrated
@@ -90,10 +92,14 @@ def estimate(
             f"Calibrate it with 'rotordrop calibrate {machine.name} RECORD... --output calibrated.toml', "
             "or leave --quick out."
         )
-    reports, outputs, folders = (places_beside(named, records) for named in (report, output, data))
+    reports, films, outputs, folders = (
+        places_beside(named, records) for named in (report, film, output, data)
+    )
     if output is not None:
         require_format(output)
-    require_places(json, *reports, *outputs)
+    if film is not None:
+        require_film(film)
+    require_places(json, *reports, *films, *outputs)
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
@@ -112,9 +118,16 @@ def estimate(
         made.save(place)
     for made, place in zip(estimates, folders, strict=False):
         made.data(place)
+    for made, place in zip(estimates, films, strict=False):
+        write_film(made.bearings, place, simulated=made.simulated_record, certain=made.consistent)
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
-    words = (("Report", reports), ("Histories", outputs), ("Tables and figures", folders))
+    words = (
+        ("Report", reports),
+        ("Film", films),
+        ("Histories", outputs),
+        ("Tables and figures", folders),
+    )
     written = [f"{word}: {place}" for word, places in words for place in places]
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])

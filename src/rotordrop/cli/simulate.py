@@ -70,6 +70,7 @@ def simulate(
         Path | None, file_option("--output", "Write all histories as HDF5 (NetCDF4).", "-o")
     ] = None,
     report: options.Report = None,
+    film: options.Film = None,
     data: options.Data = None,
     json: options.Json = None,
 ) -> None:
@@ -87,6 +88,10 @@ def simulate(
     from rotordrop.simulate.drop import simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
+    if film is not None:
+        from rotordrop.report.film import require_film
+
+        require_film(film)
     described = load_machine(machine)
     bearings = [bearing.name for bearing in described.touchdown_bearings]
     if levitated:
@@ -129,6 +134,11 @@ def simulate(
     result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
         result.save(output)
+    if film is not None:
+        from rotordrop.estimate.bearing_drop import simulated_bearings
+        from rotordrop.report.film import write_film
+
+        write_film(simulated_bearings(result), film, simulated=True)
     if report is None and data is None:
         said = simulate_summary(result, described)  # draws nothing: plotly takes half a second to load
     else:

@@ -222,13 +222,18 @@ class BearingDrop:
         )
         return found.model_copy(update={"maximum": self.peak_stress.value})
 
+    @property
+    def motion(self) -> Motion:
+        """The motion that the loads belong to: estimated or simulated, else as measured."""
+        own = [motion for motion in self.motions if motion.role in ("estimated", "simulated")]
+        return (own or self.motions)[0]
+
     @cached_property
     def touched(self) -> Array:
         """When each impact began, by the rule and the displacement that a look goes by [s], shape (K,)."""
         if self.air_gap is None:
             return np.empty(0)
-        own = [motion for motion in self.motions if motion.role in ("estimated", "simulated")]
-        motion, gap = (own or self.motions)[0], 0.5 * (self.air_gap.lower + self.air_gap.upper)
+        motion, gap = self.motion, 0.5 * (self.air_gap.lower + self.air_gap.upper)
         rate = (len(motion.time) - 1) / float(motion.time[-1] - motion.time[0])
         return motion.time[find_impacts(motion.displacement, rate, gap, 0.0).touched]
 

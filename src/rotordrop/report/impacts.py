@@ -13,7 +13,7 @@ import plotly.graph_objects as go
 from rotordrop.estimate.bearing_drop import BearingDrop, Impact
 from rotordrop.record.impacts import HOP, shortest_flight
 from rotordrop.report.content import Column, Table, table
-from rotordrop.report.quantity import Quantity, places_of
+from rotordrop.report.quantity import Quantity, places_of, round_steps
 from rotordrop.report.style import MUTED, axis_title, curve, panels, square
 
 LISTED = 24
@@ -76,7 +76,7 @@ def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
     figure = panels([bearing.name for bearing in bearings], height=420, spacing=0.1)
     impacts = [impact for bearing in bearings for impact in bearing.impacts]
     latest = max(impact.peak_time for impact in impacts)
-    rings = ring_forces(max(impact.peak_force.high for impact in impacts))
+    rings = round_steps(max(impact.peak_force.high for impact in impacts))
     for column, bearing in enumerate(bearings, start=1):
         _add_rings(figure, rings, column)
         _add_impacts(figure, bearing.impacts, column)
@@ -94,13 +94,6 @@ def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
         }
     )
     return figure
-
-
-def ring_forces(highest: float) -> list[float]:
-    """Forces of the rings [N]: three to five round numbers, the last above the highest force."""
-    step = 10.0 ** math.floor(math.log10(highest))
-    step = next(size * step for size in (0.2, 0.5, 1.0, 2.0, 5.0) if highest <= 5.0 * size * step)
-    return [step * number for number in range(1, math.ceil(highest / step) + 1)]
 
 
 def _add_rings(figure: go.Figure, rings: Sequence[float], column: int) -> None:

@@ -143,9 +143,10 @@ def test_the_calibration_says_what_the_records_determine(folder: Path) -> None:
 def test_quick_estimate_writes_numbers_and_report(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out, page = tmp_path / "out.json", tmp_path / "report.html"
+    out, page, film = tmp_path / "out.json", tmp_path / "report.html", tmp_path / "drop.gif"
     arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
-    assert run([*arguments, "--json", str(out), "--report", str(page)]) == 0
+    assert run([*arguments, "--json", str(out), "--report", str(page), "--film", str(film)]) == 0
+    assert film.read_bytes().startswith(b"GIF89a")
     written = json.loads(out.read_text())
     jsonschema.Draft202012Validator(estimate_schema()).validate(written)
     assert written["method"] == "tracked"
@@ -161,6 +162,7 @@ def test_quick_estimate_writes_numbers_and_report(
     for heading in ("Impacts", "Parameters", "Consistency", "Orbit", "Hertz stress"):
         assert f">{heading}<" in html
     told = words(capsys.readouterr().out)
+    assert f"Film: {film}" in told
     assert written["consistency"]["sentence"] in told
     assert str(page) in told.replace(" ", "")
 

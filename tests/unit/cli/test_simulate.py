@@ -23,7 +23,7 @@ SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduct
 
 
 def test_a_drop_from_the_centre_reaches_every_output(tmp_path, capsys):
-    files = {name: tmp_path / name for name in ("drop.h5", "drop.html", "drop.json")}
+    files = {name: tmp_path / name for name in ("drop.h5", "drop.html", "drop.json", "drop.gif")}
     arguments = [
         "-o",
         str(files["drop.h5"]),
@@ -31,8 +31,11 @@ def test_a_drop_from_the_centre_reaches_every_output(tmp_path, capsys):
         str(files["drop.html"]),
         "--json",
         str(files["drop.json"]),
+        "--film",
+        str(files["drop.gif"]),
     ]
     assert run([*SHORT, *arguments]) == 0
+    assert files["drop.gif"].read_bytes().startswith(b"GIF89a")
     text = capsys.readouterr().out
     assert "The drop was simulated to 0.012 s" in text
     assert "Peak bearing force" in text

@@ -15,9 +15,9 @@ from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.known import Known
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.estimate_page import cross_check_statements, cross_check_table
-from rotordrop.report.impacts import impact_figure, impact_table, ring_forces
+from rotordrop.report.impacts import impact_figure, impact_table
 from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, round_steps
 from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table, thinned
 from rotordrop.report.waterfall_page import law_table
@@ -98,10 +98,10 @@ def test_impacts_are_drawn_round_the_race_with_their_interval(drop_result: DropR
         (1.0, [0.2, 0.4, 0.6, 0.8, 1.0]),
     ],
 )
-def test_rings_are_round_and_reach_beyond_the_highest_force(highest: float, rings: list[float]) -> None:
-    assert_allclose(ring_forces(highest), rings)
+def test_round_steps_reach_beyond_the_highest_force(highest: float, rings: list[float]) -> None:
+    assert_allclose(round_steps(highest), rings)
     for force in np.geomspace(0.3, 3e6, 200):
-        found = ring_forces(force)
+        found = round_steps(force)
         assert 2 <= len(found) <= 5
         assert found[-1] >= force > found[-1] - (found[1] - found[0])
 
