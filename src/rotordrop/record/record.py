@@ -326,14 +326,17 @@ class Record:
             ) from None
 
     def window(self, start: float, end: float) -> Self:
-        """Cut out the samples from `start` to `end` [s]; the speed readings stay whole."""
+        """Give the samples from `start` to `end` [s], no copies of them; the speed readings stay whole."""
         slack = 1e-3 / self.sampling_rate if np.isfinite(self.sampling_rate) else 0.0
-        keep = (self.time >= start - slack) & (self.time <= end + slack)
-        if not keep.any():
+        inside = np.flatnonzero((self.time >= start - slack) & (self.time <= end + slack))
+        if not len(inside):
             raise RecordError(
                 f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s; nothing lies "
                 f"between {start:.6g} s and {end:.6g} s"
             )
+        # a slice, unless the time goes back and forth: a copy of a minute would fill 40 MB
+        first, last = int(inside[0]), int(inside[-1]) + 1
+        keep = slice(first, last) if last - first == len(inside) else inside
         return replace(
             self,
             time=self.time[keep],

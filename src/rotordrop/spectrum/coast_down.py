@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -212,12 +211,10 @@ def analyse_coast_down(
         settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
     )
     tell("orders and waterfalls", 0.5)
-    with ThreadPoolExecutor() as pool:
-        seen = pool.map(
-            lambda name: _plane(signal, name, read[name], settled[name], lines, candidates, choice),
-            signal.planes,
-        )
-        planes = dict(zip(signal.planes, seen, strict=True))
+    planes = {  # one after the other: side by side they fill the memory of two
+        name: _plane(signal, name, read[name], settled[name], lines, candidates, choice)
+        for name in signal.planes
+    }
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
 

@@ -38,7 +38,9 @@ class TrackingSettings:
     longest_window: float = 3.0
     """Limit of the window at low speed [s]."""
     step: float = 0.1
-    """Time from one amplitude to the next [s]."""
+    """Time from one amplitude to the next [s], at least."""
+    share: float = 0.125
+    """The same over the length of the window [1], at least: what changes faster no window shows (chosen)."""
     degree: int = 2
     """Degree of the polynomial an amplitude may follow within a window [1]."""
 
@@ -205,15 +207,18 @@ def _centres(
     least = _least_turns(orders)
     fastest = max(float(np.abs(profile.speed).max()) / math.tau, 1e-300)
     room = end - start - min(max(settings.revolutions, least) / fastest, settings.longest_window)
-    step = min(settings.step, room / _FEWEST_CENTRES) if room > 0.0 else settings.step
+    most = room / _FEWEST_CENTRES if room > 0.0 else math.inf
+    step = min(settings.step, most)
     times = np.arange(start + step, end, step)
     speed = np.abs(profile.speed_at(times)) / math.tau
-    fitting = []
+    fitting: list[tuple[float, float]] = []
     for t, n in zip(times.tolist(), speed.tolist(), strict=True):
         if n <= 0.0:
             continue
         window = min(max(settings.revolutions, least) / n, settings.longest_window)
         inside = t - window / 2 >= start and t + window / 2 <= end
+        if fitting and t - fitting[-1][0] < min(settings.share * window, most) - 1e-9:
+            continue
         if inside and window * n >= least:
             fitting.append((t, window))
     return fitting
