@@ -10,6 +10,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.description import Description, Misfit, Placed
+from rotordrop.elements.parameter import Entry, Extension, Parameter, Values, in_words, itself, of_one_unknown
 from rotordrop.elements.values import Angle, Force, NonNegative, Physical, Time, default
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -158,3 +159,32 @@ def check_times(points: tuple[LoadPoint, ...] | tuple[BasePoint, ...]) -> None:
                 f"time {time:g} s of point {index + 1} does not exceed {before:g} s before it; order them",
                 ("over_time", index, "time"),
             )
+
+
+def _pushed(_machine: Any, found: Values, _load: float) -> str:
+    share = itself(found["side_force"])
+    push, lean = in_words(share, "% of the weight", 0.01), in_words(share, "deg", math.pi / 180.0)
+    return f"a steady force in +x of {push}, or a machine out of level by {lean}"
+
+
+EXTENSIONS: tuple[Extension, ...] = (
+    of_one_unknown(
+        Parameter(
+            path="side_force",
+            owner="drop",
+            label="steady side force over the weight",
+            kind="dimensionless",
+            logarithmic=False,
+            # belts, couplings and pumps push with up to a few tenths of the weight (chosen)
+            guess_sigma=0.1,
+            given_sigma=2e-3,
+            lower=-1.0,
+            upper=1.0,
+            measured_by="a level on the machine, and the load of the process",
+            entries=(Entry(array="spin", column=L.SIDE_FORCE),),
+        ),
+        "side force",
+        0.0,
+        _pushed,
+    ),
+)

@@ -15,6 +15,7 @@ from rotordrop.elements import (
     ball_bearing,
     contact,
     friction,
+    load,
     magnet,
     mount,
     race,
@@ -62,6 +63,7 @@ _ELEMENTS = (
     thermal,
     air,
     recorder,
+    load,
 )
 
 EXTENSIONS: tuple[Extension, ...] = tuple(

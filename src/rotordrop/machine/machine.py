@@ -68,6 +68,9 @@ class Machine(Description):
     """How much longer a second of their records lasts than a second [1]; right when left out."""
     loads: tuple[Load, ...] = ()
     """Forces on the rotor beside gravity."""
+    side_force: Number | None = None
+    """Steady force in +x all along the rotor over its weight [1], also that of a machine out of level by this
+    angle [rad]; none when left out."""
     base: Base | None = None
     """Acceleration of the ground on which the machine stands."""
     clearances: tuple[Clearance, ...] = ()

@@ -64,7 +64,8 @@ THERMAL_END = THERMAL + thermal.N_ENTRIES
 N_BEARING_COLUMNS = THERMAL_END
 FOUNDATION_STATES = 4
 
-# Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns and what holds it along its axis.
+# Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns, what holds it along its axis
+# and what pushes it sideways.
 POLAR_INERTIA = 0
 INITIAL_SPEED = 1
 AERO_TIME_CONSTANT = 2
@@ -77,7 +78,8 @@ AXIAL_STIFFNESS = 8
 AXIAL_DAMPING = 9
 AXIAL_HOLDING = 10
 CLOCK_ERROR = 11
-N_SPIN_ENTRIES = 12
+SIDE_FORCE = 12
+N_SPIN_ENTRIES = 13
 
 # Entries of `KernelParameters.flags`.
 SPIN_MODE = 0

@@ -162,6 +162,7 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
     slowed = speed.aero_time_constant
     spin[L.AERO_TIME_CONSTANT] = np.inf if slowed is None else float(slowed)
     # The machine file gives torques, the kernel wants them per polar inertia.
+    spin[L.SIDE_FORCE] = float(machine.side_force or 0.0)
     spin[L.AERO_LINEAR] = float(speed.aero_linear or 0.0) / fe.polar_inertia
     spin[L.AERO_QUADRATIC] = float(speed.aero_quadratic or 0.0) / fe.polar_inertia
     uniform = product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))

@@ -249,9 +249,10 @@ def gyroscopic_forces(
 def add_rotor_accelerations(
     y: Array, omega: float, omega_dot: float, p: KernelParameters, dy: Array
 ) -> tuple[float, float]:
-    """Add modal accelerations from stiffness, damping, gyroscopics, unbalance and gravity.
+    """Add modal accelerations from stiffness, damping, gyroscopics, unbalance, gravity and the
+    side force, which is a share of it.
 
-    Returns the power dissipated by modal damping and the power put in by unbalance and spin-up [W].
+    Returns the power dissipated by modal damping and that put in by unbalance, spin-up and side force [W].
     """
     s, c = sine_cosine(y[p.rotor_at[L.ROTOR_ANGLE]])
     # The unbalance pulls outwards with ω² and, while the rotor slows down, backwards with its deceleration.
@@ -264,8 +265,9 @@ def add_rotor_accelerations(
     gyroscopic_forces(p.polar, ux, uy, vx, vy, omega, omega_dot, gx, gy)
     dissipated = 0.0
     put_in = 0.0
+    side = p.spin[L.SIDE_FORCE]
     for k in range(p.eigenvalue.shape[0]):
-        fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across
+        fx = p.unbalance_cos[k] * along - p.unbalance_sin[k] * across - side * p.gravity[k]
         fy = p.unbalance_cos[k] * across + p.unbalance_sin[k] * along
         ax[k] += fx - p.eigenvalue[k] * ux[k] - p.damping[k] * vx[k] - gx[k]
         ay[k] += fy + p.gravity[k] - p.eigenvalue[k] * uy[k] - p.damping[k] * vy[k] + gy[k]

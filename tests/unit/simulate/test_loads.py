@@ -171,3 +171,21 @@ def test_an_estimate_with_loads_is_refused_and_says_what_to_do():
         RecordError, match=r"has \[\[loads\]\], with which a record cannot be estimated yet.*Leave"
     ):
         read_evidence(build_drop_model(machine, "quick"), record)
+
+
+def test_a_side_force_is_gravity_turned_and_its_work_is_booked(paper):
+    """A tenth of the weight in +x: the whole rotor, however it bends, falls by a tenth as far to the side."""
+    pushed = loads_machine(machine_text(paper.with_values({"side_force": 0.1})))
+    assert float(pushed.side_force) == 0.1
+    case = DropCase(speed=300.0, duration=0.03, tolerance=1e-8)
+    drops = [simulate_drop(build_drop_model(machine, "quick"), case) for machine in (paper, pushed)]
+    falling = drops[0].time < 0.006
+    aside = drops[1].displacement[falling] - drops[0].displacement[falling]
+    assert aside[..., 0] == pytest.approx(
+        np.broadcast_to(0.05 * G * drops[0].time[falling, None] ** 2, aside[..., 0].shape),
+        rel=1e-4,
+        abs=1e-10,
+    )
+    assert np.max(np.abs(aside[..., 1])) < 1e-10
+    assert np.max(drops[1].indentation) > 0.0
+    assert drops[1].certificate.energy_residual < 1e-6 * drops[1].certificate.energy_scale

@@ -67,6 +67,7 @@ def has(machine: Machine) -> frozenset[str]:
         "unbalance beyond its grade": machine.unbalances[0].beyond_described,
         "rotor stiffness": machine.rotor.stiffness_factor,
         "sampling clock": machine.clock_error,
+        "side force": machine.side_force,
     }
     return frozenset(name for name, value in marks.items() if value is not None)
 
