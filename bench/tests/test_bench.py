@@ -19,6 +19,7 @@ from rotordrop_bench.drops import LISTS, SINCE
 from rotordrop_bench.make import chosen_drops
 from rotordrop_bench.rotors import ROTORS, bench_rotor
 from rotordrop_bench.true_values import KINDS, violated_kinds
+from rotordrop_bench.truth import Truth
 
 MADE = ("drop_004", "drop_034")
 
@@ -46,6 +47,10 @@ def test_the_list_of_a_version_is_fixed(version, expected):
             ]
         digest.update(" ".join(f"{number:.6g}" for number in numbers).encode())
     assert digest.hexdigest()[:16] == expected
+
+
+def test_a_tilted_machine_is_scored_as_one_with_a_side_force():
+    assert Truth(values={"violated": ["tilted machine", "wear"]}).violated == ("side force", "wear")
 
 
 def test_a_version_is_chosen_by_its_name():

@@ -101,7 +101,7 @@ def score_estimate(
             for entry in _listed(found, "structure")
             if "name" in entry and entry.get("probability") is None
         ],
-        "violated": list(truth.values.get("violated", [])),
+        "violated": list(truth.violated),
         "structure": structure,
         "impacts": {name: score for name, score in impacts.items() if score},
         "coverage": {

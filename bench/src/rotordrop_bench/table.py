@@ -131,7 +131,7 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
                 "consistent": scored.get("consistent"),
                 "named": scored.get("named", []),
                 "peak_errors": {b: peak["relative_error"] for b, peak in peaks.items() if peak},
-                "violated": list(truth.values.get("violated", [])),
+                "violated": list(truth.violated),
             }
         )
     rows = []

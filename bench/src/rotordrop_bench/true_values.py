@@ -385,8 +385,18 @@ def true_structure(
         values |= {f"sensors.{sensor.name}.{path}": float(value) for path, value in mine.items()}
     values["rotor.stiffness_factor"] = float(hidden.violations.rotor.youngs_modulus)
     values["clock_error"] = float(hidden.violations.sensors.clock_error)
+    values["side_force"] = _side_force(hidden)
     values["remanence.time_constant"] = conditions.start.remanence_time_constant
     return values
+
+
+def _side_force(hidden: HiddenMachine) -> float:
+    """Steady force in +x over the weight: what pushes the rotor, and gravity on a tilted machine."""
+    tilt, side, machine = float(hidden.violations.stand.tilt), hidden.violations.side_force, hidden.machine
+    if side is None:
+        return math.sin(tilt)
+    weight = machine.rotor.mass * float(machine.gravity)
+    return math.sin(tilt) + float(side.force) * math.cos(float(side.direction)) / weight
 
 
 def _of_bearing(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, float]:

@@ -20,6 +20,10 @@ _STRESSES = {"peak_stress_Pa": ("max_stress_MPa", 1e6), "mean_stress_Pa": ("mean
 """Field and unit of a truth file for the fields of an estimate that it calls otherwise."""
 
 
+SEEN_AS = {"tilted machine": "side force"}
+"""Kinds of violations that a drop does not tell from another one."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Truth:
     """What is true about one simulated recording."""
@@ -56,6 +60,11 @@ class Truth:
             place, unit = _STRESSES.get(load.field, (load.field, 1.0))
             found[load.field] = self._of_bearing(bearing, (place,), unit)
         return {path: value for path, value in found.items() if value is not None}
+
+    @property
+    def violated(self) -> tuple[str, ...]:
+        """Kinds of violations, by the name that an estimate has for what it sees of them."""
+        return tuple(SEEN_AS.get(kind, kind) for kind in self.values.get("violated", ()))
 
     @property
     def structure(self) -> dict[str, float]:
