@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.evidence.harmonic import HalfContact, half_contact
 from rotordrop.known import NINETY
 from rotordrop.record.impacts import SMOOTHING, peaks, slope
 from rotordrop.series import noise_by_differences
@@ -60,6 +62,23 @@ _TURN = 4e-3
 _APPROACH, _AROUND = 30e-3, 0.15
 """How far back an approach is followed, and what counts as around [s] (chosen)."""
 
+_FLIGHT = 1.5e-3
+"""How much of a flight before a contact, and after it, is fitted with it [s] (chosen: what drives a rotor on
+its way, such as a surge of 20 ms, is constant over that)."""
+
+_FORM = ((0.04, 0.5), (0.06, 1.0))
+"""Standard error of a velocity by the form of its fit, before a contact and after it: its share of the
+velocity, and of the square of the speed that the pull gives within the inverse frequency on the race over
+the velocity [1]. A race dampens, more so on the way out, and a rotor pressed on it hardly leaves (set with
+seeds 300000 to 300039 of `studies/look/surges.py`)."""
+
+_SURELY = 3.0
+"""A velocity so many standard errors from zero is one [1] (chosen)."""
+
+_AS_STIFF = (0.7, 1.4)
+"""What turns a rotor with such a share of the angular frequency of its first contacts is their race [1]
+(chosen): magnets that hold it are ten times as soft."""
+
 _POINTS = 8192
 """Samples of a stretch whose spectrum is taken; stretches overlap by half (chosen)."""
 
@@ -85,8 +104,11 @@ class HeldContact:
     """Distance from where it usually is [m]."""
     approach: float
     departure: float
-    """Radial velocities before and after, by straight lines over 1 ms [m/s], both positive outwards and
-    inwards."""
+    """Radial velocities at the first and the last instant of the contact [m/s], both positive outwards and
+    inwards: by a fit of flight and half a contact, by straight lines over 1 ms where that fails."""
+    approach_interval_90: tuple[float, float]
+    departure_interval_90: tuple[float, float]
+    """Intervals that hold them with 90 % probability [m/s]."""
     velocity_change: tuple[float, float]
     """Bounds of the change of velocity by the race, which is its impulse per mass that takes part [m/s]:
     noise, what the magnets can have done during the turn, and above also what drove the rotor out."""
@@ -191,7 +213,8 @@ def held_contacts(
     -----
     A contact is a turn far outside of the usual orbit that is at least three times as sharp as any on the way
     to it, four times as sharp as the orbit around, sharper than any while nothing is near a race, and above
-    the acceleration of gravity; further turns at the same distance are contacts too. A scratch under a sensor
+    the acceleration of gravity. Further turns at the same distance that are half as sharp, or as stiff as
+    those, are contacts too. Velocities are those of `half_contact`, at the contact. A scratch under a sensor
     rises nearly as sharply as it turns, and is as sharp wherever the rotor is; a swing on the magnets turns
     as it rises. Not validated on measured contacts.
     """
@@ -209,20 +232,11 @@ def held_contacts(
     usual_turn = np.hypot(*accelerated.T)
     window = max(2 * int(0.5 * SMOOTHING * rate) + 1, 3)
     doubt = noise * rate * math.sqrt(12.0 / window**3)  # of a velocity by a straight line
-    turn, back, around = (max(round(span * rate), 2) for span in (_TURN, _APPROACH, _AROUND))
+    turn, back, around, flight = (max(round(span * rate), 2) for span in (_TURN, _APPROACH, _AROUND, _FLIGHT))
 
-    far = np.cumsum(np.pad(distance >= floor, turn + 1))
-    calm = np.flatnonzero(far[2 * turn + 1 : -1] == far[: len(distance)])
-    beside = round(0.5 * _CALM_SPAN * rate)
+    scratch = _scratches(distance >= floor, usual_turn, turn, rate)
 
-    def scratch(at: int) -> float:
-        near = int(np.searchsorted(calm, at))
-        turns = usual_turn[calm[max(near - beside, 0) : near + beside]]
-        return _ABOVE_CALM * float(np.percentile(turns, _CALM)) if len(turns) else 0.0
-
-    def contacts(
-        floor: float, sharper: float, returned: float, marred: Callable[[int], float]
-    ) -> Iterator[HeldContact]:
+    def contacts(floor: float, sharper: float, returned: float, like: _Like) -> Iterator[_Found]:
         tops = peaks(distance, floor, max(0.1 * floor, 6.0 * noise))
         # between two turns the rotor is furthest from the race: what is beyond belongs to the other turn
         parted = [before + int(np.argmin(distance[before:then])) for before, then in pairwise(tops)]
@@ -233,38 +247,120 @@ def held_contacts(
             fastest += int(np.argmax(speed[fastest : here + 1]))
             leaves = here + int(np.argmin(speed[here:]))
             outwards = accelerated[begin : at + turn + 1] @ outward
-            approach, departure = float(speed[fastest]), float(-speed[leaves])
+            lines = (
+                _Side(float(speed[fastest]), begin + fastest),
+                _Side(float(-speed[leaves]), begin + leaves),
+            )
             turned = float(-np.min(outwards[fastest : leaves + 1]))
             came = float(np.max(outwards[: fastest + 1]))
             usually = float(np.median(usual_turn[max(at - around, 0) : at + around]))
-            gentle = turned <= max(sharper * came, _ABOVE_USUAL * usually, _LEAST_TURN * GRAVITY, marred(at))
-            least, most = sorted((approach, departure))
-            if gentle or least <= max(returned * most, 0.0) or most + least <= 10.0 * doubt:
+            most = max(sharper * came, _ABOVE_USUAL * usually, _LEAST_TURN * GRAVITY, like.marred(at))
+            low, high = sorted(one.velocity for one in lines)
+            gentle = turned <= most or low <= max(returned * high, 0.0) or high + low <= 10.0 * doubt
+            if gentle and like.frequency is None:
                 continue
-            half, lasts = NINETY * math.sqrt(2.0) * doubt, (leaves - fastest) / rate
-            # what drove the rotor on its way, a surge say, may drive it against the race too, and a straight
-            # line rounds off half its length on either side
-            change = (
-                max(approach + departure - half - usually * lasts, 0.0),
-                approach + departure + half + max(usually, came) * (lasts + SMOOTHING),
+            first = max(came_from, lines[0].sample - flight)
+            path = away[first : min(goes_to, lines[1].sample + flight) + 1] @ outward
+            into = half_contact(path[: at - first + 1], rate, noise)
+            if gentle and not like.is_race(into):
+                continue
+            out = half_contact(path[at - first :][::-1], rate, noise)
+            drove = max(usually, came)
+            sides = (
+                lines[0].by(into, at, 1, NINETY * doubt, drove),
+                lines[1].by(out, at, -1, NINETY * doubt, drove),
             )
-            kink = min(begin + fastest + round(0.25 * SMOOTHING * rate), at)
-            yield HeldContact(
-                plane=plane,
-                time=float(time[kink]),
-                azimuth=float(np.arctan2(outward[1], outward[0])),
-                distance=float(distance[at]),
-                approach=approach,
-                departure=departure,
-                velocity_change=change,
-                impulse=None if masses is None else (masses[0] * change[0], masses[1] * change[1]),
-            )
+            yield _contact(plane, time, away[at], sides, (usually, drove), masses), into
 
-    sure = tuple(contacts(floor, _SHARPER, _RETURNED, scratch))
+    sure = tuple(contacts(floor, _SHARPER, _RETURNED, _Like(None, scratch)))
     if not sure:
         return ()
-    race = min(one.distance for one in sure)
-    return tuple(contacts(_BACK_AT_RACE * race, _SHARPER_AGAIN, 0.0, lambda _: 0.0))
+    race = min(one.distance for one, _ in sure)
+    stiff = [half.frequency for _, half in sure if half is not None]
+    like = _Like(float(np.median(stiff)) if stiff else None, lambda _: 0.0)
+    return tuple(one for one, _ in contacts(_BACK_AT_RACE * race, _SHARPER_AGAIN, 0.0, like))
+
+
+def _scratches(near: NDArray[np.bool_], usual_turn: Array, turn: int, rate: float) -> Callable[[int], float]:
+    """How sharply a scratch under a sensor may turn a rotor at a sample [m/s²]: as where no race is near."""
+    far = np.cumsum(np.pad(near, turn + 1))
+    calm = np.flatnonzero(far[2 * turn + 1 : -1] == far[: len(near)])
+    beside = round(0.5 * _CALM_SPAN * rate)
+
+    def scratch(at: int) -> float:
+        here = int(np.searchsorted(calm, at))
+        turns = usual_turn[calm[max(here - beside, 0) : here + beside]]
+        return _ABOVE_CALM * float(np.percentile(turns, _CALM)) if len(turns) else 0.0
+
+    return scratch
+
+
+_Found = tuple[HeldContact, HalfContact | None]
+
+
+@dataclass(frozen=True)
+class _Like:
+    """What a contact is known by: its frequency [rad/s], or what else turns a rotor as sharply [m/s²]."""
+
+    frequency: float | None
+    marred: Callable[[int], float]
+
+    def is_race(self, into: HalfContact | None) -> bool:
+        """Whether a turn is as stiff as the contacts before, and the rotor came with a velocity."""
+        if into is None or self.frequency is None or into.velocity <= _SURELY * into.velocity_error:
+            return False
+        return _AS_STIFF[0] < into.frequency / self.frequency < _AS_STIFF[1]
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Velocity on one side of a contact [m/s], when [samples], and its interval."""
+
+    velocity: float
+    sample: float
+    interval: tuple[float, float] = (math.nan, math.nan)
+
+    def by(self, half: HalfContact | None, at: int, sign: int, doubt: float, drove: float) -> _Side:
+        """That of a fit about the deepest point, or itself with the interval of a straight line."""
+        if half is None or half.velocity <= _SURELY * half.velocity_error:
+            # a line rounds off half its length, in which what drove the rotor goes on
+            high = self.velocity + doubt + drove * 0.5 * SMOOTHING
+            return _Side(self.velocity, self.sample, (max(self.velocity - doubt, 0.0), high))
+        share, pressed = _FORM[0 if sign > 0 else 1]
+        pressed *= (half.pull / half.frequency) ** 2 / half.velocity
+        wide = NINETY * math.hypot(half.velocity_error, share * half.velocity, pressed)
+        interval = (max(half.velocity - wide, 0.0), half.velocity + wide)
+        return _Side(half.velocity, at + sign * half.begin, interval)
+
+
+def _contact(
+    plane: str,
+    time: Array,
+    away: Array,
+    sides: tuple[_Side, _Side],
+    drives: tuple[float, float],
+    masses: tuple[float, float] | None,
+) -> HeldContact:
+    """A contact by its two sides, with what usually drives the rotor, and did at most [m/s²]."""
+    into, out = sides
+    begin, end = np.interp([into.sample, out.sample], np.arange(len(time)), time)
+    # what drove the rotor on its way, a surge say, may drive it against the race too, ever harder
+    change = (
+        max(into.interval[0] + out.interval[0] - drives[0] * (end - begin), 0.0),
+        into.interval[1] + out.interval[1] + drives[1] * (end - begin + SMOOTHING),
+    )
+    return HeldContact(
+        plane=plane,
+        time=float(begin),
+        azimuth=float(np.arctan2(away[1], away[0])),
+        distance=float(np.hypot(*away)),
+        approach=into.velocity,
+        departure=out.velocity,
+        approach_interval_90=into.interval,
+        departure_interval_90=out.interval,
+        velocity_change=(float(change[0]), float(change[1])),
+        impulse=None if masses is None else (masses[0] * float(change[0]), masses[1] * float(change[1])),
+    )
 
 
 def masses_at(machine: Machine, node: int) -> tuple[float, float]:

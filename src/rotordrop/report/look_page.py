@@ -165,20 +165,23 @@ def _contact_table(seen: Look) -> Table:
         low, high = row.velocity_change if row.impulse is None else row.impulse
         return f"{low:.2g} to {high:.2g}"
 
+    def speed(value: float, interval: tuple[float, float]) -> str:
+        return f"{value:.3f} ({interval[0]:.3f} to {interval[1]:.3f})"
+
     described = seen.contacts[0].impulse is not None
     columns = (
         Column("plane", "plane"),
         Column("record time", lambda row: format_moment(row.time, 4)),
         Column("direction", lambda row: f"{degrees(row.azimuth):.0f}°"),
         Column("from the usual place", "distance", "length"),
-        Column("approaches with about [m/s]", lambda row: f"{row.approach:.2g}"),
-        Column("departs with about [m/s]", lambda row: f"{row.departure:.2g}"),
+        Column("approaches with [m/s] (90 %)", lambda row: speed(row.approach, row.approach_interval_90)),
+        Column("departs with [m/s] (90 %)", lambda row: speed(row.departure, row.departure_interval_90)),
         Column("impulse [N s]" if described else "impulse per kg of moving mass [N s/kg]", bounds),
     )
     note = (
         "A contact turns the rotor back at least three times as sharply as it came, far outside of its usual "
-        "orbit. Direction counter-clockwise from +x, −90° is the bottom. Velocities by straight lines over "
-        "1 ms, which round off a turn and make them too small. "
+        "orbit; further ones are as stiff. Direction counter-clockwise from +x, −90° is the bottom. "
+        "Velocities at the contact, by a fit of the flight beside it and half the contact. "
         + (
             "Impulse between the mass that a rigid rotor has at the plane and all of it."
             if described

@@ -340,7 +340,7 @@ def test_a_record_too_short_for_a_frame_or_a_law_says_so(tmp_path, capsys):
     capsys.readouterr()
     recorded(tmp_path / "s.csv", seconds=0.04)  # it ends while the rotor bounces
     assert run(["waterfall", LP400, short]) != 0
-    assert "the signal of 0.04 s holds no whole window of 24 turns" in capsys.readouterr().err
+    assert "the signal of 0.04 s holds no whole window of 4 turns" in capsys.readouterr().err
     assert run(["coast-down", LP400, "--speed", "60 Hz", "--drag-from", record]) == 3
     assert re.search(r"recorded for 1\.\d+ s after power-off; at least 4 s", capsys.readouterr().err)
 

@@ -332,15 +332,22 @@ def test_a_contact_from_which_the_magnets_pull_the_rotor_back_is_no_drop(part, t
 
 
 def test_a_second_contact_has_its_own_time_and_velocities():
-    """Its approach was sought in the contact before: it stood inside of that, with its impulse."""
+    """Its approach was sought in the contact before: it stood inside of that, with its impulse.
+
+    Two of six were found, with velocities 9 to 13 % too low.
+    """
     time, path, touched = surging(40.0, 0.1)
     found = held_contacts("A", time, path, 20_000.0)
-    assert 2 <= len(found) <= len(touched)
-    for one, (begins, approach, departure, impulse) in zip(found, touched, strict=False):
-        assert one.time == pytest.approx(begins, abs=0.5e-3)
-        assert (one.approach, one.departure) == pytest.approx((approach, departure), rel=0.2)
+    assert 4 <= len(found) <= len(touched)
+    for one in found:
+        begins, approach, departure, impulse = min(touched, key=lambda contact: abs(contact[0] - one.time))
+        assert one.time == pytest.approx(begins, abs=0.2e-3)
+        assert one.approach_interval_90[0] < approach < one.approach_interval_90[1]
+        assert one.departure_interval_90[0] < departure < one.departure_interval_90[1]
         assert one.velocity_change[0] < approach + departure < one.velocity_change[1]
         assert one.velocity_change[0] < impulse < one.velocity_change[1]
+    first = found[0]
+    assert (first.approach, first.departure) == pytest.approx(touched[0][1:3], rel=0.03)
 
 
 def test_a_machine_file_bounds_the_impulse_of_a_contact(machine):
