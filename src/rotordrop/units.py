@@ -68,6 +68,14 @@ KINDS: dict[str, Kind] = {
     "contact_damping": Kind(unit="s/m", example="0.1 s/m", scales=((1.0, "s/m"),)),
     "voltage": Kind(unit="V", example="5 V", scales=_metric("V", "k", "", "m", "µ")),
     "voltage_sensitivity": Kind(unit="V/m", example="8 mV/um", scales=((1e3, "mV/µm"),)),
+    "current": Kind(unit="A", example="4 A", scales=_metric("A", "", "m")),
+    "resistance": Kind(unit="ohm", example="0.5 ohm", scales=((1.0, "Ω"), (1e-3, "mΩ"))),
+    "inductance": Kind(unit="H", example="10 mH", scales=_metric("H", "", "m", "µ")),
+    "area": Kind(unit="m^2", example="6 cm^2", scales=((1e-4, "cm²"),)),
+    "force_by_current": Kind(unit="N/A", example="130 N/A", scales=((1.0, "N/A"),)),
+    "proportional_gain": Kind(unit="A/m", example="15 kA/m", scales=_metric("A/m", "k", "")),
+    "integral_gain": Kind(unit="A/(m s)", example="300 kA/(m s)", scales=_metric("A/(m s)", "k", "")),
+    "derivative_gain": Kind(unit="A s/m", example="50 A s/m", scales=_metric("A s/m", "")),
     "temperature": Kind(unit="K", example="20 degC", scales=((1.0, "K"),)),
     "heat_capacity": Kind(unit="J/K", example="130 J/K", scales=_metric("J/K", "k", "")),
     "heat_conductance": Kind(unit="W/K", example="4 W/K", scales=_metric("W/K", "k", "", "m")),
@@ -113,6 +121,9 @@ psi = pound_force / inch ** 2
 ksi = 1000 * psi
 joule = newton * metre = J
 watt = joule / second = W
+ampere = watt / volt = A
+ohm = volt / ampere = Ω
+henry = volt * second / ampere = H
 degree_Celsius = kelvin; offset: 273.15 = degC
 degree_Fahrenheit = 5 / 9 * kelvin; offset: 233.15 + 200 / 9 = degF
 percent = 0.01 = %

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from typer import Option
 
@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rotordrop.machine import Machine
-    from rotordrop.simulate.case import Start
+    from rotordrop.simulate.case import MagnetEvent, Start
 
 STANDSTILL = "standstill"
+REST_VELOCITY = 5e-3
+"""Velocity [m/s] below which a rotor at its touchdown bearings counts as at rest; chosen, that of a fall of a
+micrometre."""
 _EXAMPLES = {"length": "10 um, -20 um", "velocity": "0 mm/s, -5 mm/s", "force": "0 N, 40 N"}
 
 
@@ -57,6 +60,17 @@ def simulate(
         text_option("FORCE", 'Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
     ] = None,
     remanence_time: Annotated[float, measured("time", "Levitated: its decay.", "2 ms")] = 2e-3,
+    relevitate: Annotated[
+        float | None, measured("time", "Magnets with their controllers go on again at this time.")
+    ] = None,
+    magnets: Annotated[
+        list[str] | None,
+        text_option(
+            "EVENT",
+            'Magnets with their controllers: "20 ms: off", "speed 50 Hz: levitate", "rest: levitate", '
+            '"0 s: lost NDE x".',
+        ),
+    ] = None,
     spin: Annotated[
         Spin, Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
     ] = Spin.dynamic,
@@ -82,10 +96,10 @@ def simulate(
     from rotordrop.report.simulate_summary import simulate_summary
     from rotordrop.report.simulation_numbers import simulation_numbers
     from rotordrop.report.terminal import summary_console
-    from rotordrop.rotor.parameters import DropModel, build_drop_model
+    from rotordrop.rotor.parameters import DropModel
     from rotordrop.simulate.ahead import loop_compiled_ahead
     from rotordrop.simulate.case import DropCase, LevitatedStart, PlacedStart
-    from rotordrop.simulate.drop import simulate_drop
+    from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
     if film is not None:
@@ -94,13 +108,14 @@ def simulate(
         require_film(film)
     described = load_machine(machine)
     bearings = [bearing.name for bearing in described.touchdown_bearings]
+    events = magnet_events(magnets or (), relevitate, delay if levitated and not magnets else None)
     if levitated:
         if displacement or velocity:
             raise UsageError("--levitated cannot go with --displacement or --velocity; choose one start")
         left = named_pairs(remanent_force or (), "force", [amb.name for amb in described.ambs])
         start: Start = LevitatedStart(
             rotor_angle=rotor_angle,
-            delay=delay,
+            delay=0.0 if events is not None and not magnets else delay,
             remanent_force=left if remanent_force else None,
             remanence_time_constant=remanence_time,
         )
@@ -118,6 +133,7 @@ def simulate(
         start=start,
         spin=spin.value,
         integrator=integrator.value,
+        magnets=events,
     )
     warning = long_run(described, duration, case.most_steps)
     errors = summary_console(sys.stderr)
@@ -125,7 +141,7 @@ def simulate(
         errors.print(warning, soft_wrap=True)
 
     def modelled() -> DropModel:
-        model = build_drop_model(described, case.reduction)
+        model = model_for(described, case)
         compiled()
         return model
 
@@ -172,6 +188,54 @@ def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArra
             )
         values[list(names).index(name.strip())] = [parse_quantity(part, kind) for part in parts]
     return values
+
+
+def magnet_events(
+    texts: Sequence[str], relevitate: float | None, released: float | None
+) -> tuple[MagnetEvent, ...] | None:
+    """Read events such as ``"20 ms: off"``; None where nothing is said of magnets in the loop.
+
+    With a time to ``relevitate`` [s], and one at which the magnets are ``released`` [s] before it.
+
+    Examples
+    --------
+    >>> from rotordrop.cli.simulate import magnet_events
+    >>> [str(event) for event in magnet_events(["10 ms: lost NDE x"], 0.2, None)]
+    ['lost NDE x', 'levitate']
+    """
+    from rotordrop.simulate.case import MagnetEvent
+
+    if not texts and relevitate is None:
+        return None
+    events = [] if released is None else [MagnetEvent(action="off", time=released)]
+    events += [_magnet_event(text) for text in texts]
+    if relevitate is not None:
+        events.append(MagnetEvent(action="levitate", time=relevitate))
+    return tuple(events)
+
+
+def _magnet_event(text: str) -> MagnetEvent:
+    from rotordrop.simulate.case import MagnetAction, MagnetEvent
+
+    when, _, what = (part.strip() for part in text.partition(":"))
+    actions: dict[str, MagnetAction] = {action: action for action in get_args(MagnetAction)}
+    said = next((one for one in actions if what == one or what.startswith(f"{one} ")), None)
+    where = what.removeprefix(said or "").split()
+    axes: dict[str, Literal["x", "y"]] = {"x": "x", "y": "y"}
+    axis = axes[where.pop()] if where and where[-1] in axes else None
+    if said is None or len(where) > 1:
+        raise UsageError(
+            f"{text!r} is not 'WHEN: ACTION [MAGNET] [AXIS]' with an action out of {', '.join(actions)}; "
+            "write for example '20 ms: off', 'speed 50 Hz: levitate', 'rest: levitate' or '0 s: lost NDE x'"
+        )
+    moment: dict[str, float] = {}
+    if when == "rest":
+        moment["rest_velocity"] = REST_VELOCITY
+    elif when.startswith("speed "):
+        moment["below_speed"] = parse_quantity(when.removeprefix("speed "), "speed")
+    else:
+        moment["time"] = parse_quantity(when, "time")
+    return MagnetEvent(action=actions[said], magnet=where[0] if where else None, axis=axis, **moment)
 
 
 def coast_down(

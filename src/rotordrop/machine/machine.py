@@ -108,6 +108,7 @@ class Machine(Description):
                 )
             first[bearing.node] = bearing.name
         self._check_axial()
+        self._check_loops()
         check_clearances(self.clearances, self.touchdown_bearings, nodes)
         if self.sensors:
             check_sensors_resolve_motion(tuple(one for one in self.sensors if not one.lost), nodes)
@@ -118,6 +119,54 @@ class Machine(Description):
         described = bool(self.axial_ambs) or any(load.along for load in self.loads)
         described = described or any(bearing.face for bearing in self.touchdown_bearings)
         return described if self.rotor.axial is None else self.rotor.axial
+
+    @property
+    def looped_ambs(self) -> tuple[ActiveMagneticBearing, ...]:
+        """The radial AMBs, all with magnet and controller; refuses a machine where one lacks them."""
+        lacking = [amb.name for amb in self.ambs if amb.magnet is None or amb.controller is None]
+        if lacking or not self.ambs:
+            which = f"its AMB {lacking[0]!r} lacks one" if lacking else "it has no AMB"
+            raise UsageError(
+                f"the control loop of {self.name!r} takes a magnet and a controller in every AMB, and "
+                f"{which}; "
+                "add the tables 'magnet' and 'controller', or have the magnets as springs and dampers"
+            )
+        return self.ambs
+
+    def measured_node(self, amb: ActiveMagneticBearing) -> int:
+        """Node of the plane that the controller of an AMB measures."""
+        name = None if amb.controller is None else amb.controller.sensor
+        return next((sensor.node for sensor in self.sensors if sensor.name == name), amb.node)
+
+    def _check_loops(self) -> None:
+        """Refuse magnets closer than the touchdown bearings, unknown sensors, controllers of another beat."""
+        widest = max(bearing.air_gap.value for bearing in self.touchdown_bearings)
+        beats: dict[tuple[float, float], str] = {}
+        for index, amb in enumerate(self.ambs):
+            if amb.magnet is not None and amb.magnet.gap.value <= widest:
+                gap, room = (format_quantity(one, "length") for one in (amb.magnet.gap.value, widest))
+                raise Misfit(
+                    f"the magnet of AMB {amb.name} has a gap of {gap}, and a touchdown bearing lets the "
+                    f"rotor move by {room}: it would strike the poles; check both",
+                    ("ambs", index, "magnet", "gap"),
+                )
+            if amb.controller is None:
+                continue
+            names = [sensor.name for sensor in self.sensors]
+            if amb.controller.sensor is not None and amb.controller.sensor not in names:
+                raise Misfit(
+                    f"the controller of AMB {amb.name} measures with sensor {amb.controller.sensor!r}, which "
+                    f"does not exist; there are {', '.join(sorted(names)) or 'none'}",
+                    ("ambs", index, "controller", "sensor"),
+                )
+            beat = (amb.controller.sample_time.value, amb.controller.delay.value)
+            if beats and beat not in beats:
+                raise Misfit(
+                    f"the controllers of AMBs {amb.name} and {next(iter(beats.values()))} have another "
+                    "sample time or delay; one device samples all magnets: give both the same",
+                    ("ambs", index, "controller"),
+                )
+            beats[beat] = amb.name
 
     @property
     def not_estimated(self) -> str:

@@ -23,6 +23,7 @@ _FILE_UNITS = {
     "angle": (("deg", 0.017453292519943295),),
     "pressure": (("GPa", 1e9),),
     "unbalance": (("g mm", 1e-6),),
+    "area": (("cm^2", 1e-4),),
     "voltage_sensitivity": (("mV/um", 1e3),),
 }
 """Units to write a kind in when the number comes back exactly; else its SI unit."""

@@ -5,7 +5,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rotordrop.arrays import Array, Integers
-from rotordrop.physics import ball_set, ball_table, contact, face, mount, ring, support, thermal, touch
+from rotordrop.physics import (
+    ball_set,
+    ball_table,
+    contact,
+    face,
+    magnet,
+    mount,
+    ring,
+    support,
+    thermal,
+    touch,
+)
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
 # set are blocks of columns that only their own modules read.
@@ -85,7 +96,8 @@ N_SPIN_ENTRIES = 13
 SPIN_MODE = 0
 MAGNETS_ACT = 1
 LOADS_ACT = 2
-N_FLAGS = 3
+LOOPS_ACT = 3
+N_FLAGS = 4
 
 # Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
 # reference.
@@ -98,6 +110,11 @@ AMB_DAMPING = 5
 AMB_REFERENCE_X = 6
 AMB_REFERENCE_Y = 7
 N_MAGNET_COLUMNS = 8
+
+# Behind these, in a model whose magnets are in the loop: numbers of coils and controller, then the shape (m,)
+# of the plane that the controller measures.
+LOOP = N_MAGNET_COLUMNS
+LOOP_END = LOOP + magnet.N_NUMBERS
 
 # Columns of `KernelParameters.load`, one row per load, that of the ground last: value along x and y, power of
 # the speed and its nominal, speed and phase of a sine, first point of its course and the one behind its last,
@@ -155,9 +172,11 @@ CONTACT_BODY = 1
 CONTACT_SPIN = 2
 N_CONTACT_PLACES = 3
 
-# Columns of `KernelParameters.magnet_at`, one row per AMB: place of the first of its states; -1 without any.
+# Columns of `KernelParameters.magnet_at`, one row per AMB in the loop: place of the first of its currents
+# (x+, x-, y+, y-), and of the first entry that it has in the memory, behind the clock of all.
 MAGNET_OWN = 0
-N_MAGNET_PLACES = 1
+MAGNET_MEMORY = 1
+N_MAGNET_PLACES = 2
 
 # Kinds of states: they set error scale, process noise and prior.
 POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, HEAT, AUDIT = range(7)
@@ -177,9 +196,9 @@ class KernelParameters(NamedTuple):
     ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``rub`` (N, · + m) are the contacts of
     the rotor with its housing, numbers of `physics.touch` and then shape, ``stops`` (S,) the bearings whose
     mount has a stop, ``faces`` (F,) those with an axial face; the log has all three behind the contacts with
-    races. ``memory`` is what is remembered beside the state: a right-hand side reads it, an accepted step
-    alone writes it (`simulate._loop.remember`). Bearings that warm have their temperatures first in it, which
-    `simulate.heat` writes between stretches of time.
+    races. ``memory`` is what is remembered beside the state: a right-hand side reads it. Bearings that warm
+    have their temperatures first in it, which `simulate.heat` writes between stretches of time; then come the
+    clock and the controllers of magnets, which `simulate._sampled` writes where a step has ended on a sample.
     """
 
     eigenvalue: Array

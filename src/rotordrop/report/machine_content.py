@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE
     from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary, MachineWarning
+    from rotordrop.rotor.magnet_loop import LoopStability, MagnetSummary
 
 ALL_RIGHT = "The machine can be worked with; the drop model leaves out nothing known of it."
 
@@ -47,7 +49,10 @@ def machine_content(
         subtitle="; ".join(machine.notes),
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
         verdict=(_verdict(warnings), *_remarks(machine, warnings, brief)),
-        cards=tuple(_card(machine, rest) for rest in summary.bearings),
+        cards=(
+            *(_card(machine, rest) for rest in summary.bearings),
+            *(_magnet_card(one, summary.loop) for one in summary.magnets),
+        ),
         summary=(named_values("rotor", rotor), mode_table(modes, "bending or support"), *tables),
         sections=(drawing_section(machine), *open_values) if drawn else (),
     )
@@ -107,6 +112,27 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
     )
 
 
+def _magnet_card(one: MagnetSummary, loop: LoopStability | None) -> Card:
+    """A magnet at its operating point, and its loop with the mass it carries as a point."""
+    figures = [
+        fact("force by current", one.by_current, "force_by_current"),
+        fact("negative stiffness", one.by_way, "stiffness"),
+        fact("inductance of a coil", one.inductance, "inductance"),
+        fact("pull beyond the weight, rotor at rest", one.spare_at_rest, "force"),
+    ]
+    if math.isfinite(one.lift.time):
+        figures.append(fact("lift at full current, by the slopes", one.lift.time, "time"))
+    if one.margins is not None:
+        figures += [
+            fact("crossover", one.margins.crossover / (2.0 * math.pi), "frequency"),
+            fact("phase margin", one.margins.phase, "angle"),
+            fact("delay margin, rigid rotor", one.margins.delay, "time"),
+        ]
+    if loop is not None and loop.longest_delay is not None:
+        figures.append(fact("longest delay, bending included", loop.longest_delay, "time"))
+    return Card(f"magnet {one.name}", tuple(figures))
+
+
 def named_values(head: str, rows: Iterable[tuple[str, object]]) -> Table:
     """A table of two columns: what it is, and its value."""
     columns = (Column(head, lambda row: row[0]), Column("", lambda row: row[1]))
@@ -160,9 +186,42 @@ def machine_json(
             }
             for rest in summary.bearings
         },
+        **({"magnets": {one.name: _magnet_json(one) for one in summary.magnets}} if summary.magnets else {}),
+        **({} if summary.loop is None else {"control_loop": _loop_json(summary.loop)}),
         "warnings": [warning.message for warning in warnings],
         "defaults": [list(entry) for entry in machine.defaults_in_use],
         "inferred": [list(entry) for entry in machine.inferred],
+    }
+
+
+def _magnet_json(one: MagnetSummary) -> dict[str, object]:
+    known: dict[str, object] = {
+        "force_by_current_N_per_A": one.by_current,
+        "negative_stiffness_N_per_m": one.by_way,
+        "inductance_H": one.inductance,
+        "spare_force_at_rest_N": one.spare_at_rest,
+        "linear_lift": {
+            "deepest_m": one.lift.deepest,
+            "time_s": one.lift.time if math.isfinite(one.lift.time) else None,
+            "speed_m_per_s": one.lift.speed,
+        },
+    }
+    if one.margins is not None:
+        known |= {
+            "crossover_Hz": one.margins.crossover / (2.0 * math.pi),
+            "phase_margin_rad": one.margins.phase,
+            "delay_margin_s": one.margins.delay,
+        }
+    return known
+
+
+def _loop_json(loop: LoopStability) -> dict[str, object]:
+    return {
+        "stable": loop.stable,
+        "growth_per_s": loop.growth,
+        "frequency_Hz": loop.frequency,
+        "delay_s": loop.delay,
+        "longest_delay_s": loop.longest_delay,
     }
 
 

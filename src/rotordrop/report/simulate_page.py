@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rotordrop.estimate.bearing_drop import History, simulated_bearings
 from rotordrop.report.content import Column, Figure, ReportContent, Section, appendix, table
 from rotordrop.report.drop_sections import drop_sections, speed_figure
@@ -14,6 +16,7 @@ from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.time_panels import Panel, time_panels
 from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
+from rotordrop.simulate.magnets import MagnetHistory
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -69,6 +72,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
             *appendix(rest),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
             *((_landing(result, landed),) if landed else ()),
+            *((_magnets(result, result.magnets),) if result.magnets is not None else ()),
             *heat_sections(result.heat, result.bearing_names),
             Section("Speed", figures=(turning,)),
             *(() if machine is None else appendix(machine_sections(machine))),
@@ -76,6 +80,37 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
         lead=2,
         ends=(bearings[0].name, bearings[-1].name),
     )
+
+
+EVENTS = (Column("magnets", lambda row: row[0]), Column("at", lambda row: row[1], "time", 3))
+
+
+def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
+    """Force of every magnet and the currents of its coils against time, and what happened to them."""
+    forces, currents = [], []
+    for a, name in enumerate(magnets.names):
+        force = tuple(
+            History(label=axis, time=result.time, values=magnets.force[:, a, k])
+            for k, axis in enumerate("xy")
+        )
+        current = tuple(
+            History(label=f"{axis}{sign}", time=result.time, values=magnets.current[:, a, k, j])
+            for k, axis in enumerate("xy")
+            for j, sign in enumerate("+−")
+        )
+        forces.append(Panel(title=name, axis="magnet force", histories=force, series=True))
+        currents.append(Panel(title=name, axis="current", histories=current, series=True))
+    figures = (
+        Figure(time_panels([forces], 1.0, "N"), "Force of the magnets on the rotor.", "magnet force"),
+        Figure(
+            time_panels([currents], 1.0, "A"),
+            "Currents of the coils that pull towards + and − of each axis.",
+            "current",
+        ),
+    )
+    times = [time if np.isfinite(time) else None for time in magnets.event_time.tolist()]
+    events = table(list(zip(magnets.events, times, strict=True)), EVENTS)
+    return Section("Magnets", figures=figures, tables=(events,) if magnets.events else ())
 
 
 def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:

@@ -86,6 +86,8 @@ def _verdict(
         doubts = doubts_of_speed(machine, result.initial_speed)
         said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
         said += [*_springs(result, machine), *_thrown(result, machine), *_landed(result, machine)]
+    if (lift := result.lift) is not None:
+        said.append(Statement(f"{lift.sentence()}.", "good" if lift.succeeded else "bad"))
     if result.heat is not None:
         said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
     said += [_certificate(result), Statement(NO_INTERVAL)]

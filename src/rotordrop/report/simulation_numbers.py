@@ -10,6 +10,7 @@ import numpy as np
 from rotordrop.estimate.bearing_drop import published_bearing, simulated_bearings
 from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
+from rotordrop.simulate.magnets import MagnetHistory
 from rotordrop.simulate.result import DropResult
 
 if TYPE_CHECKING:
@@ -71,7 +72,34 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
         }
     if result.heat is not None:
         numbers["heat"] = result.heat.as_json(result.bearing_names)
+    if result.magnets is not None:
+        numbers["magnets"] = _magnets(result, result.magnets)
     return numbers
+
+
+def _magnets(result: DropResult, magnets: MagnetHistory) -> dict[str, Any]:
+    events = zip(magnets.events, magnets.event_time.tolist(), strict=True)
+    known: dict[str, Any] = {
+        "events": [{"what": what, "time_s": time if math.isfinite(time) else None} for what, time in events],
+        "largest_current_A": dict(
+            zip(magnets.names, np.max(magnets.current, axis=(0, 2, 3)).tolist(), strict=True)
+        ),
+        "largest_force_N": dict(
+            zip(
+                magnets.names,
+                np.max(np.hypot(*np.moveaxis(magnets.force, 2, 0)), axis=0).tolist(),
+                strict=True,
+            )
+        ),
+    }
+    if (lift := result.lift) is not None:
+        known["lift"] = {
+            "begun_s": lift.begun,
+            "free_from_s": lift.free_from,
+            "succeeded": lift.succeeded,
+            "contacts": lift.contacts,
+        }
+    return known
 
 
 def _landed(one: Landing) -> dict[str, Any]:

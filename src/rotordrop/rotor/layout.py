@@ -91,8 +91,8 @@ class StateLayout:
         object.__setattr__(self, "kinds", kinds)
 
     @classmethod
-    def of_machine(cls, machine: Machine, n_modes: int) -> StateLayout:
-        """Give the layout that the elements of a machine ask for."""
+    def of_machine(cls, machine: Machine, n_modes: int, *, loops: bool = False) -> StateLayout:
+        """Give the layout that the elements of a machine ask for, its magnets with ``loops`` only."""
         bearings = machine.touchdown_bearings
         asked = [
             {part.states_at: part.further_states for part in (bearing, *bearing.parts) if part.further_states}
@@ -105,6 +105,7 @@ class StateLayout:
             n_modes=n_modes,
             n_bearings=len(bearings),
             further=tuple((place, tuple(one.get(place, ()) for one in asked)) for place in places),
+            magnet_own=tuple(len(amb.further_states) for amb in machine.ambs) if loops else (),
             raceless=raceless if any(raceless) else (),
             sensor_own=sum(len(sensor.further_states) for sensor in machine.sensors),
             moves_axially=machine.axial,
@@ -179,9 +180,15 @@ class StateLayout:
         # C order, as all arrays of the kernels: another order of one compiles every kernel once more.
         return np.column_stack([np.arange(self.n_bearings), bodies]).astype(np.int64, order="C")
 
-    def magnet_at(self, n_magnets: int) -> Integers:
-        """Places of the states of each AMB, shape (A, 1), see ``MAGNET_OWN``."""
-        return _first_of(self.magnet_own, self.magnets.start, n_magnets).reshape(n_magnets, L.N_MAGNET_PLACES)
+    def magnet_at(self, remembered: tuple[int, ...], first: int) -> Integers:
+        """Places of each AMB, shape (A, 2), see ``MAGNET_OWN``: of its states and what it has remembered.
+
+        Their numbers of entries in the memory, whose ``first`` of magnets is given.
+        """
+        own = _first_of(self.magnet_own, self.magnets.start, len(remembered))
+        return np.column_stack([own, _first_of(remembered, first, len(remembered))]).astype(
+            np.int64, order="C"
+        )
 
     def names(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
         """Name of every state, in order."""

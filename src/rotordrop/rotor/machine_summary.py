@@ -16,6 +16,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import Doubt, doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
+from rotordrop.rotor.magnet_loop import LoopStability, MagnetSummary, loop_of, magnet_summaries
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rotor_on_race
 from rotordrop.rotor.suspension import stiffness_of
 from rotordrop.rotor.unknowns import prior
@@ -62,6 +63,10 @@ class MachineSummary:
     levitated_sag: Array | None
     """Vertical displacement of the levitated rotor at the nodes [m]; None with fewer than two AMB planes,
     shape (N,)."""
+    magnets: tuple[MagnetSummary, ...] = ()
+    """The magnets that are described."""
+    loop: LoopStability | None = None
+    """Their control loop; None where an AMB has no magnet or no controller."""
 
 
 def summarise_machine(machine: Machine) -> MachineSummary:
@@ -83,6 +88,8 @@ def summarise_machine(machine: Machine) -> MachineSummary:
         free_free=free_free_modes(fe, min(fe.size, N_RIGID + SHOWN_MODES)).frequency[N_RIGID:],
         settled=modes_on_springs(fe, springs, min(fe.size, SHOWN_MODES)).frequency,
         levitated_sag=levitated_sag(fe, machine)[0::2] if levitated else None,
+        magnets=magnet_summaries(machine, fe),
+        loop=loop_of(machine),
     )
 
 
@@ -130,7 +137,8 @@ class MachineWarning(Doubt):
     """One thing to know before trusting a result of this machine.
 
     Its kind is "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load
-    direction", "shoulder of the race", "thermal runaway", "guess", or one of the doubts.
+    direction", "shoulder of the race", "thermal runaway", "control loop", "lift", "guess", or one of the
+    doubts.
     """
 
     doubtful: bool = False
@@ -152,7 +160,22 @@ def machine_warnings(
         found += _landing(machine, bearing)
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
         found += _guesses_aside(bearing)
-    return tuple(found)
+    return (*found, *_loop(summary))
+
+
+def _loop(summary: MachineSummary) -> Iterator[MachineWarning]:
+    loop = summary.loop
+    if loop is not None and not loop.stable:
+        told = _warning("control loop", summary.magnets[0].name, loop.growth, 0.0, loop.sentence())
+        yield replace(told, doubtful=True)
+    for one in summary.magnets:
+        if one.spare_at_rest <= 0.0:
+            short = format_quantity(-one.spare_at_rest, "force")
+            text = (
+                f"at full current it lacks {short} to lift the rotor from rest in its touchdown bearings; "
+                "a simulation cannot levitate it again"
+            )
+            yield _warning("lift", one.name, one.spare_at_rest, 0.0, text)
 
 
 def _landing(machine: Machine, bearing: TouchdownBearing) -> Iterator[MachineWarning]:

@@ -15,7 +15,7 @@ from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
-from rotordrop.physics import aerodynamics, departure, touch
+from rotordrop.physics import aerodynamics, departure, magnet, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
@@ -81,7 +81,9 @@ FASTEST = 1.25
 """Largest speed of a race over the nominal speed for which balls with inertia are tabulated [1]: chosen."""
 
 
-def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") -> DropModel:
+def build_drop_model(
+    machine: Machine, reduction: str | Reduction = "accurate", *, loops: bool = False
+) -> DropModel:
     """Assemble, reduce and flatten a machine for the time loop.
 
     Parameters
@@ -90,12 +92,21 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
         What the machine is.
     reduction : str or Reduction
         ``"accurate"`` (14 modes + attachment), ``"quick"`` (6 + attachment), ``"full"`` or an own choice.
+    loops : bool
+        Whether coils and controllers of the magnets are part of it; else magnets are springs and dampers.
+
+    Raises
+    ------
+    UsageError
+        With ``loops``, where a magnet has no coils or no controller.
     """
     fe = build_rotor_fe(machine)
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
+    if loops:  # what a few modes leave out of the planes of the loop would shift its fast modes
+        nodes += tuple(node for amb in machine.looped_ambs for node in (amb.node, machine.measured_node(amb)))
     basis = reduce_rotor(fe, reduction, nodes)
     shares = np.asarray(bearing_load_shares(machine, fe), dtype=np.float64)
-    layout = StateLayout.of_machine(machine, basis.size)
+    layout = StateLayout.of_machine(machine, basis.size, loops=loops)
     return DropModel(
         machine=machine,
         fe=fe,
@@ -109,16 +120,21 @@ def build_drop_model(machine: Machine, reduction: str | Reduction = "accurate") 
 def _kernel_parameters(
     machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: StateLayout
 ) -> KernelParameters:
-    m = basis.size
-    magnet = np.zeros((len(machine.ambs), L.N_MAGNET_COLUMNS))
-    for row, amb in zip(magnet, machine.ambs, strict=True):
+    m, loops = basis.size, bool(layout.magnet_own)
+    rows = np.zeros((len(machine.ambs), L.LOOP_END + m if loops else L.N_MAGNET_COLUMNS))
+    for row, amb in zip(rows, machine.ambs, strict=True):
         amb.fill(row)
+        if loops:
+            amb.fill_loop(row[L.LOOP : L.LOOP_END])
+            row[L.LOOP_END :] = basis.node_row(machine.measured_node(amb))
 
     def shapes_at(parts: Sequence[Placed]) -> Array:
         rows = [basis.node_row(part.node) for part in parts]
         return np.ascontiguousarray(rows, dtype=np.float64) if rows else np.zeros((0, m))
 
     parts = [part for bearing in machine.touchdown_bearings for part in bearing.parts]
+    kept = sum(part.remembered for part in parts) + (magnet.N_CLOCK if loops else 0)
+    by_magnets = tuple(amb.remembered if loops else 0 for amb in machine.ambs)
     return KernelParameters(
         eigenvalue=np.ascontiguousarray(basis.eigenvalues, dtype=np.float64),
         damping=np.ascontiguousarray(np.diag(basis.damping), dtype=np.float64),
@@ -126,14 +142,14 @@ def _kernel_parameters(
         gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))),
         bearing_shape=shapes_at(machine.touchdown_bearings),
         magnet_shape=shapes_at(machine.ambs),
-        magnet=magnet,
-        flags=np.array([aerodynamics.OFF, 0, bool(machine.loads or machine.base)], dtype=np.int64),
+        magnet=rows,
+        flags=np.array([aerodynamics.OFF, 0, bool(machine.loads or machine.base), loops], dtype=np.int64),
         rotor_at=layout.rotor_at(),
         bearing_at=layout.bearing_at(),
         contact_at=layout.contact_at(),
-        magnet_at=layout.magnet_at(len(machine.ambs)),
+        magnet_at=layout.magnet_at(by_magnets, kept),
         departure=np.zeros((0, departure.N_COLUMNS)),
-        memory=np.zeros(sum(one.remembered for one in (*parts, *machine.ambs))),
+        memory=np.zeros(kept + sum(by_magnets)),
         **_of_values(machine, fe, basis, shares),
     )
 
@@ -157,8 +173,8 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
         sine += float(unbalance.amount) * s * shape
     spin, speed = np.zeros(L.N_SPIN_ENTRIES), machine.speed
     spin[L.POLAR_INERTIA], spin[L.ROTOR_MASS] = fe.polar_inertia, machine.rotor.mass
-    for magnet in machine.axial_ambs:
-        spin[[L.AXIAL_STIFFNESS, L.AXIAL_DAMPING]] += float(magnet.stiffness), float(magnet.damping)
+    for amb in machine.axial_ambs:
+        spin[[L.AXIAL_STIFFNESS, L.AXIAL_DAMPING]] += float(amb.stiffness), float(amb.damping)
     slowed = speed.aero_time_constant
     spin[L.AERO_TIME_CONSTANT] = np.inf if slowed is None else float(slowed)
     # The machine file gives torques, the kernel wants them per polar inertia.

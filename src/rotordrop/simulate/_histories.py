@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.physics import ball_table, departure, face, mount, ring, support, touch
+from rotordrop.physics import ball_table, departure, face, magnet, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy
@@ -19,6 +19,7 @@ from rotordrop.simulate._rhs import (
     face_values,
     modal_parts,
     mount_states,
+    plane_motion,
     project,
     race_deflection,
     ring_travel,
@@ -156,6 +157,34 @@ def axial_energy(y: Array, p: KernelParameters) -> float:
 
 
 @lean_kernel
+def coil_energy(y: Array, p: KernelParameters) -> float:
+    """Energy [J] in the fields of magnets in the loop."""
+    energy = 0.0
+    if p.flags[L.LOOPS_ACT] == 0:
+        return energy
+    for a in range(p.magnet.shape[0]):
+        for axis in range(2):
+            own = p.magnet_at[a, L.MAGNET_OWN] + 2 * axis
+            x, _v = plane_motion(p.magnet_shape[a], axis, y, p)
+            energy += magnet.field_energy(p.magnet[a, L.LOOP : L.LOOP_END], x, y[own], y[own + 1])
+    return energy
+
+
+@kernel
+def magnet_forces(states: Array, p: KernelParameters) -> Array:
+    """Force of every magnet in the loop [N], shape (T, A, 2), from states (T, n)."""
+    out = np.zeros((states.shape[0], p.magnet.shape[0], 2))
+    for a in range(p.magnet.shape[0]):
+        kappa, gap = p.magnet[a, L.LOOP + magnet.FORCE], p.magnet[a, L.LOOP + magnet.GAP]
+        for axis in range(2):
+            own = p.magnet_at[a, L.MAGNET_OWN] + 2 * axis
+            for i in range(states.shape[0]):
+                x, _v = plane_motion(p.magnet_shape[a], axis, states[i], p)
+                out[i, a, axis] = magnet.magnet_force(kappa, gap, x, states[i, own], states[i, own + 1])[0]
+    return out
+
+
+@lean_kernel
 def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool) -> float:
     """Energy [J] of a state: motion, bending, contacts, balls, supports, gravity and spin."""
     n_q = p.rotor_at[L.N_COORDINATES]
@@ -193,7 +222,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
-    energy += rub_energy(y, p) + axial_energy(y, p)
+    energy += rub_energy(y, p) + axial_energy(y, p) + coil_energy(y, p)
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
     return energy

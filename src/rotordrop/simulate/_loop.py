@@ -166,11 +166,6 @@ def book_losses(h: float, powers: Array, tab: Tableau, books: Array) -> None:
 
 
 @inner_kernel
-def remember(t: float, y: Array, p: KernelParameters) -> None:
-    """Write the discrete memory after an accepted step; the one place that does. No element has any yet."""
-
-
-@inner_kernel
 def scaled_error(
     h: float, y: Array, y_new: Array, k: Array, e: Array, scale: Array, tolerance: float, scratch: Array
 ) -> float:
@@ -579,7 +574,6 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         book_losses(step, powers, tab, books)
         if peaks.shape[0] > 0:
             update_peaks(t_new, y_new, p, running, peaks, work)
-        remember(t_new, y_new, p)
         # PI control (Gustafsson): the error of the step before damps the swing between steps too long and too
         # short that every opening of a contact starts.
         growth = GROW
@@ -627,11 +621,13 @@ def integrate_drop(
     books: Array | None = None,
     change: tuple[float, KernelParameters] | None = None,
     stretches: Stretches | None = None,
+    stepped: Callable[..., int] = integrate,
 ) -> int:
     """Integrate a drop; returns ``FINISHED`` or why it ended early.
 
     A drop is one window, or two where a ``change`` says when [s] its parameters become others; ``stretches``
-    divide each once more, for parameters that follow what the loop lost.
+    divide each once more, for parameters that follow what the loop lost. Each is ``stepped`` through by
+    `integrate`, or by what takes its place.
 
     ``states`` (T, n) are filled on the grid ``times`` (T,) from the start state ``y0`` (n,), NaN behind an
     early end; ``log`` (R, 9) with the contacts, ``counters`` (5,) with accepted steps, rejected steps, last
@@ -662,7 +658,7 @@ def integrate_drop(
             scale, float(tolerance), float(largest_step), most_steps, -1.0, float(end), 0.0, True
         )
         grid = times[done : int(np.searchsorted(times, end, side="right"))]
-        outcome = integrate(
+        outcome = stepped(
             y, grid, parameters, tab, control, states[done:], log, running, books, peaks, progress
         )
         done += int(progress[SAMPLES])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.physics import aerodynamics, ball_table, departure, face, mount, ring, support, touch
+from rotordrop.physics import aerodynamics, ball_table, departure, face, magnet, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -36,7 +36,7 @@ OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 # Places where power is lost: columns of `Scratch.power`, a row for each bearing; the last row is the rotor's.
 SLIDING, IN_CONTACT, BALL_SET, SUPPORT, DRAG = range(5)
 N_PLACES = 5
-BENDING, RUBBING = range(2)
+BENDING, RUBBING, COILS = range(3)
 
 
 class Scratch(NamedTuple):
@@ -69,7 +69,10 @@ def project(shape: Array, amplitudes: Array) -> float:
 
 @inner_kernel
 def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Array]:
-    """Views of the modal amplitudes in x and in y and of their velocities in a state or its derivative."""
+    """Views of the modal amplitudes in x and in y and of their velocities in a state or its derivative.
+
+    For lean kernels alone: one that counts references would let go of what it never took hold of.
+    """
     m = p.eigenvalue.shape[0]
     x, z, n_q = p.rotor_at[L.MODES_X], p.rotor_at[L.MODES_Y], p.rotor_at[L.N_COORDINATES]
     return y[x : x + m], y[z : z + m], y[n_q + x : n_q + x + m], y[n_q + z : n_q + z + m]
@@ -304,6 +307,46 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
             ay[k] += shape[k] * fy
         put_in += fx * vx + fy * vy
     return put_in
+
+
+@lean_kernel
+def plane_motion(shape: Array, axis: int, y: Array, p: KernelParameters) -> tuple[float, float]:
+    """Displacement [m] and velocity [m/s] of the rotor along one axis, 0 or 1, in a plane of a shape (m,)."""
+    qx, qy, sx, sy = modal_parts(y, p)
+    if axis == 0:
+        return project(shape, qx), project(shape, sx)
+    return project(shape, qy), project(shape, sy)
+
+
+@lean_kernel
+def magnet_axis(a: int, axis: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float, float]:
+    """Force of one axis of a magnet in the loop [N], rates of its two currents [A/s], electrical power put in
+    and heat of its coils [W].
+    """
+    own, first = p.magnet_at[a, L.MAGNET_OWN] + 2 * axis, p.magnet_at[a, L.MAGNET_MEMORY]
+    kept = p.memory[first + axis * magnet.N_AXIS : first + (axis + 1) * magnet.N_AXIS]
+    u, v = plane_motion(p.magnet_shape[a], axis, y, p)
+    numbers = p.magnet[a, L.LOOP : L.LOOP_END]
+    return magnet.axis_rates(numbers, kept, u, v, y[own], y[own + 1])
+
+
+@lean_kernel
+def add_loops(y: Array, p: KernelParameters, dy: Array, power: Array) -> float:
+    """Add magnets in the loop to the rotor, and the rates of their currents; heat of the coils [W]."""
+    _, _, ax, ay = modal_parts(dy, p)
+    heat = 0.0
+    for a in range(p.magnet.shape[0]):
+        shape, own = p.magnet_shape[a], p.magnet_at[a, L.MAGNET_OWN]
+        for axis in range(2):
+            force, plus, minus, put_in, lost = magnet_axis(a, axis, y, p)
+            rates = ax if axis == 0 else ay
+            for k in range(shape.shape[0]):
+                rates[k] += shape[k] * force
+            dy[own + 2 * axis], dy[own + 2 * axis + 1] = plus, minus
+            dy[p.rotor_at[L.WORK_IN]] += put_in
+            heat += lost
+    power[COILS] = heat
+    return heat
 
 
 @lean_kernel
@@ -705,6 +748,8 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
         torque, lost = add_axial_motion(t, y, p, dy, work)
         contact_torque += torque
         dissipated += lost
+    if p.flags[L.LOOPS_ACT] != 0:
+        dissipated += add_loops(y, p, dy, work.power[p.bearing.shape[0]])
     work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
 
 

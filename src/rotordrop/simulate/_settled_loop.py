@@ -14,7 +14,6 @@ from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.simulate._loop import remember
 from rotordrop.simulate._rhs import Scratch, drop_derivative, scratch_of
 
 
@@ -122,7 +121,6 @@ def integrate_settled(
             d, d_new = d_new, d
         if stop_speed >= 0.0 and sense * state[i_w] <= stop_speed:
             return sample
-        remember(t + (sample + 1) * output_step, state, p)
         for i in range(n):
             y[i] = state[i]
             states[sample, i] = state[i]

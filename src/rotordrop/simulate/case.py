@@ -76,6 +76,44 @@ class UnbalanceJump:
     """When it comes [s], from power-off."""
 
 
+MagnetAction: TypeAlias = Literal["off", "levitate", "hold", "lost", "bias decays"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MagnetEvent:
+    """What magnets in the loop do from some moment on: a time, a speed, or when the rotor has come to rest.
+
+    Events happen in their order, none before the one ahead of it.
+    """
+
+    action: MagnetAction
+    """Amplifiers drive the coils empty; controllers hold the rotor, beginning anew; outputs stay as they are;
+    nothing but the bias is left; the coils are short-circuited."""
+    time: float | None = None
+    """At this time [s] after the start."""
+    below_speed: float | None = None
+    """At the first sample when the rotor turns no faster than this [rad/s]."""
+    rest_velocity: float | None = None
+    """At the first sample when it has moved no faster than this [m/s] at its touchdown bearings for 20 ms."""
+    magnet: str | None = None
+    """Name of the AMB; all when left out."""
+    axis: Literal["x", "y"] | None = None
+    """Its axis; both when left out."""
+
+    def __post_init__(self) -> None:
+        stated = [one for one in (self.time, self.below_speed, self.rest_velocity) if one is not None]
+        if len(stated) != 1 or not 0.0 <= stated[0] < np.inf:
+            raise SimulationError(
+                f"the magnets' event {self.action!r} has the moments {stated}; give one of time, below_speed "
+                "and rest_velocity, not negative"
+            )
+
+    def __str__(self) -> str:
+        """What happens, and where."""
+        where = f" {self.magnet or 'all'}" if self.magnet or self.axis else ""
+        return f"{self.action}{where}{f' {self.axis}' if self.axis else ''}"
+
+
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 
@@ -106,6 +144,9 @@ class DropCase:
     """Bound of the number of steps [1]."""
     jump: UnbalanceJump | None = None
     """An unbalance that comes during the drop."""
+    magnets: tuple[MagnetEvent, ...] | None = None
+    """What magnets in the loop do and when; None: magnets are springs and dampers. A levitated start begins
+    with controllers that hold the rotor, any other with dead coils."""
 
     def __post_init__(self) -> None:
         for name in ("duration", "output_step", "tolerance", "largest_step"):
@@ -114,9 +155,19 @@ class DropCase:
                 raise SimulationError(
                     f"{name} is {value!r}; expected a positive, finite number. Give another value."
                 )
+        if self.magnets is not None and isinstance(self.start, LevitatedStart):
+            self._check_loop(self.start)
         if not np.isfinite(self.speed):
             raise SimulationError(
                 f"speed is {self.speed!r} rad/s; expected a finite number. Give another value."
+            )
+
+    def _check_loop(self, start: LevitatedStart) -> None:
+        """Refuse what is said of magnets that are no springs and dampers."""
+        if start.delay or start.remanent_force is not None or start.orbit is not None:
+            raise SimulationError(
+                "the levitated start has a delay, a remanent force or an orbit, and the magnets are in the "
+                "loop, which has its own; leave them out and say when the magnets go off as an event"
             )
 
     @property

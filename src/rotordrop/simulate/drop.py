@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,14 @@ from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.statics import rotor_on_race
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
+from rotordrop.simulate import _sampled as S
 from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
-from rotordrop.simulate.case import DropCase, StateStart, UnbalanceJump
+from rotordrop.simulate.case import DropCase, MagnetEvent, StateStart, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
 from rotordrop.simulate.heat import WarmDrop, warms
 from rotordrop.simulate.levitation import start_of_drop
+from rotordrop.simulate.magnets import MagnetHistory, table_of_events
 from rotordrop.simulate.result import ContactLog, DropResult, stop_of
 
 Parts = Sequence[tuple[slice, KernelParameters]]
@@ -61,11 +64,16 @@ def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool
     SimulationError
         If start and machine do not fit.
     """
-    model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
+    model = machine if isinstance(machine, DropModel) else model_for(machine, case)
     result = _simulate(model, case)
     if certify:
         result = replace(result, certificate=_certified(model, case, result))
     return result
+
+
+def model_for(machine: Machine, case: DropCase) -> DropModel:
+    """Build the model of a machine that a case asks for, with magnets in the loop or without."""
+    return build_drop_model(machine, case.reduction, loops=case.magnets is not None)
 
 
 def tableau_of(case: DropCase) -> Tableau:
@@ -95,6 +103,11 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
     states = np.empty((len(times), model.layout.size))
     log = np.zeros((100 + int(LOG_ROWS_PER_SECOND * case.duration), _loop.N_LOG_COLUMNS))
     counters, books = np.zeros(5), np.zeros((model.layout.n_bearings + 1, N_PLACES))
+    stepped: Callable[..., int] = _loop.integrate
+    events = np.zeros((0, S.N_EVENT_COLUMNS))
+    if case.magnets is not None:
+        events = table_of_events(model, case.magnets)
+        stepped = partial(S.integrate_sampled, events)
     warming = WarmDrop(cold=parameters) if warms(parameters).size else None
     outcome = _loop.integrate_drop(
         start,
@@ -112,10 +125,24 @@ def _simulate(model: DropModel, case: DropCase) -> DropResult:
         books,
         None if case.jump is None else (case.jump.time, _with_jump(model, parameters, case.jump)),
         None if warming is None else warming.stretches,
+        stepped,
     )
     parts = [(slice(None), parameters)] if warming is None else list(warming.of_times(times))
     result = _result(model, case, parts, times, states, log[: int(counters[3])], counters, outcome)
-    return replace(result, lost=books, heat=None if warming is None else warming.heat)
+    magnets = None if case.magnets is None else _magnets(model, case.magnets, events, result.state)
+    return replace(result, lost=books, heat=None if warming is None else warming.heat, magnets=magnets)
+
+
+def _magnets(
+    model: DropModel, planned: tuple[MagnetEvent, ...], events: Array, states: Array
+) -> MagnetHistory:
+    return MagnetHistory(
+        names=tuple(amb.name for amb in model.machine.ambs),
+        current=states[:, model.layout.magnets].reshape(len(states), -1, 2, 2),
+        force=H.magnet_forces(states, model.parameters),
+        events=tuple(map(str, planned)),
+        event_time=events[:, S.EVENT_TIME].copy(),
+    )
 
 
 def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJump) -> KernelParameters:
@@ -263,7 +290,7 @@ def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certific
     if basis.modes is None or isinstance(case.start, StateStart):
         return certificate
     richer = Reduction(modes=basis.modes + 8, attachment=basis.attachment)
-    finer = _simulate(build_drop_model(model.machine, richer), case)
+    finer = _simulate(model_for(model.machine, replace(case, reduction=richer)), case)
     return replace(
         certificate,
         peak_change_truncation=_peak_change(result, finer, COMPARABLE_WINDOW),

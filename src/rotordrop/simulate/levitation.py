@@ -15,6 +15,7 @@ from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import FASTEST, DropModel
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
+from rotordrop.simulate.magnets import start_loop, with_springs_of
 from rotordrop.units import format_quantity
 
 _SPIN_MODES = {
@@ -30,6 +31,23 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     """State at power-off, shape (n,), and the kernel parameters with what the case adds (speed mode,
     magnets).
     """
+    looped = case.magnets is not None
+    if looped != bool(model.layout.magnet_own):
+        have, want = ("springs and dampers", "in the loop") if looped else ("in the loop", "no events")
+        raise SimulationError(
+            f"the model has its magnets {have} and the case {want}; build it with loops={looped}"
+        )
+    if looped:
+        model = with_springs_of(model, case)
+    state, parameters = _started(model, case)
+    if looped:
+        _static, holding = levitated_static(model, getattr(case.start, "offset", None), case.speed)
+        parameters = start_loop(model, case, holding, state, parameters)
+    return state, parameters
+
+
+def _started(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]:
+    """State and parameters of a start, before any loop of the magnets."""
     parameters = _with_spin(model.parameters, case)
     _refuse_overspeed(model, case.speed)
     start = case.start

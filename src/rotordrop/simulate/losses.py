@@ -33,12 +33,14 @@ class Losses:
     """Damping of the rotor's modes."""
     rubbing: float
     """Contacts of the rotor with its housing."""
+    coils: float
+    """Resistance of the coils of magnets in the loop."""
 
     @property
     def total(self) -> float:
         """Sum of all that is lost; the book of the time loop."""
         parts = (self.sliding, self.contact, self.ball_set, self.support, self.drag)
-        return float(sum(part.sum() for part in parts)) + self.bending + self.rubbing
+        return float(sum(part.sum() for part in parts)) + self.bending + self.rubbing + self.coils
 
 
 def losses(model: DropModel, result: DropResult) -> Losses:
@@ -67,4 +69,5 @@ def losses(model: DropModel, result: DropResult) -> Losses:
         spin_up=gained + lost[:, R.DRAG],
         bending=float(result.lost[-1, R.BENDING]),
         rubbing=float(result.lost[-1, R.RUBBING]),
+        coils=float(result.lost[-1, R.COILS]),
     )

@@ -18,6 +18,7 @@ from rotordrop.physics.hertz import LineContact
 from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
+from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -132,6 +133,8 @@ class DropResult:
     None where the rotor does not move along its axis."""
     heat: Heat | None = field(default=None, repr=False)
     """How the bearings warmed; None of a machine whose bearings stay cold."""
+    magnets: MagnetHistory | None = field(default=None, repr=False)
+    """What magnets in the loop did; None where they are springs and dampers."""
     further_names: tuple[str, ...] = ()
     further_contacts: ContactLog | None = field(default=None, repr=False)
     """Contacts of supports with their stops, such as "DE.mount.stop", of the rotor with its housing, by the
@@ -152,6 +155,11 @@ class DropResult:
         raise UsageError(
             f"there is no touchdown bearing {bearing!r}; there are {', '.join(self.bearing_names)}"
         )
+
+    @property
+    def lift(self) -> Lift | None:
+        """What became of the last lift by magnets in the loop; None without any."""
+        return lift_of(self.magnets, self.contacts, float(self.time[-1]))
 
     def ball_loads(self, machine: Machine, bearing: int | str) -> Array:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
@@ -328,6 +336,8 @@ def _write_more(result: DropResult, file: Any) -> None:
         _dataset(file, "face_force", result.face_force, ("time", "bearing"), "N", words)
     if result.heat is not None:
         result.heat.write(file)
+    if result.magnets is not None:
+        result.magnets.write(file)
 
 
 def _write_log(file: Any, prefix: str, log: ContactLog) -> None:
@@ -392,7 +402,7 @@ def _read(file: Any) -> DropResult:
     values["certificate"] = Certificate(**certificate)
     for name in ("lost", "race_stress", "face_force"):
         values[name] = file[name][()] if name in file else None
-    return DropResult(**values, heat=Heat.read(file))
+    return DropResult(**values, heat=Heat.read(file), magnets=MagnetHistory.read(file))
 
 
 def _read_log(file: Any, prefix: str) -> ContactLog:

@@ -18,7 +18,6 @@ from rotordrop.arrays import Array, Integers
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.simulate._loop import remember
 from rotordrop.track._covariance import is_covariance, pack, symmetrise, unpack
 from rotordrop.track._propagation import (
     FilterSettings,
@@ -173,7 +172,6 @@ def forward_pass(
             y[:] = 0.0
             y[:s] = at[:s]
             propagate(times[i - 1], y, theta, targets, p, settings, F, impulses)
-            remember(times[i], y, p)
             if form.lag.shape[0] > 0:
                 moved[:s] = y[:s]
                 moved[s:] = theta

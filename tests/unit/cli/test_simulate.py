@@ -10,9 +10,10 @@ import time
 
 import numpy as np
 import pytest
+from tests.unit.simulate.looped import looped_machine
 
 from rotordrop.cli.app import run
-from rotordrop.cli.simulate import named_pairs
+from rotordrop.cli.simulate import magnet_events, named_pairs
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
 from rotordrop.machine.saving import save_machine
@@ -128,3 +129,27 @@ def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path)
     assert running.returncode == 130
     assert "Traceback" not in rest
     assert out == ""
+
+
+def test_a_lift_stands_on_the_terminal_the_page_and_in_json(tmp_path, capsys):
+    save_machine(looped_machine(), tmp_path / "machine.toml")
+    arguments = ["simulate", str(tmp_path / "machine.toml"), "--speed", "60 Hz", "--duration", "0.15 s"]
+    arguments += ["--levitated", "--delay", "5 ms", "--relevitate", "60 ms", "--output-step", "0.1 ms"]
+    out = ["--report", str(tmp_path / "drop.html"), "--json", str(tmp_path / "drop.json")]
+    assert run([*arguments, *out]) == 0
+    assert "The magnets, switched on again at 60.0 ms, lift the rotor within" in capsys.readouterr().out
+    told = json.loads((tmp_path / "drop.json").read_text())["magnets"]
+    assert [event["time_s"] for event in told["events"]] == [0.005, 0.06]
+    assert told["lift"]["succeeded"]
+    assert 4.0 < told["largest_current_A"]["DE"] <= 8.0
+    page = (tmp_path / "drop.html").read_text()
+    assert "Currents of the coils" in page
+
+
+def test_events_of_magnets_are_read_and_bad_ones_refused():
+    events = magnet_events(["speed 50 Hz: levitate", "rest: bias decays", "0 s: lost NDE x"], None, None)
+    assert [str(event) for event in events] == ["levitate", "bias decays", "lost NDE x"]
+    assert events[0].below_speed == pytest.approx(314.159265)
+    for text in ("20 ms: lift", "20 ms", "20 ms: lost NDE DE x"):
+        with pytest.raises(UsageError, match="is not 'WHEN: ACTION"):
+            magnet_events([text], None, None)
