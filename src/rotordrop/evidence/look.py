@@ -98,14 +98,26 @@ class PlaneLook:
     """When [s]."""
     position_index: float
     """Mean distance from the centre over the air gap, from the release on for `INDEX_WINDOW` [1]."""
+    position_index_interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [1], by centre and gap."""
     velocity_index: float | None
     """Root mean square of the velocity of the shaft centre over shaft speed times air gap, over the same time
     [1]: 1 for a rotor that runs round its whole gap once per turn. None without a speed."""
+    velocity_index_interval_90: tuple[float, float] | None
+    """Interval that holds it with 90 % probability [1], by gap and gain."""
 
     @property
     def excess(self) -> float:
         """How far the rotor went beyond the air gap [m]."""
         return self.largest - self.gap
+
+    @property
+    def excess_interval_90(self) -> tuple[float, float]:
+        """Interval that holds it with 90 % probability [m]."""
+        low, high = self.gap_interval_90 or (self.gap, self.gap)
+        below = math.hypot(self.largest - self.largest_interval_90[0], high - self.gap)
+        above = math.hypot(self.largest_interval_90[1] - self.largest, self.gap - low)
+        return self.excess - below, self.excess + above
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -431,6 +443,10 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
         index = float(np.sqrt(np.mean(velocity**2))) / (speed * path.gap) if speed else None
         wall, touch = path.wall, path.wall.touch
+        narrow, wide = wall.interval_90 if wall.gap_error > 0.0 else (path.gap, path.gap)
+        distance, doubt = float(np.mean(path.radius[window])), NINETY * float(wall.centre_error.max())
+        gain = 0.0 if wall.gap_error > 0.0 else NINETY * GAIN  # a gap of the record has the same gain
+        shares = ((1.0 - gain) * path.gap / wide, (1.0 + gain) * path.gap / narrow)
         touched = None if touch is None else touch.when(motion.time)
         found.append(
             PlaneLook(
@@ -448,8 +464,13 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
                 largest=float(radius[at]),
                 largest_interval_90=_largest_between(path, at),
                 largest_time=float(motion.time[at]),
-                position_index=float(np.mean(path.radius[window])) / path.gap,
+                position_index=distance / path.gap,
+                position_index_interval_90=(
+                    max(distance - doubt, 0.0) / path.gap * shares[0],
+                    (distance + doubt) / path.gap * shares[1],
+                ),
                 velocity_index=index,
+                velocity_index_interval_90=None if index is None else (index * shares[0], index * shares[1]),
             )
         )
     return found
@@ -531,8 +552,11 @@ _DOCUMENT: dict[str, Part] = {
         largest_displacement_interval_90_m=_read_off(PAIR, "largest_interval_90"),
         largest_displacement_time_s=_read_off(NUMBER, "largest_time"),
         beyond_air_gap_m=_read_off(NUMBER, "excess"),
+        beyond_air_gap_interval_90_m=_read_off(PAIR, "excess_interval_90"),
         position_index=_read_off(NUMBER, "position_index"),
+        position_index_interval_90=_read_off(PAIR, "position_index_interval_90"),
         velocity_index=_read_off(MAYBE, "velocity_index"),
+        velocity_index_interval_90=_read_off(MAYBE_PAIR, "velocity_index_interval_90"),
     ),
     "impacts": _rows(
         lambda seen: seen.impacts,

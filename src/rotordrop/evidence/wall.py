@@ -98,6 +98,11 @@ class Wall:
     """First touch of the race; None where the fall is not seen to end."""
 
     @property
+    def distance_error(self) -> float:
+        """Half the 90 % interval of how far beyond the gap a place is [m], by centre and gap."""
+        return NINETY * math.hypot(self.gap_error, float(self.centre_error.max()))
+
+    @property
     def interval_90(self) -> tuple[float, float]:
         """Interval that holds the radius with 90 % probability [m]."""
         half = NINETY * self.gap_error

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
+from rotordrop.ends import far_end_first
 from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.known import Known
 from rotordrop.record.profile import Profile
@@ -238,7 +239,7 @@ def pairs_of(
     order = {id(channel): place for place, channel in enumerate(channels)}
     found.sort(key=lambda entry: min(order[id(channel)] for channel in entry[1]))
     # an HDF5 file lists its channels by the alphabet, DE first; every format shows the ends in one order
-    found.sort(key=lambda entry: not re.search(r"NDE|NAS", entry[0], re.IGNORECASE))
+    found = far_end_first(found, lambda entry: entry[0] or "")
     return [(name or f"plane {number}", pair) for number, (name, pair) in enumerate(found, start=1)], "names"
 
 

@@ -188,11 +188,11 @@ def _held(name: str) -> str:
 
 
 def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> tuple[Card, ...]:
-    """The lowest critical speeds of the rotor, a card for what holds it, forward and mixed ones first."""
+    """The lowest critical speeds of the rotor, in their order as in the table, a card for what holds it."""
     cards = []
     for name, diagram in diagrams.items():
         judged = separations(diagram, nominal, nominal)
-        ordered = sorted(diagram.crossings, key=lambda one: (one.direction == "backward", one.speed))
+        ordered = sorted(diagram.crossings, key=lambda one: one.speed)
         figures = []
         for number, crossing in enumerate(ordered[:ON_CARD], start=1):
             one, hertz = judged.get(crossing), crossing.speed / TURN

@@ -21,7 +21,6 @@ from rotordrop.report.content import (
     Statement,
     Table,
     appendix,
-    fact,
     table,
 )
 from rotordrop.report.drop_sections import motion_section, orbit_section, radial_section
@@ -237,7 +236,8 @@ def _verdict(seen: Look) -> list[Statement]:
             else f"{first} touched first."
         )
     said += [
-        f"{plane.plane}: {shown(plane.excess, 'length', 3)} beyond the air gap of "
+        f"{plane.plane}: {shown(plane.excess, 'length', 3)} (90 %: "
+        f"{' to '.join(shown(end, 'length', 3) for end in plane.excess_interval_90)}) beyond the air gap of "
         f"{shown(plane.gap, 'length', 3)} at {format_moment(plane.largest_time)}, at the sensors."
         for plane in seen.planes
         if plane.excess > 0 and plane.gap_interval_90 is None
@@ -258,15 +258,21 @@ def _card(seen: Look, number: int) -> Card:
     figures = [
         KeyFigure("largest distance from the centre", largest, note),
         _gap_figure(plane),
-        fact("position index (mean distance over gap)", plane.position_index, "dimensionless"),
+        _index(
+            "position index (mean distance over gap)", plane.position_index, plane.position_index_interval_90
+        ),
     ]
     if plane.velocity_index is not None:
         label = "velocity index (r.m.s. over speed × gap)"
-        figures.append(fact(label, plane.velocity_index, "dimensionless"))
+        figures.append(_index(label, plane.velocity_index, plane.velocity_index_interval_90))
     for found in seen.synchronous:
         if found.plane == plane.plane:
             figures += _synchronous(found)
     return Card(plane.plane, tuple(figures))
+
+
+def _index(label: str, value: float, interval: tuple[float, float] | None) -> KeyFigure:
+    return KeyFigure(label, Quantity(value=value, kind="dimensionless", interval_90=interval, digits=3))
 
 
 def _gap_figure(plane: PlaneLook) -> KeyFigure:
@@ -333,6 +339,12 @@ def _impacts(seen: Look) -> Table:
     )
     note = f"The first {MOST_LISTED} of {len(seen.impacts)}." if len(seen.impacts) > MOST_LISTED else ""
     rule = impact_rule([path.gap for path in seen.motion.paths])
+    known = ", ".join(
+        f"{path.name} ± {shown(path.wall.distance_error, 'length', 2)}" for path in seen.motion.paths
+    )
+    rule += (
+        f" Distances beyond the air gap are known to {known} (90 %), velocities are up to 5 mm/s too small."
+    )
     return table(
         seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{rule} {note}".strip()
     )

@@ -158,7 +158,7 @@ def find_settling(
     times = start_time + np.concatenate(found) / sampling_rate
     end = start_time + samples / sampling_rate
     contact = lasting_from(times, end)
-    count = f"{len(times)} impact{'' if len(times) == 1 else 's'}"
+    count = f"{len(times)} impact{'' if len(times) == 1 else 's'} by the displacement alone"
     if contact is not None:
         text = (
             f"{count}, the last one at {format_moment(contact)}, in contact from there on, at "

@@ -15,6 +15,7 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.files import write_json
+from rotordrop.known import NINETY
 from rotordrop.report.content import Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
@@ -64,16 +65,21 @@ def write_look(
         columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
     write_traces(made, "motion", seen.motion.time, columns)
     content = look_page(seen, drawn=False)
-    met = [(impact, impact.depth) for impact in seen.impacts] + [(one, one.distance) for one in seen.contacts]
+    doubt = {path.name: path.wall.distance_error for path in seen.motion.paths}
+    met: list[tuple[Any, float, tuple[float, float] | None, tuple[float, float] | None]] = [
+        (hit, hit.depth, (hit.depth - doubt[hit.plane], hit.depth + doubt[hit.plane]), None)
+        for hit in seen.impacts
+    ]
+    met += [(one, one.distance, None, one.approach_interval_90) for one in seen.contacts]
     impacts = [
         (
             one.plane,
             one.time,
             one.azimuth,
-            Quantity(value=beyond, kind="length", digits=3),
-            Quantity(value=one.approach, kind="velocity", digits=3),
+            Quantity(value=beyond, kind="length", interval_90=ends, digits=3),
+            Quantity(value=one.approach, kind="velocity", interval_90=speeds, digits=3),
         )
-        for one, beyond in met
+        for one, beyond, ends, speeds in met
     ]
     write_json(made / "document.json", seen.as_json(), sealed=True)
     write_json(
@@ -162,7 +168,8 @@ def write_estimate(
             Quantity.of(impact.impulse, "impulse", digits=3),
         )
         for bearing in estimate.bearings
-        for impact in bearing.impacts
+        for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
+        if after  # the report lists every contact, and how many of them are impacts
     ]
     write_traces(made, "drop", grid, columns)
     write_page(content, made / "report.html")
@@ -211,11 +218,20 @@ def _label(estimate: Estimate, column: str) -> str:
 
 
 def _events(estimate: Estimate) -> list[dict[str, Any]]:
-    """What happened when, times [s] from power-off: the estimate knows better than the first look."""
+    """What happened when, times [s] from power-off: the estimate knows better than the first look.
+
+    A first touch has the interval of power-off and its own, by its timing or by the steps of the force.
+    """
     events = [(0.0, "power-off")]
-    for bearing in estimate.bearings:
+    timed = [contact.timing_error for contact in estimate.replay.contacts] if estimate.replay else []
+    for number, bearing in enumerate(estimate.bearings):
         if bearing.impacts:
-            events.append((min(impact.start for impact in bearing.impacts), f"first touch at {bearing.name}"))
+            first = min(impact.start for impact in bearing.impacts)
+            step = float(np.median(np.diff(bearing.force.time)))
+            own = math.hypot(timed[number] if timed else 0.0, step / math.sqrt(12.0))
+            low, high = estimate.drop_instant.interval_90
+            half = math.hypot(0.5 * (high - low), NINETY * own)
+            events.append((first, f"first touch at {bearing.name} (± {1e3 * half:.2g} ms)"))
         if bearing.contact_from is not None:
             events.append((bearing.contact_from, f"last impact at {bearing.name}, in contact from here on"))
         peak = bearing.peak_force

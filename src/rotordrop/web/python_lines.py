@@ -113,7 +113,7 @@ def estimate_lines(files: Files, options: Mapping[str, Any], bearings: Sequence[
     }
     last["impacts"] = (
         "impacts = [(b.name, i.peak_time, i.azimuth, i.peak_force.value) for b in estimate.bearings "
-        "for i in b.impacts]  # [s], [rad], [N]"
+        "for i, after in zip(b.impacts, b.after_flight) if after]  # [s], [rad], [N]"
     )
     last["peaks"] = (
         "peaks = {b.name: (b.peak_force.known, b.peak_stress.known) for b in estimate.bearings}  # [N], [Pa]"

@@ -6,6 +6,7 @@ import math
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from rotordrop.ends import far_end_first
 from rotordrop.ledger.book import LoggedDrop
 from rotordrop.report.content import Figure, Statement, Table
 from rotordrop.report.quantity import Quantity, System, display_unit
@@ -94,7 +95,7 @@ def row_of(drop: LoggedDrop) -> dict[str, Any]:
                     )
                 ),
             }
-            for one in drop.severity
+            for one in far_end_first(drop.severity, lambda one: one.bearing)
             if one.quantity in _LOADS  # earlier versions let other ones into a log
         ],
     }

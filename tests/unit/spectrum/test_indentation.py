@@ -100,7 +100,7 @@ def test_impacts_are_flights_that_end_and_contact_lasts_from_the_last():
     assert len(landings) > len(after_flights(landings)) > 2
     assert found.touched == pytest.approx(after_flights(landings) - 0.1, abs=0.7e-3)
     assert found.contact_from == found.touched[-1]
-    assert f"{len(found.touched)} impacts, the last one at" in found.statement
+    assert f"{len(found.touched)} impacts by the displacement alone, the last one at" in found.statement
 
 
 def test_an_impact_late_in_a_long_signal_counts():

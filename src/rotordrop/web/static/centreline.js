@@ -1,6 +1,6 @@
 // Where the shaft centre is on average, turn by turn, in its clearance circle.
 import { canvasPen, colours, faint, keep, keepPng, keepSvg, svgPen } from "./figures.js";
-import { fileName, files, showLines, state, zero } from "./state.js";
+import { fileName, files, origin, showLines, state, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
@@ -39,7 +39,7 @@ function draw(pen) {
 const picture = () => { const pen = svgPen(460 * state.look.places.length, 460, colours().back, "Shaft centreline"); draw(pen); return pen; };
 const csv = () => {
   const { centreline: { time, speed, planes }, places } = state.look;
-  return [["time from power-off [s]", "speed [rad/s]", ...places.flatMap(({ name }) => [`${name} x [m]`, `${name} y [m]`])].map((text) => JSON.stringify(text)).join(","),
+  return [[`time from ${origin()} [s]`, "speed [rad/s]", ...places.flatMap(({ name }) => [`${name} x [m]`, `${name} y [m]`])].map((text) => JSON.stringify(text)).join(","),
     ...time.map((t, i) => [t - zero(), speed ? speed[i] : "", ...planes.flatMap(({ x, y }) => [x[i] ?? "", y[i] ?? ""])].join(",")), ""].join("\n");
 };
 export function centrelineTab() {
@@ -51,5 +51,5 @@ export function centrelineTab() {
   return [make("figure", { of: [canvas, make("header", { class: "right", of: [files("Shaft centreline", {
     csv: () => keep(new Blob([csv()], { type: "text/csv" }), `${fileName("centreline")}.csv`), svg: () => keepSvg(picture(), fileName("centreline")), png: () => keepPng(picture(), fileName("centreline")),
     python: () => showLines(python["motion 0"]), command: command && (() => showLines(command, "As command"))
-  })] })] }), make("p", { class: "small", text: "The whole record in the sensor planes; each point is a mean over a turn at the speed of the release, or more. Numbers are shaft speeds, or times from power-off where no speed is known." })];
+  })] })] }), make("p", { class: "small", text: `The whole record in the sensor planes; each point is a mean over a turn at the speed of the release, or more. Numbers are shaft speeds, or times from ${origin()} where no speed is known.` })];
 }
