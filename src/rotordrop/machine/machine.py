@@ -133,6 +133,12 @@ class Machine(Description):
             )
         return self.ambs
 
+    @property
+    def has_loops(self) -> bool:
+        """Whether every radial AMB has magnet and controller, and there is one."""
+        known = [amb.magnet is not None and amb.controller is not None for amb in self.ambs]
+        return bool(known) and all(known)
+
     def measured_node(self, amb: ActiveMagneticBearing) -> int:
         """Node of the plane that the controller of an AMB measures."""
         name = None if amb.controller is None else amb.controller.sensor

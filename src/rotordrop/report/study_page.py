@@ -30,7 +30,7 @@ from rotordrop.report.spread import ends, percent, study_numbers_of
 from rotordrop.report.style import OVER, SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
 from rotordrop.simulate.clearances import share_column, stopped
 from rotordrop.study.plan import case_kind
-from rotordrop.study.quantities import Quantity
+from rotordrop.study.quantities import LIFT, Quantity
 from rotordrop.study.sensitivity import influences
 from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
@@ -143,6 +143,10 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         touching = results.exceedance(share_column(name, stop), 1.0)
         text = f"{name}: {happens} in {percent(touching)} of the drops."
         said.append(Statement(text, "notice" if touching.value == 0.0 else "warning"))
+    if results.study.looped:
+        lifted = results.exceedance(LIFT, 0.5)
+        text = f"The magnets lift the rotor again in {percent(lifted)} of the drops."
+        said.append(Statement(text, "good" if lifted.value == 1.0 else "warning"))
     return [*said, Statement(SCOPE)]
 
 
@@ -306,7 +310,31 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
         what = "Quantiles of" if limit is None else "Probability among"
         caption = f"{what} drops with neighbouring values; bars: 90 % intervals."
         figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
+    if results.study.looped:
+        caption = "Probability that the magnets lift the rotor again; bars: 90 % intervals."
+        figures.append(Figure(_lift_figure(results, name, kind), caption, "probability of a lift"))
     return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
+
+
+def _lift_figure(results: StudyResults, name: str, kind: str) -> go.Figure:
+    figure = panels(["lift"])
+    factor, unit = display_unit(kind)
+    cells = results.map(LIFT, name, above=0.5)
+    known: list[Known] = [cell["known"] for cell in cells]
+    curve(
+        figure,
+        [0.5 * (cell["from"] + cell["to"]) / factor for cell in cells],
+        [one.value for one in known],
+        "probability",
+        mode="lines+markers",
+        colour=SERIES[0],
+        width=1.6,
+        legend=False,
+        error_y=bars([(one.value, one.low, one.high) for one in known], 1.0),
+    )
+    figure.update_xaxes(title_text=axis_title(plain(spoken_value(results.study.machine, name)), unit))
+    figure.update_yaxes(title_text="P(lift)")
+    return fit_legend(figure)
 
 
 def _map_figure(
@@ -363,6 +391,8 @@ def study_numbers(
             for bearing in bearings
             for quantity in MAPPED
         }
+        if results.study.looped:
+            found["lift > 0.5"] = cells(LIFT, name, above=0.5)
         return found | {
             f"{bearing}.{quantity} > {limit:g}": cells(f"{bearing}.{quantity}", name, above=limit)
             for bearing in bearings

@@ -124,7 +124,7 @@ def stability(model: DropModel, speed: float) -> LoopStability:
 
 def loop_of(machine: Machine) -> LoopStability | None:
     """Stability of the loops of a machine at nominal speed; None where an AMB lacks magnet or controller."""
-    if not machine.ambs or any(amb.magnet is None or amb.controller is None for amb in machine.ambs):
+    if not machine.has_loops:
         return None
     return stability(build_drop_model(machine, loops=True), float(machine.speed.nominal))
 

@@ -48,6 +48,8 @@ class DropModel:
     def with_machine(self, machine: Machine) -> DropModel:
         """The same model of a machine with the same rotor and other bearings or values."""
         values = _of_values(machine, self.fe, self.basis, self.load_shares)
+        if self.layout.magnet_own:  # of springs and dampers the rows also hold what a start put there
+            values["magnet"] = _magnet_rows(machine, self.basis, loops=True)
         return replace(self, machine=machine, parameters=self.parameters._replace(**values))
 
     def departing(self, rows: Array) -> DropModel:
@@ -121,12 +123,6 @@ def _kernel_parameters(
     machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array, layout: StateLayout
 ) -> KernelParameters:
     m, loops = basis.size, bool(layout.magnet_own)
-    rows = np.zeros((len(machine.ambs), L.LOOP_END + m if loops else L.N_MAGNET_COLUMNS))
-    for row, amb in zip(rows, machine.ambs, strict=True):
-        amb.fill(row)
-        if loops:
-            amb.fill_loop(row[L.LOOP : L.LOOP_END])
-            row[L.LOOP_END :] = basis.node_row(machine.measured_node(amb))
 
     def shapes_at(parts: Sequence[Placed]) -> Array:
         rows = [basis.node_row(part.node) for part in parts]
@@ -142,7 +138,7 @@ def _kernel_parameters(
         gravity=-float(machine.gravity) * (product(basis.shapes.T, product(fe.mass, fe.rigid_shapes[:, 0]))),
         bearing_shape=shapes_at(machine.touchdown_bearings),
         magnet_shape=shapes_at(machine.ambs),
-        magnet=rows,
+        magnet=_magnet_rows(machine, basis, loops=loops),
         flags=np.array([aerodynamics.OFF, 0, bool(machine.loads or machine.base), loops], dtype=np.int64),
         rotor_at=layout.rotor_at(),
         bearing_at=layout.bearing_at(),
@@ -152,6 +148,17 @@ def _kernel_parameters(
         memory=np.zeros(kept + sum(by_magnets)),
         **_of_values(machine, fe, basis, shares),
     )
+
+
+def _magnet_rows(machine: Machine, basis: RotorBasis, *, loops: bool) -> Array:
+    """Rows of `KernelParameters.magnet`; with ``loops`` also coils, controllers and measured planes."""
+    rows = np.zeros((len(machine.ambs), L.LOOP_END + basis.size if loops else L.N_MAGNET_COLUMNS))
+    for row, amb in zip(rows, machine.ambs, strict=True):
+        amb.fill(row)
+        if loops:
+            amb.fill_loop(row[L.LOOP : L.LOOP_END])
+            row[L.LOOP_END :] = basis.node_row(machine.measured_node(amb))
+    return rows
 
 
 def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) -> dict[str, Any]:

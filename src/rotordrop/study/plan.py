@@ -25,7 +25,7 @@ from rotordrop.known import Known
 from rotordrop.machine import Machine, load_machine
 from rotordrop.machine.machine import kind_of_path
 from rotordrop.machine.saving import machine_text
-from rotordrop.simulate.case import DropCase, LevitatedStart
+from rotordrop.simulate.case import DropCase, LevitatedStart, MagnetEvent
 from rotordrop.study import sampling
 from rotordrop.study.distributions import (
     Distribution,
@@ -62,6 +62,7 @@ shares of the weight it carries, where it holds the rotor, radius and angle of a
 
 TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
 _QUANTITIES = {"duration": "time", "output_step": "time", "speed": "speed", "tolerance": "dimensionless"}
+_QUANTITIES |= {"relevitate": "time"}
 _AS_WRITTEN = (
     "name", "drops", "seed", "tolerance", "reduction", "design", "shard", "calibrated", "repeats"
 )  # fmt: skip
@@ -134,6 +135,9 @@ class Study:
     """Preset of the rotor's reduction."""
     start: str = "levitated"
     """How drops start: ``"levitated"`` in the AMBs, or ``"centred"``, straight in the centre."""
+    relevitate: float | None = None
+    """When magnets in the loop take the rotor up again [s], let go at the begin; None: they are springs and
+    dampers that do not."""
     design: str = "random"
     """One of `sampling.DESIGNS`."""
     shard: int = 200
@@ -164,7 +168,17 @@ class Study:
                 "the drops start levitated, but the machine has no AMBs; describe them or write start = "
                 '"centred"'
             )
+        if self.relevitate is not None and not 0.0 <= self.relevitate < self.duration:
+            raise UsageError(
+                f"relevitate = {self.relevitate:g} s; expected a time within the duration of "
+                f"{self.duration:g} s"
+            )
         _check_spreads(self)
+
+    @property
+    def looped(self) -> bool:
+        """Whether the magnets are in the loop."""
+        return self.relevitate is not None
 
     @property
     def levitated(self) -> bool:
@@ -256,6 +270,9 @@ class Study:
             "tolerance": self.tolerance,
             "reduction": self.reduction,
         }
+        if self.relevitate is not None:
+            off = [MagnetEvent(action="off", time=0.0)] if self.levitated else []
+            settings["magnets"] = (*off, MagnetEvent(action="levitate", time=self.relevitate))
         if not self.levitated:
             return DropCase(speed=speed, **settings)
         magnets = len(self.machine.ambs)
@@ -284,6 +301,8 @@ class Study:
             **{key: getattr(self, key) for key in _AS_WRITTEN},
             "duration_s": self.duration,
             "output_step_s": self.output_step,
+            # only where it is asked for: studies without it keep their digest
+            **({} if self.relevitate is None else {"relevitate_s": self.relevitate}),
             "start": self.start,
             "speed_rad_per_s": None if math.isnan(self.speed) else self.speed,
             "vary": {name: {spread.shape: spread.written} for name, spread in self.vary.items()},
@@ -379,6 +398,7 @@ def planned_study(document: Mapping[str, Any], machine: Machine) -> Study:
         machine=machine,
         duration=document["duration_s"],
         output_step=document["output_step_s"],
+        relevitate=document.get("relevitate_s"),
         speed=math.nan if speed is None else speed,
         vary=_spreads(document["vary"]),
         choose=_spreads(document["choose"]),

@@ -18,6 +18,8 @@ from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
 from rotordrop.units import si_unit
 
+LIFT = "lift"
+"""Column that says whether the magnets lifted the rotor again, of machines with magnets in the loop."""
 SPUN_UP = 0.95
 """Share of the rotor's surface speed from which a race counts as spun up [1]; chosen, not measured."""
 
@@ -107,6 +109,11 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
             (f"{b}.heat.race", "temperature", f"{b}: largest mean temperature of the race above the start"),
             (f"{b}.heat.preload", "force", f"{b}: axial force of a row at the end, race in the middle"),
         ]
+    if machine.has_loops:
+        of_parts += [
+            (LIFT, "dimensionless", "one where the magnets lifted the rotor again, else zero"),
+            ("lift_time", "time", "time from their begin until it touched nothing any more"),
+        ]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
 
 
@@ -141,6 +148,11 @@ def row_of(model: DropModel, result: DropResult) -> Array:
     if result.heat is not None:
         for b in result.heat.warmed:
             values += [result.heat.hottest(b)[0], float(result.heat.preload[-1, b])]
+    if machine.has_loops:
+        lift = result.lift
+        took = math.nan if lift is None or lift.free_from is None else lift.free_from - lift.begun
+        succeeded = lift is not None and lift.succeeded
+        values += [math.nan if lift is None else float(succeeded), took if succeeded else math.nan]
     certificate = result.certificate
     values += [
         float(result.state[-1, list(result.state_names).index("dissipated energy")]),

@@ -169,7 +169,7 @@ def rare_drops(
     ``samples`` drops a repeat. ``progress`` is called with a sentence and the share of drops done.
     """
     place = columns_of(study.machine).index(column_of(study.machine, column))
-    model, varied = build_drop_model(study.machine, study.reduction), list(study.varied)
+    model, varied = build_drop_model(study.machine, study.reduction, loops=study.looped), list(study.varied)
     failed = done = 0
 
     def quantity(values: Array) -> float:

@@ -210,7 +210,7 @@ def work_on(folder: str | Path, shard: int) -> bool:
     digest = plan["digest"]
     if digest not in _OPEN:
         study = study_of(folder)
-        _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction))
+        _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction, loops=study.looped))
     return _work(*_OPEN[digest], StudyFolder(Path(folder)), shard, None)
 
 
@@ -236,7 +236,7 @@ def _work(
 def _on_threads(place: StudyFolder, wanted: list[int], threads: int, study: Study, watch: _Watch) -> None:
     if not wanted:
         return
-    model = build_drop_model(study.machine, study.reduction)
+    model = build_drop_model(study.machine, study.reduction, loops=study.looped)
     stop = threading.Event()
     with ThreadPoolExecutor(max_workers=threads) as pool:
         try:

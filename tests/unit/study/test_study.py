@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 import pytest
 from tests.no_file import NO_FILE, in_time, on_posix
+from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import DropCase, example_machine, simulate_drop
 from rotordrop._version import __version__
@@ -614,3 +615,26 @@ def test_every_column_has_a_unit_and_a_meaning():
     names = [q.name for q in columns_of(MACHINE)]
     assert len(set(names)) == len(names)
     assert all(q.unit and q.meaning for q in columns_of(MACHINE))
+
+
+def test_a_study_of_lifts_counts_those_that_succeed(tmp_path):
+    machine = looped_machine()
+    plan = {"drops": 3, "duration": "0.09 s", "output_step": "0.1 ms", "relevitate": "30 ms", "seed": 7}
+    plan["vary"] = {
+        "speed": {"uniform": ["20 Hz", "60 Hz"]},
+        "ambs.DE.magnet.current_limit": {"choices": ["2 A", "4 A"]},
+    }
+    study = read_study(plan, machine)
+    results = run_study(study, tmp_path / "lifts", threads=1)
+    strong = results.varied["ambs.DE.magnet.current_limit"] > 3.0
+    assert 0 < np.count_nonzero(strong) < 3
+    assert results.numbers["lift"] == pytest.approx(strong.astype(float))
+    assert np.array_equal(np.isfinite(results.numbers["lift_time"]), strong)
+    said = " ".join(statement.text for statement in study_page(results, ["speed"]).verdict)
+    assert "The magnets lift the rotor again in" in said
+    assert study_numbers(results, ["speed"])["maps"]["speed"]["lift > 0.5"]
+    assert read_study({**plan, "relevitate": "40 ms"}, machine).digest != study.digest
+    with pytest.raises(
+        UsageError, match=r"relevitate = 0.1 s; expected a time within the duration of 0.09 s"
+    ):
+        read_study({**plan, "relevitate": "0.1 s"}, machine)
