@@ -172,8 +172,8 @@ def _loop(summary: MachineSummary) -> Iterator[MachineWarning]:
         if one.spare_at_rest <= 0.0:
             short = format_quantity(-one.spare_at_rest, "force")
             text = (
-                f"at full current it lacks {short} to lift the rotor from rest in its touchdown bearings; "
-                "a simulation cannot levitate it again"
+                f"at full current it lacks {short} to lift its share of the rotor at rest in the touchdown "
+                "bearings; whether all magnets together lift it, 'simulate --relevitate' shows"
             )
             yield _warning("lift", one.name, one.spare_at_rest, 0.0, text)
 
