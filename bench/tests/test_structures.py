@@ -138,6 +138,30 @@ def test_a_structure_that_is_present_moves_the_drop(model, case, plain, parts):
     assert np.max(np.abs(found.displacement - plain.displacement)) > 1e-8
 
 
+@pytest.mark.parametrize(
+    ("amounts", "keys", "apart"),
+    [
+        ({"eccentricity": "12 um"}, {"eccentricity": 12e-6, "eccentricity_phase": 1.0 - 0.5 * np.pi}, 1e-4),
+        (
+            {"ovality": "5 um"},
+            {"oval": 5e-6, "oval_phase": 1.0 - 0.5 * np.pi},
+            5e-3,
+        ),  # 2 % of the gap, squared
+    ],
+    ids=["eccentric", "oval"],
+)
+def test_a_sleeve_moves_the_drop_as_that_of_a_machine_file_does(known, model, amounts, keys, apart):
+    """Two sets of equations; both first impacts, before their difference grows."""
+    case = DropCase(speed=SPEED, duration=0.012)
+    found = hidden_drop(model, case, sleeve={**amounts, "angle": "1 rad"})
+    names = [bearing.name for bearing in known.touchdown_bearings]
+    values = {f"{name}.landing_sleeve.{key}": value for name in names for key, value in keys.items()}
+    described, round_one = simulate_drop(model.with_values(values), case), simulate_drop(model, case)
+    size = np.abs(found.bearing_force).max()
+    assert np.abs(found.bearing_force - described.bearing_force).max() < apart * size
+    assert np.abs(found.bearing_force - round_one.bearing_force).max() > 20.0 * apart * size
+
+
 @pytest.mark.parametrize("parts", PRESENT.values(), ids=PRESENT)
 def test_energy_is_kept_and_booked_by_place_with_every_structure(model, parts):
     """But for a gap that changes: what moves the bore works against the contact."""

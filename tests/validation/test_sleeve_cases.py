@@ -1,4 +1,4 @@
-"""Sliding in a sleeve, which has no race, by `simulate_drop`."""
+"""Sliding in a sleeve, which has no race, and rest on a landing sleeve of the rotor that is not round."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import Compute, checks_of
-from rigid_machine import disc_in
+from rigid_machine import disc_in, rigid_model
 
 from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
+from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.case import DropCase, PlacedStart
 from rotordrop.simulate.drop import simulate_drop
 
 pytestmark = pytest.mark.acceptance
 Inputs = Mapping[str, Any]
+
+STEPS = 20
 
 
 def model_of(v: Inputs) -> DropModel:
@@ -54,8 +58,38 @@ def sliding(v: Inputs) -> dict[str, float]:
     }
 
 
-CASES: dict[str, Compute] = {"SL01": sliding}
+def resting(v: Inputs) -> dict[str, float]:
+    """Place of the rotor at rest, and the torque that its contact force is about its axis."""
+    stiff = {"n": 1.0, "lam": 0.0, "ms": 1.0, "Ks": 1e13, "Cs": 0.0}
+    amounts = f'eccentricity = "{v["eccentricity"]} m", oval = "{v["oval"]} m"'
+    phases = f'eccentricity_phase = "{v["eccentricity_phase"]} rad", oval_phase = "{v["oval_phase"]} rad"'
+    model = rigid_model(stiff | v, more=f"landing_sleeve = {{ {amounts}, {phases} }}")
+    layout, state = model.layout, model.layout.zeros()
+    shape = model.parameters.bearing_shape[0]
+    state[layout.modal_y] = -(v["c"] + v["m"] * v["g"] / v["K"]) * shape / (shape @ shape)
+    state[layout.rotor_angle] = v["angle"]
+    p, n_q = model.parameters, layout.n_coordinates
+    rates, slopes = layout.zeros(), np.zeros((layout.n_dynamic, layout.n_dynamic))
+    for _ in range(STEPS):  # of Newton's; nothing holds the tilt of the rotor, which stays zero
+        drop_derivative(0.0, state, p, rates, scratch_of(p))
+        drop_jacobian(0.0, state, p, slopes)
+        stiffness = slopes[n_q : 2 * n_q, :n_q]
+        state[:n_q] -= np.linalg.lstsq(stiffness, rates[n_q : 2 * n_q], rcond=1e-14)[0]
+    x, y = (model.parameters.bearing_shape[0] @ state[part] for part in (layout.modal_x, layout.modal_y))
+    return {
+        "place across": 1e6 * float(x),
+        "place along": 1e6 * float(y),
+        "torque": 1e3 * model.fe.polar_inertia * float(rates[layout.rotor_speed]),
+    }
+
+
+CASES: dict[str, Compute] = {"SL01": sliding, "LS01": resting}
 
 test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES, [("SL01", {"mu": 0.1505}), ("SL01", {"radius": 0.0348}), ("SL01", {"polar_inertia": 0.501})]
+    CASES,
+    [("SL01", {"mu": 0.1505}), ("SL01", {"radius": 0.0348}), ("SL01", {"polar_inertia": 0.501})]
+    + [
+        ("LS01", {name: value})
+        for name, value in (("eccentricity", 12.01e-6), ("oval_phase", -0.201), ("angle", 0.901))
+    ],
 )

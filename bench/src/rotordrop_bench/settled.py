@@ -56,6 +56,7 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
     mass = coordinate_masses(model)
     state = model.at_rest()
     state[model.layout.modal_y] = _guess(model)
+    state[model.layout.rotor_angle] = angle
     n_q = model.layout.n_coordinates
 
     def completed(coordinates: Array) -> Array:

@@ -192,6 +192,9 @@ class Parameter:
     """What a sensor reads per unit of it."""
     lag: bool = False
     """Whether it is the time by which a sensor lags behind."""
+    amount: str = ""
+    """Path below its owner of the amount of which it is the part along a mark of the rotor: it is as large,
+    and unknown in every drop anew, because nobody knows where the mark stands when a drop begins."""
     way_of: Literal["", "support"] = ""
     """What moves up to it, of a way to a stop: one never used up is larger than the largest motion seen."""
 
@@ -212,12 +215,12 @@ class Parameter:
     @property
     def shared(self) -> bool:
         """Whether all drops of a machine share it."""
-        return self.owner in _OF_A_MACHINE
+        return self.owner in _OF_A_MACHINE and not self.amount
 
     @property
     def errs_jointly(self) -> bool:
         """Whether a calibrated machine file says how its error goes with those of others."""
-        return self.owner == "bearing"
+        return self.owner == "bearing" and self.shared
 
     def named(self, owner: str) -> str:
         """Name for people, with what it belongs to."""

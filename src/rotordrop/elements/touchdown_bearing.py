@@ -15,6 +15,7 @@ from rotordrop.elements.contact import Contact
 from rotordrop.elements.description import Description, Misfit, Name, Placed
 from rotordrop.elements.face import Face
 from rotordrop.elements.friction import Friction
+from rotordrop.elements.landing_sleeve import LandingSleeve
 from rotordrop.elements.mount import Mount, mounted
 from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
 from rotordrop.elements.race import Race
@@ -70,6 +71,8 @@ class TouchdownBearing(Placed):
     """What carries the outer ring."""
     mount: Mount = Field(default_factory=Mount)
     """What lies in parallel to spring and damper of the support: ribbon, branches that relax, stop."""
+    landing_sleeve: LandingSleeve = Field(default_factory=LandingSleeve)
+    """Part of the rotor that lands in the bearing, where it is eccentric or oval."""
     face: Face | None = None
     """Faces of the race, on which the rotor lands when it moves along its axis."""
     thermal: Thermal | None = None
@@ -87,7 +90,8 @@ class TouchdownBearing(Placed):
     def parts(self) -> tuple[Description, ...]:
         """Its parts, in the order in which they write their columns: a support asks for that of its mount."""
         others = (part for part in (self.face, self.thermal) if part is not None)
-        return self.bearing, self.contact, self.friction, self.race, self.mount, self.support, *others
+        usual = self.bearing, self.contact, self.friction, self.race, self.mount, self.support
+        return *usual, self.landing_sleeve, *others
 
     def fill(self, row: NDArray[np.float64]) -> None:
         """Write the columns of clearance and parts."""
@@ -118,6 +122,7 @@ class TouchdownBearing(Placed):
                 f"the air gap {gap * 1e3:.4g} mm must be smaller than the bore radius {bore * 1e3:.4g} mm",
                 ("air_gap",),
             )
+        self.landing_sleeve.check_gap(gap)
         self.bearing.check_bore(bore)
         if self.thermal is not None and self.bearing.no_race:
             raise Misfit(

@@ -10,6 +10,7 @@ from rotordrop.physics import (
     ball_table,
     contact,
     face,
+    landing_sleeve,
     magnet,
     mount,
     ring,
@@ -72,7 +73,10 @@ FACE = FAST_END
 FACE_END = FACE + face.N_ENTRIES
 THERMAL = FACE_END
 THERMAL_END = THERMAL + thermal.N_ENTRIES
-N_BEARING_COLUMNS = THERMAL_END
+LANDING_SLEEVE = THERMAL_END
+LANDING_SLEEVE_END = LANDING_SLEEVE + landing_sleeve.N_ENTRIES
+NOT_ROUND = LANDING_SLEEVE + landing_sleeve.PRESENT
+N_BEARING_COLUMNS = LANDING_SLEEVE_END
 FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns, what holds it along its axis

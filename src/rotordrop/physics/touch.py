@@ -90,8 +90,8 @@ def touch_gradient(
 ) -> bool:
     """Derivatives of contact and friction force; False and ``g`` untouched when there is no contact.
 
-    ``g`` (3, 6): rows force on the bore in x, in y [N] and friction force [N]; columns by ``ux, uy`` [m],
-    ``vx, vy`` [m/s], rotor spin and bore spin [rad/s]; arguments as in `touch`.
+    ``g`` (3, 6 or more): rows force on the bore in x, in y [N] and friction force [N]; columns by
+    ``ux, uy`` [m], ``vx, vy`` [m/s], rotor spin and bore spin [rad/s]; arguments as in `touch`.
     Source: `touch`, differentiated.
     """
     r = math.sqrt(ux * ux + uy * uy)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -282,8 +283,21 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     for row in structure_rows("drop"):
         if (quantity := row.stated(machine)) is not None:
             yield _unknown(model, row, "", 0, quantity, prior(row, quantity))
+    yield from _from_mark(model)
     for row in AERO:
         yield of_drop(row, "", 0, math.log(aero_time_constant(machine)), row.guess_sigma)
+
+
+def _from_mark(model: DropModel) -> Iterator[Unknown]:
+    """What turns with the rotor at its bearings, against a mark of which no record says where it stands."""
+    load = float(np.mean(model.load_shares))
+    for index, (name, part) in enumerate(parts_of(model.machine, "bearing")):
+        for row in structure_rows("bearing"):
+            amount = attrgetter(row.amount)(part) if row.amount else None
+            if amount is not None:
+                limits = None if row.scaled is None else row.scaled(part, load)[1]
+                known = Prior(mean=0.0, sigma=max(row.guess_sigma * float(amount), 1e-9), start=0.0)
+                yield _unknown(model, row, name, index, amount, known, limits=limits)
 
 
 def aero_time_constant(machine: Machine) -> float:

@@ -12,7 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.physics import aerodynamics, ball_table, departure, face, magnet, mount, ring, support, touch
+from rotordrop.physics import (
+    aerodynamics,
+    ball_table,
+    departure,
+    face,
+    landing_sleeve,
+    magnet,
+    mount,
+    ring,
+    support,
+    touch,
+)
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
@@ -86,7 +97,7 @@ def departing(b: int, y: Array, p: KernelParameters) -> tuple[Array, Array]:
 
 
 @inner_kernel
-def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+def true_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
     """Displacement [m] and velocity [m/s] of the rotor against the bore of contact ``c`` of bearing ``b``.
 
     The bearing is handed in: looked up in the table of contacts it costs 3 % of a right-hand side.
@@ -105,6 +116,17 @@ def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[floa
         s, own = departing(b, y, p)
         angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
         return departure.against_bore(s, own, angle, spin, ux, uy, vx, vy)
+    return ux, uy, vx, vy
+
+
+@inner_kernel
+def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
+    """The same of a round rotor that would touch as this one does, whatever its landing sleeve."""
+    ux, uy, vx, vy = true_motion(c, b, y, p)
+    if p.bearing[b, L.NOT_ROUND] != 0.0:
+        numbers = p.bearing[b, L.LANDING_SLEEVE : L.LANDING_SLEEVE_END]
+        angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
+        return landing_sleeve.as_round(numbers, angle, spin, ux, uy, vx, vy)
     return ux, uy, vx, vy
 
 
@@ -528,7 +550,7 @@ def face_values(
 ) -> tuple[float, float, float, float, float, float, float]:
     """Contact of the rotor with the face of one race, in the order of `physics.face.face_contact`."""
     at, own = p.rotor_at[L.AXIAL], p.bearing_at[b, L.FACE_STATES]
-    _ux, _uy, vx, vy = relative_motion(p.bearing_at[b, L.CONTACTS], b, y, p)
+    _ux, _uy, vx, vy = true_motion(p.bearing_at[b, L.CONTACTS], b, y, p)
     slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[p.bearing_at[b, L.RACE_SPIN]]
     numbers = p.bearing[b, L.FACE : L.FACE_END]
     return face.face_contact(numbers, y[at] - y[own], y[at + 1] - y[own + 1], vx, vy, slip)
@@ -603,6 +625,18 @@ def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
         rates[departure.TILT : departure.TILT + 4],
     )
     return lost
+
+
+@lean_kernel
+def landing_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Torque on the rotor [N m] of the normal force that ``dy`` holds so far: it misses the rotor's axis."""
+    c = p.bearing_at[b, L.CONTACTS]
+    x, z, _vx, _vz = true_motion(c, b, y, p)
+    numbers = p.bearing[b, L.LANDING_SLEEVE : L.LANDING_SLEEVE_END]
+    arm, nx, ny = landing_sleeve.turning_arm(numbers, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
+    at = p.rotor_at[L.N_COORDINATES] + p.contact_at[c, L.CONTACT_BODY]
+    torque: float = arm * (nx * dy[at] + ny * dy[at + 1])
+    return torque
 
 
 @lean_kernel
@@ -683,6 +717,8 @@ def bearing_accelerations(
     departs = p.bearing_at[b, L.DEPARTURE] >= 0
     by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
     by_sleeve = sleeve_torque(b, y, p, dy) if departs else 0.0
+    if row[L.NOT_ROUND] != 0.0:
+        by_sleeve += landing_torque(b, y, p, dy)
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:

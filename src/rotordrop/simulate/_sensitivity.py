@@ -1,7 +1,8 @@
 """Derivative of the right-hand side by the state: what the filter needs beside the value.
 
 Every derivative is analytic and tested against finite differences away from switches. Left out, because they
-are tiny and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque.
+are tiny and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque. Left
+out too is the torque of a landing sleeve that is not round, some hundredth of that of friction.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 import numpy as np
 
 from rotordrop.arrays import Array, Integers
-from rotordrop.physics import aerodynamics, ball_table, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, landing_sleeve, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
@@ -26,6 +27,7 @@ from rotordrop.simulate._rhs import (
     relative_motion,
     ring_travel,
     support_deflection,
+    true_motion,
 )
 
 Slopes = tuple[float, float, float]
@@ -96,6 +98,7 @@ def _contact_jacobian(c: int, g: Array, p: KernelParameters, J: Array) -> None:
                 J[place, modes + k] += slope * shape[k]
             J[place, body + part % 2 + (part // 2) * n_q] -= slope
         J[place, i_w] += factor * g[force, 4]
+        J[place, p.rotor_at[L.ROTOR_ANGLE]] += factor * g[force, 6]
         if spin >= 0:
             J[place, spin] += factor * g[force, 5]
 
@@ -278,7 +281,7 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     The energies behind the rotor angle are left out.
     """
     n_c = p.contact_at.shape[0]
-    g = np.zeros((n_c, 3, 6))
+    g = np.zeros((n_c, 3, 7))
     touching = np.zeros(n_c, dtype=np.int64)
     drop_jacobian_parts(t, y, p, J, g, touching)
     for c in range(n_c):
@@ -305,7 +308,7 @@ def drop_jacobian_parts(
     """`drop_jacobian` with the contacts apart, because a contact fills the rows and columns of all modes.
 
     ``J`` (s, s) is filled with everything but the contacts and the ω̇ terms of eq. (1), which are some
-    hundred thousand times smaller than gyroscopics; ``g`` (C, 3, 6) with the gradients of each contact (see
+    hundred thousand times smaller than gyroscopics; ``g`` (C, 3, 7) with the gradients of each contact (see
     `touch_gradient`), valid where ``touching`` (C,) is not zero.
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
@@ -323,6 +326,11 @@ def drop_jacobian_parts(
         omega_i = y[spin] if spin >= 0 else 0.0
         numbers = p.bearing[b, L.TOUCH : L.TOUCH_END]
         touching[c] = 1 if touch_gradient(numbers, ux, uy, vx, vy, y[i_w], omega_i, g[c]) else 0
+        if touching[c] != 0 and p.bearing[b, L.NOT_ROUND] != 0.0:
+            sleeve = p.bearing[b, L.LANDING_SLEEVE : L.LANDING_SLEEVE_END]
+            ux, uy, _vx, _vy = true_motion(c, b, y, p)
+            angle = y[p.rotor_at[L.ROTOR_ANGLE]]
+            landing_sleeve.of_true_motion(sleeve, angle, y[i_w], ux, uy, g[c])
     _rotor_jacobian(y, p, J)
     J[p.rotor_at[L.ROTOR_ANGLE], i_w] = 1.0
     if p.flags[L.SPIN_MODE] == OF_SPEED:

@@ -292,6 +292,8 @@ def add_contact_product(c: int, g: Array, p: KernelParameters, V: Array, moved: 
             weight = g[force, part]
             for j in range(columns):
                 moved[4 + force, j] += weight * moved[part, j]
+        if g[force, 6] != 0.0:
+            add_row(g[force, 6], V[p.rotor_at[L.ROTOR_ANGLE]], moved[4 + force])
     for axis in range(2):
         add_row(1.0 / row[L.RACE_MASS], moved[4 + axis], out[n_q + r + axis])
         modes = n_q + p.rotor_at[L.MODES_X + axis]
@@ -379,7 +381,7 @@ def propagate(
     work = scratch_of(p)
     base, other = np.zeros((p.bearing.shape[0] + 1, n)), np.zeros(n)
     contact = np.empty(6)
-    g = np.zeros((p.contact_at.shape[0], 3, 6))
+    g = np.zeros((p.contact_at.shape[0], 3, 7))
     touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
     middle = y.copy()

@@ -367,6 +367,8 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
         slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
     model = problem.model
     gap = smallest_gap(model.machine)
+    # on which place of its landing sleeves a rotor comes to rest is anybody's guess
+    reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in model.machine.touchdown_bearings)
     angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
     nodes = np.array([sensor.node for sensor in model.machine.sensors])
     gain_scratch = np.empty(len(mean))
@@ -388,7 +390,8 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + c] += weight * along
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
-            F.scalar_update(mean, covariance, row, observed - predicted, (sigma * gap) ** 2, gain_scratch)
+            variance = (sigma * gap) ** 2 + reach**2
+            F.scalar_update(mean, covariance, row, observed - predicted, variance, gain_scratch)
 
 
 def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.landing_sleeve import with_amounts
 from rotordrop.elements.magnet import FORCES
 from rotordrop.elements.parameter import below
 from rotordrop.elements.table import row_of, rows, separating_measurement
@@ -158,7 +159,7 @@ def calibrate_machine(
     ]
     origin = CalibrationOrigin(drops=tuple(calibrated_on), consistent=consistent, joint=joint)
     return Calibration(
-        machine=_possible(with_unbalance(machine, said), fitted, stems).calibrated_on(origin),
+        machine=_possible(with_found(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
         identifiability=identifiability,
         confounded=confounded_of(problem, covariance),
@@ -200,12 +201,15 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     return tuple(lifts)
 
 
-def with_unbalance(machine: Machine, said: Mapping[str, Known]) -> Machine:
-    """The machine with an unbalance as large as the one found where that is beyond the described one.
+def with_found(machine: Machine, said: Mapping[str, Known]) -> Machine:
+    """The machine with an unbalance beyond the described one, and landing sleeves, as large as those found.
 
     What was described then is the width of a prior, and no amount that a simulation could use.
     """
-    values = {}
+    values: dict[str, Known] = {}
+    for bearing in machine.touchdown_bearings:
+        amounts = with_amounts(bearing, below(said, f"{bearing.name}."))
+        values |= {f"{bearing.name}.{path}": amount for path, amount in amounts.items()}
     for i, unbalance in enumerate(machine.unbalances):
         if unbalance.beyond_described is not None:
             along = [said[row.path_of(str(i))].value for row in rows("unbalance")]

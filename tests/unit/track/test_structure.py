@@ -38,11 +38,13 @@ STRUCTURE = {
     "support.foundation_share": 0.1,
     "support.foundation_frequency": 600.0,
     "support.foundation_damping_ratio": 0.03,
+    "landing_sleeve.eccentricity": 12e-6,
+    "landing_sleeve.oval": 5e-6,
 }
 
 
 def structured(machine: Machine, status: str = "guess") -> Machine:
-    """The machine with a stiffer rotor, slow clock and side force; its supports are turned, cubic, soft."""
+    """The machine with a stiffer rotor, slow clock, side force, turned and cubic supports, oval sleeves."""
     values = {
         f"{bearing.name}.{path}": Known(value=value, status=status)
         for bearing in machine.touchdown_bearings
@@ -165,7 +167,7 @@ def test_an_extension_adds_unknowns_and_a_machine_file_holds_them(described, ext
     assert set(found) - set(usual) or wider
     for path in set(found) - set(usual):
         low, high = found[path].bounds
-        of_record = extension.owner == "drop"
+        of_record = extension.owner == "drop" or extension.name in ("eccentric sleeve", "oval sleeve")
         assert low <= found[path].mean < high and (found[path].scope == "drop") == of_record, path
 
 
@@ -193,7 +195,7 @@ def extended_flight(lp400: Machine, prepared: Evidence) -> DropProblem:
     return drop_problem(build_drop_model(structured(lp400), COARSE_BASIS), prepared, until=0.003)
 
 
-@pytest.mark.parametrize("indentation", [-60e-6, 4e-6])
+@pytest.mark.parametrize("indentation", [-60e-6, 8e-6])  # what the sleeves take of it leaves some
 def test_the_sensitivity_of_such_a_machine_is_that_of_finite_differences(extended_flight, indentation):
     problem = extended_flight
     y, theta = start_of(problem.model, indentation), theta_of(problem)

@@ -286,6 +286,23 @@ def test_the_tail_ties_gap_and_offset(loose):
     )
 
 
+def test_the_tail_says_less_of_a_gap_where_a_landing_sleeve_may_be_oval(lp400, prepared, loose):
+    """Nobody knows on which place of it the rotor has come to rest."""
+    oval = {
+        f"{b.name}.landing_sleeve.oval": Known(value=20e-6, status="guess") for b in lp400.touchdown_bearings
+    }
+    model = build_drop_model(lp400.with_values(oval), COARSE_BASIS)
+    problem = drop_problem(model, prepared.with_facts(settled_level=NO_TAIL), until=0.003)
+    theta = problem.mean[problem.parameter_slice]
+    gained = []
+    for one in (loose, problem):
+        mean, covariance = one.mean.copy(), one.covariance.copy()
+        apply_tail(one, height_at_sensors(problem, theta), mean, covariance)
+        gap = one.n_dynamic + [u.path for u in one.unknowns].index("NDE.air_gap")
+        gained.append(1.0 / covariance[gap, gap] - 1.0 / one.covariance[gap, gap])
+    assert gained[1] < 0.5 * gained[0]
+
+
 def test_a_rotor_held_aside_by_friction_says_nothing_about_the_gap(loose):
     theta = loose.mean[loose.parameter_slice]
     tail = height_at_sensors(loose, theta)

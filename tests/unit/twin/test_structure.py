@@ -25,7 +25,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.track.calibration import Stage, TrackedDrops, track
 from rotordrop.twin import search as search_module
-from rotordrop.twin.calibrated import with_unbalance
+from rotordrop.twin.calibrated import with_found
 from rotordrop.twin.problems import Drops
 from rotordrop.twin.search import (
     CALIBRATION_STAGE,
@@ -68,6 +68,8 @@ def has(machine: Machine) -> frozenset[str]:
         "rotor stiffness": machine.rotor.stiffness_factor,
         "sampling clock": machine.clock_error,
         "side force": machine.side_force,
+        "eccentric sleeve": machine.touchdown_bearings[0].landing_sleeve.eccentricity,
+        "oval sleeve": machine.touchdown_bearings[0].landing_sleeve.oval,
     }
     return frozenset(name for name, value in marks.items() if value is not None)
 
@@ -373,12 +375,30 @@ def test_an_unbalance_beyond_its_grade_is_known_by_its_field_and_outlives_the_fi
     assert float(back.unbalances[0].beyond_described) == 3.0
     assert extension.values(back) == {}
     said = {f"unbalance.{i}.{p}": Known(value=2e-5) for i in range(2) for p in ("cosine", "sine")}
-    found = with_unbalance(back, said).unbalances[0]
+    found = with_found(back, said).unbalances[0]
     assert float(found.amount) == pytest.approx(np.hypot(2e-5, 2e-5))
     assert float(found.beyond_described) == pytest.approx(
         float(found.amount) / float(lp400.unbalances[0].amount)
     )
-    assert with_unbalance(lp400, said) == lp400
+    assert with_found(lp400, said) == lp400
+
+
+def test_a_landing_sleeve_found_is_said_by_its_amount_and_goes_into_the_calibrated_file(lp400):
+    oval = next(one for one in EXTENSIONS if one.name == "oval sleeve")
+    machine = oval.added_to(lp400)
+    said = {
+        f"{b.name}.landing_sleeve.oval_{part}": Known(value=value, interval_90=(value - 1e-7, value + 1e-7))
+        for b in machine.touchdown_bearings
+        for part, value in (("cosine", 3e-6), ("sine", -4e-6))
+    }
+    words = oval.found(machine, said, 300.0)
+    assert words.startswith(
+        "the radius of the landing sleeve varies twice a turn: NDE ± 5.00 µm (4.90 to 5.10)"
+    )
+    found = with_found(machine, said)
+    assert [float(b.landing_sleeve.oval) for b in found.touchdown_bearings] == pytest.approx([5e-6, 5e-6])
+    given = lp400.with_values({f"{b.name}.landing_sleeve.oval": 3e-6 for b in lp400.touchdown_bearings})
+    assert with_found(given, said) == given  # a measured amount stays
 
 
 @pytest.mark.parametrize(
