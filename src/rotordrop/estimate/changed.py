@@ -311,9 +311,7 @@ def _jointly(
 def _own(joint: Joint, common: Sequence[str]) -> tuple[Array, Array]:
     """What a record alone says, in standard deviations of the prior about its middle.
 
-    Information matrix and information vector: posterior less prior. Published parameters are wider than the
-    filter holds (`PARAMETER_WIDENING`), for what the linearised fit leaves out; that is common to two records
-    of one machine and cancels in a change.
+    Information matrix and information vector: posterior less prior.
     """
     n, at = len(joint.paths), [joint.paths.index(path) for path in common]
     lower = np.zeros((n, n))

@@ -23,8 +23,6 @@ from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_inte
 
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
-PARAMETER_WIDENING = 1.5
-"""Factor on standard errors of parameters for what the linearised fit leaves out [1]."""
 UNDETERMINED: Status = "the record does not determine it"
 KNOWN: Status = "known from the calibration"
 AT_BOUND: Status = "at its bound"
@@ -81,9 +79,9 @@ def model_error(unknown: Unknown, sigma: float) -> float:
     return math.hypot(sigma, left_out(unknown))
 
 
-def parameter_widening(unknown: Unknown, sigma: float, widening: float = 1.0) -> float:
-    """Factor on a parameter's standard error [1]; the widened error stays within that of the prior."""
-    return max(1.0, min(PARAMETER_WIDENING * widening, unknown.sigma / max(sigma, 1e-300)))
+def parameter_widening(unknown: Unknown, sigma: float, widening: float) -> float:
+    """Factor on a parameter's standard error [1] where all errors are wider; it stays within the prior's."""
+    return max(1.0, min(widening, unknown.sigma / max(sigma, 1e-300)))
 
 
 def parameters(

@@ -22,7 +22,6 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.twin.calibrated import CONFOUNDED, confounded_of, values_of
 from rotordrop.twin.tracked_parameters import (
-    PARAMETER_WIDENING,
     determination,
     parameter_widening,
     sensor_errors,
@@ -91,10 +90,10 @@ def test_a_gap_ends_at_zero_and_nothing_else_does() -> None:
 
 def test_a_parameter_is_widened_up_to_its_prior_and_never_narrowed(problem: Any) -> None:
     for unknown in problem.unknowns:
-        for share, factor in ((0.1, PARAMETER_WIDENING), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 1.5)):
-            found = parameter_widening(unknown, share * unknown.sigma)
+        for share, factor in ((0.1, 2.0), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 2.0)):
+            found = parameter_widening(unknown, share * unknown.sigma, 2.0)
             assert found == pytest.approx(factor), (unknown.path, share)
-        assert parameter_widening(unknown, 0.1 * unknown.sigma, 2.0) == pytest.approx(2 * PARAMETER_WIDENING)
+            assert parameter_widening(unknown, share * unknown.sigma, 1.0) == 1.0
 
 
 def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
