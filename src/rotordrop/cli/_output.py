@@ -57,12 +57,13 @@ def deliver(
     *,
     report: Path | None = None,
     data: Path | None = None,
+    film: Path | None = None,
 ) -> None:
     """Write page, tables and JSON where they were asked for, and print the summary.
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
     in place of the summary, which is a page or a function that prints on the console it is given. Pages and
-    tables need a page.
+    tables need a page. A film has been written, and is named.
     """
     if not callable(summary) and report is not None:
         from rotordrop.report.page import write_page
@@ -88,6 +89,8 @@ def deliver(
         print_summary(summary, out)
         if report is not None:
             out.print(f"Report: {report}")
+        if film is not None:
+            out.print(f"Film: {film}")
     if json_file is not None:
         out.print(f"JSON: {json_file}")
 

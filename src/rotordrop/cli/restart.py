@@ -76,10 +76,16 @@ def restart(
     if count and described.ambs:
         with progress_bar("the next drop") as bar:
             found = next_drops(described, speed, limits, drops=count, progress=bar)
+    before = [read_drop(one) for one in since or ()]
+    for path, one in zip(since or (), before, strict=True):
+        if one.record_sha256 == drop.record_sha256:
+            raise UsageError(
+                f"--since {path} and {estimate} are of one recording; name the estimate of an earlier drop"
+            )
     card = restart_card(
         drop,
         assumed,
-        since=[read_drop(one) for one in since or ()],
+        since=before,
         checks=_checks(check or ()),
         earlier=() if log is None else _earlier(log, drop.machine, bearings, drop.record_sha256),
         next_drops=found,
@@ -105,6 +111,13 @@ def _earlier(log: str, machine: str, bearings: str, sha256: str) -> list[dict[st
     from rotordrop.estimate.published import Value
     from rotordrop.ledger.book import logged_drops
 
+    of_machine = logged_drops(log, machine=machine)
+    sets = sorted({drop.bearing_set for drop in of_machine.values()})
+    if sets and bearings not in sets:
+        raise UsageError(
+            f"--bearings {bearings}: {log} has no drops of {machine} with this set of bearings; there are "
+            f"{', '.join(sets[:8])}"
+        )
     return [
         {
             one.bearing: Value(
@@ -114,6 +127,6 @@ def _earlier(log: str, machine: str, bearings: str, sha256: str) -> list[dict[st
             for one in drop.severity
             if one.quantity == "peak_stress_Pa" and one.lower > 0.0
         }
-        for drop in logged_drops(log, machine=machine, bearing_set=bearings).values()
-        if not sha256 or drop.sha256 != sha256
+        for drop in of_machine.values()
+        if drop.bearing_set == bearings and (not sha256 or drop.sha256 != sha256)
     ]

@@ -161,7 +161,7 @@ def simulate(
         from rotordrop.report.simulate_page import simulate_page
 
         said = simulate_page(result, described)
-    deliver(simulation_numbers(result, described), json, said, report=report, data=data)
+    deliver(simulation_numbers(result, described), json, said, report=report, data=data, film=film)
 
 
 def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:

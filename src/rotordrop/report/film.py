@@ -162,14 +162,15 @@ class _Panel:
         self.scale = 0.5 * PANEL * REACH / self.reach
 
     def follow(self, times: np.ndarray) -> None:
-        """Take the path up to the end of every frame, and the largest force within it."""
+        """Take the path up to the end of every frame, and the force there."""
         finer = np.linspace(times[0], times[-1], POINTS * FRAMES + 1)
         at = [np.interp(finer, self.time, self.motion.displacement[:, axis]) for axis in (0, 1)]
         self.path = np.stack(at, axis=1)
-        force = self.bearing.force
-        last = np.searchsorted(force.time, times[1:], side="right")
-        first = np.minimum(np.searchsorted(force.time, times[:-1]), last - 1)
-        self.strongest = [a + int(np.nanargmax(force.values[a:b])) for a, b in zip(first, last, strict=True)]
+        time, vector = self.bearing.force.time, self.bearing.force_vector
+        if vector is not None:
+            # the balls push the race back where the rotor presses it away
+            along = [np.interp(times[1:], time, -vector[:, axis]) for axis in (0, 1)]
+            self.push = np.stack(along, axis=1) / self.bearing.peak_force.value
 
     def point(self, place: np.ndarray) -> tuple[float, float]:
         """Where a displacement [m] lies in a frame [px]."""
@@ -178,7 +179,7 @@ class _Panel:
 
     def draw_ground(self, draw: ImageDraw) -> None:
         """The name, the clearance circles, a scale and what the arrow means."""
-        _text(draw, self.left + 12, 8, self.bearing.name, INK)
+        _text(draw, self.left + 12, 8, f"{self.bearing.name}, gravity downwards", INK)
         gap = self.bearing.air_gap
         for radius in () if gap is None else {gap.lower, gap.upper}:
             corner = np.array([radius, -radius])
@@ -189,9 +190,12 @@ class _Panel:
         _text(draw, left, foot + 4, Quantity(value=length, kind="dimension", digits=1).text, MUTED)
         if self.bearing.force_vector is not None:
             peak = Quantity.of(self.bearing.peak_force.known, "force", range_only=not self.certain)
-            _text(draw, left, foot + 24, f"longest arrow: bearing force of {peak.text}", FORCE)
+            arrow = FINER * ARROW * PANEL
+            _arrow(draw, (FINER * left, FINER * (foot + 33)), (FINER * left + arrow, FINER * (foot + 33)))
+            beside = left + ARROW * PANEL + 8
+            _text(draw, beside, foot + 24, f"largest bearing force, {peak.text}", FORCE)
             if peak.interval_text:
-                _text(draw, left, foot + 42, f"(90 %: {peak.interval_text})", FORCE)
+                _text(draw, beside, foot + 42, f"(90 %: {peak.interval_text})", FORCE)
 
     def draw(self, draw: ImageDraw, number: int) -> None:
         """The path so far, the rotor centre, and the force where its direction is known."""
@@ -199,10 +203,8 @@ class _Panel:
         trail = [self.point(place) for place in chosen]
         draw.line(trail, fill=PATH, width=2 * FINER, joint="curve")
         x, y = trail[-1]
-        vector = self.bearing.force_vector
-        if vector is not None:
-            # the balls push the race back where the rotor presses it away
-            push = -vector[self.strongest[number]] / self.bearing.peak_force.value
+        if self.bearing.force_vector is not None:
+            push = self.push[number]
             _arrow(draw, (x, y), (x + FINER * ARROW * PANEL * push[0], y - FINER * ARROW * PANEL * push[1]))
         size = 5 * FINER
         draw.ellipse((x - size, y - size, x + size, y + size), fill=ROTOR)

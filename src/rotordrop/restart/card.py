@@ -46,6 +46,10 @@ COSTS = {
     "day_cost": "a day of standstill",
     "bearing_set_cost": "a set of bearings",
     "machine_cost": "a damaged machine",
+    "inspection_days": "the standstill of an inspection",
+    "exchange_days": "the standstill of an exchange",
+    "replace_days": "the standstill of a replacement unseen",
+    "limited_days": "what running with limits costs",
     "another_drop": "the chance of another drop",
     "most_doubt": "the chance of a damaged bearing that is allowed",
 }
@@ -409,9 +413,7 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
     else:
         said.append("None of the checks pays: none can change the answer at its cost.")
     for one in card.flips[:3]:
-        more = one.factor > 1.0
-        times = f"{one.factor:.2g} times as large" if more else f"{1.0 / one.factor:.2g} times smaller"
-        said.append(f"The answer becomes “{one.answer}” where {one.of} is {times}.")
+        said.append(f"The answer becomes “{one.answer}” where {one.of} is {_times(one.factor)}.")
     if not card.flips:
         said.append(f"No cost and no prior within a factor of {FLIPS_WITHIN:g} changes the answer.")
     if not drop.consistent:
@@ -421,6 +423,13 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         "--assumptions."
     )
     return said
+
+
+def _times(factor: float) -> str:
+    more, size = factor > 1.0, max(factor, 1.0 / factor)
+    if size < 1.1:  # the factor is found to a percent
+        return f"{'larger' if more else 'smaller'} by {max(100.0 * (size - 1.0), 1.0):.0f} %"
+    return f"{size:.2g} times {'as large' if more else 'smaller'}"
 
 
 def _beside(card: RestartCard) -> str:

@@ -22,6 +22,8 @@ KINDS = ("force", "pressure")
 NO_PEAKS: dict[str, Any] = dict.fromkeys(
     f"{name}{end}_{unit}" for name, unit in PEAKS for end in ("", "_lower", "_upper")
 )
+CUT = "truncated"
+"""What the warning of a reader says of a file that ends too early."""
 VERBS: dict[str, Verb] = {"estimated": "estimate", "looked": "look"}
 """Computations of the page by what came of them."""
 
@@ -76,6 +78,7 @@ def _of_estimate(drop: Drop, watched: Watched | None) -> dict[str, Any]:
     limits = {} if watched is None else watched.limits
     judged = limit_statement([ComparedDrop(drop.record, drop)], limits)
     doubts = [] if drop.consistent else [drop.verdict]
+    doubts += [f"{one}." for one in drop.warnings if CUT in one]
     if limits:
         found["verdict"] = f"{drop.verdict} {judged.text}"
         doubts += [judged.text] if judged.level != "good" else []

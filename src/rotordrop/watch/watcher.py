@@ -362,7 +362,7 @@ def run_hook(command: str, scalars: dict[str, Any]) -> None:
     try:
         ended = subprocess.run(
             shlex.split(command, posix=os.name == "posix"),
-            input=json.dumps(scalars, ensure_ascii=False).encode(),
+            input=(json.dumps(scalars, ensure_ascii=False) + "\n").encode(),
             capture_output=True,
             timeout=HOOK_S,
             check=False,

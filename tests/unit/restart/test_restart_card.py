@@ -25,7 +25,7 @@ from rotordrop.report.restart_page import restart_numbers, restart_page
 from rotordrop.report.terminal import print_summary
 from rotordrop.restart import load_assumptions, restart_card
 from rotordrop.restart.assumptions import assumptions_of
-from rotordrop.restart.card import ANSWERS
+from rotordrop.restart.card import ANSWERS, COSTS, FLIPS_WITHIN, SHARES
 from rotordrop.restart.evidence import indicators, suspicions
 from rotordrop.restart.next_drop import NextDrop, next_drops
 
@@ -185,6 +185,19 @@ def test_a_flip_changes_the_answer_and_a_little_less_does_not():
         for factor, same in ((beyond, False), (short, True)):
             moved = BY_COST.model_copy(update={"machine_cost": BY_COST.machine_cost * factor})
             assert (restart_card(drop(), moved).answer == card.answer) is same
+
+
+@pytest.mark.parametrize(("name", "label"), list(COSTS.items()))
+def test_every_cost_that_can_change_the_answer_is_tried(name, label):
+    """Each cost at the end of its range: where the answer is another one there, a flip says so."""
+    card = restart_card(drop(), BY_COST)
+    value = getattr(BY_COST, name)
+    ends = [value * factor for factor in (FLIPS_WITHIN, 1.0 / FLIPS_WITHIN)]
+    if name in SHARES:
+        ends = [min(end, 1.0) for end in ends]
+    answers = {restart_card(drop(), BY_COST.model_copy(update={name: end})).answer for end in ends}
+    if answers != {card.answer}:
+        assert label in {flip.of for flip in card.flips}
 
 
 def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
@@ -348,7 +361,7 @@ def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
     assert run(call) == UsageError.exit_code
 
 
-def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimate(tmp_path):
+def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimate(tmp_path, capsys):
     machine = example_machine("small")
     places = {}
     for name, stress in (("first", 2e9), ("hard", 6e9), ("now", 2e9)):
@@ -371,3 +384,7 @@ def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimat
     ]
     assert dents[0] < 0.05 < 0.8 < dents[1]
     assert {len(one["ratios"]) for one in card["indicators"]} == {2}
+    assert run([*call, "--since", str(places["now"])]) == UsageError.exit_code
+    assert "are of one recording" in capsys.readouterr().err
+    assert run([*call, "--log", log, "--bearings", "3"]) == UsageError.exit_code
+    assert "with this set of bearings; there are 1" in capsys.readouterr().err

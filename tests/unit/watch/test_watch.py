@@ -137,7 +137,7 @@ def test_a_record_that_changed_since_it_was_seen_is_not_taken(drops, kept):
 
 def hook_into(file: Path) -> str:
     program = file.with_suffix(".py")
-    program.write_text(f"import sys; open({str(file)!r}, 'a').write(sys.stdin.read() + '\\n')")
+    program.write_text(f"import sys; open({str(file)!r}, 'a').write(sys.stdin.read())")
     return f"{sys.executable} {program}"
 
 
@@ -210,6 +210,27 @@ def found(kept: Kept, number: str, verb: str, content: dict, serial: str = "") -
     made.mkdir()
     write_json(made / "document.json", content, sealed=True)
     publish(job, verb, "abc", made)
+
+
+def test_a_record_that_ends_too_early_needs_a_person(tmp_path, drops, kept, watcher):
+    (drops / "4711.csv").write_text("x")
+    number = kept.take(Arrived.at(drops / "4711.csv"))
+    cut = "the file ends within line 9, after 4 of 6 columns: the file is truncated, 7 complete rows are used"
+    content = published(
+        machine="LP-400",
+        record_sha256=kept.job(number).read()["files"]["record"]["sha256"],
+        bearings={"NDE": bearing(PEAKS), "DE": bearing(PEAKS)},
+        warnings=[cut],
+        rotordrop_version=__version__,
+    )
+    found(kept, number, "estimate", content.as_json(), "4711")
+    told = tmp_path / "told"
+    one, said = watcher(hook=hook_into(told))
+    one.run(once=True)
+    (news,) = reported(told)
+    assert news["needs_person"] == f"{cut}."
+    assert "needs a person: the file ends within line 9" in said[0]
+    assert told.read_bytes().endswith(b"}\n")
 
 
 @pytest.fixture
