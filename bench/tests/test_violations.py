@@ -349,3 +349,18 @@ def test_a_structure_of_the_machine_file_is_not_lost_beside_violations():
     assert not len(hidden_machine(coupled, 1, "none").model.parameters.departure)
     with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
         hidden_machine(coupled, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
+
+
+def test_a_magnet_that_stays_on_holds_its_end_and_leaves_no_tail(known):
+    """The description knows nothing of it, and no settled place is true."""
+    broken = violations(magnets={"stays_on": ["DE"]})
+    hidden = hidden_machine(known, 3, broken)
+    assert violated_kinds(broken) == ("one end held",)
+    assert [amb.stays_on for amb in hidden.machine.ambs] == [False, True]
+    assert not any(amb.stays_on for amb in hidden.known.ambs)
+    made = synthesize_drop(hidden, SPEED, 8, duration=0.05)
+    assert made.tail is None
+    assert set(made.truth["first_contact_time_s"]) == {"NDE"}
+    assert "settled_radius_um" not in made.truth
+    with pytest.raises(UsageError, match="no AMB 'A'"):
+        hidden_machine(known, 3, violations(magnets={"stays_on": ["A"]}))

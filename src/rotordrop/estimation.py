@@ -94,10 +94,11 @@ def estimate_drops(
     RecordError, IdentificationError
         As for `estimate_drop`; nothing is computed before every record has passed the gate.
     """
-    from rotordrop.errors import UsageError
+    from rotordrop.errors import RecordError, UsageError
     from rotordrop.estimate.estimate import Estimates
     from rotordrop.estimate.record_facts import facts_of
     from rotordrop.evidence.evidence import Evidence, insisted
+    from rotordrop.evidence.one_end import as_dropped
 
     if not isinstance(method, Tracked | Replay):
         raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
@@ -105,6 +106,20 @@ def estimate_drops(
     if len(tails) != len(records):
         raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
     stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
+    ways = [as_dropped(record, machine) for record in records]
+    held = [[amb.name for amb in way.ambs if amb.stays_on] for way in ways]
+    if any(one != held[0] for one in held):
+        raise UsageError(
+            "some of the drops are of one end whose magnets the others did not keep on "
+            f"({'; '.join(', '.join(one) or 'none stays on' for one in held)}); expected the same of all. "
+            "Estimate them apart"
+        )
+    machine = ways[0] if ways else machine
+    if isinstance(method, Replay) and any(held):
+        raise RecordError(
+            f"{held[0][0]} stayed held by its magnets in {stems[0]}, and the replay knows no drop of one "
+            "end; estimate it with the tracked twin (--method tracked)"
+        )
     evidence = [
         Evidence(record=record, machine=machine, tail=tail, name=stem)
         for record, tail, stem in zip(records, tails, stems, strict=True)

@@ -122,10 +122,11 @@ def synthesize_drop(
         phase=random.uniform(0.0, 2.0 * np.pi, count),
         decay_time=float(random.uniform(2.0, 20.0)),
     )
+    held = hidden.violations.magnets.stays_on  # a rotor with one end held does not settle
     truth = true_values(hidden, result, conditions, chain, errors, rest, name)
     return SyntheticDrop(
         record=record,
-        tail=_tail(hidden, rest, swing, chain, errors, seed, name) if tail else None,
+        tail=_tail(hidden, rest, swing, chain, errors, seed, name) if tail and not held else None,
         truth=truth,
         histories=true_histories(hidden, result, conditions, chain.sampling_rate),
         result=result,

@@ -41,6 +41,7 @@ def violated(machine: Machine, violations: Violations) -> Machine:
         for index, unbalance in enumerate(machine.unbalances):
             values[f"unbalance.{index}.amount"] = factor * float(unbalance.amount)
     machine = machine.with_values(values) if values else machine
+    machine = machine.with_magnets_on(violations.magnets.stays_on)
     seal = violations.seal
     if seal is not None:
         gap = float(seal.gap) * max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)

@@ -306,6 +306,9 @@ class MagnetViolation(Violation):
     pull_time: PositiveTime = default(1.0, "of no effect without pull")
     """Time constant with which that decays [s]."""
 
+    stays_on: tuple[Name, ...] = ()
+    """Magnets that hold on while the others let go: a drop of one end, of which there is no tail."""
+
     together: ClassVar = (("pull", "pull_time"),)
 
 

@@ -55,6 +55,10 @@ def simulate(
     levitated: options.Levitated = False,
     rotor_angle: Annotated[float, measured("angle", "Levitated: rotor angle.", "0 deg")] = 0.0,
     delay: Annotated[float, measured("time", "Levitated: magnets hold on.", "0 s")] = 0.0,
+    stays_on: Annotated[
+        list[str] | None,
+        text_option("AMB", 'This magnet holds on while the others let go, "NDE": a drop of one end.'),
+    ] = None,
     remanent_force: Annotated[
         list[str] | None,
         text_option("FORCE", 'Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
@@ -106,7 +110,12 @@ def simulate(
         from rotordrop.report.film import require_film
 
         require_film(film)
-    described = load_machine(machine)
+    if stays_on and (magnets or relevitate is not None):
+        raise UsageError(
+            "--stays-on has the spring and damper of a magnet and cannot go with --magnets or --relevitate, "
+            "which follow its control loop; choose one"
+        )
+    described = load_machine(machine).with_magnets_on(stays_on or ())
     bearings = [bearing.name for bearing in described.touchdown_bearings]
     events = magnet_events(magnets or (), relevitate, delay if levitated and not magnets else None)
     if levitated:

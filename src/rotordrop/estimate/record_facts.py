@@ -55,7 +55,7 @@ def facts_of(evidence: Evidence) -> RecordFacts:
         findings = (unseen,)
     refuse_unusable(findings, name)
     warnings = [finding.message for finding in findings if finding.severity == "warning"]
-    if evidence.tail is None and isinstance(evidence.still, Missing):
+    if evidence.tail is None and isinstance(evidence.still, Missing) and not evidence.held:
         warnings.append(NO_TAIL)
     origin = evidence.machine.calibration
     if origin is not None:

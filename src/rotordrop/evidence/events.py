@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.table import parameter
 from rotordrop.errors import NoDropError, RecordError
+from rotordrop.evidence.ends import falling
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
@@ -123,10 +124,14 @@ def find_fall(record: Record, rotor: FreeRotor, begun: Beginning, *, until: floa
 
 def of_whole(levitated: LevitatedModel, record: Record) -> LevitatedModel:
     """The levitated motion of a record in the planes whose sensors give x and y."""
-    whole = record.whole
-    if whole is record:
+    return of_part(levitated, record, record.whole)
+
+
+def of_part(levitated: LevitatedModel, record: Record, part: Record) -> LevitatedModel:
+    """The levitated motion of a record in the channels of a part of it."""
+    if len(part.sensors) == len(record.sensors):
         return levitated
-    return levitated.of_channels([record.sensors.index(sensor) for sensor in whole.sensors])
+    return levitated.of_channels([record.sensors.index(sensor) for sensor in part.sensors])
 
 
 def instant_of(fall: Fall, levitated: LevitatedModel, record: Record) -> DropInstant:
@@ -197,10 +202,11 @@ def beginning_of(record: Record, machine: Machine) -> Beginning:
     RecordError
         When the rotor does not fall in the record, or the record does not begin before the fall.
     """
-    coarse = coarse_drop(record.whole, machine)
+    fell = falling(record, machine)
+    coarse = coarse_drop(fell, machine)
     levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
     if levitated.end <= coarse.instant - _UNSURE - 2.0 / record.sampling_rate:
-        coarse = _sooner(record.whole, machine, of_whole(levitated, record), coarse)
+        coarse = _sooner(fell, machine, of_part(levitated, record, fell), coarse)
         levitated = fit_levitated(record, coarse.instant - _UNSURE, speed=coarse.speed)
     return Beginning(coarse=coarse, levitated=levitated)
 
@@ -390,8 +396,9 @@ EARLIEST = 5e-3
 
 def begins_with_fall(record: Record, machine: Machine) -> bool:
     """Whether the rotor has fallen by a share of its gap before it could have levitated for 5 ms."""
-    gaps = nominal_gaps(machine, record.whole)
-    height = until_fallen(record.whole, gaps, first=1).motion[:, :, 1]
+    fell = falling(record, machine)
+    gaps = nominal_gaps(machine, fell)
+    height = until_fallen(fell, gaps, first=1).motion[:, :, 1]
     sunk = height[:1] - height > FALLEN_SHARE * gaps
     if not sunk.all(axis=1).any():
         return False
@@ -413,10 +420,11 @@ def power_off_of_fall(record: Record, machine: Machine) -> PowerOff:
     The rotor is taken to be at rest vertically at power-off, so the time at which the fall has no velocity is
     power-off, whether it is in the record or not.
     """
-    gravity, height = float(machine.gravity), record.whole.motion[:, :, 1]
-    low = height[0] - height > FALLEN_SHARE * nominal_gaps(machine, record.whole)
+    fell = falling(record, machine)
+    gravity, height = float(machine.gravity), fell.motion[:, :, 1]
+    low = height[0] - height > FALLEN_SHARE * nominal_gaps(machine, fell)
     start = float(record.time[0])
-    contact = first_sudden(record.whole, gravity, start, sinking(low))
+    contact = first_sudden(fell, gravity, start, sinking(low))
     chosen = record.time < contact - MARGIN
     count = int(np.count_nonzero(chosen))
     if count < FEWEST:

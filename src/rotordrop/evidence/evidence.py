@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.errors import IdentificationError, RecordError, RotordropError
+from rotordrop.errors import IdentificationError, RecordError, RotordropError, UnsettledError
+from rotordrop.evidence.ends import falling, held_bearings
 from rotordrop.evidence.events import (
     AFTER_FALL,
     Beginning,
@@ -23,6 +24,7 @@ from rotordrop.evidence.events import (
     find_fall,
     instant_of,
     nominal_gaps,
+    of_part,
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
@@ -46,6 +48,9 @@ if TYPE_CHECKING:
     from rotordrop.rotor.parameters import DropModel
 
 Fact = TypeVar("Fact")
+
+BEHIND_FALL = 5e-4
+"""Time behind the fitted fall up to which that of a rotor with one end held is followed on [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +134,26 @@ class Evidence:
         """The levitated motion in the planes whose sensors give x and y."""
         return of_whole(known(self.beginning).levitated, self.record)
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Touchdown bearings whose end did not fall, because its magnets stayed on."""
+        return held_bearings(self.machine)
+
+    @cached_property
+    def falling(self) -> Record:
+        """The whole planes of the record whose end fell."""
+        return falling(self.record, self.machine)
+
+    @cached_property
+    def falling_floats(self) -> LevitatedModel:
+        """The levitated motion in those planes."""
+        return of_part(known(self.beginning).levitated, self.record, self.falling)
+
     @cached_property
     def flights(self) -> Weighed | None:
         """How fast every sensor saw the rotor fall between impacts; None where it never flew."""
+        if self.held:
+            return None
         from rotordrop.evidence.quality.flight import weighed
 
         drop = known(self.beginning).coarse.instant
@@ -140,14 +162,24 @@ class Evidence:
     @cached_property
     def still(self) -> Record | Missing:
         """The settled part of the tail, or of a record that reaches standstill."""
-        return sought(lambda: resting_record(self.record, self.tail, self.machine))
+
+        def found() -> Record:
+            if self.held:
+                raise UnsettledError(
+                    self.record.name,
+                    f"shows no rotor that lies on all its bearings: {', '.join(self.held)} stayed held by "
+                    "its magnets",
+                )
+            return resting_record(self.record, self.tail, self.machine)
+
+        return sought(found)
 
     @cached_property
     def motion(self) -> Motion | Missing:
         """The paths in the clearance circles that the record shows without the machine file."""
         from rotordrop.evidence.paths import motion_of
 
-        whole = self.record.whole
+        whole = self.falling
         return sought(lambda: motion_of(whole, gaps=(None,) * len(whole.planes), angles_known=True))
 
     @cached_property
@@ -316,6 +348,10 @@ class Evidence:
                 )
             reached = np.full(len(names), np.nan)
             for contact in first_forces(self.record, self.machine, instant):
+                if contact.bearing in self.held:
+                    continue  # that is the force of its magnets
+                if self.held and contact.start > instant.fall.end + BEHIND_FALL:
+                    continue  # what a magnet adds to its force is not known so far behind the fall
                 b = names.index(contact.bearing)
                 along = along_sensors(instant.fall.predicted(np.array([contact.start])), self.record.sensors)
                 reached[b] = np.hypot(*sensing.at_bearings(along)[0, b])

@@ -18,9 +18,10 @@ import numpy as np
 
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.evidence.free_rotor import FreeRotor, Responses
+from rotordrop.evidence.free_rotor import GROWN, POWERS, FreeRotor, Responses
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.sensing import sensor_sigmas
+from rotordrop.units import GRAVITY
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -37,6 +38,10 @@ _SIDEWAYS_SHARE = 0.1
 
 _BACKWARD_SHARE = 0.3
 """That of the turning force against the spin over the one with it [1]; chosen, not measured."""
+
+HELD_MOVES, LOOSE = 0.5, 2.0
+"""How fast a held end of a rotor moves over a free fall at most, where the other end falls, and the factor to
+which the loop of its magnet is known [1] (chosen): a rod held at its end by nothing rises there by half."""
 
 _GROWTH = 4e-4
 """Step by which the window of the fit grows [s] (chosen)."""
@@ -75,7 +80,8 @@ class FallProblem:
 
     Release and time constant of the remanent lift are searched; the other unknowns follow linearly. Their
     order: remanent forces in x and in y over static lift, turning forces with the spin and against it (real,
-    then imaginary parts), per place where the rotor was held; relative gain errors of the sensors.
+    then imaginary parts), per place where the rotor was held; of every magnet that stays on, forces that grow
+    with powers of the time, in x and then in y [N]; relative gain errors of the sensors.
     """
 
     time: Array
@@ -104,7 +110,8 @@ class FallProblem:
         expected = fall + np.einsum("tsa->ts", parts[1]) * REMANENT_SHARE[0]
         # a gain that is off shows as a share of the fall that is expected, so the problem stays linear
         own = expected[:, :, None] * np.eye(fall.shape[1])
-        return fall, np.concatenate([*parts, own], axis=-1)
+        held = self.seen(self.responses.growing(since))
+        return fall, np.concatenate([*parts, held.real, -held.imag, own], axis=-1)
 
     def seen(self, response: ComplexArray) -> ComplexArray:
         """Complex displacement of the planes as the sensors see it; the real part is the reading."""
@@ -375,7 +382,8 @@ def _problem(
     ambs, (share, spread) = len(rotor.lift), REMANENT_SHARE
     forces = [_SIDEWAYS_SHARE, spread, turning, turning, _BACKWARD_SHARE * turning, _BACKWARD_SHARE * turning]
     gains = np.maximum(sensor_sigmas("gain", record.sensors, 1.0), 1e-4)
-    expected = np.zeros(len(forces) * ambs + len(gains))
+    grown = np.tile(np.repeat(held_forces(rotor), POWERS), 2)
+    expected = np.zeros(len(forces) * ambs + len(grown) + len(gains))
     expected[ambs : 2 * ambs] = share
     return FallProblem(
         time=time,
@@ -387,5 +395,17 @@ def _problem(
         origin=origin,
         responses=responses,
         prior_mean=expected,
-        prior_error=np.concatenate([np.repeat(forces, ambs), gains]),
+        prior_error=np.concatenate([np.repeat(forces, ambs), grown, gains]),
+    )
+
+
+def held_forces(rotor: FreeRotor) -> Array:
+    """Size of what a magnet that stays on adds to its force in `GROWN`, shape (H,) [N].
+
+    A free rotor whose other end falls moves there by a part of the fall; the spring answers to the way, the
+    damper to the speed, and neither is known better than to a factor of two.
+    """
+    speed = HELD_MOVES * GRAVITY * GROWN
+    return np.array(
+        [LOOSE * (stiffness * 0.5 * speed * GROWN + damping * speed) for _, stiffness, damping in rotor.held]
     )

@@ -16,6 +16,7 @@ from rotordrop.errors import NothingFallsError, RecordError, UnpairedError
 from rotordrop.evidence.events import expected_gap
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
+from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.paths import (
     Drop,
     Gap,
@@ -248,6 +249,7 @@ def look(
     paper 52, the position index that of its counterpart by distance; window and normalisation are those given
     at `PlaneLook`. Displacements are those of the sensor planes.
     Not validated: impacts are those of the displacement alone, without a model of the contact.
+    Where the magnets of one end hold on, the look is of the end that falls, and its first note says so.
     Where nothing falls, the look has no drop but the contacts of a rotor that its magnets hold; where no two
     channels make a plane, it has the levels of the channels.
     """
@@ -257,6 +259,7 @@ def look(
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
         return _look_at_channels(FilePath(str(record)), profile, str(error))
+    machine = None if machine is None else as_dropped(read, machine)
     evidence = None if machine is None else Evidence(record=read, machine=machine, name=read.name)
     findings = _checked(read) if evidence is None else checked(evidence)
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
@@ -264,14 +267,21 @@ def look(
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
     gaps = _gaps(read, machine, gap)
     guessed = (*read.notes, *(arrangement.notes if arrangement else ()))
+    fell = read
+    ends = one_end(read, None if None in gaps else np.array([one[0] for one in gaps if one]))
+    if ends is not None:
+        guessed = (ends.words(read), *guessed)
+        fell = read.of_channels(ends.columns(read, held=False))
+        gaps = tuple(one for one, stays in zip(gaps, ends.held, strict=True) if not stays)
     try:
-        motion = motion_of(read, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
+        motion = motion_of(fell, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
         drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
         if not drops:
             raise NothingFallsError("the rotor does not fall from where it floated; check channels and gap")
     except NothingFallsError as error:
         unseen = not_seen(evidence, fell=False)
-        return _look_at_held(read, findings, unseen, gaps, guessed, machine, str(error))
+        every = _gaps(read, machine, gap)
+        return _look_at_held(read, findings, unseen, every, guessed, machine, str(error))
     turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
@@ -283,7 +293,7 @@ def look(
         planes=tuple(_plane_looks(motion, drops[0], turning)),
         standstill=standstill_of(read),
         speed=turning,
-        synchronous=_synchronous(read, motion, drops[0].release),
+        synchronous=_synchronous(fell, motion, drops[0].release),
         notes=(*guessed, *motion.notes),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -335,6 +335,31 @@ class Machine(Description):
             raise UsageError(f"{name} cannot have a bearing {designation!r}: {_reasons(error)}") from error
         others = tuple(changed if one.name == name else one for one in self.touchdown_bearings)
         return self.completed_with({"touchdown_bearings": others})
+
+    def with_magnets_on(self, names: Iterable[str]) -> Machine:
+        """Give the same machine, some of whose AMBs stay on when the others let go.
+
+        Raises
+        ------
+        UsageError
+            If it has no AMB of a name, or none is left to let go.
+        """
+        chosen, known = list(names), [amb.name for amb in self.ambs]
+        if not chosen:
+            return self
+        for name in chosen:
+            if name not in known:
+                raise UsageError(
+                    f"the machine {self.name!r} has no AMB {name!r} that could stay on; expected one of "
+                    f"{', '.join(known) or 'none'}. Name it as the machine file does"
+                )
+        if set(chosen) == set(known):
+            raise UsageError(
+                f"every AMB of the machine {self.name!r} stays on, so that nothing falls; expected one at "
+                "least that lets go. Name fewer"
+            )
+        stay = (amb.completed_with({"stays_on": amb.stays_on or amb.name in chosen}) for amb in self.ambs)
+        return self.completed_with({"ambs": tuple(stay)})
 
     def calibrated_on(self, origin: CalibrationOrigin) -> Machine:
         """Give the same machine, with the drops that its estimates come from."""

@@ -104,7 +104,7 @@ LOOPS_ACT = 3
 N_FLAGS = 4
 
 # Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
-# reference.
+# reference, whether it holds on when the others let go.
 REMANENT_X = 0
 REMANENT_Y = 1
 HOLDING_X = 2
@@ -113,7 +113,8 @@ AMB_STIFFNESS = 4
 AMB_DAMPING = 5
 AMB_REFERENCE_X = 6
 AMB_REFERENCE_Y = 7
-N_MAGNET_COLUMNS = 8
+AMB_STAYS = 8
+N_MAGNET_COLUMNS = 9
 
 # Behind these, in a model whose magnets are in the loop: numbers of coils and controller, then the shape (m,)
 # of the plane that the controller measures.

@@ -274,8 +274,9 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
             yield of_drop(row, str(plane), plane, 0.0, max(float(unbalance.amount), 1e-9))
     share = weight_per_magnet(machine)
     for a, amb in enumerate(machine.ambs):
-        for row in rows("magnet"):
-            yield of_drop(row, amb.name, a, 0.0, row.guess_sigma * share)
+        of_magnet = () if amb.stays_on else rows("magnet")
+        yield from (of_drop(row, amb.name, a, 0.0, row.guess_sigma * share) for row in of_magnet)
+    yield from _held_magnets(model)
     if machine.ambs:
         described = machine.remanence_time_constant
         known = prior(REMANENCE, guess(REMANENCE_TIME) if described is None else described)
@@ -298,6 +299,16 @@ def _from_mark(model: DropModel) -> Iterator[Unknown]:
                 limits = None if row.scaled is None else row.scaled(part, load)[1]
                 known = Prior(mean=0.0, sigma=max(row.guess_sigma * float(amount), 1e-9), start=0.0)
                 yield _unknown(model, row, name, index, amount, known, limits=limits)
+
+
+def _held_magnets(model: DropModel) -> Iterator[Unknown]:
+    """Unknowns of the magnets that stay on: their closed loop, and where they hold the rotor."""
+    gap = smallest_gap(model.machine)
+    for index, amb in enumerate(model.machine.ambs):
+        for row in structure_rows("magnet") if amb.stays_on else ():
+            loop = row.stated(amb)
+            known = prior(row, guess(0.0) if loop is None else loop, gap)
+            yield _unknown(model, row, amb.name, index, guess(known.start), known)
 
 
 def aero_time_constant(machine: Machine) -> float:

@@ -303,7 +303,10 @@ def add_rotor_accelerations(
 
 @lean_kernel
 def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> float:
-    """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W]."""
+    """Add holding, spring, damper and remanent forces of the AMBs; returns the power they put in [W].
+
+    An AMB that stays on holds for ever.
+    """
     qx, qy, sx, sy = modal_parts(y, p)
     _, _, ax, ay = modal_parts(dy, p)
     holds = t < p.spin[L.POWER_OFF_DELAY]
@@ -315,7 +318,7 @@ def add_magnet_forces(t: float, y: Array, p: KernelParameters, dy: Array) -> flo
         vy = project(shape, sy)
         fx = left * p.magnet[a, L.REMANENT_X]
         fy = left * p.magnet[a, L.REMANENT_Y]
-        if holds:
+        if holds or p.magnet[a, L.AMB_STAYS] != 0.0:
             ux = project(shape, qx) - p.magnet[a, L.AMB_REFERENCE_X]
             uy = project(shape, qy) - p.magnet[a, L.AMB_REFERENCE_Y]
             fx += (

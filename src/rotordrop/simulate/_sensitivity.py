@@ -337,14 +337,16 @@ def drop_jacobian_parts(
         J[i_w, i_w] += aerodynamics.speed_dependent_slope(
             y[i_w], p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC]
         )
-    if p.flags[L.MAGNETS_ACT] != 0 and t < p.spin[L.POWER_OFF_DELAY]:
-        _magnet_jacobian(p, J)
+    if p.flags[L.MAGNETS_ACT] != 0:
+        _magnet_jacobian(t < p.spin[L.POWER_OFF_DELAY], p, J)
 
 
 @lean_kernel
-def _magnet_jacobian(p: KernelParameters, J: Array) -> None:
+def _magnet_jacobian(all_hold: bool, p: KernelParameters, J: Array) -> None:
     m, n_q = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES]
     for a in range(p.magnet.shape[0]):
+        if not all_hold and p.magnet[a, L.AMB_STAYS] == 0.0:
+            continue
         for k in range(m):
             for j in range(m):
                 shapes = p.magnet_shape[a, k] * p.magnet_shape[a, j]

@@ -51,6 +51,8 @@ def _started(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]
     parameters = _with_spin(model.parameters, case)
     _refuse_overspeed(model, case.speed)
     start = case.start
+    if not isinstance(start, LevitatedStart) and any(amb.stays_on for amb in model.machine.ambs):
+        parameters = _with_magnets(parameters, LevitatedStart(), levitated_static(model, None, case.speed)[1])
     if isinstance(start, StateStart):
         state = np.array(start.state, dtype=np.float64)
         if state.shape != (model.layout.size,):
@@ -233,7 +235,11 @@ def _with_magnets(parameters: KernelParameters, start: LevitatedStart, holding: 
                 "x and y for each AMB, in newtons."
             )
         magnet[:, L.REMANENT_X : L.REMANENT_Y + 1] = force
+    # a magnet that stays on has its whole force, and no remanent one beside it
+    stays = magnet[:, L.AMB_STAYS] != 0.0
+    magnet[stays, L.REMANENT_X : L.REMANENT_Y + 1] = 0.0
     spin[L.POWER_OFF_DELAY] = start.delay
     spin[L.REMANENCE_TIME_CONSTANT] = start.remanence_time_constant
-    flags[L.MAGNETS_ACT] = 1 if start.delay > 0.0 or start.remanent_force is not None else 0
+    acts = start.delay > 0.0 or start.remanent_force is not None or bool(stays.any())
+    flags[L.MAGNETS_ACT] = int(acts)
     return parameters._replace(magnet=magnet, spin=spin, flags=flags)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.physics import columns as L
 from rotordrop.track.forces import stress_at_force
 from rotordrop.track.problem import DropProblem
 
@@ -117,11 +118,14 @@ def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     zero = float(np.max(variance[first : first + problem.n_channels]))
     margin = GATE_MARGIN * problem.mean[entries] + 2.0 * np.sqrt(variance[entries] + zero)
     motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
+    reach = problem.mean[entries] - margin - _play(problem)
+    # at an end that was held, what the description of its magnet gets wrong is found as a force
+    reach[list(problem.held)] = 0.0
     return SensorCorrections(
         gain_errors=gain_errors,
         offsets=offsets,
         radius=np.hypot(motion[..., 0], motion[..., 1]),
-        reach=problem.mean[entries] - margin - _play(problem),
+        reach=reach,
         theta=problem.mean[problem.parameter_slice],
     )
 
@@ -300,7 +304,18 @@ def rotor_of(problem: DropProblem) -> ForcedRotor:
     push[:m, 0::2] = push[m:, 1::2] = -p.bearing_shape.T
     weight[m:] = p.gravity
     damping = np.block([[np.diag(p.damping), turned], [-turned, np.diag(p.damping)]])
-    A, gravity, n = transition(np.diag(np.tile(p.eigenvalue, 2)), damping, push, weight, dt)
+    stiffness = np.diag(np.tile(p.eigenvalue, 2))
+    for a in np.flatnonzero(p.magnet[:, L.AMB_STAYS]).tolist():
+        shape, row = p.magnet_shape[a], p.magnet[a]
+        spring = np.kron(np.eye(2), np.outer(shape, shape))
+        stiffness = stiffness + row[L.AMB_STIFFNESS] * spring
+        damping = damping + row[L.AMB_DAMPING] * spring
+        for axis in range(2):
+            entry = problem.entries_that_set("magnet", a, L.AMB_REFERENCE_X + axis)
+            place = float(problem.mean[entry].sum())
+            force = row[L.HOLDING_X + axis] + row[L.AMB_STIFFNESS] * place
+            weight[axis * m : (axis + 1) * m] += force * shape
+    A, gravity, n = transition(stiffness, damping, push, weight, dt)
     C = np.zeros((problem.n_channels, len(A)))
     C[:, : 2 * m] = problem.sensor_rows[:, : 2 * m]
     start, variance = np.zeros(len(A)), np.zeros(len(A))

@@ -86,9 +86,24 @@ def prior_at_power_off(
     share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     inferred_together(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     correlate(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    _hold(model, unknowns, mean, covariance)
     if layout.sensor_own:
         begin_caught_up(layout, rows, mean, covariance)
     return mean, covariance
+
+
+def _hold(model: DropModel, unknowns: tuple[Unknown, ...], mean: Array, covariance: Array) -> None:
+    """Let a magnet that stays on hold the rotor where it is at power-off, but for its orbit."""
+    layout, orbit = model.layout, START_ORBIT_SIGMA * smallest_gap(model.machine)
+    for i, unknown in enumerate(unknowns, start=layout.n_dynamic):
+        for axis, modes in ((L.AMB_REFERENCE_X, layout.modal_x), (L.AMB_REFERENCE_Y, layout.modal_y)):
+            if not unknown.sets("magnet", axis):
+                continue
+            seen = np.zeros(len(mean))
+            seen[modes] = model.parameters.magnet_shape[unknown.targets[0].row]
+            mean[i] = seen @ mean
+            covariance[i, :] = covariance[:, i] = covariance @ seen
+            covariance[i, i] = seen @ covariance @ seen + orbit**2
 
 
 def start_of(mean: Array, model: DropModel, unknowns: tuple[Unknown, ...]) -> Array:

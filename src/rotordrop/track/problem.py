@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
+from rotordrop.evidence.ends import held_bearings
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel, race_sag, static_sag
 from rotordrop.rotor.statics import settled_sag
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
 from rotordrop.series import noise_by_differences
+from rotordrop.simulate.levitation import levitated_static
 from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
@@ -126,6 +128,12 @@ class DropProblem:
     def fall_time(self) -> float:
         """Time of a free fall through the narrowest air gap [s]."""
         return fall_time(self.model.machine)
+
+    @property
+    def held(self) -> tuple[int, ...]:
+        """Numbers of the bearings whose end did not fall, because its magnets stayed on."""
+        held = held_bearings(self.model.machine)
+        return tuple(b for b, name in enumerate(self.model.bearing_names) if name in held)
 
     @property
     def n_channels(self) -> int:
@@ -266,7 +274,10 @@ def _prepared(model: DropModel, omega: float) -> DropModel:
     flags[L.MAGNETS_ACT] = 1
     bearing = p.bearing.copy()
     bearing[:, L.SMOOTHING_SPEED] = np.maximum(bearing[:, L.SMOOTHING_SPEED], SMOOTHED_FRICTION_SPEED)
-    return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing))
+    magnet = p.magnet.copy()
+    if np.any(magnet[:, L.AMB_STAYS] != 0.0):
+        magnet[:, L.HOLDING_X : L.HOLDING_Y + 1] = levitated_static(model, None, omega)[1]
+    return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing, magnet=magnet))
 
 
 def _thinned(time: Array, speed: Array) -> Array:

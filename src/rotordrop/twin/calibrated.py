@@ -189,6 +189,8 @@ def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     places = {unknown.path: problem.n_dynamic + k for k, unknown in enumerate(problem.unknowns)}
     lifts = []
     for amb in machine.ambs:
+        if amb.stays_on:
+            continue
         entries = [places[row.path_of(amb.name)] for row in FORCES]
         (sideways, up), (sideways_error, up_error) = (
             [float(values[k]) / share for k in entries] for values in (mean, sigma)

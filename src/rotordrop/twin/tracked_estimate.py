@@ -35,6 +35,7 @@ from rotordrop.twin.tracked_loads import (
     bearing_drop,
     check_without_form_error,
     cross_checks,
+    from_nothing,
     is_beyond_accuracy,
     is_beyond_factor,
     loads_of_cross_check,
@@ -203,7 +204,7 @@ def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inpu
         apart = [
             f"the peak force at {name} is {peak:.0f} N, without a contact law {check.peak[b]:.0f} N"
             for b, name in enumerate(problem.model.bearing_names)
-            if departs(peak := float(drop.forces.magnitude[:, b].max()), check, b)
+            if b not in problem.held and departs(peak := float(drop.forces.magnitude[:, b].max()), check, b)
         ]
         if not apart:
             return drop, check
@@ -236,6 +237,8 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
     replaced_at = [False] * len(problem.model.bearing_names)
     if not fits and check is not None:
         for b, name in enumerate(problem.model.bearing_names):
+            if b in problem.held:
+                continue
             # the twin has lost the drop there: by its peak force, or by an air gap that cannot be
             gap, peak = found[AIR_GAP.path_of(name)], float(drop.forces.magnitude[:, b].max())
             replaced_at[b] = is_beyond_factor(peak, check, b) or is_lost(problem, gap.estimate, b)
@@ -293,6 +296,8 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
 
 def _loads(drop: TrackedDrop, judged: _Judgement, b: int, preload: Known | None = None) -> Loads:
     twin = _twin(drop, judged, b)
+    if b in drop.problem.held:
+        return from_nothing(twin)
     if judged.fits or judged.check is None:
         return twin
     if judged.replaced_at[b]:
@@ -315,6 +320,8 @@ def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...
         return ()
     found: list[CrossCheck] = []
     for b, name in enumerate(drop.problem.model.bearing_names):
+        if b in drop.problem.held:
+            continue  # the cross-check sees what its magnets do there
         twin = _twin(drop, judged, b)
         found += cross_checks(name, twin, drop.forces, judged.check, b, replaced=judged.replaced_at[b])
     return tuple(found)

@@ -214,6 +214,19 @@ def mixed_loads(loads: Loads, others: Sequence[tuple[float, Loads]]) -> Loads:
     return _as_wide_as(loads, peak_force, peak_stress, means)
 
 
+def from_nothing(loads: Loads) -> Loads:
+    """Force of a bearing whose end was held: what the twin finds there is noise, its interval holds zero."""
+
+    def held(known: Known) -> Known:
+        return replace(known, interval_90=(0.0, known.high))
+
+    return replace(
+        loads,
+        peak_force=replace(loads.peak_force, known=held(loads.peak_force.known)),
+        means={name: held(known) if known.unit == "N" else known for name, known in loads.means.items()},
+    )
+
+
 def _history(
     forces: ForceHistory, values: Array, sigma: Array, b: int, model_share: float
 ) -> tuple[History, Array]:

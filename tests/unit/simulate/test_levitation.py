@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.errors import SimulationError
+from rotordrop.errors import SimulationError, UsageError
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart
+from rotordrop.simulate._sensitivity import drop_jacobian
+from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
-from rotordrop.simulate.levitation import levitated_orbit, levitated_static
+from rotordrop.simulate.levitation import levitated_orbit, levitated_static, start_of_drop
 
 SPEED = 2.0 * np.pi * 150.0
 
@@ -121,3 +122,45 @@ def test_a_state_of_another_basis_is_refused(levitated):
     start = StateStart(state=np.zeros(7))
     with pytest.raises(SimulationError, match=r"start state has shape \(7,\); this model expects \(54,\)"):
         simulate_drop(levitated, DropCase(speed=SPEED, start=start))
+
+
+@pytest.fixture(scope="module")
+def one_end():
+    return build_drop_model(example_machine("lp400").with_magnets_on(["NDE"]), "quick")
+
+
+@pytest.mark.parametrize("start", [LevitatedStart(), CentredStart()])
+def test_one_end_falls_where_the_magnet_of_the_other_stays_on(one_end, start):
+    """The held end never touches; the other falls as a bar about it, faster or slower than free, and lies."""
+    result = simulate_drop(one_end, DropCase(speed=SPEED, duration=0.2, start=start))
+    held, fell = (one_end.bearing_names.index(name) for name in ("NDE", "DE"))
+    reach = np.hypot(*np.moveaxis(result.displacement, -1, 0))
+    gaps = [float(bearing.air_gap) for bearing in one_end.machine.touchdown_bearings]
+    assert np.max(result.contact_force[:, held]) == 0.0
+    assert np.max(reach[:, held]) < 0.7 * gaps[held]
+    assert np.max(result.contact_force[:, fell]) > 3.0 * float(one_end.load_shares[fell])
+    assert result.certificate.energy_residual < 1e-4 * result.certificate.energy_scale
+
+
+def test_a_magnet_that_stays_on_has_the_slopes_of_its_spring_and_damper(one_end):
+    _, parameters = start_of_drop(one_end, DropCase(speed=SPEED, start=LevitatedStart()))
+    free = one_end.with_values({}).parameters
+    size, m = one_end.layout.n_dynamic, one_end.layout.n_modes
+    state = np.zeros(one_end.layout.size)
+    slopes = []
+    for p in (parameters, free):
+        slopes.append(np.zeros((size, size)))
+        drop_jacobian(1.0, state, p, slopes[-1])
+    added, shape, amb = slopes[0] - slopes[1], one_end.parameters.magnet_shape[0], one_end.machine.ambs[0]
+    rates = one_end.layout.n_coordinates + np.arange(m)
+    assert added[np.ix_(rates, np.arange(m))] == pytest.approx(-float(amb.stiffness) * np.outer(shape, shape))
+    assert added[np.ix_(rates, rates)] == pytest.approx(-float(amb.damping) * np.outer(shape, shape))
+
+
+def test_magnets_that_stay_on_are_named_and_leave_one_to_let_go():
+    machine = example_machine("lp400")
+    assert machine.with_magnets_on([]) is machine
+    with pytest.raises(UsageError, match="no AMB 'A' that could stay on; expected one of NDE, DE"):
+        machine.with_magnets_on(["A"])
+    with pytest.raises(UsageError, match=r"every AMB .* nothing falls"):
+        machine.with_magnets_on(["NDE", "DE"])

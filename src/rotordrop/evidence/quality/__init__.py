@@ -15,12 +15,20 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import NoDropError, RecordError
+from rotordrop.evidence.ends import held_planes
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
+from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels, check_rail
 from rotordrop.evidence.quality.continuity import check_orbit
-from rotordrop.evidence.quality.fall import check_ends, check_exchanged, fell_as_described
+from rotordrop.evidence.quality.fall import (
+    check_ends,
+    check_exchanged,
+    fell_as_described,
+    read_otherwise,
+    undecided,
+)
 from rotordrop.evidence.quality.finding import (
     Finding,
     Kind,
@@ -79,7 +87,8 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     tuple of Finding
         The worst first; empty when there is nothing to say.
     """
-    return checked(Evidence(record=record, machine=machine, tail=tail, name=record.name))
+    dropped = as_dropped(record, machine)
+    return checked(Evidence(record=record, machine=dropped, tail=tail, name=record.name))
 
 
 def checked(evidence: Evidence) -> tuple[Finding, ...]:
@@ -115,12 +124,12 @@ def _tail_as_read(evidence: Evidence) -> list[Finding]:
 
 
 def _units(evidence: Evidence) -> list[Finding]:
-    return check_units(evidence.record.whole, evidence.machine, _gaps(evidence))
+    return check_units(evidence.falling, evidence.machine, _gaps(evidence))
 
 
 def _gaps(evidence: Evidence) -> list[Finding]:
     motion = evidence.motion
-    return [] if isinstance(motion, Missing) else check_gaps(motion, evidence.record.whole, evidence.machine)
+    return [] if isinstance(motion, Missing) else check_gaps(motion, evidence.falling, evidence.machine)
 
 
 def _speed(evidence: Evidence) -> list[Finding]:
@@ -130,11 +139,12 @@ def _speed(evidence: Evidence) -> list[Finding]:
 def _line(evidence: Evidence) -> list[Finding]:
     whole = evidence.record.whole
     assert whole.speed_readings is not None
-    return check_rotation_line(whole, _before_motion(whole), float(whole.speed_readings[0]))
+    before = _before_motion(evidence.falling)
+    return check_rotation_line(whole, before, float(whole.speed_readings[0]))
 
 
-def _before_motion(whole: Record) -> float:
-    return float(whole.time[first_motion(whole)[0]]) - _FALL_TIME
+def _before_motion(fell: Record) -> float:
+    return float(fell.time[first_motion(fell)[0]]) - _FALL_TIME
 
 
 def _wiring(evidence: Evidence) -> list[Finding]:
@@ -142,13 +152,15 @@ def _wiring(evidence: Evidence) -> list[Finding]:
     whole, floating = evidence.record.whole, _levitated(evidence)
     if floating is None:
         return []
-    sunk = fall_of(whole, floating.mean, first_motion(whole)[0])
-    found = check_planes(whole.planes, sunk, floating.amplitudes[0])
+    sunk = fall_of(whole, floating.mean, first_motion(evidence.falling)[0])
+    held = held_planes(whole, evidence.machine)
+    planes = tuple(plane for plane, stays in zip(whole.planes, held, strict=True) if not stays)
+    found = check_planes(planes, sunk, floating.amplitudes[0])
     fall = evidence.free_fall if stops(found) else Missing(reason="not asked")
     if isinstance(fall, Missing):
         return found
     straight = fell_as_described(whole, evidence.machine, fall)
-    return check_planes(whole.planes, sunk, floating.amplitudes[0], fell_straight=straight)
+    return check_planes(planes, sunk, floating.amplitudes[0], fell_straight=straight)
 
 
 def _levitated(evidence: Evidence) -> LevitatedModel | None:
@@ -158,7 +170,9 @@ def _levitated(evidence: Evidence) -> LevitatedModel | None:
     whole = evidence.record.whole
     assert whole.speed_readings is not None
     try:
-        return fit_levitated(whole, _before_motion(whole), speed=float(np.median(whole.speed_readings[:3])))
+        return fit_levitated(
+            whole, _before_motion(evidence.falling), speed=float(np.median(whole.speed_readings[:3]))
+        )
     except RecordError:
         return None
 
@@ -175,13 +189,13 @@ def _begins(evidence: Evidence) -> list[Finding]:
 
 def _recorder(evidence: Evidence) -> list[Finding]:
     # a high-pass bends a rest into what looks like a rail; what a filter explains is none
-    whole = evidence.record.whole
+    fell = evidence.falling
     instant = known(evidence.beginning).coarse.instant
     bounces = _bounces(evidence) / (2.0 * np.pi)
-    found = check_filters(whole, evidence.floating, instant, bounces)
+    found = check_filters(fell, evidence.falling_floats, instant, bounces)
     if not isinstance(evidence.motion, Missing):
         found += check_again(evidence.motion)
-    return found or check_rail(whole, first_motion(whole)[0])
+    return found or check_rail(fell, first_motion(fell)[0])
 
 
 def _bounces(evidence: Evidence) -> float:
@@ -195,12 +209,32 @@ def _length(evidence: Evidence) -> list[Finding]:
     return check_length(evidence.record.whole, known(evidence.beginning).coarse.instant, rests)
 
 
+def _one_end(evidence: Evidence) -> list[Finding]:
+    """Say which end stayed held by its magnets."""
+    if not evidence.held:
+        return []
+    whole = evidence.record.whole
+    found = one_end(whole, evidence.gaps)
+    words = f"{', '.join(evidence.held)} stayed held by its magnets" if found is None else found.words(whole)
+    return [
+        Finding(
+            kind=Kind.ONE_END,
+            message=f"a drop of one end: {words}",
+            remedy="if both ends fell, check the channels of that end; a machine file can say it with "
+            "stays_on = true of the magnet",
+            severity="warning",
+        )
+    ]
+
+
 def _fall(evidence: Evidence) -> list[Finding]:
     coarse = known(evidence.beginning).coarse
     near = evidence.record.whole.window(-np.inf, coarse.instant + _NEAR)
     fall = evidence.free_fall
     own = None if isinstance(fall, Missing) else fall
     machine, floating = evidence.machine, evidence.floating
+    if evidence.held:
+        return [undecided("only one of them fell"), *([] if own is None else read_otherwise(own))]
     found = check_ends(near, machine, evidence.rotor, floating, coarse, own)
     if own is None or stops(found):
         return found
@@ -214,6 +248,8 @@ def _flights(evidence: Evidence) -> list[Finding]:
 
 def _tail_at_rest(evidence: Evidence) -> list[Finding]:
     still, record, floating = evidence.still, evidence.record.whole, evidence.floating
+    if evidence.held:
+        return []  # a tail with one end held shows no air gap, and is not looked at
     if isinstance(still, Missing):
         return [] if evidence.tail is None else check_tail(still, evidence.machine, floating, record)
     found = check_tail(still.whole, evidence.machine, floating, record)
@@ -244,6 +280,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
         "orbit": lambda e: check_orbit(e.floating, e.record.whole),
         "levitated": lambda e: check_levitated(e.floating, e.record.whole),
         "length": _length,
+        "one end": _one_end,
         "fall": _fall,
         "flights": _flights,
         "gaps": _gaps,

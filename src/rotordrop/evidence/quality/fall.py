@@ -85,7 +85,7 @@ def check_ends(
     `own` is the fall fitted to the record as described, where it is known already.
     """
     if len({amb.node for amb in machine.ambs}) < 2 or len(record.planes) < 2:
-        return [_undecided("it takes two AMB planes in the machine file and two sensor planes")]
+        return [undecided("it takes two AMB planes in the machine file and two sensor planes")]
 
     def fitted(read: Record, floats: LevitatedModel, until: float | None = None) -> Fall:
         return find_fall(read, rotor, Beginning(coarse=coarse, levitated=floats), until=until)
@@ -203,7 +203,8 @@ def fell_as_described(record: Record, machine: Machine, fall: Fall) -> bool:
         return False
     if fall.misfit > GOOD_FIT:
         return False
-    upwards = fall.remanent_force[:, 1] / fall.rotor.lift
+    let_go = fall.rotor.lift != 0.0
+    upwards = fall.remanent_force[let_go, 1] / fall.rotor.lift[let_go]
     if np.any(upwards < _POSSIBLE_LIFT[0]) or np.any(upwards > _POSSIBLE_LIFT[1]):
         return False
     aside, error = _sideways(fall)
@@ -212,8 +213,9 @@ def fell_as_described(record: Record, machine: Machine, fall: Fall) -> bool:
 
 def _sideways(fall: Fall) -> tuple[Array, Array]:
     """Horizontal force at the release over static lift, per magnetic bearing, and its standard error [1]."""
-    share = fall.remanent_force[:, 0] / fall.rotor.lift
-    return share, np.sqrt(np.diag(fall.covariance)[: len(share)])
+    let_go = fall.rotor.lift != 0.0
+    share = fall.remanent_force[let_go, 0] / fall.rotor.lift[let_go]
+    return share, np.sqrt(np.diag(fall.covariance)[: len(let_go)][let_go])
 
 
 def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
@@ -244,7 +246,7 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
     tried = [(case, fall) for case, fall in zip(cases, falls, strict=True) if fall is not None]
     best = min(tried, key=lambda pair: pair[1].misfit, default=None)
     if best is None or best[1].misfit * _BETTER > mine or best[1].misfit > _BETTER * GOOD_FIT:
-        return _undecided(
+        return undecided(
             f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise, and no "
             "exchange of channels explains it clearly better"
         )
@@ -254,7 +256,7 @@ def _decide(mine: float, cases: list[_Case], falls: list[Fall | None]) -> Findin
         errors = fall.gain_errors
         index = int(np.argmax(np.abs(errors)))
         if abs(errors[index]) < WRONG_GAIN:
-            return _undecided(
+            return undecided(
                 f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise"
             )
         name = case.record.channel_names[index]
@@ -318,7 +320,8 @@ def _doubted(found: Finding) -> Finding:
     return replace(found, message=found.message + why, severity="warning")
 
 
-def _undecided(why: str) -> Finding:
+def undecided(why: str) -> Finding:
+    """That nothing tells the two ends apart, and why."""
     return Finding(
         kind=Kind.UNDECIDED_ENDS,
         message=f"whether the two ends are exchanged cannot be decided: {why}",

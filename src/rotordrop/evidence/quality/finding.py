@@ -63,6 +63,7 @@ class Kind(StrEnum):
     ENDS_TURNING = "record ends before standstill"
     NO_PRETRIGGER = "missing pre-trigger"
     NO_DROP = "no drop in the record"
+    ONE_END = "one end held"
     NOT_SETTLED = "not settled"
     TAIL_OFFSET = "tail offset"
     MACHINE_FILE = "machine file"

@@ -1,0 +1,125 @@
+"""A drop of one end: found in the record, said by the look and the gate, and posed as a problem."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.estimation import Replay, estimate_drops
+from rotordrop.evidence.evidence import Evidence, Missing
+from rotordrop.evidence.look import look
+from rotordrop.evidence.one_end import as_dropped, one_end
+from rotordrop.evidence.quality import Kind, check_record
+from rotordrop.physics import columns as L
+from rotordrop.track.input_state import corrections_by_record, rotor_of
+from rotordrop.twin.problems import twin_problem
+from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.violations import Violations
+
+SPEED = 2.0 * math.pi * 60.0
+HELD, FELL = "NDE", "DE"
+
+
+@pytest.fixture(scope="module")
+def drop(known):
+    """A recorded drop of a hidden machine whose NDE magnet stays on."""
+    hidden = hidden_machine(known, 14, Violations.model_validate({"magnets": {"stays_on": [HELD]}}))
+    made = synthesize_drop(hidden, SPEED, 140, duration=0.22, name="one end")
+    assert made.tail is None
+    assert made.truth["violated"] == ["one end held"]
+    return made
+
+
+@pytest.fixture(scope="module")
+def evidence(known, drop):
+    return Evidence(record=drop.record, machine=as_dropped(drop.record, known), name="one end")
+
+
+def test_the_record_shows_which_end_was_held(known, drop, synthetic):
+    found = one_end(drop.record)
+    assert found is not None
+    assert found.held == (True, False)
+    assert f"{HELD} stayed held by its magnets" in found.words(drop.record)
+    assert [amb.stays_on for amb in as_dropped(drop.record, known).ambs] == [True, False]
+    assert one_end(synthetic.record) is None
+    assert as_dropped(synthetic.record, known) is known
+
+
+def test_what_a_machine_file_says_of_its_magnets_stands(drop, known):
+    said = known.with_magnets_on([FELL])
+    assert as_dropped(drop.record, said) is said
+
+
+@pytest.mark.parametrize("with_machine", [False, True])
+def test_a_look_is_of_the_end_that_fell_and_says_so(drop, known, with_machine):
+    seen = look(drop.record, machine=known if with_machine else None)
+    assert [plane.plane for plane in seen.planes] == [FELL]
+    assert f"{HELD} stayed held by its magnets" in seen.notes[0]
+    assert seen.impacts
+    assert {impact.plane for impact in seen.impacts} == {FELL}
+    assert seen.drops[0].release == pytest.approx(drop.truth["t_off_in_record_s"], abs=3e-3)
+
+
+def test_the_gate_says_it_and_stops_nothing(drop, known):
+    found = check_record(drop.record, known)
+    assert [one.severity for one in found if one.kind is Kind.ONE_END] == ["warning"]
+    assert not [one for one in found if one.severity == "stop"]
+    assert Kind.WRONG_UNIT not in {one.kind for one in found}
+
+
+def test_the_fall_knows_that_one_magnet_holds_on(evidence, drop):
+    """Release and lift of the end that fell; the loop of the other is known to a factor of two only."""
+    fall, truth = evidence.free_fall, drop.truth
+    assert not isinstance(fall, Missing)
+    assert fall.misfit < 1.5
+    assert fall.instant == pytest.approx(truth["t_off_in_record_s"], abs=6e-5)
+    assert fall.remanent_force[0] == pytest.approx([0.0, 0.0])
+    assert np.isnan(evidence.reach).tolist() == [True, False]
+    gap = {b.name: float(b.air_gap) for b in evidence.machine.touchdown_bearings}[FELL]
+    assert evidence.reach[1] == pytest.approx(gap, rel=0.3)
+
+
+def test_the_twin_seeks_the_loop_of_that_magnet_and_not_its_lift(evidence):
+    problem = twin_problem(evidence.machine, evidence)
+    paths = [unknown.path for unknown in problem.unknowns]
+    for path in ("stiffness", "damping", "reference.x", "reference.y"):
+        assert f"{HELD}.{path}" in paths
+        assert f"{FELL}.{path}" not in paths
+    lifts = [path for path in paths if "remanent_force" in path]
+    assert {path.partition(".")[0] for path in lifts} == {FELL}
+    assert problem.held == (0,)
+    # it holds the rotor where it was, but for the orbit
+    layout, p = problem.model.layout, problem.model.parameters
+    apart = np.zeros(len(problem.mean))
+    apart[layout.modal_y] = p.magnet_shape[0]
+    apart[layout.n_dynamic + paths.index(f"{HELD}.reference.y")] = -1.0
+    assert apart @ problem.mean == pytest.approx(0.0, abs=1e-12)
+    assert math.sqrt(apart @ problem.covariance @ apart) < 2e-5
+    assert p.magnet[0, L.HOLDING_Y] > 0.0
+
+
+def test_the_cross_check_has_the_magnet_as_described_and_no_gate_there(evidence):
+    problem = twin_problem(evidence.machine, evidence)
+    assert corrections_by_record(problem).reach[0] == 0.0
+    assert corrections_by_record(problem).reach[1] > 0.0
+    rotor = rotor_of(problem)
+    free = SimpleNamespace(**vars(rotor))
+    # without forces the held end stays, the other falls
+    state = rotor.start.copy()
+    m = problem.model.layout.n_modes
+    at = problem.model.parameters.magnet_shape
+    begun = at @ state[m : 2 * m]
+    for _ in range(round(8e-3 / rotor.dt)):
+        state = free.A @ state + free.gravity
+    moved = at @ state[m : 2 * m] - begun
+    assert abs(moved[0]) < 0.4 * abs(moved[1])
+    assert moved[1] < -1.5e-4
+
+
+def test_drops_that_do_not_go_together_are_refused(drop, known, synthetic):
+    with pytest.raises(UsageError, match="drops are of one end"):
+        estimate_drops(known, [drop.record, synthetic.record])
+    with pytest.raises(RecordError, match="the replay knows no drop of one end"):
+        estimate_drops(known, [drop.record], method=Replay())
