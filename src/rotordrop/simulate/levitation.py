@@ -37,6 +37,11 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
         raise SimulationError(
             f"the model has its magnets {have} and the case {want}; build it with loops={looped}"
         )
+    if looped and any(amb.stays_on for amb in model.machine.ambs):
+        raise SimulationError(
+            "the machine has a magnet that stays on, as a spring and a damper, and the case has magnets in "
+            "the loop; say by an event which of them is switched off, or leave the events out"
+        )
     if looped:
         model = with_springs_of(model, case)
     state, parameters = _started(model, case)

@@ -153,3 +153,15 @@ def test_events_of_magnets_are_read_and_bad_ones_refused():
     for text in ("20 ms: lift", "20 ms", "20 ms: lost NDE DE x"):
         with pytest.raises(UsageError, match="is not 'WHEN: ACTION"):
             magnet_events([text], None, None)
+
+
+def test_a_magnet_that_stays_on_is_named_and_is_no_loop(capsys):
+    """The names are those of the machine file; a loop has events of its own for a magnet that fails."""
+    arguments = [*SHORT, "--levitated", "--stays-on"]
+    assert run([*arguments, "A"]) != 0
+    assert "no AMB 'A' that could stay on" in " ".join(capsys.readouterr().err.split())
+    assert run([*arguments, "NDE", "--relevitate", "60 ms"]) != 0
+    assert "--stays-on" in capsys.readouterr().err
+    assert run([*arguments, "NDE", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)["bearings"]
+    assert found["NDE"]["peak_force_N"]["value"] == pytest.approx(0.0, abs=1e-3)
