@@ -271,6 +271,6 @@ def print_calibration(result: Calibration, out: Console) -> None:
         )
     for name, checks in result.checks.items():
         for check in checks:
-            if not check.passed:
+            if check.failed:
                 out.print(f"{name}: {check.said()}")
     out.print(result.sentence())

@@ -285,7 +285,7 @@ class Estimate:
 
     def verdict_in(self, name_of: Callable[[str], str]) -> str:
         """The verdict, with what failed and with unknowns by the names that are given for their paths."""
-        failed = "; ".join(check.said(name_of) for check in self.checks if not check.passed)
+        failed = "; ".join(check.said(name_of) for check in self.checks if check.failed)
         said = " ".join((self.verdict.value, *(one.sentence for one in self.structure)))
         return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 

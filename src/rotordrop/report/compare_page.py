@@ -137,7 +137,7 @@ def _verdict(
 def _reach(one: ComparedDrop) -> str:
     """Between what the peak force of a drop may lie, for the statement that leaves it out."""
     peaks = {bearing: one.number(bearing, LOADS[0]) for bearing in one.drop.bearings}
-    parts = [f"{bearing} {peak.interval_text}" for bearing, peak in peaks.items() if peak.interval_90]
+    parts = [f"{bearing} {peak.text}" for bearing, peak in peaks.items() if peak.interval_90]
     return f"; its peak force may be {', '.join(parts)}" if parts else ""
 
 
@@ -182,6 +182,7 @@ def _boxes(drops: Sequence[ComparedDrop]) -> tuple[StressBox, ...]:
             outliers=np.zeros(0),
         )
         for one in drops
+        if one.drop.consistent  # of others no single number holds
         for bearing, entry in one.drop.bearings.items()
     )
 
@@ -200,7 +201,8 @@ def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ra
             for bearing in bearings
             if (bearing, number.field) in ranked
         ]
-    boxes = _boxes(drops)
+    if not (boxes := _boxes(drops)):
+        return Section("Severity", figures=tuple(figures), tables=tuple(tables))
     caption = "Distribution of the stress within each drop, outliers left out (Neisi 2020, Fig. 16)."
     figures.append(Figure(stress_box_figure(boxes), caption))
     return Section("Severity", figures=tuple(figures), tables=(*tables, stress_table(boxes)))
@@ -238,10 +240,11 @@ def comparison_figure(drops: Sequence[str], values: Mapping[str, Sequence[Quanti
             f"{name}, 90 % interval",
             column=column,
             mode="markers",
-            marker={"size": 9},
+            marker={"size": [0 if quantity.range_only else 9 for quantity in quantities]},
             legend=column == 1,
             error_y=bars([(one.value, *one.ends) for one in quantities], scale, thickness=1.6, width=6),
-            hover=f"%{{x}}: %{{y:.4~g}} {unit}",
+            customdata=[quantity.text for quantity in quantities],
+            hover="%{x}: %{customdata}",
         )
     figure.update_xaxes(type="category", range=[-0.6, len(drops) - 0.4])
     figure.update_yaxes(title_text=axis_title(name, unit), col=1)

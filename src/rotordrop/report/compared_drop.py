@@ -34,7 +34,10 @@ class ComparedDrop:
         return format_minute(self.drop.recorded)
 
     def number(self, bearing: str, number: Number) -> Quantity:
-        """A number at a bearing with its interval; a dash where the estimate does not state it."""
+        """A number at a bearing with its interval; a dash where the estimate does not state it.
+
+        Of an estimate that is not consistent with its record the interval alone is shown.
+        """
         found = self.drop.bearings[bearing].numbers.get(number.field)
         if found is None:
             return Quantity(value=math.nan, kind=number.kind)
@@ -44,6 +47,7 @@ class ComparedDrop:
             interval_90=found.interval,
             standard_error=found.standard_error,
             status=found.status or "",
+            range_only=not self.drop.consistent,
         )
 
     def hardest(self, bearing: str) -> str:

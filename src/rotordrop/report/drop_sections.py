@@ -25,6 +25,9 @@ CARRIED = (
     "The measured motion is carried from the planes of the sensors to the bearings along the straight line "
     "through them; the bending in between, a few micrometres, is left out."
 )
+NO_DISTRIBUTION = (
+    "No distribution of the stress is stated: its numbers have no ranges, and single numbers do not hold."
+)
 NO_IMPACT = "The rotor did not touch a bearing in this window."
 
 
@@ -35,11 +38,13 @@ def drop_sections(
     static_loads: Mapping[str, float] | None = None,
     *,
     contact_tables: tuple[Table, ...] = (),
+    certain: bool = True,
 ) -> tuple[Section, ...]:
     """Force, orbit, stress, impacts, motion and first contact of a drop, in this order.
 
     The origin says what is drawn, as "measured and estimated"; the speed at power-off [rad/s] names the
-    drop; static loads are the share of the weight by bearing [N].
+    drop; static loads are the share of the weight by bearing [N]. Where single numbers are not certain,
+    ranges alone are stated.
     """
     contact = Figure(
         first_contact_figure(bearings),
@@ -48,9 +53,9 @@ def drop_sections(
         "first contact",
     )
     return (
-        _force(bearings, static_loads or {}),
+        _force(bearings, static_loads or {}, certain=certain),
         orbit_section(bearings),
-        _stress(bearings, speed),
+        _stress(bearings, speed, certain=certain),
         _impacts(bearings),
         motion_section(bearings, origin),
         radial_section(bearings),
@@ -58,7 +63,7 @@ def drop_sections(
     )
 
 
-def force_panel(bearing: BearingDrop, loads: Mapping[str, float]) -> Panel:
+def force_panel(bearing: BearingDrop, loads: Mapping[str, float], *, certain: bool = True) -> Panel:
     """The ball force on the race with its band and peak, beside the share of the weight [N]."""
     return Panel(
         title=bearing.name,
@@ -67,10 +72,11 @@ def force_panel(bearing: BearingDrop, loads: Mapping[str, float]) -> Panel:
         band=bearing.force_band,
         levels=(("share of the weight", loads[bearing.name]),) if bearing.name in loads else (),
         peak=bearing.peak_force,
+        certain=certain,
     )
 
 
-def stress_panel(bearing: BearingDrop) -> Panel:
+def stress_panel(bearing: BearingDrop, *, certain: bool = True) -> Panel:
     """The largest Hertz stress with its band and peak, and what the preload alone does."""
     return Panel(
         title=bearing.name,
@@ -79,12 +85,13 @@ def stress_panel(bearing: BearingDrop) -> Panel:
         band=bearing.stress_band,
         levels=() if bearing.preload_stress is None else (("preload alone", bearing.preload_stress),),
         peak=bearing.peak_stress,
+        certain=certain,
     )
 
 
-def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Section:
+def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float], *, certain: bool) -> Section:
     """The whole force beside its stretch around the peak, where the 90 % interval can be seen."""
-    panels = [force_panel(bearing, loads) for bearing in bearings]
+    panels = [force_panel(bearing, loads, certain=certain) for bearing in bearings]
     near = [replace(panel.around(*AROUND_PEAK), title=f"{panel.title}, around its peak") for panel in panels]
     rows = [[replace(whole, peak=None), close] for whole, close in zip(panels, near, strict=True)]
     chart = time_panels(rows, 1.0, "N", from_zero=True, from_power_off=False)
@@ -92,13 +99,15 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float]) -> Secti
     return Section("Bearing force", figures=(Figure(chart, caption, "force"),))
 
 
-def _stress(bearings: Sequence[BearingDrop], speed: float) -> Section:
-    boxes = stress_boxes(bearings, speed)
+def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> Section:
     history = Figure(
-        time_panels([[stress_panel(bearing)] for bearing in bearings], MEGA, "MPa"),
+        time_panels([[stress_panel(bearing, certain=certain)] for bearing in bearings], MEGA, "MPa"),
         "Largest Hertz stress of all balls at the inner race, instantaneous.",
         "stress",
     )
+    if not certain:
+        return Section("Hertz stress", (), (Statement(NO_DISTRIBUTION),), (history,))
+    boxes = stress_boxes(bearings, speed)
     box = Figure(
         stress_box_figure(boxes),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",

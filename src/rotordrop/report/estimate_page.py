@@ -150,7 +150,7 @@ def _judgement(estimate: Estimate) -> Statement:
     level: Level = "good" if estimate.consistent else "bad"
     if isinstance(estimate.method, Replay):
         level = "notice"
-    elif estimate.consistent and any(not check.passed for check in estimate.checks):
+    elif estimate.consistent and any(check.failed for check in estimate.checks):
         level = "warning"
     return Statement(estimate.verdict_in(names_in(estimate)), level)
 
@@ -206,7 +206,12 @@ def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tupl
         tables=(cross_check_table(estimate.cross_check),),
     )
     force, orbit, *rest = drop_sections(
-        estimate.bearings, origin, estimate.speed, shares, contact_tables=tables
+        estimate.bearings,
+        origin,
+        estimate.speed,
+        shares,
+        contact_tables=tables,
+        certain=estimate.consistent,
     )
     further = (
         *rest,
@@ -272,6 +277,7 @@ def _parameters(estimate: Estimate) -> Section:
             Column("sensor", "sensor"),
             Column("gain error", lambda o: Quantity.of(o.gain_error, "share", range_only=uncertain)),
             Column("offset", lambda o: Quantity.of(o.offset, "length", range_only=uncertain)),
+            Column("verdict", lambda o: o.gain_error.status),
             Column("noise (standard deviation)", "noise", "length", 2),
         )
         tables.append(table(estimate.sensors, columns, "Sensors", SENSORS_NOTE))
@@ -297,7 +303,7 @@ def _consistency(estimate: Estimate) -> Section:
     name_of = names_in(estimate)
     columns = (
         Column("check", "name"),
-        Column("passed", lambda check: "yes" if check.passed else "no"),
+        Column("passed", lambda check: "yes" if check.passed else "no" if check.judged else "not judged"),
         Column("numbers compared", lambda check: check.said(name_of)),
     )
     checks = table(estimate.checks, columns, "Consistency of model and record", CHECKS_NOTE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from textwrap import shorten
 
 import numpy as np
@@ -13,7 +13,7 @@ from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
 from rotordrop.report.estimate_numbers import static_limit_statement
-from rotordrop.report.estimate_page import estimate_verdict
+from rotordrop.report.estimate_page import estimate_verdict, names_in
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.record_quality import unseen_in
 
@@ -40,7 +40,7 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     shares = ", ".join(f"{100.0 * one / STATIC_STRESS:.0f}" for one in stresses)
     rated = f"peak stress {shares} % of the {shown(STATIC_STRESS, 'pressure')} of C0 (ISO 76)"
     assumed = ", ".join(dict.fromkeys((*estimate.assumed.values(), rated)))
-    remedies = dict.fromkeys(check.remedy for check in estimate.checks if not check.passed and check.remedy)
+    remedies = dict.fromkeys(_remedies(estimate))
     closing = (
         f"{len(limits) - len(said)} more with --all" if len(limits) > len(said) else "",
         f"assumed: {assumed}",
@@ -57,6 +57,13 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
         ),
         screen=_loads(estimate),
     )
+
+
+def _remedies(estimate: Estimate) -> Iterator[str]:
+    """What to do next, first what may well let the model fit."""
+    yield from (one.measurement for one in estimate.advice if one.at_most)
+    name_of = names_in(estimate)
+    yield from (check.advised(name_of) for check in estimate.checks if check.failed and check.remedy)
 
 
 def _short(one: Statement, longest: int) -> Statement:
@@ -80,7 +87,7 @@ def _loads(estimate: Estimate) -> Table:
         "at, pressed towards": _moment,
         "peak Hertz stress": lambda b: number(b.peak_stress.known, "pressure"),
         "impacts (contacts)": _impacts,
-        "largest displacement": _displacement,
+        "largest displacement": lambda b: _displacement(b, certain=certain),
         "mean force, 150 to 200 ms": mean,
     }
     what = "90 % intervals" if certain else "90 % ranges"
@@ -106,10 +113,15 @@ def _moment(b: BearingDrop) -> str:
     return f"{when}, {math.degrees(math.atan2(y, x)):.0f}° (bottom −90°)"
 
 
-def _displacement(b: BearingDrop) -> str:
+def _displacement(b: BearingDrop, *, certain: bool) -> str:
+    """The largest distance from the centre, over the air gap, too; that alone, as a range, if not certain.
+
+    A gain error is in displacement and gap alike, and not in their ratio.
+    """
     farthest = float(np.nanmax(b.motions[-1].radial.values))
     known = b.values.get("air_gap_m")
+    if known is not None and not certain:
+        return f"{farthest / known.high:.2f} to {farthest / max(known.low, 1e-9):.2f} × the air gap"
     if known is None:
         return shown(farthest, "length")
-    gap = known.value
-    return f"{shown(farthest, 'length')}, {farthest / gap:.2f} × the air gap"
+    return f"{shown(farthest, 'length')}, {farthest / known.value:.2f} × the air gap"

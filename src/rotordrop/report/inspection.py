@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.estimate.bearing_drop import AirGap, BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import Column, Section, Statement, table
 from rotordrop.report.quantity import Quantity, shown
@@ -42,9 +43,7 @@ def inspection_section(estimate: Estimate) -> Section:
             )
             said.append(Statement(text, "warning"))
     gaps = "; ".join(
-        f"{bearing.name} {shown(bearing.values['air_gap_m'], 'length')}"
-        if "air_gap_m" in bearing.values
-        else f"{bearing.name} {1e6 * bearing.air_gap.upper:.0f} µm"
+        f"{bearing.name} {_gap(bearing, bearing.air_gap, certain=estimate.consistent)}"
         for bearing in estimate.bearings
         if bearing.air_gap is not None
     )
@@ -54,6 +53,15 @@ def inspection_section(estimate: Estimate) -> Section:
         "that has moved; turning each bearing by hand shows whether it still runs."
     )
     return Section("What to do", (), (*said, Statement(text), Statement(SCOPE)))
+
+
+def _gap(bearing: BearingDrop, limits: AirGap, *, certain: bool) -> str:
+    """The air gap with its 90 % interval, that alone where single numbers do not hold, or its limits."""
+    if (known := bearing.values.get("air_gap_m")) is None:
+        low, high = 1e6 * limits.lower, 1e6 * limits.upper
+        return f"{high:.0f} µm" if low == high else f"{low:.0f} to {high:.0f} µm"
+    gap = Quantity.of(known, "length", range_only=not certain)
+    return f"{gap.text} ({gap.interval_text})" if gap.interval_text else gap.text
 
 
 def limits_section(estimate: Estimate) -> Section:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -53,6 +54,8 @@ class Panel:
     """Further horizontal limits with their names."""
     peak: Peak | None = None
     """Marked with its value, time and interval."""
+    certain: bool = True
+    """Whether the value of the peak holds; else it is marked with its interval alone."""
     series: bool = False
     """Whether the curves take the colours of a series instead of those of their roles."""
 
@@ -131,15 +134,22 @@ def _draw(
     for name, level in panel.levels:
         add_level(figure, scale * level, name, **place, legend=first(name))
     if panel.peak is not None:
-        _mark(figure, panel.peak, scale, unit, row, column)
+        _mark(figure, panel.peak, scale, unit, row, column, certain=panel.certain)
 
 
-def _mark(figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, column: int) -> None:
-    """Mark a peak with its value, time and 90 % interval."""
-    text = f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms"
-    if peak.interval_90 is not None:
-        low, high = (written(scale * limit, 0) for limit in peak.interval_90)
-        text += f"<br>90 %: {low} to {high} {unit}"
+def _mark(
+    figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, column: int, *, certain: bool
+) -> None:
+    """Mark a peak with its value, time and 90 % interval, or with the interval alone."""
+    text = f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms<br>90 %: "
+    low, high = (written(scale * limit, 0) for limit in peak.interval_90 or (math.nan, math.nan))
+    between = f"{low} to {high} {unit}"
+    if not certain:
+        text = f"peak, 90 %: {between}"
+    elif peak.interval_90 is None:
+        text = text.removesuffix("<br>90 %: ")
+    else:
+        text += between
     figure.add_annotation(
         x=MILLI * peak.time,
         y=scale * peak.value,

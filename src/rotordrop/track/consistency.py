@@ -18,6 +18,14 @@ from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
 NIS_RANGE = (0.6, FITTING_NIS)
 DIRECTIONS = "directions"
 """Name of the check without which nothing can cross-check an estimate."""
+SENSORS, PARAMETERS, OF_DROP, REMANENT = (
+    "sensor errors",
+    "parameters",
+    "unknowns of the drop",
+    "remanent force",
+)
+DEPARTURES = frozenset((SENSORS, PARAMETERS, OF_DROP, REMANENT))
+"""Names of the checks of what was estimated, which says nothing where the filter lost the record."""
 CORRELATION_LIMIT = 0.25
 DEPARTURE_LIMIT = 3.5
 """Departure of a parameter or a sensor error from its prior in standard deviations, from which on it is told
@@ -31,6 +39,8 @@ LONGEST_REMANENCE = 0.2
 LARGEST_LASTING_LIFT = 0.02
 """Upward part of a force that stays, over the weight, up to which it is a note [1]: a gain error of all
 sensors looks like one, and forces have as much of it; the stated intervals allow for this much anyway."""
+THIS = "{this}"
+"""Stands in a remedy for the name of the unknown that a check is about."""
 LEAST_SECOND_DIRECTION = 0.05
 """Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
 
@@ -50,7 +60,14 @@ class Check:
     widening: float = 1.0
     """Factor on all intervals that what is noted asks for [1]."""
     remedy: str = ""
-    """What to do where it did not pass."""
+    """What to do where it did not pass, with `THIS` for the unknown by its path."""
+    judged: bool = True
+    """Whether it was judged; one that was not has not passed, and is no finding."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether it is a finding."""
+        return self.judged and not self.passed
 
     def said(self, name_of: Callable[[str], str] = str) -> str:
         """What was compared, with the unknown by its path or by another name."""
@@ -59,6 +76,10 @@ class Check:
     def noted(self, name_of: Callable[[str], str] = str) -> str:
         """What is worth knowing, with the unknown by its path or by another name."""
         return f"{name_of(self.path)} {self.note}" if self.note and self.path else self.note
+
+    def advised(self, name_of: Callable[[str], str] = str) -> str:
+        """What to do, with the unknown by its path or by another name."""
+        return self.remedy.replace(THIS, name_of(self.path))
 
 
 def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forward:
@@ -71,29 +92,53 @@ def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forwa
 
 
 def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
-    """Check innovations, sensor errors, parameters and process noise of a smoothed drop."""
+    """Check innovations, sensor errors, parameters and process noise of a smoothed drop.
+
+    Where the filter lost the record that is said first. What passes is then not judged, and departures are no
+    findings: all of it is of the samples before, the last of which the model no longer followed.
+    """
+    followed = _followed_check(smoothed.filtered)
+    checks = _checks(problem, smoothed, noise_factor)
+    if followed.passed:
+        return (*checks, followed)
+    return (followed, *(one if one.name == DIRECTIONS else _of_a_part(one, followed) for one in checks))
+
+
+def _followed_check(filtered: Forward) -> Check:
+    return Check(
+        name="filter",
+        passed=not is_lost(filtered),
+        message=f"the filter followed {filtered.done} of {len(filtered.means)} samples",
+        remedy="plan with the upper ends; calibrate on two drops with their tails; check rotor, air gaps and "
+        "sensors of the machine file against the record",
+    )
+
+
+def is_lost(filtered: Forward) -> bool:
+    """Whether the filter lost the record before its end."""
+    return filtered.done < len(filtered.means)
+
+
+def _of_a_part(check: Check, followed: Check) -> Check:
+    """A check of a drop whose filter lost the record: innovations and noise that failed before, failed."""
+    if check.name not in DEPARTURES and not check.passed:
+        return check
+    message = f"{check.message}; not judged, {followed.message}"
+    return replace(check, passed=False, judged=False, message=message, note="", widening=1.0)
+
+
+def _checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
+    """All of them but the one whether the filter followed the record."""
     innovations = innovation_checks(problem, smoothed)
     white = all(check.passed for check in innovations)
     sensors, parameters = _sensor_departures(problem, smoothed), _departures(problem, smoothed, "machine")
-    beyond = [one for one in (*sensors, *parameters) if one[0] >= DEPARTURE_LIMIT]
+    beyond = [one for one in (*sensors, *parameters) if one.sigmas >= DEPARTURE_LIMIT]
     tolerated = white and len(beyond) == 1
     return (
         *innovations,
-        _departure_check(
-            "sensor errors",
-            sensors,
-            tolerated=tolerated,
-            by_path=False,
-            remedy="check that sensor against a known distance, or give its gain a range",
-        ),
+        _departure_check(SENSORS, sensors, tolerated=tolerated),
         direction_check(problem),
-        _departure_check(
-            "parameters",
-            parameters,
-            tolerated=tolerated,
-            by_path=True,
-            remedy="measure that value of the machine, or widen its range in the machine file",
-        ),
+        _departure_check(PARAMETERS, parameters, tolerated=tolerated),
         nuisance_check(problem, smoothed, white),
         _remanence_check(problem, smoothed, white),
         Check(
@@ -102,11 +147,6 @@ def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: f
             message=f"process noise {noise_factor:.3g} × its usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
             note=_of_a_beam(noise_factor) if problem.model.machine.rotor.form_errs else "",
             remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
-        ),
-        Check(
-            name="filter",
-            passed=smoothed.filtered.done == len(smoothed.filtered.means),
-            message=f"the filter followed {smoothed.filtered.done} of {len(smoothed.filtered.means)} samples",
         ),
     )
 
@@ -167,8 +207,21 @@ def _lag_one(e: Array) -> float:
     return float(np.sum(e[1:][pairs] * e[:-1][pairs]) / np.sum(e[1:][pairs] ** 2))
 
 
-Departure = tuple[float, str]
-"""How far something went from its prior, in standard deviations [1], and what."""
+@dataclass(frozen=True, kw_only=True)
+class Departure:
+    """How far something went from its prior."""
+
+    sigmas: float
+    """In standard deviations of the prior [1]."""
+    what: str = ""
+    """Of a sensor, in words."""
+    path: str = ""
+    """Of an unknown."""
+    remedy: str = ""
+    """What to do where it went too far."""
+
+
+USUAL = Departure(sigmas=0.0, what="no unknown")
 
 
 def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departure]:
@@ -178,26 +231,27 @@ def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departu
     sigma = np.sqrt(np.diag(problem.covariance)[chosen])
     sigma[:n_c] = np.hypot(sigma[:n_c], problem.model.machine.rotor.gain_sigma)
     departure = np.abs(smoothed.means[-1][chosen] - problem.mean[chosen]) / sigma
-    names = [
-        f"{kind} of channel {sensor.name}"
-        for kind in ("gain", "offset")
-        for sensor in problem.model.machine.sensors
+    names = [(kind, sensor.name) for kind in ("gain", "offset") for sensor in problem.model.machine.sensors]
+    return [
+        Departure(
+            sigmas=sigmas,
+            what=f"{kind} of channel {name}",
+            remedy=f"check sensor {name} against a known distance, or give its {kind} a range",
+        )
+        for sigmas, (kind, name) in zip(departure.tolist(), names, strict=True)
     ]
-    return list(zip(departure.tolist(), names, strict=True))
 
 
-def _departure_check(
-    name: str, departures: list[Departure], *, tolerated: bool, by_path: bool, remedy: str
-) -> Check:
+def _departure_check(name: str, departures: list[Departure], *, tolerated: bool) -> Check:
     """What went farthest from its prior.
 
     One alone that goes a little too far is news of the machine where the innovations are white; the intervals
     widen with it, up to where it counts as a fault.
     """
-    departure, what = max(departures, default=(0.0, "no unknown"))
-    said, path = (_departs(departure), what) if by_path else (f"{what} {_departs(departure)}", "")
+    farthest = max(departures, key=_sigmas, default=USUAL)
+    departure, said = farthest.sigmas, f"{farthest.what} {_departs(farthest.sigmas)}".lstrip()
     passed = departure < DEPARTURE_LIMIT
-    check = Check(name=name, passed=passed, message=said, path=path, remedy=remedy)
+    check = Check(name=name, passed=passed, message=said, path=farthest.path, remedy=farthest.remedy)
     if check.passed or not tolerated or departure >= NOTED_DEPARTURE:
         return check
     return replace(
@@ -229,17 +283,17 @@ def nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Che
     Forces do not depend on how large these are, only on whether the filter has found them: as long as the
     innovations are white it has, and an unusual value is news of the machine, not a fault of the estimate.
     """
-    departure, path = max(_departures(problem, smoothed, "drop"), default=(0.0, "no unknown"))
-    usual = departure < DEPARTURE_LIMIT
-    message = _departs(departure)
+    farthest = max(_departures(problem, smoothed, "drop"), key=_sigmas, default=USUAL)
+    usual = farthest.sigmas < DEPARTURE_LIMIT
+    message = f"{farthest.what} {_departs(farthest.sigmas)}".lstrip()
     note = "" if usual or not white else f"{message}; the readings are followed all the same"
     return Check(
-        name="unknowns of the drop",
+        name=OF_DROP,
         passed=usual or white,
         message=message,
         note=note,
-        path=path,
-        remedy="check that value in the machine file, the planes of unbalance and magnets first",
+        path=farthest.path,
+        remedy=f"check {THIS} in the machine file, the planes of unbalance and magnets first",
     )
 
 
@@ -256,7 +310,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
         (u.value_of(values[u.parameter]) for u in problem.unknowns if u.parameter is REMANENCE), 0.0
     )
     if longest < LONGEST_REMANENCE:
-        return Check(name="remanent force", passed=True, message=_fades(longest))
+        return Check(name=REMANENT, passed=True, message=_fades(longest))
     weight = problem.model.machine.rotor.mass * float(problem.model.machine.gravity)
     across, up = (
         math.fsum(t for t, u in zip(theta, problem.unknowns, strict=True) if u.parameter is row)
@@ -265,7 +319,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
     share = abs(up) / weight
     noted = white and share < LARGEST_LASTING_LIFT
     return Check(
-        name="remanent force",
+        name=REMANENT,
         passed=noted,
         message=(
             f"{_fades(longest)}; one that stays looks like a gain error of all sensors, which forces and "
@@ -291,10 +345,18 @@ def _departures(problem: DropProblem, smoothed: Smoothed, scope: str) -> list[De
     """Unknowns of a scope."""
     theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
     return [
-        (abs(float(t) - u.mean) / u.sigma, u.path)
+        Departure(
+            sigmas=abs(float(t) - u.mean) / u.sigma,
+            path=u.path,
+            remedy=f"measure {THIS}, or widen its range in the machine file",
+        )
         for t, u in zip(theta, problem.unknowns, strict=True)
         if u.scope == scope and not u.parameter.spin_up_only and u.parameter not in STRUCTURE
     ]
+
+
+def _sigmas(one: Departure) -> float:
+    return one.sigmas
 
 
 def _departs(departure: float) -> str:

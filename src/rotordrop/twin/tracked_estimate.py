@@ -260,7 +260,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
 
 
 def _refuse_unchecked(drop: TrackedDrop) -> None:
-    failed = [check for check in drop.checks if not check.passed]
+    failed = [check for check in drop.checks if check.failed]
     if len(failed) == 1:  # the directions themselves: the model fits what is seen
         return
     raise IdentificationError(

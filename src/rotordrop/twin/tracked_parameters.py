@@ -16,6 +16,7 @@ from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorEr
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
+from rotordrop.track.consistency import is_lost as is_lost_record
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.mixture import mixed
@@ -225,29 +226,62 @@ def is_lost(problem: DropProblem, gap: Known, b: int) -> bool:
 def sensor_errors(
     problem: DropProblem, smoothed: Smoothed, *, fits: bool, widening: float
 ) -> tuple[SensorErrors, ...]:
-    """Gain and offset of every sensor at the end of the drop, and its noise."""
+    """Gain and offset of every sensor at the end of the drop, and its noise.
+
+    Where model and record disagree, each may be anything between its prior, by machine file and settled tail,
+    and the fit. Where the filter lost the record the prior alone stands.
+    """
     last = len(smoothed.means) - 1
     sigma = np.sqrt(np.maximum(np.diag(smoothed.covariance(last)), 0.0))
-    gain, offset = problem.sensor_errors(smoothed.means[last])
-    gain_sigma, offset_sigma = problem.sensor_errors(sigma)
     status: Status = "determined" if fits else INCONSISTENT
-
-    def known(value: float, error: float, unit: str) -> Known:
-        half = NINETY * widening * error
-        return Known(
-            value=value,
-            standard_error=widening * error,
-            interval_90=(value - half, value + half),
-            status=status,
-            unit=unit,
+    found = _sensor_values(problem, smoothed.means[last], widening * sigma, status)
+    if not fits:
+        # an error of the rotor's form looks like one of the gains, as in the check of both
+        form = problem.model.machine.rotor.gain_sigma
+        before = _sensor_values(
+            problem, problem.mean, np.sqrt(np.diag(problem.covariance)), UNDETERMINED, form
         )
-
+        if is_lost_record(smoothed.filtered):
+            found = before
+        found = [
+            [replace(value, interval_90=_hull(value, prior)) for value, prior in zip(*both, strict=True)]
+            for both in zip(found, before, strict=True)
+        ]
     return tuple(
         SensorErrors(
             sensor=sensor.name,
-            gain_error=known(float(gain[c]), float(gain_sigma[c]), "1"),
-            offset=known(float(offset[c]), float(offset_sigma[c]), "m"),
+            gain_error=gain_error,
+            offset=offset,
             noise=float(np.sqrt(problem.variances[c])),
         )
-        for c, sensor in enumerate(problem.model.machine.sensors)
+        for c, (sensor, gain_error, offset) in enumerate(
+            zip(problem.model.machine.sensors, *found, strict=True)
+        )
     )
+
+
+def _sensor_values(
+    problem: DropProblem, mean: Array, sigma: Array, status: Status, form: float = 0.0
+) -> list[list[Known]]:
+    """Gain errors [1] and offsets [m] of all sensors by mean and standard deviations of an estimate (n,).
+
+    The gains have a further standard deviation by the form of the rotor [1].
+    """
+    return [
+        [
+            Known(
+                value=float(value),
+                standard_error=math.hypot(error, more),
+                interval_90=(
+                    float(value) - NINETY * math.hypot(error, more),
+                    float(value) + NINETY * math.hypot(error, more),
+                ),
+                status=status,
+                unit=unit,
+            )
+            for value, error in zip(values, errors, strict=True)
+        ]
+        for values, errors, unit, more in zip(
+            problem.sensor_errors(mean), problem.sensor_errors(sigma), ("1", "m"), (form, 0.0), strict=True
+        )
+    ]

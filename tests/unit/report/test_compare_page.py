@@ -132,6 +132,24 @@ def test_an_estimate_beside_its_record_is_shown_but_takes_no_part_in_the_ranking
     assert content.summary[0].rows[3][0] == "lost (not consistent with its record)"
 
 
+def test_of_an_estimate_beside_its_record_ranges_alone_are_shown() -> None:
+    """In the tables, and in the figures by a bar without a point; no box of its stress."""
+    content = compare_page((*DROPS, marked("lost", consistent=False)))
+    force = content.summary[0].rows[3][3]
+    assert isinstance(force, Quantity)
+    assert (force.text, force.interval_text) == ("8\u202f850 to 9\u202f150 N", "")
+    severity = content.sections[0]
+    told = next(row for row in severity.tables[0].rows if row[0] == "peak bearing force")
+    assert isinstance(told[4], Quantity) and told[4].text == force.text
+    chart = next(f.chart for f in severity.figures if f.caption.startswith("Peak bearing force"))
+    assert chart.data[0].marker.size == (9, 9, 9, 0)  # type: ignore[attr-defined]
+    assert list(chart.data[0].customdata)[3] == force.text  # type: ignore[attr-defined]
+    distribution = next(t for t in severity.tables if t.caption.startswith("Distribution"))
+    assert not any("lost" in column for column in distribution.columns)
+    lost = [marked(name, consistent=False, record=name) for name in ("x", "y")]
+    assert not [t for t in compare_page(lost).sections[0].tables if t.caption.startswith("Distribution")]
+
+
 def test_fewer_than_two_drops_left_are_not_ranked() -> None:
     content = compare_page((DROPS[0], marked("lost", consistent=False)))
     assert rankings((DROPS[0], marked("lost", consistent=False)), ("NDE", "DE"), {}) == {}

@@ -5,16 +5,18 @@ from __future__ import annotations
 import io
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
 from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.evidence.quality import NO_CHECK_SEES
+from rotordrop.known import Known
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.estimate_screen import estimate_screen
 from rotordrop.report.terminal import print_summary
-from rotordrop.track.consistency import Check
+from rotordrop.track.consistency import THIS, Check
 
 
 def lines_of(estimate: Estimate) -> list[str]:
@@ -78,3 +80,37 @@ def test_a_flagged_estimate_shows_ranges_and_what_to_do(estimate: Estimate, fail
     assert "to do next: calibrate on two drops" in text.lower()
     low, high = estimate.bearing("DE").peak_force.interval_90 or (0.0, 0.0)
     assert f"{low:.0f} to {high:.0f} N" in line(flagged, "peak bearing force")
+
+
+def test_an_estimate_that_lost_its_record_says_that_first_and_blames_no_sensor(estimate: Estimate) -> None:
+    """What failed by name, in the verdict and in what to do; what was not judged in neither."""
+    lost = Check(name="filter", passed=False, message="the filter followed 9 of 99 samples", remedy="plan so")
+    gain = Check(
+        name="sensor errors", passed=False, judged=False, message="gain of A departs", remedy="check sensor A"
+    )
+    stiff = Check(
+        name="parameters",
+        passed=False,
+        message="departs",
+        path="DE.support.stiffness",
+        remedy=f"measure {THIS}, or widen its range",
+    )
+    gap = Known(value=300e-6, status="determined", interval_90=(250e-6, 350e-6), unit="m")
+    told = replace(
+        estimate,
+        verdict=Verdict.REPLACED,
+        checks=(lost, gain, stiff),
+        bearings=tuple(replace(b, values={**b.values, "air_gap_m": gap}) for b in estimate.bearings),
+    )
+    text = " ".join(" ".join(lines_of(told)).split())
+    assert "as ranges. The filter followed 9 of 99 samples; DE: support stiffness departs." in text
+    assert "o do next: plan so; measure DE: support stiffness, or widen its range" in text
+    assert "gain of A" not in text and "check sensor" not in text
+    farthest = float(np.nanmax(told.bearings[0].motions[-1].radial.values))
+    assert f"{farthest / 350e-6:.2f} to {farthest / 250e-6:.2f} × the air gap" in text
+    assert f"{1e6 * farthest:.1f} µm" not in text
+    (section,) = (one for one in estimate_page(told).sections if one.heading == "Consistency")
+    assert [row[1] for row in section.tables[0].rows] == ["no", "not judged", "no"]
+    (found,) = (one for one in estimate_page(told).sections if one.heading == "Parameters")
+    sensors = next(one for one in found.tables if one.caption == "Sensors")
+    assert "verdict" in sensors.columns

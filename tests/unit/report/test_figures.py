@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -332,3 +333,21 @@ def test_names_from_files_cannot_bring_tags_into_a_figure(name: str) -> None:
     text = EVIL_FIGURES[name]().to_json()
     assert "<a href" not in text.replace("\\u003c", "<")
     assert "&lt;a href" in text.replace("\\u0026", "&")
+
+
+def test_where_single_numbers_do_not_hold_peaks_are_ranges_and_no_distribution_is_stated() -> None:
+    force = highest(history(), "N", Origin.CROSS_CHECK)
+    ranged = replace(force, known=replace(force.known, interval_90=(1500.0, 2300.0)))
+    for certain in (True, False):
+        sections = drop_sections((drop("NDE", peak_force=ranged),), "", 377.0, certain=certain)
+        told = [note.text for one in sections for f in one.figures for note in f.chart.layout.annotations]
+        (peak,) = (text for text in told if "N" in text and text.startswith("peak") and "MPa" not in text)
+        stress = next(section for section in sections if section.heading == "Hertz stress")
+        if certain:
+            assert peak.startswith(f"peak {force.value:,.0f} N at ".replace(",", "\u202f"))
+            assert peak.endswith("90 %: 1\u202f500 to 2\u202f300 N")
+            assert [table.caption for table in stress.tables] == ["Distribution of the maximum Hertz stress"]
+        else:
+            assert peak == "peak, 90 %: 1\u202f500 to 2\u202f300 N"
+            assert not stress.tables and len(stress.figures) == 1
+            assert stress.statements[0].text.startswith("No distribution of the stress is stated")

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
+from rotordrop.estimate.bearing_drop import AirGap, BearingDrop, simulated_bearings
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.known import Known
 from rotordrop.report.content import ReportContent
@@ -112,3 +112,14 @@ def test_the_measured_curve_lies_on_top_and_thin(drop_result: DropResult) -> Non
 def test_ticks_of_a_logarithmic_axis_show_whole_numbers() -> None:
     labels = dict(zip(LOG_LABELS["tickvals"], LOG_LABELS["ticktext"], strict=True))
     assert (labels[20.0], labels[5000.0], labels[0.02]) == ("20", "5\u202f000", "0.02")
+
+
+def test_the_gap_of_a_lift_check_is_stated_with_its_interval(drop_result: DropResult) -> None:
+    """With it where single numbers hold, as it where they do not; limits where no more is known."""
+    gap = Known(value=436e-6, status="determined", interval_90=(407e-6, 465e-6), unit="m")
+    nde, de = estimate(drop_result).bearings
+    known = (replace(nde, values={"air_gap_m": gap}), replace(de, air_gap=AirGap(lower=28e-5, upper=29e-5)))
+    for consistent, told in ((True, "NDE 436 µm (407 to 465 µm)"), (False, "NDE 407 to 465 µm")):
+        section = inspection_section(estimate(drop_result, bearings=known, consistent=consistent))
+        text = next(one.text for one in section.statements if "lift check" in one.text)
+        assert f"({told}; DE 280 to 290 µm)" in text

@@ -186,9 +186,52 @@ def test_unusual_process_noise_is_seen(impacts, impacts_smoothed):
 
 def test_a_filter_that_gave_up_is_not_consistent(impacts, impacts_smoothed):
     lost = replace(impacts_smoothed, filtered=replace(impacts_smoothed.filtered, done=300))
-    check = next(c for c in consistency_checks(impacts, lost, 1.0) if c.name == "filter")
-    assert not check.passed
+    check, *others = consistency_checks(impacts, lost, 1.0)
+    assert check.name == "filter" and check.failed and check.remedy
     assert check.message == "the filter followed 300 of 500 samples"
+    for other in others:
+        if other.name == "directions":
+            assert other.passed
+            continue
+        assert not other.passed and not other.judged and not other.failed, other.name
+        assert other.message.endswith(f"; not judged, {check.message}")
+
+
+def test_departures_after_a_lost_filter_are_no_findings_but_earlier_innovations_are(
+    impacts, impacts_smoothed
+):
+    """A mass, a gain and an unbalance far off; innovations of twice the size; noise beyond its limit."""
+    means, filtered = impacts_smoothed.means.copy(), impacts_smoothed.filtered
+    means[:, impacts.n_dynamic :] += 40.0 * np.sqrt(np.diag(impacts.covariance)[impacts.n_dynamic :])
+    lost = replace(
+        impacts_smoothed,
+        means=means,
+        filtered=replace(filtered, done=300, innovations=2.0 * filtered.innovations),
+    )
+    checks = consistency_checks(impacts, lost, NOISE_FACTOR_LIMIT)
+    assert [check.name for check in checks if check.failed] == ["filter", "innovation size", "process noise"]
+    assert not any(check.note for check in checks)
+
+
+def test_a_remedy_names_the_sensor_and_the_value(impacts, impacts_smoothed):
+    place = [u.path for u in impacts.unknowns].index("NDE.support.mass")
+    for index, name, told in (
+        (place, "parameters", "measure support mass of NDE,"),
+        (
+            len(impacts.unknowns) + 1,
+            "sensor errors",
+            "check sensor S_NDE_B against a known distance, or give",
+        ),
+        (len(impacts.unknowns) + impacts.n_channels, "sensor errors", "or give its offset a range"),
+    ):
+        means = impacts_smoothed.means.copy()
+        means[:, impacts.n_dynamic + index] += 30.0 * math.sqrt(
+            impacts.covariance[impacts.n_dynamic + index, impacts.n_dynamic + index]
+        )
+        checks = consistency_checks(impacts, replace(impacts_smoothed, means=means), 1.0)
+        check = next(c for c in checks if c.name == name)
+        assert check.failed
+        assert told in check.advised({"NDE.support.mass": "support mass of NDE", "": ""}.__getitem__)
 
 
 def test_a_lost_channel_is_not_judged(impacts):

@@ -114,6 +114,37 @@ def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
                 assert value.interval_90 == pytest.approx((middle - half, middle + half), rel=1e-12)
 
 
+@pytest.mark.parametrize("done", [3, 2])
+def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem: Any, done: int) -> None:
+    """From prior to fit where the filter followed the drop; the prior alone where it lost it."""
+    size = problem.n_dynamic + len(problem.unknowns) + 2 * SENSORS
+    dice = np.random.default_rng(5)
+    prior, prior_sigma = dice.normal(size=size), dice.uniform(0.01, 0.5, size)
+    means, sigma = prior + dice.normal(size=(done, size)), 0.1 * prior_sigma
+    smoothed: Any = SimpleNamespace(
+        means=means,
+        covariance=lambda at: np.diag(sigma**2),
+        filtered=SimpleNamespace(done=done, means=np.zeros((3, size))),
+    )
+    known = SimpleNamespace(**vars(problem), mean=prior, covariance=np.diag(prior_sigma**2))
+    found = sensor_errors(known, smoothed, fits=False, widening=2.0)  # type: ignore[arg-type]
+    first = size - 2 * SENSORS
+    for c, one in enumerate(found):
+        for at, value in ((first + c, one.gain_error), (first + SENSORS + c, one.offset)):
+            form = problem.model.machine.rotor.gain_sigma if value is one.gain_error else 0.0
+            half = NINETY * math.hypot(prior_sigma[at], form)
+            low, high = prior[at] - half, prior[at] + half
+            if done == 3:
+                assert value.status == "the model does not fit the record"
+                assert value.value == means[-1, at]
+                low = min(low, means[-1, at] - 2.0 * NINETY * sigma[at])
+                high = max(high, means[-1, at] + 2.0 * NINETY * sigma[at])
+            else:
+                assert value.status == "the record does not determine it"
+                assert value.value == prior[at]
+            assert value.interval_90 == pytest.approx((low, high))
+
+
 def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
     """A sensor that reads (1 + g) times the motion needs the gain 1 / (1 + g); its error by differences."""
     names = ("A", "B")
