@@ -277,8 +277,8 @@ def _parameters(estimate: Estimate) -> Section:
             Column("sensor", "sensor"),
             Column("gain error", lambda o: Quantity.of(o.gain_error, "share", range_only=uncertain)),
             Column("offset", lambda o: Quantity.of(o.offset, "length", range_only=uncertain)),
-            Column("verdict", lambda o: o.gain_error.status),
             Column("noise (standard deviation)", "noise", "length", 2),
+            Column("verdict", lambda o: o.gain_error.status),
         )
         tables.append(table(estimate.sensors, columns, "Sensors", SENSORS_NOTE))
     if estimate.unbalance:
