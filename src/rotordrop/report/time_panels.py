@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -141,19 +140,16 @@ def _mark(
     figure: go.Figure, peak: Peak, scale: float, unit: str, row: int, column: int, *, certain: bool
 ) -> None:
     """Mark a peak with its value, time and 90 % interval, or with the interval alone."""
-    text = f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms<br>90 %: "
-    low, high = (written(scale * limit, 0) for limit in peak.interval_90 or (math.nan, math.nan))
-    between = f"{low} to {high} {unit}"
-    if not certain:
-        text = f"peak, 90 %: {between}"
-    elif peak.interval_90 is None:
-        text = text.removesuffix("<br>90 %: ")
-    else:
-        text += between
+    said = [f"peak {written(scale * peak.value, 0)} {unit} at {MILLI * peak.time:.2f} ms"] if certain else []
+    if peak.interval_90 is not None:
+        low, high = (written(scale * limit, 0) for limit in peak.interval_90)
+        said.append(f"{'' if certain else 'peak, '}90 %: {low} to {high} {unit}")
+    if not said:
+        return
     figure.add_annotation(
         x=MILLI * peak.time,
         y=scale * peak.value,
-        text=text,
+        text="<br>".join(said),
         showarrow=True,
         arrowhead=2,
         arrowcolor=MUTED,
