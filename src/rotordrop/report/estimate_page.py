@@ -273,14 +273,14 @@ def _parameters(estimate: Estimate) -> Section:
     if rows["drop"]:
         tables.append(parameter_table(rows["drop"], caption="Unknowns of this drop"))
     if estimate.sensors:
-        columns = (
+        of_sensor = (
             Column("sensor", "sensor"),
             Column("gain error", lambda o: Quantity.of(o.gain_error, "share", range_only=uncertain)),
             Column("offset", lambda o: Quantity.of(o.offset, "length", range_only=uncertain)),
             Column("noise (standard deviation)", "noise", "length", 2),
             Column("verdict", lambda o: o.gain_error.status),
         )
-        tables.append(table(estimate.sensors, columns, "Sensors", SENSORS_NOTE))
+        tables.append(table(estimate.sensors, of_sensor, "Sensors", SENSORS_NOTE))
     if estimate.unbalance:
         columns = (
             Column("node", "node"),
