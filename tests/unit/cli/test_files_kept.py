@@ -186,7 +186,8 @@ def test_every_command_that_writes_is_called_with_a_full_disk_or_computes_for_lo
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 @pytest.mark.parametrize(("verb", "option"), [one for one in WRITTEN if one.values[0].name in CALLS])
 def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, capsys):
-    file = tmp_path / ("o.h5" if option in ("output", "share") else "o.json")
+    suffix = {"output": ".h5", "share": ".h5", "film": ".gif"}.get(option, ".json")
+    file = tmp_path / f"o{suffix}"
     file.symlink_to("/dev/full")
     monkeypatch.chdir(things)
     (parameter,) = (one for one in verb.load().params if one.name == option)

@@ -292,6 +292,7 @@ WRITTEN = {
 }
 NEVER_READ = {
     "report.page:write_page": "for people",
+    "report.film:write_film": "for people",
     "report.csv_files:write_data": "for people and other programs",
     "cli._terminal:open_streams": "the null device",
     "cli.log:_export": "a table for other programs",
