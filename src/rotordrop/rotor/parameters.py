@@ -48,8 +48,12 @@ class DropModel:
     def with_machine(self, machine: Machine) -> DropModel:
         """The same model of a machine with the same rotor and other bearings or values."""
         values = _of_values(machine, self.fe, self.basis, self.load_shares)
-        if self.layout.magnet_own:  # of springs and dampers the rows also hold what a start put there
+        if self.layout.magnet_own:
             values["magnet"] = _magnet_rows(machine, self.basis, loops=True)
+        else:  # the rows also hold what a start put there
+            values["magnet"] = self.parameters.magnet.copy()
+            for row, amb in zip(values["magnet"], machine.ambs, strict=True):
+                amb.fill(row)
         return replace(self, machine=machine, parameters=self.parameters._replace(**values))
 
     def departing(self, rows: Array) -> DropModel:

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from rotordrop.known import Known
+from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
 
@@ -30,3 +32,18 @@ def test_an_attachment_named_twice_counts_once(paper_fe):
     twice = reduce_rotor(paper_fe, Reduction(modes=6, attachment=True), (4, 26, 26))
     assert once.shapes.shape[1] == twice.shapes.shape[1] == 8
     assert twice.eigenvalues == pytest.approx(once.eigenvalues, rel=1e-8, abs=1e-3)
+
+
+def test_magnets_of_another_machine_are_in_its_model_and_what_a_start_put_there_stays(paper):
+    model = build_drop_model(paper, "quick")
+    started = model.parameters.magnet
+    started[:, L.REMANENT_X] = 7.0
+    stiffer = tuple(
+        amb.model_copy(update={"stiffness": Known(value=2.0 * float(amb.stiffness), status="given")})
+        for amb in paper.ambs
+    )
+    other = model.with_machine(paper.model_copy(update={"ambs": stiffer})).parameters.magnet
+    assert len(other) == len(paper.ambs) > 0
+    assert other[:, L.AMB_STIFFNESS] == pytest.approx(2.0 * started[:, L.AMB_STIFFNESS])
+    assert other[:, L.REMANENT_X] == pytest.approx(7.0)
+    assert started[:, L.AMB_STIFFNESS] == pytest.approx([float(amb.stiffness) for amb in paper.ambs])
