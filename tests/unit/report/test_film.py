@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,17 @@ def test_rotor_and_arrow_are_where_the_drop_has_them(film: Path, number: int) ->
         assert_allclose(rotor, 0.5 * PANEL * REACH * outward, atol=2.0)
         arrow = np.array(_middle(frame, FORCE, columns)) - rotor
         assert arrow @ outward > 0.9 * np.hypot(*arrow) > 10.0
+
+
+def test_a_force_that_is_over_at_the_end_of_a_frame_has_no_arrow_in_it(tmp_path: Path) -> None:
+    """Rotor and arrow are of one instant: a blow from 100.2 to 100.4 ms ends before its frame, at 100.7."""
+    bearing, path = _bearing("NDE", 1.0), tmp_path / "blow.gif"
+    time = bearing.force.time
+    blow = (time > 0.1001) & (time < 0.1005)
+    assert bearing.force_vector is not None
+    write_film([replace(bearing, force_vector=np.where(blow[:, None], bearing.force_vector, 0.0))], path)
+    near = np.abs(_frame(path, 150)[HEAD : HEAD + PANEL] - ImageColor.getrgb(FORCE)).sum(axis=2) < 60
+    assert not near.any()
 
 
 def test_a_simulated_drop_says_so_in_every_frame(tmp_path: Path, film: Path) -> None:
