@@ -18,7 +18,7 @@ from rotordrop.arrays import Array
 from rotordrop.estimate import published
 from rotordrop.estimate.published import Value
 from rotordrop.known import Known
-from rotordrop.record.impacts import find_impacts, lasting_from
+from rotordrop.record.impacts import after_flights, lasting_from
 from rotordrop.severity.statistics import Statistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
 
@@ -229,35 +229,19 @@ class BearingDrop:
         return (own or self.motions)[0]
 
     @cached_property
-    def touched(self) -> Array:
-        """When each impact began [s], shape (K,): by the rule and the displacement that a look goes by.
-
-        The displacement tells the beginning to about 0.3 ms; where a contact of the list lies at the impact,
-        it began with that contact.
-        """
+    def after_flight(self) -> tuple[bool, ...]:
+        """For every contact, whether it ends a flight, and is an impact by the rule that a look goes by."""
         if self.air_gap is None:
-            return np.empty(0)
-        motion, gap = self.motion, 0.5 * (self.air_gap.lower + self.air_gap.upper)
-        rate = (len(motion.time) - 1) / float(motion.time[-1] - motion.time[0])
-        found = find_impacts(motion.displacement, rate, gap, 0.0)
-        seen = zip(motion.time[found.touched].tolist(), motion.time[found.deepest].tolist(), strict=True)
-        return np.array([self._begun(touched, deepest) for touched, deepest in seen])
-
-    def _begun(self, touched: float, deepest: float) -> float:
-        """Start of the contact at an impact that is seen to begin and be deepest then [s]."""
-        there = [
-            one.start
-            for one in self.impacts
-            if one.start <= deepest and not one.end < touched  # the end of one that lasts is NaN
-        ]
-        return min(there, key=lambda start: abs(start - touched), default=touched)
+            return (False,) * len(self.impacts)
+        begun, ended = (np.array([getattr(one, of) for one in self.impacts]) for of in ("start", "end"))
+        gap = 0.5 * (self.air_gap.lower + self.air_gap.upper)
+        return tuple(after_flights(begun, ended, gap).tolist())
 
     @property
-    def after_flight(self) -> tuple[bool, ...]:
-        """For every contact, whether it is the one that begins an impact."""
-        starts = np.array([impact.start for impact in self.impacts])
-        begun = {int(np.argmin(np.abs(starts - time))) for time in self.touched} if len(starts) else set()
-        return tuple(number in begun for number in range(len(starts)))
+    def touched(self) -> Array:
+        """When each impact began [s], shape (K,)."""
+        begun = [one.start for one, after in zip(self.impacts, self.after_flight, strict=True) if after]
+        return np.array(begun)
 
     @property
     def contact_from(self) -> float | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from rotordrop.errors import NothingFallsError, RecordError, UnpairedError
 from rotordrop.evidence.events import expected_gap
-from rotordrop.evidence.evidence import Evidence
+from rotordrop.evidence.evidence import Evidence, Missing, sought
 from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
 from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.paths import (
@@ -34,6 +34,7 @@ from rotordrop.evidence.paths import (
 from rotordrop.evidence.quality import Finding, Kind, checked, not_seen, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
+from rotordrop.evidence.quality.motion import check_given_gap
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
@@ -54,7 +55,7 @@ from rotordrop.json_schema import (
 )
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import Arrangement
-from rotordrop.record.impacts import slope
+from rotordrop.record.impacts import Settling, slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record, sha256_of
@@ -89,8 +90,8 @@ class PlaneLook:
     """When the shaft first touches its race [s]; None where the record does not show it."""
     touch_interval_90: tuple[float, float] | None
     """Interval that holds it with 90 % probability [s]."""
-    contact_from: float | None
-    """When the last impact began, after which the rotor no longer left its race [s]."""
+    settling: Settling
+    """Its impacts, and from when on the rotor no longer left its race."""
     largest: float
     """Largest distance from the centre [m]."""
     largest_interval_90: tuple[float, float]
@@ -188,8 +189,10 @@ class Look:
         ]
         for number, drop in enumerate(self.drops, start=1):
             events.append((drop.release, "released" if number == 1 else f"released again, drop {number}"))
-            if drop.permanent_contact is not None:
-                events.append((drop.permanent_contact, "last impact, in contact from here on"))
+            last, between = drop.permanent_contact, drop.permanent_contact_interval_90
+            if last is not None and between is not None:
+                early, late = (1e3 * abs(end - last) for end in between)
+                events.append((last, f"last impact, in contact from here on (−{early:.2g}, +{late:.2g} ms)"))
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:
@@ -265,9 +268,9 @@ def look(
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
     if blocking:
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
-    gaps = _gaps(read, machine, gap)
+    findings, gaps = _gaps(read, evidence, gap, findings)
     guessed = (*read.notes, *(arrangement.notes if arrangement else ()))
-    fell = read
+    fell, every = read, gaps
     ends = one_end(read, None if None in gaps else np.array([one[0] for one in gaps if one]))
     if ends is not None:
         guessed = (ends.words(read), *guessed)
@@ -280,7 +283,6 @@ def look(
             raise NothingFallsError("the rotor does not fall from where it floated; check channels and gap")
     except NothingFallsError as error:
         unseen = not_seen(evidence, fell=False)
-        every = _gaps(read, machine, gap)
         return _look_at_held(read, findings, unseen, every, guessed, machine, str(error))
     turning = _speed_at(read, drops[0].release)
     return Look(
@@ -416,13 +418,26 @@ def _checked(record: Record) -> tuple[Finding, ...]:
     return ranked(findings if stops(findings) else findings + check_blocks(record))
 
 
-def _gaps(record: Record, machine: Machine | None, gap: float | None) -> tuple[Gap | None, ...]:
-    """Air gaps that are given, or that a machine file expects with their doubt."""
+def _gaps(
+    record: Record, evidence: Evidence | None, gap: float | None, findings: tuple[Finding, ...]
+) -> tuple[tuple[Finding, ...], tuple[Gap | None, ...]]:
+    """Air gaps that are given or that a machine file expects, with their doubt, and findings on them.
+
+    One that was given by hand holds though the record contradicts it; what it contradicts of a machine file
+    is left out.
+    """
+    alone = (None,) * len(record.planes)
     if gap is not None:
-        return ((gap, 0.0),) * len(record.planes)
-    if machine is None:
-        return (None,) * len(record.planes)
-    return tuple(expected_gap(machine, plane) for plane in record.planes)
+        own = sought(lambda: motion_of(record, gaps=alone, angles_known=True))
+        said = [] if isinstance(own, Missing) else check_given_gap(own, record, gap)
+        return ranked([*findings, *said]), ((gap, 0.0),) * len(record.planes)
+    if evidence is None:
+        return findings, alone
+    walls = {} if isinstance(evidence.motion, Missing) else evidence.motion.walls
+    expected = ((plane.bearing, expected_gap(evidence.machine, plane)) for plane in record.planes)
+    return findings, tuple(
+        None if name in walls and walls[name].contradicts(one) else one for name, one in expected
+    )
 
 
 def _speed_at(record: Record, release: float) -> float | None:
@@ -447,7 +462,7 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
     during = (motion.time >= drop.release) & (motion.time <= drop.end)
     window = during & (motion.time <= drop.release + INDEX_WINDOW)
     found = []
-    for path, contact_from in zip(motion.paths, drop.lasting, strict=True):
+    for path, settling in zip(motion.paths, drop.settlings, strict=True):
         radius = np.where(during, path.radius, 0.0)
         at = int(np.argmax(radius))
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
@@ -470,7 +485,7 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
                     if touch is None or touched is None
                     else (touched - NINETY * touch.error, touched + NINETY * touch.error)
                 ),
-                contact_from=contact_from,
+                settling=settling,
                 largest=float(radius[at]),
                 largest_interval_90=_largest_between(path, at),
                 largest_time=float(motion.time[at]),
@@ -557,7 +572,10 @@ _DOCUMENT: dict[str, Part] = {
         air_gap_determined=_read_off(FLAG, "gap_determined"),
         first_touch_s=_read_off(MAYBE, "touch"),
         first_touch_interval_90_s=_read_off(MAYBE_PAIR, "touch_interval_90"),
-        contact_from_s=_read_off(MAYBE, "contact_from"),
+        impacts=(NUMBER, lambda plane: len(plane.settling.touched)),
+        impacts_interval_90=_read_off(PAIR, "settling.count_interval_90"),
+        contact_from_s=_read_off(MAYBE, "settling.contact_from"),
+        contact_from_interval_90_s=_read_off(MAYBE_PAIR, "settling.contact_from_interval_90"),
         largest_displacement_m=_read_off(NUMBER, "largest"),
         largest_displacement_interval_90_m=_read_off(PAIR, "largest_interval_90"),
         largest_displacement_time_s=_read_off(NUMBER, "largest_time"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import Wall, find_wall
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import whirl_spells
-from rotordrop.record.impacts import find_impacts, lasting_from
+from rotordrop.record.impacts import Settling, find_impacts
 from rotordrop.record.record import Record
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import GRAVITY
@@ -317,14 +318,30 @@ class Drop:
     """Whether it was lifted again in the record."""
     impacts: tuple[Impact, ...] = ()
     """In the order of time."""
-    lasting: tuple[float | None, ...] = ()
-    """When the last impact of each plane began [s]; None where that was within `LASTING` of the end."""
+    settlings: tuple[Settling, ...] = ()
+    """How many impacts each plane has, and from when on the rotor stayed in contact."""
 
     @property
     def permanent_contact(self) -> float | None:
         """When the last impact of all began [s]; None where one plane has none."""
-        known = [time for time in self.lasting if time is not None]
-        return max(known) if known and len(known) == len(self.lasting) else None
+        known = [one.contact_from for one in self.settlings if one.contact_from is not None]
+        return max(known) if known and len(known) == len(self.settlings) else None
+
+    @property
+    def permanent_contact_interval_90(self) -> tuple[float, float] | None:
+        """Interval that holds it with 90 % probability [s]."""
+        known = [one.contact_from_interval_90 for one in self.settlings]
+        ends = [one for one in known if one is not None]
+        if not ends or len(ends) < len(known):
+            return None
+        return max(low for low, _ in ends), max(high for _, high in ends)
+
+    @property
+    def count_interval_90(self) -> tuple[int, int]:
+        """Interval that holds the number of impacts with 90 % probability, planes apart from each other."""
+        below = math.hypot(*(len(one.touched) - one.count_interval_90[0] for one in self.settlings))
+        above = math.hypot(*(one.count_interval_90[1] - len(one.touched) for one in self.settlings))
+        return math.floor(len(self.impacts) - below), math.ceil(len(self.impacts) + above)
 
 
 def drops_of(motion: Motion) -> tuple[Drop, ...]:
@@ -366,7 +383,7 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
     first = int(np.searchsorted(motion.time, drop.release))
     inside = slice(first, int(np.searchsorted(motion.time, drop.end, side="right")))
     time = motion.time[inside]
-    impacts, lasting = [], []
+    impacts, settlings = [], []
     for path in motion.paths:
         place = path.bearing_position[inside]
         hits = find_impacts(place, motion.rate, path.gap, path.noise)
@@ -391,8 +408,8 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
                 touched, hits.deepest, hits.approach, hits.rebound, strict=True
             )
         ]
-        lasting.append(lasting_from(touched, drop.end))
-    return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), lasting=tuple(lasting))
+        settlings.append(Settling.of(touched, time[hits.surely], time[hits.perhaps], drop.end))
+    return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), settlings=tuple(settlings))
 
 
 def whirls_of(motion: Motion, drop: Drop) -> tuple[Whirl, ...]:

@@ -60,6 +60,10 @@ GAIN = 0.01
 _DOUBTFUL = 0.25
 """An air gap whose 90 % interval reaches this share of it to either side is not determined [1] (chosen)."""
 
+_OTHER_GAP = 2.5
+"""In how many standard deviations, its own and those of what is stated, a gap that a record shows by itself
+lies off a stated one that it contradicts [1] (chosen)."""
+
 _BIN = 5e-3
 """Length of a stretch that shows where a swinging rotor lies [s] (chosen)."""
 
@@ -112,6 +116,11 @@ class Wall:
     def determined(self) -> bool:
         """Whether the record, or who gave it, tells the radius to `_DOUBTFUL` of itself."""
         return NINETY * self.gap_error < _DOUBTFUL * self.gap
+
+    def contradicts(self, stated: tuple[float, float]) -> bool:
+        """Whether a radius that the record shows by itself is none that is stated, with its error [m]."""
+        gap, doubt = stated
+        return abs(self.gap - gap) > _OTHER_GAP * math.hypot(self.gap_error, doubt)
 
 
 def find_wall(

@@ -1,4 +1,4 @@
-"""Impacts of a path in its clearance circle: one rule for all that tell of a drop, by displacement alone."""
+"""Impacts of a drop, one rule for all that tell of it: by its contacts, or by displacement alone."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.known import NINETY
 from rotordrop.units import GRAVITY
 
 SMOOTHING = 1e-3
@@ -24,9 +25,12 @@ HOP = 0.05
 """A flight is at least as long as a hop of this height over the gap under gravity, and leaves the race by
 half of it [1] (chosen)."""
 
-_FREE, _LEAST_FREE = 0.8, 0.3
-"""Least mean acceleration in a flight over that of a free body, and least of that over gravity [1] (both from
-the first half of DropBench)."""
+BEGUN = 0.3e-3
+"""Standard error of where displacement shows that a contact begins or ends [s]."""
+
+_FREE, _FREE_DOUBT, _LEAST_FREE = 0.8, 0.2, 0.3
+"""Least mean acceleration in a flight over that of a free body, how far 90 % of flights stray from that, and
+least of that over gravity [1] (all from the first half of DropBench)."""
 
 _LONGEST_FALL = 20e-3
 """The first approach is looked for so long before the first reversal [s]."""
@@ -51,6 +55,15 @@ def shortest_flight(gap: float) -> float:
     return math.sqrt(8.0 * HOP * gap / GRAVITY)
 
 
+def after_flights(begun: Array, ended: Array, gap: float) -> NDArray[np.bool_]:
+    """Which of the contacts of a bearing end a flight, where contacts are known; the first one does.
+
+    Their times in the order of their beginning [s], shape (K,), and the air gap [m].
+    """
+    flown = begun[1:] - ended[:-1]
+    return np.append(True, flown >= shortest_flight(gap))[: len(begun)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Impacts:
     """Where a bearing turned the rotor back; K impacts, as samples of the path."""
@@ -58,10 +71,14 @@ class Impacts:
     deepest: NDArray[np.int64]
     """Deepest point, shape (K,)."""
     touched: NDArray[np.int64]
-    """Begin of the contact before it, to about 0.3 ms, shape (K,)."""
+    """Begin of the contact before it, with a standard error of `BEGUN`, shape (K,)."""
     approach: Array
     rebound: Array
     """Largest radial velocity before and after, by straight lines over `SMOOTHING` [m/s], shape (K,)."""
+    surely: NDArray[np.int64]
+    perhaps: NDArray[np.int64]
+    """Begins of those that are impacts, and that may be, with 90 % probability: how long a flight lasted and
+    how freely the rotor flew are known to `BEGUN` and `_FREE_DOUBT`."""
 
 
 def find_impacts(
@@ -78,25 +95,35 @@ def find_impacts(
     speed = slope(radius, rate)
     turns = _turns_of(radius, speed, rate, gap, noise)
     contact = _Contact.of(turns)
-    found: list[tuple[_Turn, float]] = []
+    found: list[tuple[_Turn, float, float]] = []
     for number, turn in enumerate(turns):
         touched = turn.fastest / rate + contact.aside(turn.approach)
         if number == 0 and falls:
-            found.append((turn, touched))
+            found.append((turn, touched, math.inf))
+            continue
+        if not turn.sharp or turn.hop < 0.5 * HOP * gap or turn.fastest <= turn.left:
             continue
         departed = max(-float(speed[turn.left]), 0.0)
         flew = touched - turn.left / rate + contact.aside(departed)
-        if flew < shortest_flight(gap) or turn.hop < 0.5 * HOP * gap or turn.fastest <= turn.left:
-            continue
         gained = float(speed[turn.fastest] - speed[turn.left]) * rate / (turn.fastest - turn.left)
         free = _free_acceleration(path, rate, gap, down, slice(turn.left, turn.fastest + 1))
-        if turn.sharp and gained > _FREE * max(free, _LEAST_FREE * GRAVITY):
-            found.append((turn, touched))
+        longer = (flew - shortest_flight(gap)) / (NINETY * math.sqrt(2.0) * BEGUN)
+        freer = (gained / max(free, _LEAST_FREE * GRAVITY) - _FREE) / _FREE_DOUBT
+        found.append((turn, touched, min(longer, freer)))
+
+    def begun(above: float) -> NDArray[np.int64]:
+        return np.array(
+            [min(round(at * rate), turn.at) for turn, at, sure in found if sure >= above], dtype=np.int64
+        )
+
+    hits = [turn for turn, _, sure in found if sure >= 0.0]
     return Impacts(
-        deepest=np.array([turn.at for turn, _ in found], dtype=np.int64),
-        touched=np.array([min(round(at * rate), turn.at) for turn, at in found], dtype=np.int64),
-        approach=np.array([turn.approach for turn, _ in found], dtype=np.float64),
-        rebound=np.array([turn.rebound for turn, _ in found], dtype=np.float64),
+        deepest=np.array([turn.at for turn in hits], dtype=np.int64),
+        touched=begun(0.0),
+        approach=np.array([turn.approach for turn in hits], dtype=np.float64),
+        rebound=np.array([turn.rebound for turn in hits], dtype=np.float64),
+        surely=begun(1.0),
+        perhaps=begun(-1.0),
     )
 
 
@@ -237,6 +264,35 @@ def peaks(values: Array, floor: float, least: float) -> list[int]:
                     found.append(at)
                 sign, at, extreme = -sign, i, -sign * value
     return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settling:
+    """The impacts on one bearing by displacement, and from when on the rotor stayed in contact."""
+
+    touched: Array
+    """When each impact began [s], shape (K,)."""
+    count_interval_90: tuple[int, int]
+    """Interval that holds their number with 90 % probability."""
+    contact_from: float | None
+    """When the last one began, from which on it stayed in contact [s]; None where it did not."""
+    contact_from_interval_90: tuple[float, float] | None
+    """Interval that holds that with 90 % probability [s]."""
+
+    @classmethod
+    def of(cls, touched: Array, surely: Array, perhaps: Array, end: float) -> Settling:
+        """By the times [s] of impacts, sure and possible ones, and the end of the part looked at [s]."""
+        last = lasting_from(touched, end)
+        between = None
+        if last is not None:
+            early = surely[-1] if len(surely) else touched[0]
+            between = (float(early) - NINETY * BEGUN, float(perhaps[-1]) + NINETY * BEGUN)
+        return cls(
+            touched=touched,
+            count_interval_90=(len(surely), len(perhaps)),
+            contact_from=last,
+            contact_from_interval_90=between,
+        )
 
 
 def lasting_from(touched: Array, end: float) -> float | None:

@@ -84,7 +84,7 @@ def _loads(estimate: Estimate) -> Table:
 
     lines: dict[str, Callable[[BearingDrop], str]] = {
         "peak bearing force": lambda b: number(b.peak_force.known, "force"),
-        "at, pressed towards": _moment,
+        "at (from power-off), towards": _moment,
         "peak Hertz stress": lambda b: number(b.peak_stress.known, "pressure"),
         "impacts (contacts)": _impacts,
         "largest displacement": lambda b: _displacement(b, certain=certain),

@@ -20,15 +20,21 @@ LISTED = 24
 LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
 
 
-def impact_rule(gaps: Sequence[float]) -> str:
-    """The rule of `find_impacts` in words, with the shortest flight for these air gaps [m]."""
+def impact_rule(gaps: Sequence[float], *, seen: bool = False) -> str:
+    """The rule of an impact in words, with the shortest flight for these air gaps [m].
+
+    Where displacement alone is seen it asks for more.
+    """
     times = dict.fromkeys(f"{1e3 * shortest_flight(gap):.2g}" for gap in sorted(gaps))
     after = f"at least {' to '.join([*times][:: max(len(times) - 1, 1)])} ms" if times else "a time"
+    leaves, swing = "", ""
+    if seen:
+        leaves = f", in which the rotor leaves the race by {0.5 * HOP:.1%} of the gap or more"
+        swing = ", and a swing along the race is none"
     return (
         f"An impact is a return to the race after {after} of free flight, as long as a hop of {HOP:.0%} of "
-        f"the air gap under gravity lasts, in which the rotor leaves the race by {0.5 * HOP:.1%} of the gap "
-        "or more; the first touch of a fall is one too. Shorter hops belong to the impact before, and a "
-        "swing along the race is none."
+        f"the air gap under gravity lasts{leaves}; the first touch of a fall is one too. Shorter hops belong "
+        f"to the impact before{swing}."
     )
 
 

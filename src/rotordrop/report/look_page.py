@@ -59,7 +59,9 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     )
     return ReportContent(
         title=f"A look at {record.name}",
-        subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}",
+        # figures of a page count from the release
+        subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}"
+        + ("" if drawn else f"; times are those of the record, which begins at {record.time[0]:.4g} s"),
         facts=facts,
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         # the terminal shows neither the facts nor the sections
@@ -221,12 +223,16 @@ def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
 
 def _verdict(seen: Look) -> list[Statement]:
     drop = seen.drops[0]
-    contact = drop.permanent_contact
-    ends = (
-        "." if contact is None else f"; the last one at {format_moment(contact)}, in contact from there on."
-    )
+    contact, between = drop.permanent_contact, drop.permanent_contact_interval_90
+    ends = "."
+    if contact is not None and between is not None:
+        ends = (
+            f"; the last one at {format_moment(contact)} (90 %: {' to '.join(map(format_moment, between))}), "
+            "in contact from there on."
+        )
+    low, high = drop.count_interval_90
     release = f"{format_moment(drop.release)} of the record (± {1e3 * RELEASE_ERROR:g} ms)"
-    said = [f"The rotor was released at {release}, {len(seen.impacts)} impacts{ends}"]
+    said = [f"The rotor was released at {release}, {len(seen.impacts)} impacts (90 %: {low} to {high}){ends}"]
     if len(seen.planes) > 1:
         first = seen.first_end
         said.append(
@@ -252,11 +258,15 @@ def _verdict(seen: Look) -> list[Statement]:
 
 def _card(seen: Look, number: int) -> Card:
     plane = seen.planes[number]
-    hits = sum(impact.plane == plane.plane for impact in seen.impacts)
-    note = f"at the sensors, at {plane.largest_time:.4g} s, {hits} impacts"
+    note = f"at the sensors, at {plane.largest_time:.4g} s"
+    settling = plane.settling
+    hits = Quantity(
+        value=len(settling.touched), kind="count", interval_90=settling.count_interval_90, digits=3
+    )
     largest = _found(plane.largest, plane.largest_interval_90)
     figures = [
         KeyFigure("largest distance from the centre", largest, note),
+        KeyFigure("impacts", hits, "by the displacement alone"),
         _gap_figure(plane),
         _index(
             "position index (mean distance over gap)", plane.position_index, plane.position_index_interval_90
@@ -338,7 +348,7 @@ def _impacts(seen: Look) -> Table:
         Column("and after", "rebound", "velocity"),
     )
     note = f"The first {MOST_LISTED} of {len(seen.impacts)}." if len(seen.impacts) > MOST_LISTED else ""
-    rule = impact_rule([path.gap for path in seen.motion.paths])
+    rule = impact_rule([path.gap for path in seen.motion.paths], seen=True)
     known = ", ".join(
         f"{path.name} ± {shown(path.wall.distance_error, 'length', 2)}" for path in seen.motion.paths
     )

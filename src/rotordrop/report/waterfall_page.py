@@ -19,7 +19,6 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
-    fact,
     table,
 )
 from rotordrop.report.quantity import NO_BREAK, Quantity, shown, with_error, written
@@ -57,6 +56,7 @@ LINES_NOTE = (
     "the multiple of the rotor's speed."
 )
 LINES = "Lines"
+BY_DISPLACEMENT, FROM_POWER_OFF = "by the displacement alone", "from power-off"
 _IN_WHOLE_SECONDS = 10.0
 """Time from which on whole seconds say when a line was seen [s] (chosen)."""
 _COMPONENTS = {
@@ -82,21 +82,35 @@ def waterfall_page(
     """
     cards = []
     for name, plane in analysis.planes.items():
-        history, contact = plane.history, plane.settling.contact_from
+        history, settled = plane.history, plane.settling
         at = f"at {shown(history.largest_time, 'duration', 3)}"
-        largest = Quantity(
-            value=history.largest, kind="length", interval_90=history.largest_interval_90, digits=3
-        )
-        figures = (
-            KeyFigure("Largest displacement", largest, note=at),
-            fact("Beyond the air gap", history.largest_indentation, "length", 3),
-            fact("Largest after 0.2 s", history.largest_later, "length"),
-            fact("Impacts", len(plane.settling.touched), "count"),
-            fact("In contact from", math.nan if contact is None else contact, "duration", 3),
+        last = math.nan if settled.contact_from is None else settled.contact_from
+        figures = tuple(
+            KeyFigure(label, Quantity(value=value, kind=kind, interval_90=between, digits=3), note)
+            for label, value, kind, between, note in (
+                ("Largest displacement", history.largest, "length", history.largest_interval_90, at),
+                (
+                    "Beyond the air gap",
+                    history.largest_indentation,
+                    "length",
+                    history.largest_indentation_interval_90,
+                    "",
+                ),
+                (
+                    "Largest after 0.2 s",
+                    history.largest_later,
+                    "length",
+                    history.largest_later_interval_90,
+                    "",
+                ),
+                ("Impacts", len(settled.touched), "count", settled.count_interval_90, BY_DISPLACEMENT),
+                ("In contact from", last, "duration", settled.contact_from_interval_90, FROM_POWER_OFF),
+            )
         )
         cards.append(Card(f"{name} plane", figures))
     return ReportContent(
         title=title,
+        subtitle="times count from power-off",
         simulated=simulated,
         verdict=_verdict(analysis),
         cards=tuple(cards),
@@ -154,7 +168,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
 def settling_statement(name: str, plane: PlaneAnalysis) -> Statement:
     """When the rotor came to lie in its bearing for good."""
     settled = plane.settling.contact_from is not None
-    return Statement(f"{name}: {plane.settling.statement}", "good" if settled else "notice")
+    return Statement(f"{name}: {plane.settling_words}.", "good" if settled else "notice")
 
 
 def _standstill(stop: Known) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import Known
+from rotordrop.record.impacts import Settling
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.coast_down_law import (
     DragFit,
@@ -22,10 +23,10 @@ from rotordrop.spectrum.coast_down_law import (
 )
 from rotordrop.spectrum.indentation import (
     DisplacementHistory,
-    Settling,
     displacement_history,
     find_settling,
     held_maximum,
+    settling_words,
 )
 from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.lines import Line, find_lines
@@ -131,6 +132,8 @@ class PlaneAnalysis:
     waterfalls: tuple[Waterfall, ...]
     history: DisplacementHistory
     settling: Settling
+    settling_words: str
+    """Its impacts in words, and where it lies in the end."""
     track: OrderTrack | None
     resonances: tuple[PassedResonance, ...]
 
@@ -260,6 +263,7 @@ def _plane(
             start_time=start,
         ),
         settling=settled,
+        settling_words=settling_words(settled, moved, rate),
         track=track,
         resonances=resonances,
     )
@@ -334,13 +338,17 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
         "largest_displacement_interval_90_m": history.largest_interval_90,
         "largest_displacement_time_s": history.largest_time,
         "largest_indentation_m": history.largest_indentation,
+        "largest_indentation_interval_90_m": history.largest_indentation_interval_90,
         "largest_later_m": history.largest_later if later else None,
+        "largest_later_interval_90_m": history.largest_later_interval_90,
         "largest_later_time_s": history.largest_later_time if later else None,
         "first_0.2_s_held_the_maximum": bool(held_maximum(history)),
         "statement": history.statement,
         "impacts": len(plane.settling.touched),
+        "impacts_interval_90": plane.settling.count_interval_90,
         "contact_from_s": plane.settling.contact_from,
-        "settling": plane.settling.statement,
+        "contact_from_interval_90_s": plane.settling.contact_from_interval_90,
+        "settling": plane.settling_words,
         "resonances": [resonance.as_json() for resonance in plane.resonances],
         "waterfalls": [_waterfall_json(item) for item in plane.waterfalls],
     }

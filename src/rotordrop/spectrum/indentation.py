@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import NINETY
-from rotordrop.record.impacts import find_impacts, lasting_from
+from rotordrop.record.impacts import Settling, find_impacts
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 from rotordrop.units import format_moment
@@ -49,25 +50,15 @@ class DisplacementHistory:
     """Largest magnitude after ``window`` [m]; nan when the signal ends before."""
     largest_later_time: float
     """When [s]."""
+    largest_indentation_interval_90: tuple[float, float] | None
+    largest_later_interval_90: tuple[float, float] | None
+    """Intervals that hold the two with 90 % probability [m], the former by gap and centre."""
     window: float
     """The time after power-off that a simulation would cover [s]."""
     noise: float
     """Noise of the displacement [m], which lifts every maximum by some four times itself."""
     statement: str
     """Whether the window held the maximum."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settling:
-    """The impacts on one bearing, and from when on the rotor stayed in contact."""
-
-    touched: Array
-    """When each impact began, by the rule of `rotordrop.record.impacts` [s], shape (K,)."""
-    contact_from: float | None
-    """When the last impact began, from which on it stayed in contact [s]; None where it did not."""
-    contact_radius: float
-    """Magnitude of displacement in the last second [m]."""
-    statement: str
 
 
 def displacement_history(
@@ -114,7 +105,11 @@ def displacement_history(
     lowest_xy, highest_xy = envelope.directions()
     spread = float(np.median(noise))
     half = None if error is None else NINETY * error
-    between = None if half is None else (float(largest) - half, float(largest) + half)
+
+    def between(value: float, wide: float = 1.0) -> tuple[float, float] | None:
+        known = half is not None and math.isfinite(value)
+        return (value - wide * half, value + wide * half) if known and half is not None else None
+
     middles = (np.arange(lowest.size, dtype=np.float64) + 0.5) * per_interval / sampling_rate
     return DisplacementHistory(
         time=start_time + middles,
@@ -124,11 +119,13 @@ def displacement_history(
         highest_xy=highest_xy,
         air_gap=air_gap,
         largest=float(largest),
-        largest_interval_90=between,
+        largest_interval_90=between(float(largest)),
         largest_time=largest_time,
         largest_indentation=float(largest) - air_gap,
         largest_later=later,
         largest_later_time=later_time if np.isfinite(later) else float("nan"),
+        largest_indentation_interval_90=between(float(largest) - air_gap, math.sqrt(2.0)),
+        largest_later_interval_90=between(later),
         window=window,
         noise=spread,
         statement=_window_statement(
@@ -146,32 +143,36 @@ def find_settling(
     fall.
     """
     samples = displacement.shape[0]
-    last_second = np.asarray(displacement[max(0, samples - int(sampling_rate)) : samples], dtype=np.float64)
-    radius = float(np.median(np.hypot(*last_second.T)))
-    around, found = int(LONGEST_FLIGHT * sampling_rate), []
+    around = int(LONGEST_FLIGHT * sampling_rate)
+    found: list[list[Array]] = [[], [], []]
     for start in range(0, samples, BLOCK):
         before = max(start - around, 0)
         part = np.asarray(displacement[before : start + BLOCK + around], dtype=np.float64)
         hits = find_impacts(part, sampling_rate, air_gap, noise_by_differences(part, 3), falls=start == 0)
-        touched = before + hits.touched
-        found.append(touched[(touched >= start) & (touched < start + BLOCK)])
-    times = start_time + np.concatenate(found) / sampling_rate
-    end = start_time + samples / sampling_rate
-    contact = lasting_from(times, end)
-    count = f"{len(times)} impact{'' if len(times) == 1 else 's'} by the displacement alone"
-    if contact is not None:
-        text = (
-            f"{count}, the last one at {format_moment(contact)}, in contact from there on, at "
-            f"{radius * 1e6:.1f} µm from the centre in the end"
-        )
-    elif len(times):
-        text = (
-            f"{count}, the last one at {format_moment(float(times[-1]))}, {1e3 * (end - times[-1]):.0f} ms "
-            "before the signal ends: it did not settle"
-        )
-    else:
-        text = "no impact: the rotor did not reach the air gap"
-    return Settling(touched=times, contact_from=contact, contact_radius=radius, statement=text)
+        for kept, touched in zip(found, (hits.touched, hits.surely, hits.perhaps), strict=True):
+            at = before + touched
+            kept.append(at[(at >= start) & (at < start + BLOCK)])
+    touched, surely, perhaps = (start_time + np.concatenate(one) / sampling_rate for one in found)
+    return Settling.of(touched, surely, perhaps, start_time + samples / sampling_rate)
+
+
+def settling_words(found: Settling, displacement: PlanarSignal, sampling_rate: float) -> str:
+    """The impacts of a coast-down in words, and how far from the centre the rotor is in the end."""
+    touched, between = found.touched, found.contact_from_interval_90
+    if not len(touched):
+        return "no impact: the rotor did not reach the air gap"
+    low, high = found.count_interval_90
+    count = f"{len(touched)} impact{'' if len(touched) == 1 else 's'}"
+    count += f" (90 %: {low} to {high}) by the displacement alone, the last one at "
+    if found.contact_from is None or between is None:
+        return f"{count}{format_moment(float(touched[-1]))}, at the end of the signal: it did not settle"
+    last_second = displacement[max(0, displacement.shape[0] - int(sampling_rate)) : displacement.shape[0]]
+    radius = float(np.median(np.hypot(*np.asarray(last_second, dtype=np.float64).T)))
+    times = " to ".join(format_moment(one) for one in between)
+    return (
+        f"{count}{format_moment(found.contact_from)} ({times}), in contact from there on, at "
+        f"{radius * 1e6:.0f} µm from the centre in the end"
+    )
 
 
 class _Envelope:

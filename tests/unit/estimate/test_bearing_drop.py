@@ -1,14 +1,14 @@
-"""When the impacts at a bearing began, told by its contacts and by the displacement."""
+"""When the impacts at a bearing began, told by its contacts."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import pytest
 
 from rotordrop.estimate.bearing_drop import AirGap, BearingDrop, History, Impact, Motion, Origin, highest
 from rotordrop.known import Known
+from rotordrop.record.impacts import shortest_flight
 from rotordrop.units import GRAVITY
 
 GAP, RATE = 300e-6, 20000.0
@@ -57,18 +57,17 @@ def fallen(*contacts: tuple[float, float]) -> BearingDrop:
     )
 
 
-def test_an_impact_begins_with_its_contact() -> None:
-    """Of the list, where one lies there; the rotor is in contact from no other time on."""
-    late = 0.2e-3
+def test_an_impact_ends_a_flight_between_contacts() -> None:
+    """By the contacts, which the estimate knows better than its displacement shows them."""
     first, second = BEGUN
-    listed = fallen((first + late, first + CONTACT), (second + late, math.nan))
-    assert listed.touched.tolist() == [first + late, second + late]
-    assert listed.contact_from == listed.impacts[1].start
-    assert listed.after_flight == (True, True)
+    listed = fallen((first, first + CONTACT), (second, second + CONTACT))
+    assert listed.touched.tolist() == [first, second]
+    assert listed.contact_from == second
+    chatter = shortest_flight(GAP) - 0.1e-3
+    bounced = fallen((first, first + CONTACT), (first + CONTACT + chatter, second), (second + HOP, math.nan))
+    assert bounced.after_flight == (True, False, True)
+    assert bounced.contact_from == second + HOP
 
 
-def test_without_a_contact_there_the_displacement_tells_when_an_impact_began() -> None:
-    seen = fallen().touched
-    assert seen == pytest.approx(BEGUN, abs=0.4e-3)
-    elsewhere = fallen((BEGUN[0] + 3e-3, BEGUN[0] + 4e-3), (BEGUN[1], math.nan))
-    assert elsewhere.touched.tolist() == [seen[0], BEGUN[1]]
+def test_without_contacts_no_impact_is_told() -> None:
+    assert fallen().touched.tolist() == [] and fallen().contact_from is None

@@ -14,7 +14,9 @@ from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
-from rotordrop.machine import example_path
+from rotordrop.evidence.quality import Kind
+from rotordrop.known import Known
+from rotordrop.machine import example_path, load_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.report.look_page import look_page
 
@@ -97,6 +99,30 @@ def test_the_gap_comes_from_the_depth_of_the_rest_where_it_is_not_given(tmp_path
     assert any(note.startswith(told) and "--gap" in note for note in seen.notes)
 
 
+def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_left_out():
+    """It was blended into that of the record, 275 µm to 312, below a warning that the two contradict."""
+    record, machine = example_record_path("lp400_drop_060"), load_machine(example_path("lp400"))
+    wide = {f"{one}.air_gap": Known(value=400e-6, status="given", unit="m") for one in ("NDE", "DE")}
+    alone, seen = look(record), look(record, machine=machine.with_values(wide))
+    assert any("400 µm" in one.message for one in seen.findings if one.kind == Kind.WRONG_AIR_GAP)
+    for plane, own in zip(seen.planes, alone.planes, strict=True):
+        assert plane.gap == pytest.approx(own.gap, rel=0.01)
+        assert plane.gap_interval_90 == pytest.approx(own.gap_interval_90, rel=0.02)
+
+
+def test_a_given_gap_that_the_record_contradicts_is_named_with_both_numbers(tmp_path):
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
+    (found,) = look(file, gap="0.4 mm").findings
+    assert found.kind == Kind.WRONG_AIR_GAP and found.severity == "warning"
+    told = re.search(r"air gap of (\d+) µm \((\d+) to (\d+)\) at NDE, 400 µm was given", found.message)
+    own, low, high = map(float, told.groups())
+    assert own == pytest.approx(1e6 * GAP, rel=0.05) and low < 1e6 * GAP < high
+    assert "at DE, 400 µm was given" in found.message
+    assert "leave that gap out, or correct it" in found.remedy
+    assert look(file, gap=0.9 * GAP).findings == ()
+
+
 def test_a_gap_is_found_where_the_rotor_floats_beside_the_centre(tmp_path):
     """The way from floating to rest was taken for the gap: 222 µm of 250."""
     time, path, _ = fall_and_bounce(until=1.5)
@@ -128,7 +154,28 @@ def test_a_swing_along_the_race_is_no_impact_and_bounces_are_counted(tmp_path):
     for plane in seen.planes:
         mine = [hit for hit in seen.impacts if hit.plane == plane.plane]
         assert 1 < surely <= len(mine) <= perhaps
-        assert plane.contact_from == mine[-1].time == pytest.approx(hits[len(mine) - 1][0], abs=0.3e-3)
+        assert (
+            plane.settling.contact_from == mine[-1].time == pytest.approx(hits[len(mine) - 1][0], abs=0.3e-3)
+        )
+
+
+def test_count_and_last_impact_hold_those_of_the_contacts():
+    """Displacement shows neither the shortest flights nor the softest contacts: it counted 5 and 2."""
+    seen = look(example_record_path("lp400_drop_060"))
+    off = -0.25e-3
+    # contacts of the simulation behind this record, after flights as long as the rule asks for
+    for plane, (count, last) in zip(seen.planes, ((6, 52.14e-3), (4, 37.94e-3)), strict=True):
+        low, high = plane.settling.count_interval_90
+        assert low <= count <= high
+        early, late = plane.settling.contact_from_interval_90
+        assert early < last + off < late and late - early < 0.1
+    low, high = seen.drops[0].count_interval_90
+    assert low <= 10 <= high
+    told = " ".join(one.sentence for one in look_page(seen, drawn=False).verdict)
+    assert f"7 impacts (90 %: {low} to {high}); the last one at 0.052 s (90 %: " in told
+    planes = seen.as_json()["planes"]
+    assert [plane["impacts"] for plane in planes] == [5, 2]
+    assert all(plane["contact_from_interval_90_s"][0] < plane["contact_from_s"] for plane in planes)
 
 
 def test_the_end_that_touches_first_is_named_by_the_kink_and_left_open_where_both_touch_together(tmp_path):

@@ -35,7 +35,9 @@ def test_the_loads_of_every_bearing_stand_in_one_line_each(estimate: Estimate) -
     assert f"{bearing.peak_force.value:.0f} N ({low:.0f} to {high:.0f} N)" in line(
         estimate, "peak bearing force"
     )
-    assert f"{1e3 * bearing.peak_force.time:.3f} ms, -" in line(estimate, "at, pressed").replace("−", "-")
+    assert f"{1e3 * bearing.peak_force.time:.3f} ms, -" in line(
+        estimate, "at (from power-off), towards"
+    ).replace("−", "-")
     assert f"{len(bearing.touched)} ({len(bearing.impacts)})" in line(estimate, "impacts (contacts)")
     assert "× the air gap" in line(estimate, "largest displacement")
     assert "the estimated part ends before 200 ms" in " ".join(" ".join(lines_of(estimate)).split())

@@ -71,7 +71,7 @@ def test_a_unit_that_all_numbers_of_a_column_share_stands_above_it() -> None:
 def test_the_weakest_impacts_are_left_out_and_counted(drop_result: DropResult) -> None:
     table = impact_table(simulated_bearings(drop_result), force="contact force", listed=2)
     assert [texts(row)[1] for row in table.rows] == ["7.900 ms", "9.200 ms"]
-    assert table.caption == "Contacts (2 of 3), 0 of them impacts"
+    assert table.caption == "Contacts (2 of 3), 3 of them impacts"
     assert "1 weaker ones are left out" in table.note
 
 

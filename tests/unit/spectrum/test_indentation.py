@@ -7,7 +7,13 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.record.impacts import shortest_flight
-from rotordrop.spectrum.indentation import BLOCK, displacement_history, find_settling, held_maximum
+from rotordrop.spectrum.indentation import (
+    BLOCK,
+    displacement_history,
+    find_settling,
+    held_maximum,
+    settling_words,
+)
 from rotordrop.units import GRAVITY
 
 FS = 5000.0
@@ -100,7 +106,14 @@ def test_impacts_are_flights_that_end_and_contact_lasts_from_the_last():
     assert len(landings) > len(after_flights(landings)) > 2
     assert found.touched == pytest.approx(after_flights(landings) - 0.1, abs=0.7e-3)
     assert found.contact_from == found.touched[-1]
-    assert f"{len(found.touched)} impacts by the displacement alone, the last one at" in found.statement
+    low, high = found.count_interval_90
+    assert low <= len(after_flights(landings)) <= high
+    told = settling_words(found, xy, FS)
+    assert f"{len(found.touched)} impacts (90 %: {low} to {high}) by the displacement alone, the last" in told
+    assert found.contact_from_interval_90 is not None
+    early, late = found.contact_from_interval_90
+    assert early < after_flights(landings)[-1] - 0.1 < late
+    assert f"({early:.3f} s to {late:.3f} s), in contact from there on" in told
 
 
 def test_an_impact_late_in_a_long_signal_counts():
@@ -121,7 +134,8 @@ def test_a_rotor_that_still_hops_did_not_settle():
     found = find_settling(xy, FS, air_gap=GAP)
     assert len(found.touched) > 5
     assert found.contact_from is None
-    assert "did not settle" in found.statement
+    assert found.contact_from_interval_90 is None
+    assert "did not settle" in settling_words(found, xy, FS)
 
 
 def test_a_swing_along_the_race_makes_no_impacts():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -35,10 +35,6 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
-_OTHER_GAP = 2.5
-"""In how many standard deviations, those of the record and of the machine file, a gap that a record shows by
-itself lies off that of the machine file to be named [1] (chosen)."""
-
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
 
@@ -97,27 +93,47 @@ def check_units(record: Record, machine: Machine, other_gaps: Sequence[Finding] 
 
 def check_gaps(motion: Motion, record: Record, machine: Machine) -> list[Finding]:
     """Compare the air gaps that the record shows by itself with those of the machine file."""
-    found = []
-    for number in sorted(planes_at_bearings(machine, record)):
-        wall, (expected, doubt) = motion.paths[number].wall, expected_gap(machine, record.planes[number])
-        if abs(wall.gap - expected) > _OTHER_GAP * math.hypot(wall.gap_error, doubt):
-            shown, stated = (
-                f"{1e6 * gap:.0f} µm ({1e6 * (gap - NINETY * off):.0f} to {1e6 * (gap + NINETY * off):.0f})"
-                for gap, off in ((wall.gap, wall.gap_error), (expected, doubt))
-            )
-            found.append((record.planes[number], shown, stated))
+    return _gap_findings(
+        motion,
+        record,
+        {p: expected_gap(machine, record.planes[p]) for p in sorted(planes_at_bearings(machine, record))},
+        "the machine file says {}",
+        "correct air_gap in the machine file, after a lift check where in doubt",
+    )
+
+
+def check_given_gap(motion: Motion, record: Record, gap: float) -> list[Finding]:
+    """Compare the air gaps that the record shows by itself with one that was given by hand [m]."""
+    given = dict.fromkeys(range(len(record.planes)), (gap, 0.0))
+    return _gap_findings(motion, record, given, "{} was given", "leave that gap out, or correct it")
+
+
+def _gap_findings(
+    motion: Motion, record: Record, stated: Mapping[int, tuple[float, float]], says: str, remedy: str
+) -> list[Finding]:
+    """The planes whose own gap is none that is stated, by number, with its standard error [m]."""
+
+    def written(gap: float, off: float) -> str:
+        ends = f" ({1e6 * (gap - NINETY * off):.0f} to {1e6 * (gap + NINETY * off):.0f})" if off else ""
+        return f"{1e6 * gap:.0f} µm{ends}"
+
+    found = [number for number, gap in stated.items() if motion.paths[number].wall.contradicts(gap)]
     if not found:
         return []
-    words = (f"{shown} at {plane.bearing}, the machine file says {stated}" for plane, shown, stated in found)
+    walls = {number: motion.paths[number].wall for number in found}
+    words = (
+        f"{written(wall.gap, wall.gap_error)} at {record.planes[number].bearing}, "
+        + says.format(written(*stated[number]))
+        for number, wall in walls.items()
+    )
     return [
         Finding(
             kind=Kind.WRONG_AIR_GAP,
             message="where the rotor turns back and rests, the record shows an air gap of "
             f"{'; of '.join(words)}; 90 % intervals",
-            remedy="correct air_gap in the machine file, after a lift check where in doubt; if it is right, "
-            "correct unit or sensitivity of the sensors",
+            remedy=f"{remedy}; if it is right, correct unit or sensitivity of the sensors",
             severity="warning",
-            channel=", ".join(name for plane, *_ in found for name in plane.names),
+            channel=", ".join(name for number in found for name in record.planes[number].names),
         )
     ]
 
