@@ -244,7 +244,7 @@ def kill_a_child(kept: Kept) -> int:
         for file in kept.job(number).path.glob("*.process"):
             process = int(file.read_text())
             command = Path(f"/proc/{process}/cmdline")
-            if command.exists() and b"rotordrop.web.child" in command.read_bytes():
+            if command.exists() and b"rotordrop.child" in command.read_bytes():
                 os.kill(process, signal.SIGKILL)
                 return 1
     return 0

@@ -6,6 +6,7 @@ nobody, so that neither page nor server has to be there when it ends.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -25,7 +26,16 @@ from rotordrop.errors import (
     UsageError,
 )
 from rotordrop.files import write_json
-from rotordrop.web.running import OF_MACHINE, Verb, clear, publish, result_folder, state_of, write_state
+from rotordrop.web.running import (
+    OF_MACHINE,
+    Verb,
+    clear,
+    process_file,
+    publish,
+    result_folder,
+    state_of,
+    write_state,
+)
 from rotordrop.web.workspace import Job, Workspace, beside, is_path
 
 if TYPE_CHECKING:
@@ -58,6 +68,7 @@ def main(folder: str, verb: Verb) -> None:
     told = state_of(job, verb)
     assert told is not None
     try:
+        process_file(job, verb).write_text(str(os.getpid()), encoding="ascii")  # or nobody could cancel it
         size = sum(entry["bytes"] for entry in job.read()["files"].values())
         limit(MEMORY[verb] + MEMORY_PER_BYTE * size, CPU_S[verb])
         of = job.digests()

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
-from rotordrop.child import child_command
+from rotordrop.child import Starter
 from rotordrop.errors import DamagedFileError
 from rotordrop.files import clear_of_no_file, digest_at, read_sealed, write_json
 from rotordrop.web.workspace import Job, Workspace, digests_in
@@ -38,6 +38,17 @@ AT_ONCE: dict[Verb, int] = {
     **dict.fromkeys(OF_MACHINE, 1),
 }
 """Computations of one verb that run beside each other; others wait."""
+IMPORTS: dict[Verb, tuple[str, ...]] = {
+    "look": (
+        "rotordrop.evidence.look",
+        "rotordrop.record.readers.delimited",
+        "rotordrop.report.look_page",
+        "rotordrop.report.rotor_drawing",
+        "rotordrop.web.drawn",
+    ),
+    "estimate": ("rotordrop.estimation", "rotordrop.twin.search", "rotordrop.web.drawn"),
+}
+"""What is imported before a computation is begun, where that need not be done for each."""
 
 _PATIENCE_S = 5.0
 """How long a killed child may take to end [s]; chosen, not measured."""
@@ -121,7 +132,9 @@ class Runner:
     """Begins what waits, notices what ended; the files say all there is to know."""
 
     space: Workspace
+    _starter: Starter = field(default_factory=Starter)
     _children: dict[Key, subprocess.Popen[bytes]] = field(default_factory=dict)
+    """Children that are no copies: whether they run is not told by a lock everywhere."""
     _open: dict[Key, Job] = field(default_factory=dict)
     _one: threading.RLock = field(default_factory=threading.RLock)
 
@@ -177,20 +190,15 @@ class Runner:
             if not take_lock(lock):
                 return
             write_state(job, verb, {**told, "state": "running", "started": time.time(), "fraction": 0.0})
-            child = subprocess.Popen(
-                child_command("rotordrop.web.child", "main", str(job.path), verb),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                env=os.environ
-                | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"},
-                start_new_session=True,
-                pass_fds=(lock,) if os.name == "posix" else (),
+            clear_of_no_file(process_file(job, verb))
+            process_file(job, verb).write_text("", encoding="ascii")  # the child says who it is
+            child = self._starter.start(
+                *("rotordrop.web.child", "main", str(job.path.absolute()), verb),
+                imports=("rotordrop.web.child", *IMPORTS.get(verb, ())),
+                held=lock,
             )
-            self._children[job.number, verb] = child
-            with suppress(OSError):
-                clear_of_no_file(_process_file(job, verb))
-                _process_file(job, verb).write_text(str(child.pid), encoding="ascii")
+            if child is not None:
+                self._children[job.number, verb] = child
         finally:
             os.close(lock)
 
@@ -213,7 +221,7 @@ class Runner:
         until = time.monotonic() + _PATIENCE_S
         while (child is not None and child.poll() is None) or _locked(job, verb):
             with suppress(OSError, ValueError):
-                kept = _process_file(job, verb)
+                kept = process_file(job, verb)
                 number = child.pid if child else kept.read_text(encoding="ascii") if kept.is_file() else ""
                 if os.name == "posix":
                     os.killpg(int(number), signal.SIGKILL)
@@ -271,7 +279,8 @@ def _lock_file(job: Job, verb: Verb) -> Path:
     return job.path / f"{verb}.lock"
 
 
-def _process_file(job: Job, verb: Verb) -> Path:
+def process_file(job: Job, verb: Verb) -> Path:
+    """Where a computation says which process it is."""
     return job.path / f"{verb}.process"
 
 

@@ -150,7 +150,7 @@ def test_an_estimate_is_cancelled_with_all_it_began(served, files):
     served.order(f"/api/jobs/{job}/estimate")
     folder = served.space.jobs_folder / job
     until = time.monotonic() + 60
-    while not (folder / "estimate.process").is_file():
+    while not (folder / "estimate.process").is_file() or not (folder / "estimate.process").read_text():
         assert time.monotonic() < until
         time.sleep(0.05)
     process = int((folder / "estimate.process").read_text())

@@ -30,8 +30,8 @@ _UNEVEN = 0.1
 _COUNTERS = re.compile(
     r"(sample|index|idx|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
 )
-_ONLY_NUMBERS = re.compile(r"[0-9.eE+-]*")
-"""Python reads ``1_000`` and digits of any script as numbers; no recorder writes them."""
+_ONLY_NUMBERS = {".": re.compile(r"[0-9.eE+-]*"), ",": re.compile(r"[0-9,eE+-]*")}
+"""By decimal sign. Python reads ``1_000`` and digits of any script as numbers; no recorder writes them."""
 
 _SIGNS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "blank"}
 _DAY = 86_400
@@ -154,9 +154,9 @@ def _intact_rows(
 
 def _numbers(fields: list[str], label: str, layout: Layout, path: Path) -> Array:
     """The fields of a column as numbers, missing samples as NaN."""
-    if layout.decimal == "." and _ONLY_NUMBERS.fullmatch("".join(fields)):
+    if _ONLY_NUMBERS[layout.decimal].fullmatch("".join(fields)):
         try:
-            return np.array(fields, dtype=np.float64)
+            return np.array("\n".join(fields).replace(",", ".").split("\n"), dtype=np.float64)
         except ValueError:
             pass  # looked at one by one
     values = np.full(len(fields), np.nan)
