@@ -93,6 +93,22 @@ def parts_of(record: Path) -> dict[str, Path]:
     return found
 
 
+def record_of(job: Job) -> Path:
+    """Where the record of a drop is kept."""
+    return job.path / "files" / str(job.read()["files"]["record"]["stored"])
+
+
+def is_part(part: Path, whole: Path) -> bool:
+    """Whether a file is the beginning of a longer one."""
+    left = part.stat().st_size
+    if left >= whole.stat().st_size:
+        return False
+    with part.open("rb") as one, whole.open("rb") as other:
+        while left > 0 and (block := one.read(2**20)) == other.read(min(left, 2**20)):
+            left -= len(block)
+    return left == 0
+
+
 @dataclass(frozen=True)
 class Kept:
     """All records that were taken."""

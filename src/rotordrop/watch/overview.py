@@ -18,12 +18,12 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.units import format_minute
 from rotordrop.watch.fleet import Fleet
 from rotordrop.watch.kept import QUARANTINE, Kept, status_of
-from rotordrop.watch.scalars import KINDS, NO_PEAKS, NOT_KNOWN, PEAKS, VERBS, shown_peak
+from rotordrop.watch.scalars import KINDS, NO_PEAKS, NOT_KNOWN, PEAKS, REPLACED, VERBS, shown_peak
 from rotordrop.web.running import published_run
 
 MOST_ROWS = 300
 """Records of one table; chosen, not measured."""
-RANKS = ("failed", "estimated", "quarantined", "looked", "superseded")
+RANKS = ("failed", "estimated", "quarantined", "looked", "superseded", REPLACED)
 """Outcomes by how soon somebody should look where there is a reason to."""
 
 

@@ -24,6 +24,8 @@ NO_PEAKS: dict[str, Any] = dict.fromkeys(
 )
 CUT = "truncated"
 """What the warning of a reader says of a file that ends too early."""
+REPLACED = "replaced"
+"""Outcome of a record that was taken before it was complete, and is kept whole."""
 VERBS: dict[str, Verb] = {"estimated": "estimate", "looked": "look"}
 """Computations of the page by what came of them."""
 
@@ -41,7 +43,7 @@ def scalars_of(job: Job, status: dict[str, Any], watched: Watched | None) -> dic
         "recorded": "",
         "outcome": outcome,
         "verdict": why,
-        "needs_person": why,
+        "needs_person": "" if outcome == REPLACED else why,
         "speed_Hz": None,
         "bearing": "",
         **NO_PEAKS,

@@ -10,8 +10,10 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import shutil
 import subprocess
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -21,11 +23,20 @@ from typing import Any
 from rotordrop.errors import OutputError, RecordError, RotordropError, UsageError
 from rotordrop.estimate.published import read_drop
 from rotordrop.files import clear_of_no_file, digest_of_file
-from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate
+from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate, logged_drops, remove_drop
 from rotordrop.watch.fleet import Fleet, read_fleet
-from rotordrop.watch.kept import Arrived, Kept, arrived, keep_status, put, status_of
+from rotordrop.watch.kept import (
+    Arrived,
+    Kept,
+    arrived,
+    is_part,
+    keep_status,
+    put,
+    record_of,
+    status_of,
+)
 from rotordrop.watch.overview import write_overview
-from rotordrop.watch.scalars import line_of, scalars_of
+from rotordrop.watch.scalars import REPLACED, line_of, scalars_of
 from rotordrop.web.running import Runner, Verb, result_folder, state_of, take_lock
 from rotordrop.web.workspace import Job
 
@@ -41,6 +52,9 @@ CRASHES = 3
 """Computations of a record that may be ended from outside before a person must look; chosen, not measured."""
 AGAIN_S, LATEST_S = 5.0, 3600.0
 """First and longest pause before what failed is tried again [s]; chosen, not measured."""
+GONE = ("superseded", REPLACED)
+"""Outcomes of what is no record of its own."""
+CUT_SHORT = "the file was taken before it was complete, and is kept whole since"
 HOOK_S = 60.0
 """How long a hook may take [s]; chosen, not measured."""
 OVERVIEW_SHARE = 0.05
@@ -69,6 +83,10 @@ class Watcher:
     _quarantined: set[str] = field(default_factory=set)
     _seen: dict[Path, Arrived] = field(default_factory=dict)
     """Files as they were taken."""
+    _of_file: defaultdict[Path, set[str]] = field(default_factory=lambda: defaultdict(set))
+    """Drops that were taken from each file."""
+    _announced: set[str] = field(default_factory=set)
+    """Drops whose estimate was said to have begun."""
     _standing: dict[Path, tuple[Arrived, float]] = field(default_factory=dict)
     """Files that were not taken, and since when they are as they are."""
     _queue: list[Arrived] = field(default_factory=list)
@@ -146,6 +164,7 @@ class Watcher:
         """Lock drops that nobody works on: of killed watchers, and those that are to be tried again."""
         for number in self._quarantined.copy():
             if not self.kept.quarantined(self.kept.job(number)).is_dir():
+                self._quarantined.discard(number)
                 self._ended.discard(number)
         for number in self.kept.numbers():
             if number in self._ended or number in self._mine:
@@ -155,6 +174,7 @@ class Watcher:
             if status is not None and "size" in status:
                 source = Path(status["source"])
                 self._seen.setdefault(source, Arrived(source, status["size"], status["mtime_ns"]))
+                self._of_file[source].add(number)
             if status is None or (status.get("done") and not self._is_to_be_tried_again(job, status)):
                 self._end(number, status)
             else:
@@ -187,8 +207,8 @@ class Watcher:
     def _names(self, job: Job, status: dict[str, Any]) -> tuple[Path, Path]:
         """A record as it lay under the folder, and where it is kept."""
         source = Path(status["source"])
-        stored = job.path / "files" / job.read()["files"]["record"]["stored"]
-        return source.relative_to(self.folder) if source.is_relative_to(self.folder) else source, stored
+        name = source.relative_to(self.folder) if source.is_relative_to(self.folder) else source
+        return name, record_of(job)
 
     def _look_round(self, now: float) -> None:
         """Queue files that have stood still long enough and are not taken."""
@@ -208,11 +228,12 @@ class Watcher:
         def taken() -> bool:
             number = self.kept.take(one)
             self._seen[one.path] = one
+            self._of_file[one.path].add(number)
             self._standing.pop(one.path, None)
             job = self.kept.job(number)
             status = status_of(job)
-            if status is not None and status["outcome"] == "superseded":  # its content is back
-                keep_status(job, status | {"outcome": "", "done": False})
+            if status is not None and status["outcome"] in GONE:  # its content is back
+                keep_status(job, _anew(status))
                 self._ended.discard(number)
             if number not in self._ended and number not in self._mine:
                 self._lock(job)
@@ -229,15 +250,13 @@ class Watcher:
         if status.get("done"):
             if not self._is_to_be_tried_again(job, status):
                 return True
-            kept = ("source", "size", "mtime_ns")
-            status = {"outcome": "", **{key: status[key] for key in kept}}
+            status = _anew(status)
             keep_status(job, status)
         if not status["outcome"]:
             status = self._computed(job, status)
         if not status["outcome"]:
             return False
-        self._deliver(job, status)
-        return True
+        return self._deliver(job, status)
 
     def _computed(self, job: Job, status: dict[str, Any]) -> dict[str, Any]:
         """What came of the computation of a drop, which is begun where it has not been."""
@@ -246,7 +265,7 @@ class Watcher:
         if verb is None or state is None or state["run"] == status.get("counted"):
             return self._begun(job, status)
         if state["state"] in ("waiting", "running"):
-            self._runner.ask(job, verb, state["options"])
+            self._ask(job, status, state["options"])
             return status
         if state["state"] == "done" and (folder := result_folder(job, verb, "document.json")) is not None:
             status = status | self._judged(job, status, verb, folder)
@@ -268,17 +287,25 @@ class Watcher:
         verb: Verb = "look" if watched is None else "estimate"
         status = status | {"verb": verb, "serial": "" if watched is None else watched.serial, "why": why}
         keep_status(job, status)
-        self._runner.ask(job, verb, {"quick": True} if self.quick and watched is not None else {})
+        self._ask(job, status, {"quick": True} if self.quick and watched is not None else {})
         return status
+
+    def _ask(self, job: Job, status: dict[str, Any], options: dict[str, Any]) -> None:
+        """Ask for a computation that may wait; say it when an estimate runs, which takes its time."""
+        state = self._runner.ask(job, status["verb"], options)
+        if status["verb"] == "estimate" and state["state"] == "running" and job.number not in self._announced:
+            self._announced.add(job.number)
+            self.say(f"{job.read()['files']['record']['name']}: {status['serial']}, estimate begun")
 
     def _judged(self, job: Job, status: dict[str, Any], verb: Verb, folder: Path) -> dict[str, Any]:
         """What a finished computation means: the outcome, with the reason."""
-        source = Path(status["source"])
-        now = Arrived.at(source)
-        changed = now not in (None, Arrived(source, status["size"], status["mtime_ns"]))
-        if changed and not digest_of_file(source).startswith(job.number):
-            why = "it was taken before it was complete; what stands there now is another record"
-            return {"outcome": "superseded", "why": why}
+        source, record = Path(status["source"]), record_of(job)
+        if Arrived.at(source) not in (None, Arrived(source, status["size"], status["mtime_ns"])):
+            if is_part(record, source):
+                return {"outcome": REPLACED, "why": CUT_SHORT}
+            if not is_part(source, record) and not digest_of_file(source).startswith(job.number):
+                why = "it was taken before it was complete; what stands there now is another record"
+                return {"outcome": "superseded", "why": why}
         if verb == "estimate":
             return {"outcome": "estimated"}
         findings = json.loads((folder / "document.json").read_bytes())["findings"]
@@ -289,8 +316,18 @@ class Watcher:
             return {"outcome": "quarantined", "why": f"{where}{worst['message']}; {worst['remedy']}"}
         return {"outcome": "looked"}
 
-    def _deliver(self, job: Job, status: dict[str, Any]) -> None:
-        """Quarantine, log and report a drop, each once, whatever was done before."""
+    def _deliver(self, job: Job, status: dict[str, Any]) -> bool:
+        """Quarantine, log and report a drop, each once, whatever was done before; whether that is done."""
+        if status["outcome"] not in GONE:
+            for number in sorted(self._of_file[Path(status["source"])] - {job.number}):
+                other = self.kept.job(number)
+                if (of_other := status_of(other)) is None:
+                    continue  # removed on the page
+                if of_other["outcome"] not in GONE and is_part(record_of(job), record_of(other)):
+                    status = status | {"outcome": REPLACED, "why": CUT_SHORT}
+                    break
+                if is_part(record_of(other), record_of(job)) and not self._withdrawn(other, of_other):
+                    return False
         watched = self._fleet.machines.get(status.get("serial", ""))
         if status["outcome"] == "quarantined":
             self.kept.quarantine(job, status["why"])
@@ -301,11 +338,41 @@ class Watcher:
                 status["logged"] = self._logged(job, bearings)
             status["scalars"] = scalars_of(job, status, watched)
             keep_status(job, status)
-        if self.hook is not None and status["outcome"] != "superseded" and not status.get("hooked"):
+        if self.hook is not None and status["outcome"] not in GONE and not status.get("hooked"):
             run_hook(self.hook, status["scalars"])
             status["hooked"] = True
         keep_status(job, status | {"done": True})
         self.say(line_of(status["scalars"], status["logged"]))
+        return True
+
+    def _withdrawn(self, cut: Job, status: dict[str, Any]) -> bool:
+        """Take a drop back whose file grew: from the log, the quarantine and the hook; whether that is done.
+
+        It is not while somebody works on it: then its file is found to have grown.
+        """
+        if status.get("withdrawn") or not status.get("done") or cut.number in self._mine:
+            return bool(status.get("withdrawn"))
+        self._lock(cut)
+        if cut.number not in self._mine:
+            return False
+        try:
+            status = status | {"outcome": REPLACED, "why": CUT_SHORT}
+            status["scalars"] = scalars_of(cut, status, None)
+            keep_status(cut, status)
+            if status.get("logged") is not None:
+                for number, drop in logged_drops(self.log).items():
+                    if drop.sha256 == status["scalars"]["sha256"]:
+                        remove_drop(self.log, number)
+            if (place := self.kept.quarantined(cut)).is_dir():
+                shutil.rmtree(place)
+            if self.hook is not None and status.get("hooked"):
+                run_hook(self.hook, status["scalars"])
+            keep_status(cut, status | {"withdrawn": True})
+            self.say(line_of(status["scalars"], None))
+        finally:
+            os.close(self._mine.pop(cut.number))
+        self._news = True
+        return True
 
     def _logged(self, job: Job, bearings: str) -> int:
         folder = result_folder(job, "estimate", "document.json")
@@ -335,6 +402,11 @@ def _standing_in(folder: Path) -> set[Arrived]:
     with suppress(OSError):
         return {one for path in folder.iterdir() if (one := Arrived.at(path)) is not None}
     return set()
+
+
+def _anew(status: dict[str, Any]) -> dict[str, Any]:
+    """Of a drop that is begun again only where it came from is known."""
+    return {"outcome": "", **{key: status[key] for key in ("source", "size", "mtime_ns")}}
 
 
 def _failed(job: Job, status: dict[str, Any], state: dict[str, Any]) -> dict[str, Any]:

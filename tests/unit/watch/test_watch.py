@@ -188,17 +188,85 @@ def test_what_a_killed_watcher_left_is_done_by_the_next(tmp_path, drops, kept, w
     assert "quarantined" in said[0]
 
 
-def test_a_record_that_grew_after_it_was_taken_is_taken_as_it_is_now(drops, kept, watcher):
+def test_a_record_that_changed_after_it_was_taken_is_taken_as_it_is_now(drops, kept, watcher):
     file = drops / "a.csv"
     file.write_bytes(b" ")
     number = kept.take(Arrived.at(file))
     job = kept.job(number)
     found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
-    file.write_bytes(b"")
+    file.write_bytes(b"x")
     watcher()[0].run(once=True)
     outcomes = {status_of(kept.job(name))["outcome"] for name in kept.numbers()}
     assert status_of(job)["outcome"] == "superseded"
     assert outcomes == {"superseded", "quarantined"}
+
+
+def test_a_record_that_grew_replaces_what_was_taken_of_it(tmp_path, drops, kept, watcher):
+    file, whole = drops / "a.csv", b"t;x\n0,1;2\n"
+    file.write_bytes(whole[:5])
+    told = tmp_path / "told"
+    watcher(hook=hook_into(told))[0].run(once=True)
+    assert [one["outcome"] for one in reported(told)] == ["quarantined"]
+    assert len(list(kept.path.glob("quarantine/*"))) == 1
+    (cut,) = kept.numbers()
+    file.write_bytes(whole)
+    one, said = watcher(hook=hook_into(told))
+    one.run(once=True)
+    assert status_of(kept.job(cut))["outcome"] == "replaced"
+    assert [one["outcome"] for one in reported(told)] == ["quarantined", "replaced", "quarantined"]
+    assert reported(told)[1]["sha256"] == reported(told)[0]["sha256"]
+    assert "a.csv: unknown machine, replaced: the file was taken before it was complete" in said[0]
+    assert not (kept.path / "quarantine" / cut).exists()
+    assert "1 records need a person" in (kept.path / "overview.html").read_text()
+
+    file.write_bytes(whole[:5])  # and cut again: another copy that broke
+    watcher(hook=hook_into(told))[0].run(once=True)
+    assert status_of(kept.job(cut))["outcome"] == "replaced"
+    assert not (kept.path / "quarantine" / cut).exists()
+    assert len(reported(told)) == 3
+
+
+def test_a_cut_drop_that_was_logged_leaves_the_log_when_its_file_grows(
+    tmp_path, drops, kept, watcher, estimated
+):
+    log = str(tmp_path / "drops.db")
+    watcher()[0].run(once=True)
+    assert [drop.sha256 for drop in logged_drops(log).values()] == [
+        kept.job(estimated).read()["files"]["record"]["sha256"]
+    ]
+    (drops / "4711.csv").write_text("x and more")
+    whole = kept.take(Arrived.at(drops / "4711.csv"))
+    sha256 = kept.job(whole).read()["files"]["record"]["sha256"]
+    content = published(
+        machine="LP-400",
+        record_sha256=sha256,
+        bearings={"NDE": bearing(PEAKS), "DE": bearing(PEAKS)},
+        rotordrop_version=__version__,
+    )
+    found(kept, whole, "estimate", content.as_json(), "4711")
+    watcher()[0].run(once=True)
+    assert [drop.sha256 for drop in logged_drops(log).values()] == [sha256]
+    assert status_of(kept.job(estimated))["outcome"] == "replaced"
+
+
+def test_another_record_under_the_same_name_is_another_drop(drops, kept, watcher):
+    for content in (b"first", b"second"):
+        (drops / "a.csv").write_bytes(content)
+        watcher()[0].run(once=True)
+    assert [status_of(kept.job(number))["outcome"] for number in kept.numbers()] == ["quarantined"] * 2
+
+
+def test_an_estimate_that_begins_is_said(drops, watcher, monkeypatch):
+    shutil.copy(DROP, drops / "4711.h5")
+    one, said = watcher()
+    monkeypatch.setattr(one._runner, "ask", lambda *_: {"state": "waiting"})
+    one._look_round(time.monotonic() - 10.0)
+    one.turn()
+    assert said == []  # it waits
+    monkeypatch.setattr(one._runner, "ask", lambda *_: {"state": "running"})
+    one.turn()
+    one.turn()
+    assert said == ["4711.h5: 4711, estimate begun"]
 
 
 def found(kept: Kept, number: str, verb: str, content: dict, serial: str = "") -> None:
