@@ -27,6 +27,7 @@ from rotordrop.record.axes import (
 )
 from rotordrop.record.clock import at_one_rate, shared_clock
 from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
+from rotordrop.record.event_date import event_of
 from rotordrop.record.examples import example_hashes
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
@@ -38,12 +39,6 @@ from rotordrop.units import parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
-
-EVENT_KEYS = (
-    *("start", "event_time", "event time", "trigger_time", "trigger time", "trigger", "date", "recorded"),
-    "time",
-)
-"""Header entries of recorders that say when the drop was, the most telling first."""
 
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _TIME_NAMES = ("time", "t", "zeit")
@@ -300,10 +295,8 @@ class Record:
 
     @property
     def event_date(self) -> str:
-        """When the recorder says the drop was; empty where its header does not tell."""
-        entries = {str(key).strip().lower(): str(value) for key, value in self.metadata.items()}
-        dates = (entries.get(key, "") for key in EVENT_KEYS)
-        return next((date[:40] for date in dates if any(sign.isdigit() for sign in date)), "")
+        """When the recorder says the drop was (ISO 8601); empty where its header does not tell."""
+        return event_of(self.metadata)[0]
 
     @property
     def is_simulated(self) -> bool:
@@ -421,6 +414,7 @@ def record_of(
     for column, (channel, sensor) in enumerate(zip(matched, sensors, strict=True)):
         signals[:, column], said = displacement(channel, sensor, recording, profile, place)
         words += said
+    notes += [doubt] if (doubt := event_of(recording.metadata)[1]) else []
     marks = next((c.values for c in recording.channels if c.name == MARKS and c.unit == "s"), None)
     when: Array | None = None
     readings: Array | None = None

@@ -7,6 +7,9 @@ import pytest
 
 from rotordrop.errors import RecordError
 from rotordrop.machine import example_machine
+from rotordrop.record.event_date import event_of
+from rotordrop.record.profile import Profile
+from rotordrop.record.readers import read_recording
 from rotordrop.record.record import record_of
 from rotordrop.record.recording import Channel, Recording
 
@@ -26,13 +29,56 @@ def test_a_window_holds_the_samples_at_its_bounds_whatever_their_rounding(drop):
     ("metadata", "date"),
     [
         ({"start": "2019-10-16T13:42:07.250000Z"}, "2019-10-16T13:42:07.250000Z"),
-        ({"Trigger_Time": "16.10.2019 13:42"}, "16.10.2019 13:42"),
+        ({"Trigger_Time": "16.10.2019 13:42"}, "2019-10-16T13:42"),
         ({"start": "trigger", "date": "2019-10-16"}, "2019-10-16"),
         ({"machine": "LP 400"}, ""),
+        ({"start": "-0.12", "Datum": "24.11.2026 13:05"}, "2026-11-24T13:05"),
+        ({"Datum": "3.4.2026", "Uhrzeit": "13:05:06,5"}, "2026-04-03T13:05:06.500000"),
+        ({"Datum/Uhrzeit": "24. November 2026, 13:05 Uhr"}, "2026-11-24T13:05"),
+        ({"Datum": "1. März 2026"}, "2026-03-01"),
+        ({"Date": "11/24/2026 1:05 PM"}, "2026-11-24T13:05"),
+        ({"Date": "24/11/2026"}, "2026-11-24"),
+        ({"Date": "2026/11/24 13:05"}, "2026-11-24T13:05"),
+        ({"Recorded at": "Nov 24, 2026 12:05:07 am"}, "2026-11-24T00:05:07"),
+        ({"date": "24-Nov-2026", "time": "13:05:06+01:00"}, "2026-11-24T13:05:06+01:00"),
+        ({"date": "04 MAY 2023"}, "2023-05-04"),
+        ({"Datum": "31.02.2026"}, ""),
+        ({"Date": "24.11.26"}, ""),
+        ({"Date": "03/04/2026"}, ""),
+        ({"Date": "10.20.30.40"}, ""),
     ],
 )
 def test_the_date_of_the_event_comes_from_the_header(drop, metadata, date):
     assert replace(drop, metadata=metadata).event_date == date
+
+
+@pytest.mark.parametrize("text", ["03/04/2026 13:05", "24.11.26"])
+def test_a_date_that_leaves_the_day_open_is_left_out_and_named(text):
+    recording = replace(_unequal(1), metadata={"Datum": text})
+    record = record_of(recording, example_machine("lp400").sensors)
+    assert record.event_date == ""
+    assert any(
+        f"the date {text!r} behind 'datum' leaves open which day it is" in note for note in record.notes
+    )
+
+
+@pytest.mark.parametrize(
+    ("head", "date"),
+    [
+        ("Datum: 24.11.2026 13:05", "2026-11-24T13:05"),
+        ("Datum;24.11.2026;13:05:06", "2026-11-24T13:05:06"),
+        ("# Date: Nov 24, 2026 1:05 PM", "2026-11-24T13:05"),
+        ("Messung 24.11.2026 13:05;Anlage 4711", "2026-11-24T13:05"),
+        ("Kalibriert: 24.11.2026", ""),
+        ("Datum: 03/04/2026", ""),
+    ],
+)
+def test_the_date_of_the_event_is_read_from_the_head_of_a_table(tmp_path, head, date):
+    rows = [f"{0.001 * k:.3f};{k % 7},5;{k % 5},25" for k in range(30)]
+    file = tmp_path / "drop.csv"
+    file.write_text("\n".join([head, "Zeit [s];X [um];Y [um]", *(row.replace(".", ",") for row in rows)]))
+    recording = read_recording(file, Profile())
+    assert event_of(recording.metadata)[0] == date
 
 
 def _unequal(times, shift=0.0):

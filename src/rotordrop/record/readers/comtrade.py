@@ -164,7 +164,8 @@ def _configuration(text: bytes, path: Path) -> _Configuration:
         row(1)
         declared = [row(2) for _ in range(max(int(row(1)[0]), 1))]
         rates = tuple((float(rate), int(last)) for rate, last, *_ in declared)
-        start, trigger = _instant(row(2)), _instant(row(2))
+        start, when = _instant(row(2)), row(2)
+        trigger = _instant(when)
         kind = row(1)[0].upper()
         time_factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
     except (ValueError, IndexError) as error:
@@ -178,7 +179,7 @@ def _configuration(text: bytes, path: Path) -> _Configuration:
         start=(start[0] - trigger[0]) + (start[1] - trigger[1]),
         kind=kind,
         time_factor=time_factor * 1e-6,
-        entries={"station": station[0], "recorder": station[1]},
+        entries={"station": station[0], "recorder": station[1], "trigger time": " ".join(when)},
     )
 
 

@@ -86,6 +86,9 @@ def recording_of_lines(
         if kind == "number" or (kind == "blank" and any(row[i] for row in rows))
     }
     stamped = _stamped_seconds(rows, layout, path)
+    if stamped is not None:
+        first = (field for field, kind in zip(rows[0], layout.kinds, strict=True) if kind == "time")
+        head.entries.setdefault("start", " ".join(first))
     times, used, words = _clock(table, columns, stamped, head, profile, path)
     channels = []
     for i in sorted(set(table) - set(used)):

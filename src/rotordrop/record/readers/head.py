@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.event_date import dated_line
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers.text import Layout, fields_of, is_number
 from rotordrop.record.recording import known_unit, split_unit
@@ -249,6 +250,8 @@ def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
         # one value for all channels, or one and the same for each
         values = [field for field in fields[1:] if field]
         entries.setdefault(key, values[0] if len(set(values)) == 1 else " ".join(fields[1:3]).strip())
+    if (dated := dated_line(plain)) is not None:
+        entries[dated[0]] = dated[1]
 
 
 def _number(value: str, unit: str, kind: str, default_unit: str) -> float | None:
