@@ -73,11 +73,25 @@ class NoDropError(RecordError):
         self.seen = seen
         self.remedy = remedy
         self.begins_late = begins_late
-        super().__init__(f"{record}: {seen}; {remedy}")
+        what = "" if begins_late else "no drop in the record: "
+        super().__init__(f"{record}: {what}{seen}; {remedy}")
 
 
 class NothingFallsError(RecordError):
-    """Nothing falls in a record: its rotor is held throughout, or lies on its bearings throughout."""
+    """Nothing falls in a record: its rotor is held throughout, or lies on its bearings throughout.
+
+    Parameters
+    ----------
+    seen : str
+        What it does.
+    remedy : str
+        The way out.
+    """
+
+    def __init__(self, seen: str, remedy: str) -> None:
+        self.seen = seen
+        self.remedy = remedy
+        super().__init__(f"nothing falls in the record: {seen}; {remedy}")
 
 
 class UnpairedError(RecordError):

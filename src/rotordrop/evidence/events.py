@@ -42,7 +42,6 @@ _BLOCK = 65536
 """Samples that are looked at in one piece [1] (chosen): a megabyte or two of memory."""
 _CONTACT_FILTER = 1e-3
 """Window of the curvature by which a contact is seen [s] (chosen)."""
-_NO_BEGINNING = "the levitated part before the drop is missing"
 
 _THROWN = 1.0
 """Range over the air gap that no levitated rotor has [1]: that of the limit C/D of ISO 14839-2."""
@@ -242,8 +241,9 @@ def _coarse_drop(record: Record, gravity: float, gaps: Array, first: int) -> Coa
         raise NoDropError(
             record.name,
             f"the rotor has sunk by {format_quantity(fastest, 'length')} at {record.time[sunk]:.6g} s, "
-            f"{(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the record begins: {_NO_BEGINNING}",
-            "record with pre-trigger",
+            f"{(record.time[sunk] - record.time[0]) * 1e3:.3g} ms after the record begins: "
+            "the levitated part before the drop is missing",
+            "give a recording with pre-trigger",
             begins_late=True,
         )
     before = speed_time < instant
@@ -342,18 +342,18 @@ def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:
     if thrown or (sunk_now.any() and deepest < FALLEN_SHARE):
         raise NoDropError(
             record.name,
-            f"no drop in the record, and it begins with the rotor at "
+            f"no drop in the record: it begins with the rotor at "
             f"{format_quantity(float(np.min(start)), 'length')} and moving by up to "
-            f"{format_quantity(float(np.ptp(path, axis=0).max()), 'length')}: {_NO_BEGINNING}",
-            "record with pre-trigger",
+            f"{format_quantity(float(np.ptp(path, axis=0).max()), 'length')}, as one that was dropped before",
+            "give the recording of the drop, with pre-trigger; the readings at standstill belong to --tail",
             begins_late=True,
         )
     raise NoDropError(
         record.name,
-        f"no drop in the record: the vertical displacement spans {ranges} in its planes and sinks by "
+        f"the vertical displacement spans {ranges} in its planes and sinks by "
         f"{deepest:.0%} of the nominal air gap at most, a dropped rotor by more than {FALLEN_SHARE:.0%} in "
         "all planes",
-        "check that this is the recording of a drop and that its polarity and unit are right",
+        "give a recording that holds the drop; if this one does, correct polarity or unit",
         begins_late=False,
     )
 

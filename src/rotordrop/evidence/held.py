@@ -85,6 +85,10 @@ _POINTS = 8192
 _LINES = 5
 """Lines listed of a channel (chosen)."""
 
+LEAST_PERIODS = 3
+"""A line has at least so many periods in a stretch [1]: below that its window does not part it from a step,
+such as that of a drop, or from a drift."""
+
 LINE_ABOVE, LINE_AROUND = 5.0, 64
 """A line is at least so many times the median of the spectrum within so many points to either side [1]
 (chosen: noise reaches that less than once in a million points, even in a single stretch)."""
@@ -149,6 +153,7 @@ def level_of(channel: str, unit: str, values: Array, rate: float) -> Level:
     amplitude: Array = 2.0 * np.sqrt(power) / max(window.sum(), 1e-12)
     frequency: Array = np.asarray(np.fft.rfftfreq(points, 1.0 / rate), dtype=np.float64)
     inner = np.flatnonzero((amplitude[1:-1] > amplitude[:-2]) & (amplitude[1:-1] >= amplitude[2:])) + 1
+    inner = inner[inner >= LEAST_PERIODS]
     around = sliding_window_view(np.pad(amplitude, LINE_AROUND, mode="reflect"), 2 * LINE_AROUND + 1)
     lines = [
         _between_points(frequency, amplitude, at)

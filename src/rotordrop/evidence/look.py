@@ -31,7 +31,7 @@ from rotordrop.evidence.paths import (
     whirls_of,
     with_impacts,
 )
-from rotordrop.evidence.quality import Finding, Kind, checked, not_seen, stops
+from rotordrop.evidence.quality import Finding, Kind, gate, not_seen, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.motion import check_given_gap
@@ -264,7 +264,8 @@ def look(
         return _look_at_channels(FilePath(str(record)), profile, str(error))
     machine = None if machine is None else as_dropped(read, machine)
     evidence = None if machine is None else Evidence(record=read, machine=machine, name=read.name)
-    findings = _checked(read) if evidence is None else checked(evidence)
+    passed = None if evidence is None else gate(evidence)
+    findings = _checked(read) if passed is None else passed.findings
     blocking = [found for found in findings if found.kind in _UNREADABLE and found.severity == "stop"]
     if blocking:
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
@@ -280,16 +281,20 @@ def look(
         motion = motion_of(fell, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
         drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
         if not drops:
-            raise NothingFallsError("the rotor does not fall from where it floated; check channels and gap")
+            raise NothingFallsError(
+                "the rotor does not fall from where it floated", "correct channels or gap"
+            )
     except NothingFallsError as error:
         unseen = not_seen(evidence, fell=False)
-        return _look_at_held(read, findings, unseen, every, guessed, machine, str(error))
+        notes = guessed if ends is None else guessed[1:]  # what held one end is no news where none fell
+        rest = tuple(one for one in findings if one.message != error.seen)
+        return _look_at_held(read, rest, unseen, every, notes, machine, str(error))
     turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
         motion=motion,
         findings=findings,
-        not_seen=not_seen(evidence),
+        not_seen=not_seen(evidence, passed=passed),
         drops=drops,
         whirls=whirls_of(motion, drops[0]),
         planes=tuple(_plane_looks(motion, drops[0], turning)),

@@ -203,18 +203,20 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
     usual = np.max(away[:first], axis=0)
     if np.any(reach < 4.0 * usual) or np.any(reach < 5e-6):
         raise NothingFallsError(
-            f"nothing falls in the record: the shaft strays by {1e6 * float(np.min(reach)):.3g} µm and moved "
-            f"by {1e6 * float(np.max(usual)):.3g} µm in its first 10 ms; check that it begins before the drop"
+            f"the shaft strays by {1e6 * float(np.max([reach, usual])):.3g} µm in all and by "
+            f"{1e6 * float(np.max(usual)):.3g} µm in its first 10 ms, as one that its magnets hold "
+            "throughout, or one that was dropped before",
+            "give a recording in which the rotor is let go: this one ends before that or begins after it",
         )
     moved = np.min(away / reach, axis=1) > FALLEN_SHARE
     sunk = int(np.argmax(moved))
     fastest = max(fall_accelerations(path, far, rate).max() for path, far in zip(away.T, reach, strict=True))
     if fastest < _SLOWEST_FALL * GRAVITY:
         raise NothingFallsError(
-            f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm, but "
-            f"with {fastest:.2g} m/s², a rotor falls with up to {GRAVITY:g} m/s²; a rotor that lies on its "
-            "bearings swings like that: give the recording of the drop (a settled tail belongs to "
-            "'estimate --tail'), or check unit and sampling rate"
+            f"the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm with {fastest:.2g} m/s², as one "
+            f"that swings on its bearings; a rotor falls with up to {GRAVITY:g} m/s²",
+            "give the recording of the drop, the readings at standstill belong to --tail; if it is that, "
+            "correct unit or sampling rate",
         )
     window, largest = round(_LASTS * rate), np.percentile(away, 99.9, axis=0)
     if len(away) - sunk > window:
@@ -222,9 +224,10 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
         stays = np.max(summed[window:] - summed[:-window], axis=0) / window
         if np.all(stays < _STAYS * largest) or np.any(reach < _LEAST_FALL):
             raise NothingFallsError(
-                f"nothing falls in the record: the shaft moves away by {1e6 * float(np.max(largest)):.3g} µm "
-                f"and is back within {1e3 * _LASTS:.0f} ms, or by {1e6 * float(np.min(reach)):.3g} µm for "
-                f"longer; a dropped rotor goes {1e6 * _LEAST_FALL:.0f} µm at least and stays there"
+                f"the shaft moves away by {1e6 * float(np.max(largest)):.3g} µm and is back within "
+                f"{1e3 * _LASTS:.0f} ms, or by {1e6 * float(np.min(reach)):.3g} µm for longer, as one that "
+                f"its magnets hold; a dropped rotor goes {1e6 * _LEAST_FALL:.0f} µm at least and stays there",
+                "give a recording in which the rotor is let go; if this is one, correct unit or channels",
             )
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
-from rotordrop.evidence.held import LINE_ABOVE, LINE_AROUND
+from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -116,7 +116,8 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     )
     stands_out = (
         f"A line is at least {LINE_ABOVE:g} times the median of the spectrum within {LINE_AROUND} points to "
-        "either side (chosen); its frequency is known to half the spacing of the points (±)."
+        f"either side (chosen), from {LEAST_PERIODS} periods in a stretch on: below, a step looks "
+        "like a tone. Its frequency is known to half the spacing of the points (±)."
     )
     summary = [table(seen.levels, levels, "Levels, in the unit of each channel", stands_out)]
     if seen.contacts:

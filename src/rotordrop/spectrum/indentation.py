@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
@@ -144,7 +145,7 @@ def find_settling(
     """
     samples = displacement.shape[0]
     around = int(LONGEST_FLIGHT * sampling_rate)
-    found: list[list[Array]] = [[], [], []]
+    found: list[list[NDArray[np.int64]]] = [[], [], []]
     for start in range(0, samples, BLOCK):
         before = max(start - around, 0)
         part = np.asarray(displacement[before : start + BLOCK + around], dtype=np.float64)
@@ -152,8 +153,9 @@ def find_settling(
         for kept, touched in zip(found, (hits.touched, hits.surely, hits.perhaps), strict=True):
             at = before + touched
             kept.append(at[(at >= start) & (at < start + BLOCK)])
-    touched, surely, perhaps = (start_time + np.concatenate(one) / sampling_rate for one in found)
-    return Settling.of(touched, surely, perhaps, start_time + samples / sampling_rate)
+    times = (start_time + np.concatenate(one) / sampling_rate for one in found)
+    begun, surely, perhaps = times
+    return Settling.of(begun, surely, perhaps, start_time + samples / sampling_rate)
 
 
 def settling_words(found: Settling, displacement: PlanarSignal, sampling_rate: float) -> str:

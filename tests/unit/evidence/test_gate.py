@@ -16,6 +16,7 @@ from rotordrop.evidence.quality import (
     Finding,
     Kind,
     check_record,
+    gate,
     not_seen,
     refuse_unusable,
     standing,
@@ -107,6 +108,18 @@ def test_what_the_gate_sees_of_this_record_is_not_said_to_pass(whole_drop, tail,
     assert "zeros off" not in not_seen(Evidence(record=whole_drop, machine=machine, tail=tail))
     assert only(whole_drop, machine, edited(tail, moved), severity="warning").kind == "tail offset"
     assert "tail" not in not_seen(Evidence(record=whole_drop, machine=machine))
+
+
+def test_what_a_stopped_gate_did_not_ask_is_said_to_pass(whole_drop, machine, edited):
+    """Without a speed no check looks at wiring; the sentence named neither ends nor axes."""
+    slow = replace(whole_drop, speed_time=None, speed_readings=None)
+    passed = gate(Evidence(record=slow, machine=machine))
+    said = not_seen(Evidence(record=slow, machine=machine), passed=passed)
+    assert "as the checks end with 'speed missing', axes exchanged or reversed, ends exchanged" in said
+    turned = reordered(edited, slow, [1, 0, 3, 2])
+    assert [one.kind for one in gate(Evidence(record=turned, machine=machine)).findings] == ["speed missing"]
+    whole = Evidence(record=whole_drop, machine=machine)
+    assert not_seen(whole, passed=gate(whole)) == not_seen(whole)
 
 
 class TestSingleChannels:

@@ -274,6 +274,7 @@ def test_a_levitated_record_shows_levels_and_no_contact(tmp_path):
     still = 5e-6 * np.column_stack([np.cos(377 * time), np.sin(377 * time)])
     seen = look(written(tmp_path / "drop.csv", time, {"NDE": still, "DE": still}))
     assert "nothing falls in the record: the shaft strays by " in seen.no_fall
+    assert seen.no_fall.endswith("let go: this one ends before that or begins after it")
     assert (seen.drops, seen.impacts, seen.contacts, seen.planes) == ((), (), (), ())
     level = seen.levels[0]  # 60 Hz lies between two points of the spectrum
     assert len(level.lines) == 1 and level.lines[0][1] == pytest.approx(5e-6, rel=0.02)
@@ -296,7 +297,7 @@ def test_a_settled_tail_is_no_drop(amplitude, tmp_path):
 def test_the_bundled_tail_is_no_drop(machine):
     for described in (None, machine):
         seen = look(example_record_path("lp400_drop_060_tail"), machine=described)
-        assert re.search(r"with [01]\.\d+ m/s².*'estimate --tail'", seen.no_fall)
+        assert re.search(r"with [01]\.\d+ m/s².* belong to --tail", seen.no_fall)
         assert not seen.contacts
 
 
@@ -444,6 +445,26 @@ def test_a_single_channel_shows_its_level(tmp_path, capsys):
     assert "Spectrum of VE-101X" in (tmp_path / "one.html").read_text()
     (level,) = look(file).levels
     assert max(level.lines, key=lambda line: line[1]) == pytest.approx((50.0, 20.0), rel=0.05)
+
+
+def test_the_step_of_a_drop_is_no_line_of_its_channel(tmp_path):
+    """Single channels show a drop as a step; it was their second line, 2.2 Hz of 30 µm."""
+    time, path, _ = fall_and_bounce(until=2.0)
+    path[:, 1] += 30e-6 * np.sin(100.0 * np.pi * time)
+    rows = [f"{at:.5f},{1e6 * y:.4f}" for at, y in zip(time, path[:, 1], strict=True)]
+    file = tmp_path / "one.csv"
+    file.write_text("\n".join(["Time [s],height [um]", *rows]) + "\n")
+    (level,) = look(file).levels
+    assert level.lines and min(at for at, _ in level.lines) > 2.5 * 2.0 * level.resolution
+    assert any(at == pytest.approx(50.0, abs=level.resolution) for at, _ in level.lines)
+
+
+def test_a_tail_is_told_to_be_one(tmp_path):
+    """It was said that one end stayed held by its magnets, and an estimate asked for a speed."""
+    seen = look(example_record_path("lp400_drop_060_tail"))
+    assert not seen.drops and "as one that swings on its bearings" in seen.no_fall
+    assert "the readings at standstill belong to --tail" in seen.no_fall
+    assert not any("held by its magnets" in note for note in seen.notes)
 
 
 def test_a_record_too_short_for_a_level_says_so(tmp_path):

@@ -8,13 +8,13 @@ ones found nothing that forbids it. One place says which finding overrules which
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.errors import NoDropError, RecordError
+from rotordrop.errors import NoDropError, NothingFallsError, RecordError
 from rotordrop.evidence.ends import held_planes
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
@@ -48,6 +48,7 @@ from rotordrop.evidence.quality.motion import (
     first_motion,
     hum_instead_of_a_drop,
     no_drop,
+    nothing_falls,
 )
 from rotordrop.evidence.quality.recorder import (
     check_again,
@@ -91,8 +92,23 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     return checked(Evidence(record=record, machine=dropped, tail=tail, name=record.name))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gate:
+    """What the checks say of a record, and which of them were asked before one forbade to go on."""
+
+    findings: tuple[Finding, ...]
+    """The worst first."""
+    asked: frozenset[str]
+    """Names of checks in `STAGES`."""
+
+
 def checked(evidence: Evidence) -> tuple[Finding, ...]:
     """Pass a record through the gate; the facts it asks for are there for an estimate afterwards."""
+    return gate(evidence).findings
+
+
+def gate(evidence: Evidence) -> Gate:
+    """Pass a record through the gate, and say how far it got."""
     said: dict[str, list[Finding]] = {}
     stand: list[Finding] = []
     for stage in STAGES:
@@ -102,7 +118,7 @@ def checked(evidence: Evidence) -> tuple[Finding, ...]:
         stand = standing(said, gains_right=flown is not None and gains_hold(flown))
         if stops(stand):
             break
-    return ranked(stand)
+    return Gate(findings=ranked(stand), asked=frozenset(said))
 
 
 def _damage(evidence: Evidence) -> list[Finding]:
@@ -133,7 +149,11 @@ def _gaps(evidence: Evidence) -> list[Finding]:
 
 
 def _speed(evidence: Evidence) -> list[Finding]:
-    return check_speed_signal(evidence.record) or check_speed(evidence.record, evidence.machine)
+    found = check_speed_signal(evidence.record) or check_speed(evidence.record, evidence.machine)
+    motion = evidence.motion if evidence.record.speed_readings is None else None
+    if isinstance(motion, Missing) and isinstance(motion.error, NothingFallsError):
+        return [nothing_falls(motion.error), *found]  # a tail, say, needs no speed but a drop
+    return found
 
 
 def _line(evidence: Evidence) -> list[Finding]:
@@ -338,15 +358,30 @@ UNSEEN_IN_TAIL: Mapping[str, Callable[[Evidence], bool]] = {
 }
 """What passes these checks in `studies/gate`, and in which records it does; of the tail they are asked."""
 
+SEEN_BY: Mapping[str, str] = {
+    "wiring": "axes exchanged or reversed",
+    "fall": "ends exchanged",
+    "flights": "gains",
+    "gaps": "air gaps",
+}
+"""What passes where these checks are not asked, because one before them forbids to go on."""
+
 NO_CHECK_SEES = "No check sees: "
 
 
-def not_seen(evidence: Evidence | None, *, fell: bool = True) -> str:
-    """What no check can see of this record, in a sentence; without evidence no machine is known."""
+def not_seen(evidence: Evidence | None, *, fell: bool = True, passed: Gate | None = None) -> str:
+    """What no check can see of this record, in a sentence; without evidence no machine is known.
+
+    A gate that it did not pass whole says which checks were not asked.
+    """
     said = f"{NO_CHECK_SEES}{', '.join(UNSEEN_ANYWHERE)}"
     if evidence is None or not fell:
         lacking = "a machine file" if evidence is None else "a fall"
         return f"{said}; without {lacking} none looks at wiring, polarity, gains and gaps"
+    if passed is not None and (unasked := SEEN_BY.keys() - passed.asked):
+        passes = ", ".join(words for name, words in SEEN_BY.items() if name in unasked)
+        ended = ", ".join(dict.fromkeys(one.kind for one in passed.findings if one.severity == "stop"))
+        return f"{said}; nor, as the checks end with '{ended}', {passes}"
     record, tail = (
         ", ".join(words for words, passes in table.items() if passes(evidence))
         for table in (UNSEEN, UNSEEN_IN_TAIL)
@@ -403,10 +438,12 @@ def standing(said: Mapping[str, list[Finding]], *, gains_right: bool) -> list[Fi
 __all__ = [
     "NO_CHECK_SEES",
     "Finding",
+    "Gate",
     "Kind",
     "Severity",
     "check_record",
     "checked",
+    "gate",
     "not_seen",
     "ranked",
     "refuse_unusable",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.errors import NoDropError
+from rotordrop.errors import NoDropError, NothingFallsError
 from rotordrop.evidence.events import expected_gap, fall_accelerations, nominal_gaps, planes_at_bearings
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
@@ -461,6 +461,11 @@ def no_drop(error: NoDropError) -> Finding:
         remedy=error.remedy,
         severity="stop",
     )
+
+
+def nothing_falls(error: NothingFallsError) -> Finding:
+    """What a record without a machine shows in place of a drop, as a finding."""
+    return Finding(kind=Kind.NO_DROP, message=error.seen, remedy=error.remedy, severity="stop")
 
 
 def first_motion(record: Record) -> tuple[int, Array]:
