@@ -79,10 +79,10 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         named = {name: fitting(recording.channels, label) for name, label in profile.channels.items()}
         called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
         pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
-        planes = [(name, [(channel, None) for channel in pair]) for name, pair in pairs]
-        spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair in pairs)
+        planes = [(name, [(channel, None) for channel in pair]) for name, pair, _ in pairs]
+        spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair, _ in pairs)
         notes = (f"planes by the {guessed} of the channels ({spoken}), their sensors taken as perpendicular",)
-        paired = {id(channel) for _, pair in pairs for channel in pair}
+        paired = {id(channel) for _, pair, _ in pairs for channel in pair}
         left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
         left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
         if pairs and left:
@@ -99,10 +99,16 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
                 f"of length or in volts); a plane needs two. It has {have}: export the "
                 "displacements of a plane together"
             )
+        by_two = list(zip(labels[::2], labels[1::2], strict=False))
+        ends = ("NDE", "DE") if len(by_two) == 2 else [f"plane {k + 1}" for k in range(len(by_two))]
+        as_listed = " ".join(
+            f'--map "{end}: {first}, {second}"' for end, (first, second) in zip(ends, by_two, strict=True)
+        )
         raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
-            "their names (X and Y, A and B, H and V, left and right); say which look at one plane, for "
-            f'example --map "NDE: {labels[0]} 0 deg, {labels[1]} 90 deg"'
+            "their names (X and Y, A and B, H and V, left and right); say which look at one plane: if they "
+            f"are listed in pairs, {as_listed}; angles that are known go with their channels "
+            f'("{labels[0]} 45 deg")'
         )
     sensors = [
         Sensor.model_construct(
@@ -210,8 +216,10 @@ def _may_read(channel: Channel) -> bool:
 
 def pairs_of(
     channels: Sequence[Channel], called: Callable[[Channel], str] = lambda channel: channel.name
-) -> tuple[list[tuple[str, tuple[Channel, Channel]]], str]:
+) -> tuple[list[tuple[str, tuple[Channel, Channel], str]], str]:
     """Channels that look at one plane, in the order of the file, and whether by their names or their order.
+
+    The name of a plane, its two channels, and the letters of their axes, empty where they are only counted.
 
     Names of a pair differ only in a letter or word for an axis, once as they are, once without counters.
     Names that only count (CH1, CH2, …) are taken two by two.
@@ -219,8 +227,8 @@ def pairs_of(
     left = [channel for channel in channels if _may_read(channel)]
     if left and len(left) % 2 == 0 and all(_ONLY_COUNTED.fullmatch(called(channel)) for channel in left):
         pairs = zip(left[::2], left[1::2], strict=True)
-        return [(f"plane {k}", pair) for k, pair in enumerate(pairs, start=1)], "order"
-    found: list[tuple[str, tuple[Channel, Channel]]] = []
+        return [(f"plane {k}", pair, "") for k, pair in enumerate(pairs, start=1)], "order"
+    found: list[tuple[str, tuple[Channel, Channel], str]] = []
     for strip in (False, True):
         names = {}
         for channel in left:
@@ -234,13 +242,14 @@ def pairs_of(
                     if not any(first is c for c in left) or not any(second is c for c in left):
                         continue
                     if (name := _common(names[id(first)], names[id(second)], axes)) is not None:
-                        found.append((name, (first, second)))
+                        found.append((name, (first, second), axes))
                         left = [c for c in left if c is not first and c is not second]
     order = {id(channel): place for place, channel in enumerate(channels)}
     found.sort(key=lambda entry: min(order[id(channel)] for channel in entry[1]))
     # an HDF5 file lists its channels by the alphabet, DE first; every format shows the ends in one order
     found = far_end_first(found, lambda entry: entry[0] or "")
-    return [(name or f"plane {number}", pair) for number, (name, pair) in enumerate(found, start=1)], "names"
+    numbered = enumerate(found, start=1)
+    return [(name or f"plane {number}", pair, axes) for number, (name, pair, axes) in numbered], "names"
 
 
 def _common(first: str, second: str, axes: str) -> str | None:

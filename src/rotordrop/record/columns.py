@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,16 +80,23 @@ def match_sensors(
 
 
 def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
-    """Options that would map the sensors without a channel: planes in their order where as many are pairs."""
+    """Options that would map the sensors without a channel: planes in their order where as many are pairs.
+
+    With their angles: X stands a quarter turn before Y, counter-clockwise, the right probe before the left.
+    """
     pairs, _ = pairs_of(recording.channels)
     planes = list(dict.fromkeys(sensor.bearing for sensor in sensors))
     members = [[sensor for sensor in sensors if sensor.bearing == plane] for plane in planes]
     if len(pairs) == len(planes) and all(len(found) == 2 for found in members):
-        options = [
-            f'--map "{plane}: {first.label}, {second.label}"'
-            for plane, (_, (first, second)), found in zip(planes, pairs, members, strict=True)
-            if any(sensor.name in missing for sensor in found)
-        ]
+        options = []
+        for plane, (_, pair, axes), found in zip(planes, pairs, members, strict=True):
+            angles = [float(sensor.angle) for sensor in found]
+            leads = math.sin(angles[1] - angles[0]) > 0.0
+            if leads != (axes != "LR") and axes in ("XY", "HV", "LR"):
+                angles.reverse()
+            stand = (f"{c.label} {math.degrees(at):.4g} deg" for c, at in zip(pair, angles, strict=True))
+            if any(sensor.name in missing for sensor in found):
+                options.append(f'--map "{plane}: {", ".join(stand)}"')
         return f"likeliest {' '.join(options)}"
     return " ".join(f'--map "{name}=..."' for name in missing[:8])
 
@@ -218,8 +226,8 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         options = _likeliest(recording, sensors, unmapped)
         missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
     pairs = [] if sensors else pairs_of(recording.channels)[0]
-    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other) in pairs}
-    paired = [channel.label for _, pair in pairs for channel in pair]
+    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
+    paired = [channel.label for _, pair, _ in pairs for channel in pair]
     used = [
         channel
         for channel in recording.channels

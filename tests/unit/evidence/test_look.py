@@ -447,6 +447,22 @@ def test_a_single_channel_shows_its_level(tmp_path, capsys):
     assert max(level.lines, key=lambda line: line[1]) == pytest.approx((50.0, 20.0), rel=0.05)
 
 
+def test_the_map_that_odd_names_are_asked_with_can_be_given_as_it_stands(tmp_path):
+    """It named two of four channels, at angles that nobody knew."""
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path}, (45.0, 135.0))
+    head, rest = file.read_text().split("\n", 1)
+    for name, odd in (("NDE_X", "front"), ("NDE_Y", "probe alpha"), ("DE_X", "K17"), ("DE_Y", "hinten")):
+        head = head.replace(name, odd, 1)
+    file.write_text(f"{head}\n{rest}")
+    given = re.findall(r'--map "([^"]+)"', look(file).no_fall)
+    assert given == ["NDE: front, probe alpha", "DE: K17, hinten"]
+    seen = look(file, mapping=given)
+    assert [plane.plane for plane in seen.planes] == ["NDE", "DE"]
+    hits = [impact.azimuth for impact in seen.impacts]
+    assert np.degrees(hits) == pytest.approx(-90.0, abs=3.0)
+
+
 def test_the_step_of_a_drop_is_no_line_of_its_channel(tmp_path):
     """Single channels show a drop as a step; it was their second line, 2.2 Hz of 30 µm."""
     time, path, _ = fall_and_bounce(until=2.0)

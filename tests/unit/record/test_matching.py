@@ -247,11 +247,17 @@ def test_a_map_that_does_not_fit_says_why(text, said, machine):
 
 
 def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answer(machine):
-    asked = r'likeliest --map "NDE: Ch1 VE-101X, Ch2 VE-101Y" --map "DE: Ch3 VE-102X, Ch4 VE-102Y"'
-    with pytest.raises(RecordError, match=asked):
+    """Y stands a quarter turn behind X: the sensors at 135 and 45° were to be X and Y, in this order."""
+    with pytest.raises(RecordError, match="likeliest") as asked:
         record_of(recording(*API), machine.sensors)
-    given = re.findall(r'--map "([^"]+)"', asked)
-    assert record_of(recording(*API), machine.sensors, profile=rules_of(None, given)).signals.shape == (10, 4)
+    given = re.findall(r'--map "([^"]+)"', str(asked.value))
+    assert given == [
+        "NDE: Ch1 VE-101X 45 deg, Ch2 VE-101Y 135 deg",
+        "DE: Ch3 VE-102X 45 deg, Ch4 VE-102Y 135 deg",
+    ]
+    channels = tuple(channel(name, values=np.full(10, float(k))) for k, name in enumerate(API))
+    record = record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given))
+    np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
 
 
 def test_a_sensor_takes_the_channel_of_its_name_without_counter_and_prefix(machine):
