@@ -182,6 +182,8 @@ class ReportContent:
     """Sentence that says the record is simulated; empty for a measured one."""
     verdict: tuple[Statement, ...] = ()
     """The result in sentences, warnings included, most important first."""
+    to_do: Section | None = None
+    """What follows from the verdict, directly below it."""
     cards: tuple[Card, ...] = ()
     """Headline numbers per bearing."""
     screen: Table | None = None

@@ -67,8 +67,8 @@ CROSS_CHECK_NOTE = (
     "that fits its record it takes sensor errors, air gaps and, for the stress, the preload; from one that "
     "does not it takes nothing."
 )
-FRONT = 3
-"""Sections of the page to send: force, orbit, what to do."""
+FRONT = 2
+"""Sections of the page to send: force and orbit."""
 AGREES = "The independent cross-check agrees within its known accuracy."
 
 
@@ -86,7 +86,10 @@ def estimate_page(
     """
     weighed = card or assumed_card(estimate, since)
     return replace(
-        estimate_summary(estimate, origin), sections=_sections(estimate, since, weighed), lead=FRONT
+        estimate_summary(estimate, origin),
+        to_do=inspection_section(estimate),
+        sections=_sections(estimate, since, weighed),
+        lead=FRONT,
     )
 
 
@@ -230,7 +233,7 @@ def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tupl
         assumptions_section(),
         *defaults_section(estimate.machine),
     )
-    return (force, orbit, inspection_section(estimate), *appendix(further))
+    return (force, orbit, *appendix(further))
 
 
 def _severity(estimate: Estimate) -> Section:

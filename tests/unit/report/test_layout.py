@@ -107,7 +107,7 @@ def test_the_first_printed_page_is_the_one_to_send_and_the_rest_an_appendix(
     browser.open(f"file://{tmp_path / 'page.html'}")
     browser.until("document.documentElement.getAttribute('data-drawn') === '2'")
     heads = "[...document.querySelectorAll('.front h2')].map(one => one.innerText).join()"
-    assert browser.evaluate(heads) == "Verdict,Bearing force,Orbit,What to do"
+    assert browser.evaluate(heads) == "Verdict,What to do,Bearing force,Orbit"
     assert browser.evaluate("document.querySelectorAll('.front .card dl > div').length") == 8
     last = "[...document.querySelectorAll('.part')].find(one => one.querySelector('.chart'))"
     assert browser.evaluate(f"{last}.open") is False

@@ -276,7 +276,11 @@ def test_the_event_is_written_as_a_person_would(estimate: Estimate) -> None:
 def test_every_curve_is_drawn_once(estimate: Estimate) -> None:
     content = estimate_page(estimate)
     front = [section.heading for section in content.sections[: content.lead]]
-    assert front == ["Bearing force", "Orbit", "What to do"]
+    assert front == ["Bearing force", "Orbit"]
+    html = render_page(content)
+    verdict, advice, numbers = (html.index(part) for part in ('id="verdict"', 'id="to-do"', 'class="cards"'))
+    assert verdict < advice < numbers < html.index("Figure 1")  # it stood below force and orbit
+    assert html[advice:numbers].count("<li") == len(content.to_do.statements)
     assert all(section.folded for section in content.sections[content.lead :])
     drawn = {section.heading: len(section.figures) for section in content.sections}
     assert (drawn["Bearing force"], drawn["Displacement"]) == (1, 1)

@@ -46,7 +46,8 @@ const TABS = {
   Numbers: () => {
     const page = state.estimate || state.look;
     const folded = page.verdict.filter((one) => page.assumptions?.includes(one.text)), list = (some) => make("ul", { class: "statements", of: some.map(sentence) });
-    return [cards(page.cards), list(page.verdict.filter((one) => !folded.includes(one))),
+    const [first, ...rest] = page.verdict, todo = page.to_do;
+    return [list([first]), ...(todo ? [make("h3", { class: "part", text: todo.heading }), list(todo.statements)] : []), cards(page.cards), list(rest.filter((one) => !folded.includes(one))),
       ...(folded.length ? [make("details", { of: [make("summary", { text: `${folded.length} more notes and assumptions` }), list(folded)] })] : []), ...(state.estimate ? page.summary : []).map(table)];
   },
   Quality: () => [findings(state.estimate?.findings || state.look.findings), make("p", { class: "small", text: (state.estimate || state.look).not_seen || "" }), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
