@@ -441,4 +441,6 @@ def _rounded(number: float, digits: int) -> str:
 
 def _spoken(kind: str) -> str:
     """Name a kind with its article."""
+    if kind == "dimensionless":
+        return "a number without a unit"
     return ("an " if kind[0] in "aeiou" else "a ") + kind.replace("_", " ")

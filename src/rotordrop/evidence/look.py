@@ -34,7 +34,7 @@ from rotordrop.evidence.paths import (
 from rotordrop.evidence.quality import Finding, Kind, gate, not_seen, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
-from rotordrop.evidence.quality.motion import check_given_gap
+from rotordrop.evidence.quality.motion import check_fall, check_given_gap
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
@@ -284,6 +284,8 @@ def look(
             raise NothingFallsError(
                 "the rotor does not fall from where it floated", "correct channels or gap"
             )
+        if evidence is None:
+            findings = ranked([*findings, *check_fall(motion)])
     except NothingFallsError as error:
         unseen = not_seen(evidence, fell=False)
         notes = guessed if ends is None else guessed[1:]  # what held one end is no news where none fell

@@ -78,6 +78,8 @@ class Motion:
     paths: tuple[Path, ...]
     floats: NDArray[np.bool_]
     notes: tuple[str, ...]
+    falls: tuple[float, ...] = ()
+    """With which acceleration each plane first falls [m/s²]; empty where nothing does."""
 
     @property
     def walls(self) -> dict[str, Wall]:
@@ -105,7 +107,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
         When nothing falls.
     """
     raw, rate = record.resolved(), record.sampling_rate
-    begin, sunk = _first_fall(raw, rate)
+    begin, sunk, falls = _first_fall(raw, rate)
     # where the rotor lies: the last quarter after the fall
     rest_from = sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
     rest = np.median(raw[rest_from:], axis=0)
@@ -141,6 +143,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
         paths=tuple(paths),
         floats=where_floating(paths, rate),
         notes=tuple(notes),
+        falls=falls,
     )
 
 
@@ -190,8 +193,8 @@ def _gap_note(path: Path) -> str:
     return f"{path.name}: air gap {told}; give it with --gap where it is known"
 
 
-def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
-    """Last sample of the levitated part and first sample by which the rotor lies away from it.
+def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
+    """Last sample of the levitated part, first sample by which the rotor lies away from it, accelerations.
 
     No gap is known yet: every plane is scaled by how far it strays in all.
     """
@@ -210,13 +213,17 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
         )
     moved = np.min(away / reach, axis=1) > FALLEN_SHARE
     sunk = int(np.argmax(moved))
-    fastest = max(fall_accelerations(path, far, rate).max() for path, far in zip(away.T, reach, strict=True))
+    found = [fall_accelerations(path, far, rate) for path, far in zip(away.T, reach, strict=True)]
+    fastest = max(float(one.max()) for one in found)
     if fastest < _SLOWEST_FALL * GRAVITY:
+        in_mil = 25.4 * fastest  # a fall in which an orbit has a part, or a slower one, by `_SLOWEST_FALL`
+        likely = _SLOWEST_FALL * GRAVITY < in_mil < 2.0 * GRAVITY
+        mil = f": if it is in mil, it fell with {in_mil:.2g} m/s²" if likely else ""
         raise NothingFallsError(
             f"the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm with {fastest:.2g} m/s², as one "
             f"that swings on its bearings; a rotor falls with up to {GRAVITY:g} m/s²",
             "give the recording of the drop, the readings at standstill belong to --tail; if it is that, "
-            "correct unit or sampling rate",
+            f"correct unit or sampling rate{mil}",
         )
     window, largest = round(_LASTS * rate), np.percentile(away, 99.9, axis=0)
     if len(away) - sunk > window:
@@ -230,7 +237,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int]:
                 "give a recording in which the rotor is let go; if this is one, correct unit or channels",
             )
     back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
-    return max(sunk - back, first), sunk
+    return max(sunk - back, first), sunk, tuple(float(one[0]) for one in found)
 
 
 def _upright(levitated: Array, fall: Array) -> Array:

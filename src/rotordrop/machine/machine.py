@@ -82,12 +82,19 @@ class Machine(Description):
 
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
-        """Refuse a direction of gravity, which a later version will know."""
+        """Refuse a direction of gravity, for a later version, and a side force with a unit."""
         if isinstance(raw.get("gravity"), list | tuple):
             raise Misfit(
                 "gravity as a direction is reserved and not yet supported; it acts towards -y: give its "
                 'acceleration alone, gravity = "9.81 m/s^2"',
                 ("gravity",),
+            )
+        push = raw.get("side_force")
+        if isinstance(push, str) and re.search(r"[A-Za-z]\s*$", push):
+            raise Misfit(
+                f"{push!r} has a unit; side_force is the steady force across over the weight of the rotor, "
+                "or the angle in rad by which the machine is out of level: side_force = 0.01",
+                ("side_force",),
             )
         return raw
 

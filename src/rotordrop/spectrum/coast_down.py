@@ -232,6 +232,7 @@ def _plane(
     choice: WaterfallChoice,
 ) -> PlaneAnalysis:
     moved, rate, start = signal.planes[name], signal.sampling_rate, signal.start_time
+    error = None if signal.air_gap_error is None else signal.air_gap_error[name]
     track = None
     resonances: tuple[PassedResonance, ...] = ()
     if signal.profile is not None:
@@ -259,11 +260,11 @@ def _plane(
             moved,
             rate,
             air_gap=signal.air_gap[name],
-            error=None if signal.air_gap_error is None else signal.air_gap_error[name],
+            error=error,
             start_time=start,
         ),
         settling=settled,
-        settling_words=settling_words(settled, moved, rate),
+        settling_words=settling_words(settled, moved, rate, error),
         track=track,
         resonances=resonances,
     )

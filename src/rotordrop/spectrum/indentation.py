@@ -158,8 +158,13 @@ def find_settling(
     return Settling.of(begun, surely, perhaps, start_time + samples / sampling_rate)
 
 
-def settling_words(found: Settling, displacement: PlanarSignal, sampling_rate: float) -> str:
-    """The impacts of a coast-down in words, and how far from the centre the rotor is in the end."""
+def settling_words(
+    found: Settling, displacement: PlanarSignal, sampling_rate: float, error: float | None = None
+) -> str:
+    """The impacts of a coast-down in words, and how far from the centre the rotor is in the end.
+
+    The distance has a standard error [m], where that is known.
+    """
     touched, between = found.touched, found.contact_from_interval_90
     if not len(touched):
         return "no impact: the rotor did not reach the air gap"
@@ -170,10 +175,11 @@ def settling_words(found: Settling, displacement: PlanarSignal, sampling_rate: f
         return f"{count}{format_moment(float(touched[-1]))}, at the end of the signal: it did not settle"
     last_second = displacement[max(0, displacement.shape[0] - int(sampling_rate)) : displacement.shape[0]]
     radius = float(np.median(np.hypot(*np.asarray(last_second, dtype=np.float64).T)))
+    known = "" if error is None else f" ± {NINETY * error * 1e6:.0f}"
     times = " to ".join(format_moment(one) for one in between)
     return (
         f"{count}{format_moment(found.contact_from)} ({times}), in contact from there on, at "
-        f"{radius * 1e6:.0f} µm from the centre in the end"
+        f"{radius * 1e6:.0f}{known} µm from the centre in the end"
     )
 
 
@@ -221,14 +227,17 @@ def _window_statement(
     half: float | None,
 ) -> str:
     (largest, time), (later, later_time) = maximum, after
-    size = f"{largest * 1e6:.1f} µm" if half is None else f"{largest * 1e6:.0f} ± {half * 1e6:.0f} µm"
-    first = (
-        f"largest displacement {size} ({(largest - air_gap) * 1e6:+.1f} µm beyond the air "
-        f"gap) at {format_moment(time, 4)}"
-    )
+
+    def size(value: float, wide: float = 1.0, sign: str = "") -> str:
+        if half is None:
+            return f"{value * 1e6:{sign}.1f} µm"
+        return f"{value * 1e6:{sign}.0f} ± {wide * half * 1e6:.0f} µm"
+
+    beyond = size(largest - air_gap, math.sqrt(2.0), "+")
+    first = f"largest displacement {size(largest)} ({beyond} beyond the air gap) at {format_moment(time, 4)}"
     if not np.isfinite(later):
         return f"{first}; the signal ends within {window:g} s"
-    second = f"later than {window:g} s at most {later * 1e6:.1f} µm (at {format_moment(later_time, 2)})"
+    second = f"later than {window:g} s at most {size(later)} (at {format_moment(later_time, 2)})"
     if abs(largest - later) <= 2.0 * noise and time <= window:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     held = "held the maximum" if time <= window else "did not hold the maximum"

@@ -463,6 +463,24 @@ def test_the_map_that_odd_names_are_asked_with_can_be_given_as_it_stands(tmp_pat
     assert np.degrees(hits) == pytest.approx(-90.0, abs=3.0)
 
 
+@pytest.mark.parametrize("unit", ["um", "mil", "mm"])
+def test_a_unit_in_which_the_shaft_falls_faster_than_gravity_is_doubted(tmp_path, unit):
+    """Nothing else is known without a machine file; 25.4 times the gap passed without a word."""
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
+    file.write_text(file.read_text().replace("[um]", f"[{unit}]"))
+    found = [one for one in look(file).findings if one.kind == Kind.WRONG_UNIT]
+    if unit == "um":
+        assert found == []
+        return
+    factor = {"mil": 25.4, "mm": 1e3}[unit]
+    told = re.search(
+        r"falls (\S+) times as fast as gravity .* a unit factor of (\d+\.?\d*)", found[0].message
+    )
+    assert float(told[1]) == pytest.approx(factor, rel=0.4) and float(told[2]) == factor
+    assert found[0].severity == "warning" and "correct it there" in found[0].remedy
+
+
 def test_the_step_of_a_drop_is_no_line_of_its_channel(tmp_path):
     """Single channels show a drop as a step; it was their second line, 2.2 Hz of 30 µm."""
     time, path, _ = fall_and_bounce(until=2.0)

@@ -27,6 +27,12 @@ BAD = [
         "gravity as a direction is reserved and not yet supported",
         "gravity",
     ),
+    (
+        'name = "small"',
+        'name = "small"\nside_force = "5 N"',
+        "side_force: '5 N' has a unit; side_force is the steady force across over the weight of the rotor",
+        "5 N",
+    ),
     (GAP, 'airgap = "250 um"', "unknown key 'airgap'; did you mean 'air_gap'", "airgap"),
     (
         GAP,

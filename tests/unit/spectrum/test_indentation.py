@@ -42,8 +42,10 @@ def test_early_maximum_is_found_and_told():
 def test_late_maximum_is_found_and_told():
     xy = swing()
     xy[30000] = [200e-6, -260e-6]
-    found = displacement_history(xy, FS, air_gap=GAP, start_time=0.01)
+    found = displacement_history(xy, FS, air_gap=GAP, start_time=0.01, error=4e-6)
     assert found.largest_time == pytest.approx(6.01)
+    assert "328 ± 7 µm (+48 ± 9 µm beyond the air gap) at 6.0100 s; later" in found.statement
+    assert "at most 328 ± 7 µm (at 6.01 s)" in found.statement
     assert not held_maximum(found)
     assert "did not hold the maximum" in found.statement
 

@@ -86,9 +86,8 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
         findings.append(
             Finding(
                 kind=Kind.SLOW_SAMPLING,
-                message=f"{record.sampling_rate:.6g} Hz leaves {record.sampling_rate * 1e-3:.2g} samples per "
-                "millisecond of "
-                "contact",
+                message=f"{record.sampling_rate:.6g} Hz has a sample every {1e3 / record.sampling_rate:.2g} "
+                "ms; contacts last about a millisecond",
                 remedy=f"record at {SLOWEST:.0f} Hz or faster, better 20000 Hz",
                 severity="warning",
             )
