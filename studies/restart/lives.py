@@ -206,7 +206,7 @@ def shows(check, present: set[str]) -> float:
 def least(states, assumed) -> float:
     """Expected cost of the cheapest answer that is allowed, weights not normalised."""
     total = sum(w for w, _, _ in states)
-    doubt = sum(w for w, present, _ in states if present - {"unbalance"}) / total
+    doubt = sum(w for w, present, _ in states if present) / total
     allowed = [a for a in ANSWERS if a != "restart" or doubt <= assumed.most_doubt]
     return min(sum(w * c[a] for w, _, c in states) for a in allowed)
 
@@ -282,7 +282,7 @@ def live(machine: Machine, random: np.random.Generator, base, score: Score) -> N
         if card.answer == "restart":
             score.restarts += 1
             score.damaged_restarts += bool(there - {"unbalance"})
-            score.stated_restarts += card.doubt
+            score.stated_restarts += 1.0 - card.sound
         if card.answer in ("inspect first", "replace"):
             return
         known.append(drop)

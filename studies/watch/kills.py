@@ -36,6 +36,7 @@ from rotordrop.web.workspace import Workspace
 PACKAGE = Path(str(resources.files("rotordrop")))
 MACHINES, WATCHERS = 50, 2
 NOISE = 0.02  # added to each record [µm], so that no two are alike
+LOOK_S = 3.0  # pause between two looks at what is done
 SPAN = (-0.12, 0.33)  # of a record [s] about its zero
 DAMAGES = (
     "empty",
@@ -206,7 +207,7 @@ def main() -> None:
     kept = Kept(Workspace(place / "kept" / "kept"))
     waiting = sorted(made, key=lambda _: draw.random())
     watchers = [begun(place, k) for k in range(WATCHERS)]
-    start, sizes = time.time(), []
+    start, asked, sizes = time.time(), 0.0, []
     killing = Killing(place, kept, watchers, draw, every)
     while time.time() - start < 3.0 * 3600.0:
         for _ in range(draw.randrange(4)):
@@ -214,9 +215,9 @@ def main() -> None:
                 arrive(place, waiting.pop(), draw)
         time.sleep(draw.uniform(0.1, 0.5))
         killing.turn(filling=len(waiting) < records // 2)
-        if not waiting:
-            found = done(kept)
-            sizes.append((time.time() - start, sum(found.values()), memory(watchers[0])))
+        sizes.append(max(memory(one) for one in watchers))
+        if not waiting and time.time() - asked > LOOK_S:
+            found, asked = done(kept), time.time()
             if sum(found.values()) >= records and not found["under way"]:
                 break
     for one in watchers:
@@ -302,8 +303,10 @@ def report(place: Path, kept: Kept, made, seconds: float, killing: Killing, size
     logged_twice = [name for name, count in Counter(logged).items() if count > 1]
     print(f"logged {len(logged)}, missing {sorted(set(wanted) - set(logged))[:5]}, twice {logged_twice}")
     print(f"hook: {len(hooked)} drops, {sum(hooked.values())} calls")
-    few = [tuple(map(round, one)) for one in sizes[:: max(1, len(sizes) // 8)]]
-    print(f"time [s], records, memory of a watcher [MB]: {few}")
+    third = len(sizes) // 3
+    first, last = (np.nanmedian(part) for part in (sizes[:third], sizes[-third:]))
+    largest = np.nanmax(sizes)
+    print(f"memory of a watcher [MB], first and last third, largest: {first:.0f} {last:.0f} {largest:.0f}")
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(f"processor time {spent.ru_utime + spent.ru_stime:.0f} s, what killed watchers began left out")
 

@@ -14,8 +14,7 @@ from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.estimate.published import Value
-    from rotordrop.restart.next_drop import NextDrop
+    from rotordrop.restart.order import EarlierDrop
 
 
 def restart(
@@ -56,7 +55,8 @@ def restart(
     from rotordrop.report.restart_page import restart_numbers, restart_page
     from rotordrop.restart.assumptions import assumptions_of, load_assumptions
     from rotordrop.restart.card import restart_card
-    from rotordrop.restart.next_drop import DROPS, next_drops
+    from rotordrop.restart.next_drop import DROPS, Foreseen, next_drops
+    from rotordrop.restart.order import in_order
     from rotordrop.study.repeat import COMPARED
 
     described, drop = load_machine(machine), read_drop(estimate)
@@ -71,24 +71,33 @@ def restart(
             raise UsageError(f"--limit: no simulated drop has {field}; there are {', '.join(COMPARED)}")
     assumed = assumptions_of({}, "the assumptions") if assumptions is None else load_assumptions(assumptions)
     speed = 2.0 * math.pi * drop.speed_Hz
-    found: tuple[NextDrop, ...] = ()
+    found = Foreseen()
     count = DROPS if drops is None else drops
     if count and described.ambs:
         with progress_bar("the next drop") as bar:
-            found = next_drops(described, speed, limits, drops=count, progress=bar)
+            found = next_drops(
+                *(described, speed, limits),
+                drop=drop,
+                chance=assumed.most_beyond,
+                drops=count,
+                progress=bar,
+            )
     before = [read_drop(one) for one in since or ()]
     for path, one in zip(since or (), before, strict=True):
         if one.record_sha256 == drop.record_sha256:
             raise UsageError(
                 f"--since {path} and {estimate} are of one recording; name the estimate of an earlier drop"
             )
+    logged = [] if log is None else _logged(log, drop.machine, bearings, drop.record_sha256)
+    since_then, earlier, remarks = in_order(drop, before, logged)
     card = restart_card(
         drop,
         assumed,
-        since=before,
+        since=since_then,
         checks=_checks(check or ()),
-        earlier=() if log is None else _earlier(log, drop.machine, bearings, drop.record_sha256),
-        next_drops=found,
+        earlier=earlier,
+        foreseen=found,
+        remarks=remarks,
     )
     deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
 
@@ -106,10 +115,11 @@ def _checks(written: list[str] | tuple[str, ...]) -> dict[str, str]:
     return found
 
 
-def _earlier(log: str, machine: str, bearings: str, sha256: str) -> list[dict[str, Value]]:
-    """Peak stresses of the drops of a set of bearings in a log, this one left out."""
+def _logged(log: str, machine: str, bearings: str, sha256: str) -> list[EarlierDrop]:
+    """Drops of a set of bearings in a log, this one left out."""
     from rotordrop.estimate.published import Value
     from rotordrop.ledger.book import logged_drops
+    from rotordrop.restart.order import EarlierDrop
 
     of_machine = logged_drops(log, machine=machine)
     sets = sorted({drop.bearing_set for drop in of_machine.values()})
@@ -119,14 +129,18 @@ def _earlier(log: str, machine: str, bearings: str, sha256: str) -> list[dict[st
             f"{', '.join(sets[:8])}"
         )
     return [
-        {
-            one.bearing: Value(
-                value=math.sqrt(one.lower * one.upper) if one.value is None else one.value,
-                interval_90=[one.lower, one.upper],
-            )
-            for one in drop.severity
-            if one.quantity == "peak_stress_Pa" and one.lower > 0.0
-        }
+        EarlierDrop(
+            record=drop.record,
+            recorded=drop.recorded,
+            stresses={
+                one.bearing: Value(
+                    value=math.sqrt(one.lower * one.upper) if one.value is None else one.value,
+                    interval_90=[one.lower, one.upper],
+                )
+                for one in drop.severity
+                if one.quantity == "peak_stress_Pa" and one.lower > 0.0
+            },
+        )
         for drop in of_machine.values()
         if drop.bearing_set == bearings and (not sha256 or drop.sha256 != sha256)
     ]

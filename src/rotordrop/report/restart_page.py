@@ -68,7 +68,7 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
         sections=(
             Section("What may be damaged", tables=(_suspected(card), _evidence(card))),
             Section("On what the answer hangs", tables=(_flips(card), _costs(card), kinds)),
-            _next(card.next_drops),
+            _next(card),
         ),
     )
 
@@ -105,9 +105,11 @@ def _bearing(card: RestartCard, drop: Drop, name: str) -> Card:
 
 
 def _answers(card: RestartCard) -> Table:
+    bounds = {name: f"{bound:.2g}" for name, bound in zip(ANSWERS, card.bounds, strict=False) if bound > 0.0}
     columns = (
         Column("answer", lambda name: f"{name} ←" if name == card.answer else name),
         Column(f"expected cost [{card.assumptions.unit}]", lambda name: f"{card.costs[name]:.3g}"),
+        Column("up to a chance of a damage of", lambda name: bounds.get(name, "–")),
         Column("right if the state was known", lambda name: card.right[name], "probability", 2),
     )
     return table(ANSWERS, columns, "The four answers")
@@ -171,13 +173,15 @@ def _costs(card: RestartCard) -> Table:
         ("running with limits", f"{one.limited_days:g} d, and {one.limited_risk:.0%} of the risk is left"),
         ("risk with sound bearings", f"{one.sound_risk:.2%}"),
         ("another drop until the next planned inspection", f"{one.another_drop:.0%}"),
-        ("damaged bearing allowed in a restart without limits", f"{one.most_doubt:.1%}"),
+        ("damage allowed in a restart without limits", f"{one.most_doubt:.1%}"),
+        ("chance to pass a limit that a speed limit brings it down to", f"{one.most_beyond:.1%}"),
     )
     columns = (Column("assumption", lambda row: row[0]), Column("value", lambda row: row[1]))
     return table(rows, columns, "Costs and chances", f"Source: {one.source}.")
 
 
-def _next(drops: Sequence[NextDrop]) -> Section:
+def _next(card: RestartCard) -> Section:
+    drops = card.foreseen.drops
     if not drops:
         return Section("The next drop", text=(NO_DROPS,))
 
@@ -202,7 +206,9 @@ def _next(drops: Sequence[NextDrop]) -> Section:
             ),
         ),
     )
-    note = f"{drops[0].peak_force[names[0]][0].drops} simulated drops a speed; no damage is simulated."
+    of = "as this estimate found it" if card.foreseen.of_estimate else "by its file alone"
+    count = drops[0].peak_force[names[0]][0].drops
+    note = f"{count} simulated drops a speed, the machine {of}; no damage is simulated."
     return Section(
         "The next drop",
         figures=(Figure(_by_speed(drops, names), "Half of the next drops, and 95 % of them, stay below."),),

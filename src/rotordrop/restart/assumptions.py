@@ -88,8 +88,10 @@ class Assumptions(Document):
     sound_risk: float = Field(default=0.002, ge=0.0, le=1.0)
     """Chance that a machine with sound bearings is damaged until the next planned inspection [1]."""
     most_doubt: float = Field(default=0.01, ge=0.0, le=1.0)
-    """Largest chance of a damaged bearing with which it may run without limits, checks included; 1 leaves the
+    """Largest chance of a damage with which it may run without limits, checks included; 1 leaves the
     answer to the costs alone [1]."""
+    most_beyond: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """Chance that the next drop passes a limit, to which a speed limit brings it down [1]."""
     another_drop: float = Field(default=0.2, ge=0.0, le=1.0)
     """Chance of another drop until then [1]."""
     brinelling_stress: float = Field(default=5.25e9, gt=0.0)

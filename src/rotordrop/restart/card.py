@@ -1,7 +1,9 @@
-"""The restart card: which answer costs least, how sure that is, and which check would change it most.
+"""The restart card: which answer the chance of a damage allows, and which check would change it most.
 
-Kinds of damage are present or not, each by itself; every answer has a cost in every such state. The answer is
-the one of the least expected cost, and a check is worth what it takes off that cost.
+Kinds of damage are present or not, each by itself; every answer has a cost in every such state. Up to which
+chance of a damage the machine restarts, and up to which it runs with limits, follows from the costs and
+the priors alone. Evidence moves that chance and not these bounds: worse evidence, which never lowers it,
+never has a milder answer. A check is worth what it takes off the expected cost.
 Source: Bayesian decision with the expected value of sample information, Raiffa and Schlaifer, Applied
 Statistical Decision Theory, 1961.
 """
@@ -9,29 +11,29 @@ Statistical Decision Theory, 1961.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.estimate.published import Drop, Value
+from rotordrop.known import Known
 from rotordrop.restart.assumptions import Assumptions, Check
 from rotordrop.restart.evidence import (
     Indicator,
     Suspicion,
+    contradictions,
     in_words,
     indicators,
     require_check,
     suspicions,
 )
-from rotordrop.units import format_chance
-
-if TYPE_CHECKING:
-    from rotordrop.restart.next_drop import NextDrop
+from rotordrop.restart.next_drop import Foreseen, SpeedLimit
+from rotordrop.units import format_chance, format_quantity
 
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]
 ANSWERS: tuple[Answer, ...] = ("restart", "restart with limits", "inspect first", "replace")
@@ -51,9 +53,10 @@ COSTS = {
     "replace_days": "the standstill of a replacement unseen",
     "limited_days": "what running with limits costs",
     "another_drop": "the chance of another drop",
-    "most_doubt": "the chance of a damaged bearing that is allowed",
+    "most_doubt": "the chance of a damage that is allowed",
 }
 SHARES = ("another_drop", "most_doubt")
+NOTHING_FORESEEN = Foreseen()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +90,9 @@ class RestartCard:
     """Whether a machine may run again."""
 
     answer: Answer
-    """What costs least in expectation."""
+    """What may be done; of opening and replacing what costs less in expectation."""
+    bounds: tuple[float, float]
+    """Up to which chance of a damage it restarts, and up to which it runs with limits [1]."""
     right: dict[Answer, float]
     """Probability that each answer is the one that is right if the state was known [1]."""
     costs: dict[Answer, float]
@@ -104,12 +109,10 @@ class RestartCard:
     """Checks that have not been made, the most valuable first."""
     made: dict[str, str]
     """Checks that were made, with their outcome."""
-    doubt: float
-    """Chance of a damaged bearing, checks included [1]."""
     flips: tuple[Flip, ...]
     """Assumptions on which the answer hangs, the nearest first."""
-    next_drops: tuple[NextDrop, ...]
-    """What the next drop would be, by speed."""
+    foreseen: Foreseen
+    """What the next drop would be, by speed, and the speed limit."""
     prior_alone: bool
     """Whether nothing but the assumptions decided."""
     assumptions: Assumptions
@@ -129,7 +132,8 @@ def restart_card(
     since: Sequence[Drop] = (),
     checks: Mapping[str, str] | None = None,
     earlier: Sequence[Mapping[str, Value]] = (),
-    next_drops: Sequence[NextDrop] = (),
+    foreseen: Foreseen = NOTHING_FORESEEN,
+    remarks: Sequence[str] = (),
 ) -> RestartCard:
     """Judge whether a machine may run again after a drop.
 
@@ -147,8 +151,10 @@ def restart_card(
     earlier : sequence of mapping of str to Value
         Drops that this set of bearings took before, in their order, as the peak stress [Pa] of each bearing;
         empty where it is not known.
-    next_drops : sequence of NextDrop
-        What the next drop would be, the first one at the speed of a restart without limits.
+    foreseen : Foreseen
+        What the next drop would be, and the speed limit.
+    remarks : sequence of str
+        What else is to be said, of dates that are missing for example.
 
     Raises
     ------
@@ -160,7 +166,7 @@ def restart_card(
         require_check(name, outcome, assumed)
     found = indicators(drop, since, len(earlier), assumed)
     suspected = suspicions(drop, found, earlier, assumed, len(since))
-    before = _Case.of(suspected, assumed, next_drops)
+    before = _Case.of(suspected, assumed, foreseen)
     case = before.after(made)
     shown = [
         replace(one, probability=one.probability * case.share(one.kind) / before.share(one.kind))
@@ -175,6 +181,7 @@ def restart_card(
     alone = not made and all(abs(math.log(one.ratio)) < SAYS_SOMETHING for one in found)
     card = RestartCard(
         answer=answer,
+        bounds=case.bounds,
         right=right,
         costs=costs,
         at_stake=max(costs.values()) - min(costs.values()),
@@ -183,14 +190,14 @@ def restart_card(
         indicators=found,
         checks=tuple(left),
         made=made,
-        doubt=case.doubt,
-        flips=_flips(suspected, assumed, next_drops, made, answer),
-        next_drops=tuple(next_drops),
+        flips=_flips(suspected, assumed, foreseen, made, answer),
+        foreseen=foreseen,
         prior_alone=alone,
         assumptions=assumed,
         statements=(),
     )
-    return replace(card, statements=tuple(_said(card, drop, since)))
+    said = [*_said(card, drop, since), *contradictions(found), *remarks]
+    return replace(card, statements=tuple(said))
 
 
 @dataclass(frozen=True)
@@ -204,19 +211,27 @@ class _Case:
     """Cost of each answer in each state, shape (answers, states)."""
     weights: Array
     """Probability of each state, shape (states,)."""
+    bounds: tuple[float, float]
+    """Up to which chance of a damage it restarts, and up to which it runs with limits [1]."""
 
     @classmethod
-    def of(
-        cls, suspected: Sequence[Suspicion], assumed: Assumptions, next_drops: Sequence[NextDrop]
-    ) -> _Case:
+    def of(cls, suspected: Sequence[Suspicion], assumed: Assumptions, foreseen: Foreseen) -> _Case:
         kinds = list(assumed.damages)
-        sound = np.ones(len(kinds))
-        for one in suspected:
-            sound[kinds.index(one.kind)] *= 1.0 - one.probability
         states = np.array(list(product((0.0, 1.0), repeat=len(kinds))))
-        weights = np.prod(np.where(states > 0.0, 1.0 - sound, sound), axis=1)
-        beyond = (next_drops[0].beyond, min(one.beyond for one in next_drops)) if next_drops else (0.0, 0.0)
-        return cls(assumed, states, _costs(assumed, states, beyond), weights / weights.sum())
+
+        def weighed(chance: Callable[[Suspicion], float]) -> Array:
+            sound = np.ones(len(kinds))
+            for one in suspected:
+                sound[kinds.index(one.kind)] *= 1.0 - chance(one)
+            return np.asarray(np.prod(np.where(states > 0.0, 1.0 - sound, sound), axis=1))
+
+        weights = weighed(lambda one: one.probability)
+        costs = _costs(assumed, states, _beyond(foreseen, assumed))
+        usual = weighed(lambda one: assumed.damages[one.kind].prior)[1:]
+        ends = np.column_stack([costs[:, 0], costs[:, 1:] @ usual / usual.sum()])
+        restart = min(_cheapest_up_to(ends[0], ends[1:]), assumed.most_doubt)
+        bounds = restart, max(restart, _cheapest_up_to(ends[1], ends[2:]))
+        return cls(assumed, states, costs, weights / weights.sum(), bounds)
 
     def after(self, made: Mapping[str, str]) -> _Case:
         """The same once checks were made."""
@@ -241,18 +256,18 @@ class _Case:
         return dict(zip(ANSWERS, (self.costs @ self.weights).tolist(), strict=True))
 
     @property
-    def doubt(self) -> float:
-        """Chance that a bearing is damaged [1]."""
-        of_bearings = np.array([not one.of_machine for one in self.assumed.damages.values()])
-        return float(self.weights @ (self.states @ of_bearings > 0.0))
-
-    @property
     def answer(self) -> Answer:
-        """The answer of the least expected cost of those that the doubt allows."""
-        costs = self.expected()
-        if self.doubt > self.assumed.most_doubt:
-            costs.pop("restart")
-        return min(costs, key=lambda name: costs[name])
+        """The mildest answer that the chance of a damage allows; of opening and replacing the cheaper one.
+
+        No bad check and no greater suspicion lowers that chance: the sound state is the one in which a check
+        is bad least often. Opening and replacing both stop the machine.
+        """
+        doubt, costs = 1.0 - float(self.weights[0]), self.expected()
+        if doubt <= self.bounds[0]:
+            return "restart"
+        if doubt <= self.bounds[1]:
+            return "restart with limits"
+        return "replace" if costs["replace"] < costs["inspect first"] else "inspect first"
 
     def right(self) -> dict[Answer, float]:
         """Probability of the states in which each answer costs least."""
@@ -288,6 +303,27 @@ class _Case:
         cost = self.cost_of(name)
         value = self.expected()[now] - left - cost
         return CheckValue(name=name, label=check.label, cost=cost, value=value, settles=settles)
+
+
+def _cheapest_up_to(one: Array, others: Array) -> float:
+    """Chance of a damage up to which an answer is the cheapest [1], by its cost without and with one.
+
+    Each cost is linear in that chance; an answer that is not the cheapest one at zero never is: below zero.
+    """
+    if one[0] > others[:, 0].min():
+        return -1.0
+    excess, lead = (one[1] - others[:, 1]) - (one[0] - others[:, 0]), others[:, 0] - one[0]
+    return float(min([1.0, *(lead[excess > 0.0] / excess[excess > 0.0])]))
+
+
+def _beyond(foreseen: Foreseen, assumed: Assumptions) -> tuple[float, float]:
+    """Chance that the next drop passes a limit, at full speed and with a speed limit [1]."""
+    if not foreseen.drops:
+        return 0.0, 0.0
+    limit, full = foreseen.speed_limit, foreseen.drops[0].beyond
+    if limit is not None and limit.speed is not None:
+        return full, min(full, assumed.most_beyond)
+    return full, min(one.beyond for one in foreseen.drops)
 
 
 def _costs(a: Assumptions, present: Array, beyond: tuple[float, float]) -> Array:
@@ -333,7 +369,7 @@ def _costs(a: Assumptions, present: Array, beyond: tuple[float, float]) -> Array
 def _flips(
     suspected: Sequence[Suspicion],
     assumed: Assumptions,
-    next_drops: Sequence[NextDrop],
+    foreseen: Foreseen,
     made: Mapping[str, str],
     answer: Answer,
 ) -> tuple[Flip, ...]:
@@ -342,11 +378,11 @@ def _flips(
     def scaled_cost(name: str, factor: float) -> _Case:
         value = getattr(assumed, name) * factor
         changed = assumed.model_copy(update={name: min(value, 1.0) if name in SHARES else value})
-        return _Case.of(suspected, changed, next_drops).after(made)
+        return _Case.of(suspected, changed, foreseen).after(made)
 
     def scaled_prior(kind: str, factor: float) -> _Case:
         moved = [_with_prior_odds(one, factor) if one.kind == kind else one for one in suspected]
-        return _Case.of(moved, assumed, next_drops).after(made)
+        return _Case.of(moved, assumed, foreseen).after(made)
 
     tried: list[tuple[str, Callable[[float], _Case]]] = [
         *((label, partial(scaled_cost, name)) for name, label in COSTS.items()),
@@ -387,21 +423,22 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
             f"The assumptions alone decide this: {missing}, and no check was made. Make one before you rely "
             "on the answer."
         )
-    known = [
-        name for name in sorted(card.right, key=lambda name: -card.right[name]) if card.right[name] > RARE
-    ]
-    said.append(
-        f"{card.answer.capitalize()}: it costs least in expectation of what may be done, "
-        f"{card.costs[card.answer]:.2g} "
-        f"{assumed.unit}{_beside(card)}. Nothing is damaged with {format_chance(card.sound)}; the largest "
-        f"doubt is a {in_words(likeliest, assumed)}. Who knew the state of the bearings would answer "
-        f"{', '.join(f'{name} ({format_chance(card.right[name])})' for name in known)}."
+    known = ", ".join(
+        f"{name} ({format_chance(card.right[name])})"
+        for name in sorted(card.right, key=lambda name: -card.right[name])
+        if card.right[name] > RARE
     )
-    if card.doubt > assumed.most_doubt:
-        said.append(
-            f"It may not run without limits: a bearing is damaged with {format_chance(card.doubt)}, and at "
-            f"most {format_chance(assumed.most_doubt)} is allowed."
-        )
+    restart, limited = (format_chance(max(bound, 0.0)) for bound in card.bounds)
+    ranges = f"up to {restart} it may restart" if card.bounds[0] > 0.0 else "it may not restart at all"
+    if card.bounds[1] > max(card.bounds[0], 0.0):
+        ranges += f", up to {limited} with limits"
+    said.append(
+        f"{card.answer.capitalize()}: something is damaged with {format_chance(1.0 - card.sound)}, and at "
+        f"these costs {ranges}. It costs {card.costs[card.answer]:.2g} {assumed.unit} in "
+        f"expectation{_beside(card)}. The largest doubt is a {in_words(likeliest, assumed)}. Who knew the "
+        f"state of the bearings would answer {known}."
+    )
+    said += _of_next_drop(card.foreseen)
     best = card.best_check
     if best is not None:
         hours = 24.0 * best.cost / assumed.day_cost
@@ -423,6 +460,54 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         "--assumptions."
     )
     return said
+
+
+def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
+    """What the next drop would be at full speed, and up to which speed it keeps to the limits."""
+    if not foreseen.drops:
+        return
+    full = foreseen.drops[0]
+    of = "as this estimate found the machine" if foreseen.of_estimate else "by the machine file alone"
+    beyond = ""
+    if full.beyond_limit is not None:
+        low, high = (format_chance(end) for end in full.beyond_limit.interval_90 or (full.beyond,) * 2)
+        beyond = f"; it passes a limit with {format_chance(full.beyond)} (90 %: {low} to {high})"
+    count = full.peak_force[next(iter(full.peak_force))][0].drops
+    yield (
+        f"The next drop from {format_quantity(full.speed, 'speed')}, {of}, by {count} simulated ones"
+        f"{beyond}. Its peaks by bearing, with 90 % intervals:"
+    )
+    for name, force in full.peak_force.items():
+        parts = [
+            f"{label} below {_shown(known[0], kind)} in half of the cases, {_shown(known[1], kind)} in 95 %"
+            for label, kind, known in (
+                ("force", "force", force),
+                ("stress", "pressure", full.peak_stress[name]),
+            )
+        ]
+        yield f"{name}: {'; '.join(parts)}."
+    if foreseen.speed_limit is not None:
+        yield _of_speed_limit(foreseen.speed_limit)
+
+
+def _shown(known: Known, kind: str) -> str:
+    ends = known.interval_90 or (known.value,) * 2
+    value, low, high = (format_quantity(number, kind) for number in (known.value, *ends))
+    return f"{value} ({low} to {high})"
+
+
+def _of_speed_limit(limit: SpeedLimit) -> str:
+    allowed = f"a chance of {format_chance(limit.chance)} or less"
+    if limit.speed is None or limit.interval_90 is None:
+        lowest = format_quantity(limit.tried[0], "speed")
+        return f"No speed limit down to {lowest} brings the next drop to {allowed} of passing a limit."
+    speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
+    if not limit.needed:
+        return f"It needs no speed limit: up to {speed} it passes one with {allowed}."
+    return (
+        f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings it to "
+        f"{allowed}; take the lower end to be sure."
+    )
 
 
 def _times(factor: float) -> str:

@@ -21,6 +21,12 @@ _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 """Gauss's rule for an expectation over a standard normal number."""
 
 
+ONLY_WIDER = "air_gap"
+"""What wear only makes larger."""
+IMPOSSIBLE = 3.0
+"""Standard errors from which a change that cannot be is named, one in 740 sound ones; chosen."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Indicator:
     """One thing that is known of one kind of damage at one bearing."""
@@ -35,6 +41,8 @@ class Indicator:
     next, in their order, the present one last [1]."""
     ratio: float
     """The same on average, every drop as likely [1]."""
+    smaller: float | None = None
+    """Standard errors by which a gap became smaller, where that is beyond chance [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +93,9 @@ def indicators(
             if not seen:
                 continue
             ratios = _ratios(seen, len(since), effect)
+            smaller = _shrunk(seen, effect) if path == ONLY_WIDER else None
+            if smaller is not None:  # what cannot be says nothing, neither for nor against
+                ratios = np.ones_like(ratios)
             found.append(
                 Indicator(
                     kind=kind,
@@ -92,9 +103,16 @@ def indicators(
                     what=f"{seen[min(seen)].what} since then",
                     ratios=tuple(ratios.tolist()),
                     ratio=float(weights @ ratios / weights.sum()),
+                    smaller=smaller,
                 )
             )
     return tuple(found)
+
+
+def _shrunk(seen: Mapping[int, _Moved], effect: Effect) -> float | None:
+    """Standard errors by which something became smaller since any estimate, where that is beyond chance."""
+    below = [-one.change / math.hypot(one.error, math.sqrt(2.0) * effect.healthy) for one in seen.values()]
+    return max(below) if max(below) > IMPOSSIBLE else None
 
 
 def _drops_between(estimates: int, earlier: int) -> list[int]:
@@ -144,6 +162,17 @@ def _logarithm(value: Value) -> tuple[float, float] | None:
     if ends is None or ends[0] <= 0.0:
         return None
     return math.log(value.value), math.log(ends[1] / ends[0]) / (2.0 * NINETY)
+
+
+def contradictions(found: Sequence[Indicator]) -> Iterator[str]:
+    """What no bearing can have done: a gap became smaller, beyond errors and the scatter of a sound one."""
+    for one in found:
+        if one.smaller is not None:
+            yield (
+                f"A contradiction: {one.what}, where a bearing only wears wider: {one.smaller:.1f} standard "
+                "errors below no change. One of the two estimates is wrong, a sensor moved, or the bearings "
+                "are not the same set; this gap is no evidence against wear."
+            )
 
 
 def _ratios(seen: Mapping[int, _Moved], estimates: int, effect: Effect) -> Array:

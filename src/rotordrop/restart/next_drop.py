@@ -1,4 +1,4 @@
-"""What the next drop would be if the machine was restarted: at its speed, and at lower ones."""
+"""What the next drop would be if the machine was restarted, and up to which speed it keeps to the limits."""
 
 from __future__ import annotations
 
@@ -9,16 +9,28 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from rotordrop.arrays import Array
+from rotordrop.estimate.published import Drop, Parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.study.repeat import COMPARED, repeat_study
 from rotordrop.study.run import run_study
 from rotordrop.study.summary import StudyResults, exceedance
+from rotordrop.twin.calibrated import as_filed, machine_values
+from rotordrop.twin.joint_covariance import joint_covariance
+from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 
-DROPS = 40
-"""Drops behind the prediction at each speed; chosen, not measured: an interval says what they tell."""
-SLOWER = (0.7,)
-"""Speeds that are tried as limits, over the full one [1]; chosen, not measured."""
+DROPS = 24
+"""Drops behind the prediction at full speed, half as many at each lower one; chosen, not measured: intervals
+say what they tell."""
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
+"""Speeds at which drops are simulated where a speed limit is sought, over the full one [1]; chosen, not
+measured."""
+DRAWN_AGAIN = 400
+"""Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,26 +51,107 @@ class NextDrop:
         return 0.0 if self.beyond_limit is None else self.beyond_limit.value
 
 
+@dataclass(frozen=True, kw_only=True)
+class SpeedLimit:
+    """Up to which speed a drop passes a limit with no more than a chance that is allowed."""
+
+    speed: float | None
+    """[rad/s]; None where even the lowest speed tried passes it more often."""
+    interval_90: tuple[float, float] | None
+    """By the number of simulated drops [rad/s]; cut at the lowest and the highest speed tried."""
+    chance: float
+    """That is allowed [1]."""
+    tried: tuple[float, float]
+    """Lowest and highest speed tried [rad/s]."""
+    drops: int
+    """Simulated drops behind it."""
+
+    @property
+    def needed(self) -> bool:
+        """Whether the highest speed tried passes a limit too often."""
+        return self.speed is None or self.speed < self.tried[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Foreseen:
+    """Next drops by speed, the full one first, and the speed limit where limits were given."""
+
+    drops: tuple[NextDrop, ...] = ()
+    speed_limit: SpeedLimit | None = None
+    of_estimate: bool = False
+    """Whether the machine is the one that the estimate found, with its intervals; else that of its file."""
+
+
+def found_machine(machine: Machine, drop: Drop) -> Machine | None:
+    """The machine as the estimate of a drop found it: gaps, supports and friction with their joint intervals.
+
+    None where the estimate has no joint distribution: it is a replay, or does not fit its record. What the
+    record does not determine keeps the width it had before.
+    """
+    joint = drop.joint
+    if joint is None or not drop.consistent:
+        return None
+    known = {one.path: _as_known(one) for one in drop.parameters if one.scope == "machine"}
+    model = build_drop_model(machine)
+    by_path = {one.path: one for one in all_unknowns(model)}
+    at = [k for k, path in enumerate(joint.paths) if path in by_path and path in known]
+    fitted = {joint.paths[k]: by_path[joint.paths[k]] for k in at}
+    if not at:
+        return None
+    lower = np.zeros((len(joint.paths), len(joint.paths)))
+    lower[np.tril_indices(len(joint.paths))] = joint.covariance
+    covariance = (lower + np.tril(lower, -1).T)[np.ix_(at, at)]
+    known = as_filed(machine, {path: known[path] for path in fitted})
+    spread = joint_covariance(model, fitted, [joint.mean[k] for k in at], covariance, known)
+    names = [bearing.name for bearing in machine.touchdown_bearings]
+    values = machine_values(names, known, f"estimated from {drop.record}")
+    before = () if machine.calibration is None else machine.calibration.drops
+    origin = CalibrationOrigin(
+        drops=(
+            *(one for one in before if one.name != drop.record),
+            CalibrationDrop(name=drop.record, sha256=drop.record_sha256),
+        ),
+        consistent=True,
+        joint=spread,
+    )
+    return machine.with_values(values).calibrated_on(origin)
+
+
+def _as_known(one: Parameter) -> Known:
+    """An estimated parameter; one that the record does not determine is as wide as it was before."""
+    status, value, ends = one.estimate.status or "determined", one.estimate.value, one.estimate.interval
+    before = None if one.prior is None else one.prior.interval
+    if status in NOT_DETERMINED and before is not None:
+        ends = min(before[0], value), max(before[1], value)
+    return Known(value=value, status=status, interval_90=ends, unit=one.estimate.unit)  # type: ignore[arg-type]
+
+
 def next_drops(
     machine: Machine,
     speed: float,
     limits: Mapping[str, float],
     *,
-    shares: Sequence[float] = (1.0, *SLOWER),
+    drop: Drop | None = None,
+    chance: float = 0.05,
+    shares: Sequence[float] | None = None,
     drops: int = DROPS,
     duration: float = 0.2,
     seed: int = 1,
     progress: Callable[[str, float], None] | None = None,
-) -> tuple[NextDrop, ...]:
+) -> Foreseen:
     """Simulate the drops that could happen next, at a speed [rad/s] and at shares of it.
 
-    ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]. What the machine
-    file leaves open varies as in `repeat_study`; damage is not simulated.
+    ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]; with them the speed
+    is sought up to which they are passed with no more than ``chance`` [1]. The machine is that of ``drop``,
+    by its estimate, where there is one; what stays open varies as in `repeat_study`. Damage is not simulated.
     """
-    names = [bearing.name for bearing in machine.touchdown_bearings]
-    found = []
+    found = None if drop is None else found_machine(machine, drop)
+    at, names = found or machine, [bearing.name for bearing in machine.touchdown_bearings]
+    shares = shares or (SHARES if limits else SHARES[:1])
+    made, ratios = [], []
     for k, share in enumerate(shares):
-        study = repeat_study(machine, share * speed, duration=duration, drops=drops, seed=seed)
+        count = drops if k == 0 else max(drops // 2, 2)
+        study = repeat_study(at, share * speed, duration=duration, drops=count, seed=seed)
         with TemporaryDirectory() as folder:
             results = run_study(study, Path(folder) / "drops")
         beyond = [
@@ -66,17 +159,58 @@ def next_drops(
             for field, limit in limits.items()
             for name in names
         ]
-        found.append(
+        worst = np.max(beyond, axis=0) if beyond else np.zeros(0)
+        ratios.append(worst)
+        made.append(
             NextDrop(
                 speed=share * speed,
                 peak_force={name: _middle_and_high(results, f"{name}.peak_force") for name in names},
                 peak_stress={name: _middle_and_high(results, f"{name}.peak_stress") for name in names},
-                beyond_limit=exceedance(np.max(beyond, axis=0), 1.0) if beyond else None,
+                beyond_limit=exceedance(worst, 1.0) if beyond else None,
             )
         )
         if progress is not None:
             progress("the next drop", (k + 1) / len(shares))
-    return tuple(found)
+    limit = None
+    if limits and len(shares) > 2:
+        fewest = min(map(len, ratios))  # each draw at every speed
+        limit = speed_limit(np.array(shares) * speed, np.array([one[:fewest] for one in ratios]), chance)
+    return Foreseen(drops=tuple(made), speed_limit=limit, of_estimate=found is not None)
+
+
+def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit:
+    """The speed limit by drops at several speeds [rad/s], shape (S,), over their limit [1], shape (S, drops).
+
+    The logarithm of a peak over its limit is a parabola of the logarithm of the speed, with the scatter of
+    all drops about it. The interval is that of drops drawn again from those simulated, each at all speeds.
+    """
+    low, high = float(speeds.min()), float(speeds.max())
+    fine = np.linspace(low, high, 200)
+    basis = np.vander(np.log(speeds / high), 3)
+    logs = np.log(np.maximum(ratios, 1e-9))
+    sound = np.isfinite(logs).all(axis=0)
+    logs = logs[:, sound]
+    random = np.random.default_rng(0)
+
+    def fastest(of: Array) -> float:
+        """Below it no speed passes the limit too often; zero where the lowest does."""
+        course = np.linalg.lstsq(basis, of.mean(axis=1), rcond=None)[0]
+        scatter = np.sort((of - (basis @ course)[:, None]).ravel())
+        middle = np.vander(np.log(fine / high), 3) @ course
+        passed = 1.0 - np.searchsorted(scatter, -middle, side="right") / len(scatter)
+        too_often = np.flatnonzero(passed > chance)
+        return high if not too_often.size else float(fine[too_often[0] - 1]) if too_often[0] else 0.0
+
+    found = fastest(logs)
+    drawn = [fastest(logs[:, random.integers(0, logs.shape[1], logs.shape[1])]) for _ in range(DRAWN_AGAIN)]
+    ends = np.maximum(np.quantile(drawn, (0.05, 0.95)), low)
+    return SpeedLimit(
+        speed=found or None,
+        interval_90=(float(ends[0]), float(ends[1])) if found else None,
+        chance=chance,
+        tried=(low, high),
+        drops=int(logs.size),
+    )
 
 
 def _middle_and_high(results: StudyResults, column: str) -> tuple[Known, Known]:

@@ -149,7 +149,9 @@ def calibrate_machine(
     marked = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{marked}"
     fitted = machine_values(bearings, known, source)
-    joint = joint_covariance(problem, mean, covariance, known)
+    fit = {unknown.path: unknown for unknown in problem.unknowns}
+    of = slice(problem.n_dynamic, problem.n_dynamic + len(fit))
+    joint = joint_covariance(problem.model, fit, mean[of], covariance[of, of], known)
     said = values | _of_drop(problem, mean, covariance)
     calibrated_on = [
         CalibrationDrop(name=name, sha256=record.sha256, lift=_lift(one, followed))

@@ -53,8 +53,10 @@ def scalars_of(job: Job, status: dict[str, Any], watched: Watched | None) -> dic
         return found
     if outcome == "estimated":
         return found | _of_estimate(read_drop(folder / "document.json"), watched)
-    speed = json.loads((folder / "document.json").read_bytes())["speed_rad_per_s"]
-    warned = f"{NOT_KNOWN}: {why}"
+    seen = json.loads((folder / "document.json").read_bytes())
+    speed = seen["speed_rad_per_s"]
+    cut = [f"; {one['message']}" for one in seen["findings"] if CUT in one["message"]]
+    warned = f"{NOT_KNOWN}: {why}{''.join(cut)}"
     return found | {
         "verdict": warned,
         "needs_person": warned,

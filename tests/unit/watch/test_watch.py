@@ -301,6 +301,16 @@ def test_a_record_that_ends_too_early_needs_a_person(tmp_path, drops, kept, watc
     assert told.read_bytes().endswith(b"}\n")
 
 
+def test_a_cut_record_of_an_unknown_machine_is_said_to_be_cut(tmp_path, drops, kept, watcher):
+    (drops / "a.csv").write_text("x")
+    number = kept.take(Arrived.at(drops / "a.csv"))
+    cut = {"message": "the file ends within line 9: the file is truncated", "severity": "warning"}
+    found(kept, number, "look", {"findings": [cut], "speed_rad_per_s": None})
+    told = tmp_path / "told"
+    watcher(hook=hook_into(told))[0].run(once=True)
+    assert reported(told)[0]["needs_person"].endswith("; the file ends within line 9: the file is truncated")
+
+
 @pytest.fixture
 def estimated(drops, kept):
     """A kept drop of the machine 4711 with its estimate."""
