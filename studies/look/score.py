@@ -34,6 +34,7 @@ HEAD = (
     "drop", "rotor", "rate_Hz", "family", "bearing", "gap_um", "look_um", "low_um", "high_um", "touch_ms",
     "look_touch_ms", "touch_low_ms", "touch_high_ms", "order", "impacts", "look_impacts", "lasting_ms",
     "look_lasting_ms", "largest_um", "look_largest_um", "largest_low_um", "largest_high_um",
+    "impacts_low", "impacts_high", "lasting_low_ms", "lasting_high_ms",
 )  # fmt: skip
 
 
@@ -76,6 +77,7 @@ def scored(record: Path, truth: dict[str, Any]) -> list[dict[str, Any]]:
             ends = plane.get("first_touch_interval_90_s") or [touch, touch]
             seen[bearing] = (touch - off, ends[0] - off, ends[1] - off)
         lasting = plane.get("contact_from_s", found["drops"][0]["permanent_contact_s"])
+        between = plane["contact_from_interval_90_s"] or (math.nan, math.nan)
         gap = float(truth["air_gap_m"][bearing])
         impacts = true_impacts(truth["contact_intervals_0_0p25_s"][bearing], gap)
         low, high = plane.get("air_gap_interval_90_m") or (plane["air_gap_m"],) * 2
@@ -105,6 +107,10 @@ def scored(record: Path, truth: dict[str, Any]) -> list[dict[str, Any]]:
                 "look_largest_um": 1e6 * plane["largest_displacement_m"],
                 "largest_low_um": 1e6 * least,
                 "largest_high_um": 1e6 * most,
+                "impacts_low": plane["impacts_interval_90"][0],
+                "impacts_high": plane["impacts_interval_90"][1],
+                "lasting_low_ms": 1e3 * (between[0] - off),
+                "lasting_high_ms": 1e3 * (between[1] - off),
             }
         )
     order = order_of(truth["first_contact_time_s"], seen)
@@ -124,6 +130,11 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
         column("touch_ms") <= column("touch_high_ms")
     )
     impacts = np.abs(column("look_impacts") - column("impacts"))
+    counted = (column("impacts_low") <= column("impacts")) & (column("impacts") <= column("impacts_high"))
+    settled = np.isfinite(column("lasting_low_ms"))
+    lasted = (column("lasting_low_ms") <= column("lasting_ms")) & (
+        column("lasting_ms") <= column("lasting_high_ms")
+    )
     lasting = np.abs(column("look_lasting_ms") - column("lasting_ms"))
     largest, top = column("largest_um"), column("look_largest_um")
     inside = (column("largest_low_um") <= largest) & (largest <= column("largest_high_um"))
@@ -142,6 +153,8 @@ def summary(rows: list[dict[str, Any]]) -> list[str]:
         f"{100 * np.mean(lasting < 20.0):.0f}",
         f"{100 * np.median(np.abs(top / largest - 1.0)):.1f}",
         f"{100 * inside.mean():.0f}",
+        f"{100 * counted.mean():.0f}",
+        f"{100 * lasted[settled].mean():.0f}",
     ]
     return [str(len(rows)), *share]
 
@@ -151,7 +164,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     head = (
         "bearings", "gap: error [%]", "half width [%]", "held [%]", "end first (not determined)",
         "touch within 0.3 ms [%]", "touch held [%]", "impacts ± 2 [%]", "lasting from: error [ms]",
-        "within 20 ms [%]", "largest: error [%]", "held [%]",
+        "within 20 ms [%]", "largest: error [%]", "held [%]", "impacts: held [%]", "lasting from: held [%]",
     )  # fmt: skip
     lines = ["| | " + " | ".join(head) + " |", "|---" * (len(head) + 1) + "|"]
     groups = {"all": rows}

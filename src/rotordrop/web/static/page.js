@@ -35,7 +35,7 @@ const TABS = {
   Impacts: () => {
     const source = state.estimate && state.estimate.impacts.length ? state.estimate : state.look, list = impacts();
     return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact)] : [make("p", { text: "No impacts." })]),
-      ...(source === state.estimate ? [make("p", { class: "small", text: "By the estimated motion, in place of the count of the first look, which has the displacement alone. The report lists every contact." })] : []),
+      ...(source === state.estimate ? [make("p", { class: "small", text: "By the estimated contacts, in place of the count of the first look, which has the displacement alone. The report lists every contact." })] : []),
       make("span", { class: "files", of: [make("button", { text: "as Python", on: { click: () => showLines(lines(source === state.look ? "look" : "estimate", "impacts")) } })] })];
   },
   Events: () => [...(notes().length ? [make("h3", { class: "part", text: "Notes" }), make("ol", { class: "timeline", of: notes().map((note) => make("li", { of: [
