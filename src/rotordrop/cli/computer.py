@@ -148,14 +148,13 @@ def _version(name: str) -> str | None:
 
 def _cache() -> dict[str, Any]:
     """Where compiled code is kept, whether it can be written, and how much of it is there."""
-    from rotordrop.physics._compile import cache_folder
+    from rotordrop.physics._compile import cache_folder, is_writable
 
     folder = Path(cache_folder())
     files = list(folder.rglob("*.nbc")) if folder.is_dir() else []
-    nearest = next(parent for parent in (folder, *folder.parents) if parent.exists())
     return {
         "folder": str(folder),
-        "writable": os.access(nearest, os.W_OK),
+        "writable": is_writable(folder),
         "kernels": len(files),
         "bytes": sum(file.stat().st_size for file in files),
     }
@@ -163,12 +162,15 @@ def _cache() -> dict[str, Any]:
 
 def cache_lines(cache: dict[str, Any]) -> list[str]:
     """What to say of compiled code."""
-    if not cache["writable"]:
+    if not cache["kernels"]:
+        if cache["writable"]:
+            return [f"compiled code is not cached yet in {cache['folder']}; the first run takes a minute or two"]
         return [
             f"problem: {cache['folder']} cannot be written; every run compiles again, for a minute or two. "
             "Name another folder in NUMBA_CACHE_DIR"
         ]
-    if not cache["kernels"]:
-        return [f"compiled code is not cached yet in {cache['folder']}; the first run takes a minute or two"]
     size = cache["bytes"] / 1e6
-    return [f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {cache['folder']}"]
+    cached = f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {cache['folder']}"
+    if cache["writable"]:
+        return [cached]
+    return [f"{cached}, which cannot be written: every run copies it, and compiles again what is not there"]

@@ -11,8 +11,11 @@ numbers stand, such as the description of a machine, loads no compiler.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
+import tempfile
 from collections.abc import Callable, Iterable
 from functools import lru_cache, update_wrapper
 from pathlib import Path
@@ -54,6 +57,27 @@ def cache_folder(beside: Path | None = None) -> str:
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     root = Path(os.environ.get("NUMBA_CACHE_DIR") or caches / "rotordrop")
     return str(root / digest.hexdigest()[:16])
+
+
+def is_writable(folder: Path) -> bool:
+    """Whether compiled kernels can be kept in a folder, there or yet to be made."""
+    return os.access(next(parent for parent in (folder, *folder.parents) if parent.exists()), os.W_OK)
+
+
+@lru_cache
+def _open_folder(folder: str) -> str:
+    """The folder of compiled kernels; where it cannot be written, a copy of it for this process.
+
+    The compiler refuses to read from a folder that it cannot write, and a program in a container, or one
+    installed for all users of a computer, often has its kernels in such a one.
+    """
+    if is_writable(Path(folder)):
+        return folder
+    copy = tempfile.mkdtemp(prefix="rotordrop-kernels-")
+    atexit.register(shutil.rmtree, copy, ignore_errors=True)
+    if Path(folder).is_dir():
+        shutil.copytree(folder, copy, dirs_exist_ok=True)
+    return copy
 
 
 def kernel(function: Function) -> Function:
@@ -149,7 +173,8 @@ def _compiled(function: Callable[..., Any], place: str, **options: Any) -> Any:
     }
     previous = settings.CACHE_DIR
     home = Path(function.__code__.co_filename).resolve().parent
-    settings.CACHE_DIR = str(Path(cache_folder(None if home in _FOLDERS else home)) / place)
+    folder = _open_folder(cache_folder(None if home in _FOLDERS else home))
+    settings.CACHE_DIR = str(Path(folder) / place)
     try:
         return numba.njit(**options)(function)
     finally:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop.child import child_command
-from rotordrop.physics._compile import cache_folder, compile_for
+from rotordrop.physics._compile import cache_folder, compile_for, is_writable
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.simulate import _histories, _loop
 from rotordrop.simulate._tableau import tsit5
@@ -63,7 +63,7 @@ def loop_compiled_ahead(say: Callable[[str], None]) -> Iterator[Callable[[], Non
     """Compile the loop beside the block if the cache lacks it; the block calls what it is given to wait."""
     folder = Path(cache_folder())
     alone = (os.cpu_count() or 1) < 2 or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    if alone or any(folder.rglob("_loop.integrate-*.nbc")):
+    if alone or not is_writable(folder) or any(folder.rglob("_loop.integrate-*.nbc")):
         yield lambda: None
         return
     say("The first drop after an installation compiles its kernels, once, for some ten seconds ...")
