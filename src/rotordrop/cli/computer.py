@@ -162,15 +162,16 @@ def _cache() -> dict[str, Any]:
 
 def cache_lines(cache: dict[str, Any]) -> list[str]:
     """What to say of compiled code."""
+    place = cache["folder"]
     if not cache["kernels"]:
         if cache["writable"]:
-            return [f"compiled code is not cached yet in {cache['folder']}; the first run takes a minute or two"]
+            return [f"compiled code is not cached yet in {place}; the first run takes a minute or two"]
         return [
-            f"problem: {cache['folder']} cannot be written; every run compiles again, for a minute or two. "
+            f"problem: {place} cannot be written; every run compiles again, for a minute or two. "
             "Name another folder in NUMBA_CACHE_DIR"
         ]
     size = cache["bytes"] / 1e6
-    cached = f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {cache['folder']}"
+    cached = f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {place}"
     if cache["writable"]:
         return [cached]
     return [f"{cached}, which cannot be written: every run copies it, and compiles again what is not there"]

@@ -11,7 +11,13 @@ import yaml
 from rotordrop.cli.app import run
 
 CLUSTER = Path(__file__).parents[3] / "tools" / "cluster"
-STUDY = 'drops = 3\nshard = 1\nspeed = "60 Hz"\nduration = "2 ms"\nreduction = "quick"\nmachine = "machine.toml"\n'
+STUDY = """machine = "machine.toml"
+drops = 3
+shard = 1
+speed = "60 Hz"
+duration = "2 ms"
+reduction = "quick"
+"""
 
 
 @pytest.fixture
