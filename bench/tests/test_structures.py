@@ -7,10 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
+from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force
 from rotordrop.physics.contact import contact_force
 from rotordrop.rotor.assembly import free_free_modes
 from rotordrop.rotor.parameters import DropModel, build_drop_model
@@ -19,6 +22,7 @@ from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, Plac
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
 from rotordrop_bench import Violations, hidden_machine
+from rotordrop_bench.ball_tables import fast_pair, held_pair, thrust_pair
 from rotordrop_bench.recording import true_drop
 from rotordrop_bench.settled import settled_coordinates, without_magnets
 from rotordrop_bench.structure import departures_of, violated
@@ -128,6 +132,10 @@ PRESENT = {
     "sleeve off": {"sleeve": {"eccentricity": "12 um", "angle": "1 rad"}},
     "sleeve oval": {"sleeve": {"ovality": "5 um", "angle": "1 rad"}},
     "wear": {"friction": {"wear": 0.6, "wear_heat": "20 J"}},
+    "stop": {"support": {"stop_gap": "8 um", "stop_stiffness": "5e8 N/m", "stop_damping": 0.2}},
+    "ribbon": {"support": {"ribbon_stiffness": "6e7 N/m", "ribbon_slip": "300 N"}},
+    "held preload": {"balls": {"held_preload": True}},
+    "thrust": {"balls": {"thrust": "400 N"}},
 }
 
 
@@ -174,6 +182,59 @@ def test_energy_is_kept_and_booked_by_place_with_every_structure(model, parts):
         # an oval is known to the first order of its size over the displacement, 2 % here
         share = 1e-4 if "ovality" in parts.get("sleeve", {}) else 1e-6
         assert found.certificate.energy_residual < share * found.certificate.energy_scale
+
+
+def test_tables_of_balls_have_the_force_of_the_drop_model_in_its_limit(known):
+    """No thrust, a race that stands, springs not yet moved: one solution for all, by other equations."""
+    bearing = known.touchdown_bearings[0]
+    numbers = numbers_of(bearing)
+    constants = numbers.constants
+    for way in (2e-6, 15e-6):
+        expected, _ = ball_sum(numbers, way)
+        assert thrust_pair(constants, way, 0.0)[0] == pytest.approx(expected, rel=2e-3)
+        assert fast_pair(bearing, constants, way, 0.0)[0] == pytest.approx(expected, rel=2e-3)
+        assert held_pair(constants, way)[0] < 0.99 * expected
+        assert fast_pair(bearing, constants, way, 3000.0)[0] != pytest.approx(expected, rel=5e-3)
+    least = constants.preload_ball_load
+    assert held_pair(constants, 0.0) == pytest.approx((0.0, least), rel=1e-6, abs=1e-6)
+    assert thrust_pair(constants, 0.0, 1000.0)[1] > 1.5 * least
+
+
+def ball_sum(numbers, way):
+    entries = numbers.entries()
+    return ball_set_force(entries, numbers.places(), way, 0.0, np.empty((2, numbers.places().shape[1])))
+
+
+def test_a_held_preload_is_that_of_springs_without_rate_and_friction(known):
+    """Static: the package's sprung rings under the same force, found by their own equations."""
+    bearing = known.touchdown_bearings[0]
+    sprung = bearing.changed(
+        bearing=bearing.bearing.changed(preload_kind="spring", spring_rate="1 N/m", ring_travel="5 mm")
+    )
+    constants = numbers_of(bearing).constants
+    entries, places = numbers_of(sprung).entries(), numbers_of(sprung).places()
+    for way in (5e-6, 20e-6):
+        force, _load = held_pair(constants, way)
+        work = np.empty((2, places.shape[1]))
+
+        def lacking(ring, way=way, work=work):
+            return ball_set_axial_force(entries, places, way, 0.0, work, ring) - 2.0 * constants.preload
+
+        ring = brentq(lacking, -1e-4, 1e-4, xtol=1e-14)
+        assert ball_set_force(entries, places, way, 0.0, work, ring)[0] == pytest.approx(force, rel=2e-3)
+
+
+def test_a_ribbon_of_springs_that_slip_has_the_loop_of_their_sum():
+    """Slow cycles far beyond its travel: friction at its slip force, and stiff as its springs at first."""
+    row, own, rates = D.no_departure(), np.zeros(D.N_STATES), np.zeros(D.N_STATES)
+    row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = 1e8, 400.0
+    step, forces = 1e-9, []
+    for _ in range(20_000):
+        forces.append(D.ribbon_force(row, own, rates, 1.0, 0.0)[0])
+        own += step * rates
+    assert forces[500] == pytest.approx(1e8 * 500 * step, rel=1e-6)
+    assert forces[-1] == pytest.approx(400.0, rel=1e-3)
+    assert D.ribbon_force(row, own, rates, 1.0, 0.0)[2] == pytest.approx(400.0, rel=1e-3)
 
 
 def test_axes_turned_by_a_quarter_exchange_the_supports(known, case):

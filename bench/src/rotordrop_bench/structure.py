@@ -19,6 +19,8 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop_bench.ball_tables import table_row
 from rotordrop_bench.violations import BearingViolations, Violations
 
 PULL_LASTS, PULL_POINTS = 6.0, 61
@@ -101,13 +103,19 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
 
 def departures_of(machine: Machine, violations: Violations) -> Array:
     """Departures of all bearings of a true machine, shape (B, C) [SI]; (0, C) where nothing departs."""
-    rows = np.array([_departure(b, violations.of_bearing(b.name)) for b in machine.touchdown_bearings])
+    nominal = float(machine.speed.nominal)
+    rows = np.array(
+        [
+            _departure(b, violations.of_bearing(b.name), float(load), nominal)
+            for b, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True)
+        ]
+    )
     if violations.unbalance_jump is None and np.all(rows == D.no_departure()):
         return rows[:0]
     return rows
 
 
-def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
+def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float) -> Array:
     row = D.no_departure()
     support, gap, foundation = v.support, v.gap, v.foundation
     angle = float(support.axes_angle)
@@ -118,6 +126,7 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
     row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
     if float(support.slip_force) > 0.0:
         row[[D.SLIP_FORCE, D.SLIP_TRAVEL]] = float(support.slip_force), float(support.slip_travel)
+    _further(row, bearing, v, load, nominal)
     if foundation.mass is not None and foundation.frequency is not None:
         across = foundation.frequency_horizontal or foundation.frequency
         row[D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH] = _mode(
@@ -154,20 +163,37 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations) -> Array:
     return row
 
 
+def _further(
+    row: Array, bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float
+) -> None:
+    """Fill stop, ribbon and table of balls."""
+    gap, stiffness = v.support.stop_gap, v.support.stop_stiffness
+    if gap is not None and stiffness is not None:
+        loss = 2.0 * float(v.support.stop_damping) * math.sqrt(float(stiffness) * float(bearing.support.mass))
+        row[[D.STOP_GAP, D.STOP_STIFFNESS, D.STOP_DAMPING]] = float(gap), float(stiffness), loss
+    spring, slip = v.support.ribbon_stiffness, v.support.ribbon_slip
+    if spring is not None and slip is not None:
+        row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = float(spring), float(slip)
+    if v.balls.tabulated:
+        row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
+
+
 def pushed(model: DropModel, violations: Violations) -> DropModel:
     """The model with what pushes its rotor beside level gravity and the drawn unbalance."""
     p, machine = model.parameters, model.machine
     rows: list[tuple[Array, Array, Array]] = []  # entries, course, shape over the modes
     side, tilt, bow = violations.side_force, float(violations.stand.tilt), float(violations.rotor.bow)
 
-    def steady(x: float, y: float, shape: Array) -> None:
+    def steady(x: float, y: float, shape: Array, course: Array | None = None) -> None:
         entries = np.zeros(L.N_LOAD_COLUMNS)
         entries[[L.LOAD_X, L.LOAD_Y]] = x, y
-        rows.append((entries, np.zeros((0, 3)), shape))
+        rows.append((entries, np.zeros((0, 3)) if course is None else course, shape))
 
     if side is not None and float(side.force) > 0.0:
         force, angle = float(side.force), float(side.direction)
-        steady(force * math.cos(angle), force * math.sin(angle), model.basis.node_row(side.node))
+        x, y, grown = force * math.cos(angle), force * math.sin(angle), 1.0 + float(side.growth)
+        course = np.array([[0.0, x, y], [float(side.growth_time), grown * x, grown * y]])
+        steady(x, y, model.basis.node_row(side.node), course if grown > 1.0 else None)
     if tilt != 0.0:  # gravity alone acts along -y
         steady(-math.sin(tilt), math.cos(tilt) - 1.0, p.gravity)
     pull = float(violations.magnets.pull)

@@ -98,7 +98,23 @@ class SupportViolation(Violation):
     slip_travel: PositiveLength = default(1e-6, "of no effect without slip")
     """Deflection over which that friction builds up [m]."""
 
-    together: ClassVar = (("hardening", "hardening_force"), ("slip_force", "slip_travel"))
+    stop_gap: PositiveLength | None = None
+    """Travel of the support up to a stop [m]."""
+    stop_stiffness: Stiffness | None = None
+    """Stiffness of the stop [N/m]."""
+    stop_damping: NonNegativeNumber = default(0.0, "a stop without loss")
+    """Damping ratio of the mass of the support on its stop [1]."""
+    ribbon_stiffness: Stiffness | None = None
+    """Stiffness of a ribbon before it slips [N/m]."""
+    ribbon_slip: PositiveForce | None = None
+    """Force at which all of it slips [N]."""
+
+    together: ClassVar = (
+        ("hardening", "hardening_force"),
+        ("slip_force", "slip_travel"),
+        ("stop_gap", "stop_stiffness"),
+        ("ribbon_stiffness", "ribbon_slip"),
+    )
 
 
 class FoundationViolation(Violation):
@@ -217,6 +233,23 @@ class BallsViolation(Violation):
     """Where the first ball stands [rad]."""
     turn: bool = False
     """Whether the balls turn with the cage as the race spins up."""
+    held_preload: bool = False
+    """Whether the preload is a force that holds whatever the race does, as that of long springs."""
+    thrust: Force = default(0.0, "none")
+    """Axial load of the bearing [N]."""
+    inertia: bool = False
+    """Whether the centrifugal force of the balls acts."""
+
+    @property
+    def tabulated(self) -> bool:
+        """Whether the balls have a load of their own over the deflection of the race."""
+        return self.held_preload or self.inertia or float(self.thrust) > 0.0
+
+    def check(self) -> None:
+        """Refuse two of what a table holds one of."""
+        super().check()
+        if self.held_preload + self.inertia + (float(self.thrust) > 0.0) > 1:
+            raise Misfit("balls have one of 'held_preload', 'thrust' and 'inertia'; leave out the others")
 
 
 class SleeveViolation(Violation):
@@ -344,6 +377,12 @@ class SideForce(Violation):
     """Force [N]."""
     direction: Angle = default(0.0, "horizontal")
     """Its direction, from +x towards y [rad]."""
+    growth: Share = default(0.0, "a force that stays")
+    """Share by which it grows at an even rate from power-off on [1]."""
+    growth_time: PositiveTime = default(1.0, "of no effect without growth")
+    """Time it takes [s]."""
+
+    together: ClassVar = (("growth", "growth_time"),)
 
 
 class Seal(Violation):

@@ -249,12 +249,6 @@ class BallBearing(RaceBearing):
         return self.preload_kind == "spring"
 
     @property
-    def beyond_estimates(self) -> tuple[str, str] | None:
-        """Balls with inertia."""
-        more = "; leave out ball_inertia: 'rotordrop check' says what it would change"
-        return ("has balls with inertia", more) if self.ball_inertia else None
-
-    @property
     def no_face(self) -> str:
         """Springs, balls with inertia and rows that face one way."""
         if self.sprung:

@@ -12,9 +12,10 @@ from rotordrop.arrays import Array
 from rotordrop.elements.description import Description, Misfit, Placed
 from rotordrop.elements.parameter import Entry, Extension, Parameter, Values, in_words, itself, of_one_unknown
 from rotordrop.elements.values import Angle, Force, NonNegative, Physical, Time, default
-from rotordrop.known import Known
+from rotordrop.known import NINETY, Known
 from rotordrop.physics import columns as L
 
+SignedForce = Annotated[Known, Physical("force")]
 SignedAcceleration = Annotated[Known, Physical("acceleration")]
 Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 
@@ -41,8 +42,8 @@ class Load(Placed):
     """Direction of the force, from +x towards y [rad]; or "axial", towards higher nodes, or "-axial"."""
     along: Literal["axial", "-axial"] | None = None
     """Sense along the axis, where the direction was given so."""
-    force: Force | None = None
-    """Force [N]; with an exponent that at nominal speed."""
+    force: SignedForce | None = None
+    """Force [N], against the direction where it is negative; with an exponent that at nominal speed."""
     speed_exponent: NonNegative = default(0.0, "the same at every speed")
     """Power of the speed with which the force goes [1]."""
     over_time: tuple[LoadPoint, ...] = ()
@@ -72,9 +73,11 @@ class Load(Placed):
         check_times(self.over_time)
 
     @property
-    def beyond_estimates(self) -> tuple[str, str]:
-        """It acts during the fall."""
-        return "has [[loads]]", _NOT_ESTIMATED
+    def unit(self) -> tuple[float, float]:
+        """Its direction across the axis, x and y; that of an axial load stands in the place of x."""
+        if self.along is not None:
+            return self.sense, 0.0
+        return math.cos(float(self.direction or 0.0)), math.sin(float(self.direction or 0.0))
 
     @property
     def sense(self) -> float:
@@ -86,11 +89,8 @@ class Load(Placed):
 
         That of an axial load stands in the place of x.
         """
-        row = np.zeros(L.N_LOAD_COLUMNS)
-        if self.along is not None:
-            c, s, row[L.LOAD_AXIAL] = self.sense, 0.0, 1.0
-        else:
-            c, s = math.cos(float(self.direction or 0.0)), math.sin(float(self.direction or 0.0))
+        row, (c, s) = np.zeros(L.N_LOAD_COLUMNS), self.unit
+        row[L.LOAD_AXIAL] = float(self.along is not None)
         points = np.array([[float(p.time), c * float(p.force), s * float(p.force)] for p in self.over_time])
         if self.force is not None:
             row[[L.LOAD_X, L.LOAD_Y]] = c * float(self.force), s * float(self.force)
@@ -166,6 +166,23 @@ def _pushed(_machine: Any, found: Values, _load: float) -> str:
     push, lean = in_words(share, "% of the weight", 0.01), in_words(share, "deg", math.pi / 180.0)
     return f"a steady force in +x of {push}, or a machine out of level by {lean}"
 
+
+STATED: tuple[Parameter, ...] = (
+    Parameter(
+        path="force",
+        owner="load",
+        label="force",
+        kind="force",
+        logarithmic=False,
+        # who gives a guess without a range knows the direction and little else: half the weight either way
+        guess_sigma=0.5 / NINETY,
+        given_sigma=2e-3,
+        scale="the weight of the rotor",
+        measured_by="the load of the process at the time of the drop",
+        entries=(Entry(array="load", column=L.LOAD_X), Entry(array="load", column=L.LOAD_Y)),
+    ),
+)
+"""Unknowns of a load across the axis, of a machine that has it."""
 
 EXTENSIONS: tuple[Extension, ...] = (
     of_one_unknown(

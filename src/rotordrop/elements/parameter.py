@@ -15,7 +15,7 @@ from rotordrop.units import si_unit
 if TYPE_CHECKING:
     from rotordrop.elements.sensor import Seen
 
-Owner = Literal["bearing", "sensor", "unbalance", "magnet", "drop", "rotor"]
+Owner = Literal["bearing", "sensor", "unbalance", "magnet", "load", "drop", "rotor"]
 _OF_A_MACHINE = ("bearing", "sensor", "rotor")
 SMALLEST_GAP = "smallest air gap"
 """Scale of the prior of an offset."""
@@ -61,7 +61,7 @@ class Rule(Enum):
 class Entry:
     """An entry of the kernel that a parameter sets: array of `KernelParameters`, column, and how."""
 
-    array: Literal["bearing", "unbalance", "magnet", "spin", "modes"]
+    array: Literal["bearing", "unbalance", "magnet", "load", "spin", "modes"]
     column: int
     rule: Rule = Rule.VALUE
 
@@ -93,7 +93,7 @@ def path_of(owner: Owner, name: str, path: str) -> str:
     """Path in the machine of a path below an owner of a name."""
     if owner == "rotor":
         return f"rotor.{path}"
-    group = {"sensor": "sensors.", "unbalance": "unbalance."}.get(owner, "")
+    group = {"sensor": "sensors.", "unbalance": "unbalance.", "load": "loads."}.get(owner, "")
     return f"{group}{name}.{path}" if name else path
 
 
@@ -224,8 +224,8 @@ class Parameter:
 
     def named(self, owner: str) -> str:
         """Name for people, with what it belongs to."""
-        if self.owner == "unbalance":
-            return f"{self.label} of unbalance {int(owner) + 1}" if owner.isdigit() else self.label
+        if self.owner in ("unbalance", "load"):
+            return f"{self.label} of {self.owner} {int(owner) + 1}" if owner.isdigit() else self.label
         return f"{owner}: {self.label}" if owner else self.label
 
     def path_of(self, owner: str) -> str:
@@ -296,8 +296,9 @@ def parts_of(machine: Any, owner: Owner) -> list[tuple[str, Any]]:
     if owner in ("bearing", "sensor"):
         parts = machine.touchdown_bearings if owner == "bearing" else machine.sensors
         return [(part.name, part) for part in parts]
-    if owner == "unbalance":
-        return [(str(i), unbalance) for i, unbalance in enumerate(machine.unbalances)]
+    if owner in ("unbalance", "load"):
+        parts = machine.unbalances if owner == "unbalance" else machine.loads
+        return [(str(i), part) for i, part in enumerate(parts)]
     return [("", machine.rotor if owner == "rotor" else machine)]
 
 

@@ -45,12 +45,25 @@ def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...
         *_noise(evidence, problem),
         *_level(evidence),
         *_gaps(evidence, problem),
+        *_taken_along(problem),
     )
 
 
 def left_to_assumption(problem: DropProblem) -> dict[str, str]:
     """What most machine files do not state, in a few words, by the note that says more."""
     return {note: words for part in (_gains, _lag, _races, _air) for note, words in part(problem)}
+
+
+def _taken_along(problem: DropProblem) -> Iterator[str]:
+    """What the model has by the machine file alone: no sensor shows it, and no interval knows its error."""
+    model = problem.model
+    beyond = "it is simulated by the machine file, and the intervals do not hold an error of it"
+    if model.machine.axial:
+        yield f"no sensor shows the axial motion of the rotor: {beyond}"
+    rows = zip(model.bearing_names, model.parameters.bearing, strict=True)
+    fast = ", ".join(name for name, row in rows if row[L.FAST_SPEED_STEP] > 0.0)
+    if fast:
+        yield f"{fast}: the table of balls with inertia knows no other preload or grooves: {beyond}"
 
 
 def _noise(evidence: Evidence, problem: DropProblem) -> Iterator[str]:

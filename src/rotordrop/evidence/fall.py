@@ -105,7 +105,7 @@ class FallProblem:
         step, forward, backward = np.split(self.seen(fixed), 3, axis=-1)
         left = self.seen(self.responses.fading(decay, since, free)) * lift
         # over two or three places `sum` takes five times as long
-        fall = np.einsum("tsa->ts", step.imag * lift)
+        fall = np.einsum("tsa->ts", step.imag * lift - step.real * self.rotor.aside)
         parts = [column for unit in (left, forward, backward) for column in (unit.real, -unit.imag)]
         expected = fall + np.einsum("tsa->ts", parts[1]) * REMANENT_SHARE[0]
         # a gain that is off shows as a share of the fall that is expected, so the problem stays linear

@@ -16,7 +16,7 @@ from rotordrop.machine import Machine
 from rotordrop.record.axes import Plane
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, RotorBasis, modes_that_sag, reduce_rotor
-from rotordrop.rotor.statics import rest_on
+from rotordrop.rotor.statics import load_vectors, rest_on
 
 GROWN = 5e-3
 """Time in which the force of a magnet that stays on grows to its size [s]: most of a fall (chosen)."""
@@ -51,6 +51,8 @@ class Held:
     """Where, counted from 1."""
     lift: Array
     """Static lift [N], shape (A,)."""
+    aside: Array
+    """Horizontal force that kept loads from pushing the rotor aside [N], shape (A,)."""
     sag: Array
     """Static shape of the rotor in y [m, rad], shape (2N,)."""
     words: str
@@ -66,18 +68,21 @@ def held_by(machine: Machine, planes: tuple[Plane, ...], fe: RotorFE) -> Held:
     0.03 ms, each plane falling by itself to 0.1 ms.
     """
     gravity, ambs = float(machine.gravity), machine.ambs
+    across, upright = load_vectors(fe, machine, 0.0, float(machine.speed.nominal))
     if len({amb.node for amb in ambs}) >= 2:
         compliance = [0.0 if amb.integral_action else 1.0 / float(amb.stiffness) for amb in ambs]
         nodes = tuple(amb.node for amb in ambs)
-        sag, lift = rest_on(fe, nodes, gravity, compliance)
+        sag, lift = rest_on(fe, nodes, gravity, compliance, upright)
+        aside = rest_on(fe, nodes, 0.0, compliance, across)[1]
         words = f"{len(nodes)} magnetic bearings"
-        return Held(nodes=nodes, lift=lift, sag=sag, words=words, by_magnets=True)
+        return Held(nodes=nodes, lift=lift, aside=aside, sag=sag, words=words, by_magnets=True)
     bearings = tuple(bearing.node for bearing in machine.touchdown_bearings)
     guesses = (tuple(plane.node for plane in planes), bearings, (1, len(machine.rotor.node_positions)))
     nodes = next(guess for guess in guesses if len(set(guess)) >= 2)
-    sag, lift = rest_on(fe, nodes, gravity)
+    sag, lift = rest_on(fe, nodes, gravity, beside=upright)
+    aside = rest_on(fe, nodes, 0.0, beside=across)[1]
     words = f"forces at nodes {', '.join(map(str, nodes))} (the AMB planes are not known)"
-    return Held(nodes=nodes, lift=lift, sag=sag, words=words, by_magnets=False)
+    return Held(nodes=nodes, lift=lift, aside=aside, sag=sag, words=words, by_magnets=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +97,8 @@ class FreeRotor:
     """The same where forces act, shape (A, m)."""
     lift: Array
     """Static lift that acted there before the release and has gone [N], 0 where a magnet stays on, (A,)."""
+    aside: Array
+    """The same of the horizontal force that kept loads from pushing it aside."""
     held: tuple[tuple[int, float, float], ...] = ()
     """Magnets that stay on: place among them, stiffness [N/m] and damping [N s/m] as described."""
     mass: float
@@ -128,7 +135,7 @@ def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
     modes = modes_that_sag(fe)
     basis = reduce_rotor(fe, Reduction(modes=modes, attachment=False))
     words = f"free rotor with {modes - N_RIGID} bending modes, released by {held.words}"
-    released = _pushed(fe, basis, planes, held.nodes, held.lift, words)
+    released = _pushed(fe, basis, planes, held.nodes, (held.lift, held.aside), words)
     stay = tuple(
         (place, float(amb.stiffness), float(amb.damping))
         for place, amb in enumerate(machine.ambs)
@@ -136,9 +143,9 @@ def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
     )
     if not stay:
         return released
-    lift = held.lift.copy()
-    lift[[place for place, *_ in stay]] = 0.0
-    return replace(released, lift=lift, held=stay)
+    gone = np.array([held.lift, held.aside])
+    gone[:, [place for place, *_ in stay]] = 0.0
+    return replace(released, lift=gone[0], aside=gone[1], held=stay)
 
 
 def rotor_pushed_at_bearings(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
@@ -147,7 +154,7 @@ def rotor_pushed_at_bearings(machine: Machine, planes: tuple[Plane, ...]) -> Fre
     nodes = [bearing.node for bearing in machine.touchdown_bearings]
     basis = reduce_rotor(fe, Reduction(modes=modes_that_sag(fe) + 2, attachment=True), nodes)
     words = f"free rotor, {basis.description}, pushed at {len(nodes)} touchdown bearings"
-    return _pushed(fe, basis, planes, nodes, np.zeros(len(nodes)), words)
+    return _pushed(fe, basis, planes, nodes, (np.zeros(len(nodes)), np.zeros(len(nodes))), words)
 
 
 def _pushed(
@@ -155,14 +162,15 @@ def _pushed(
     basis: RotorBasis,
     planes: tuple[Plane, ...],
     nodes: Sequence[int],
-    lift: Array,
+    gone: tuple[Array, Array],
     description: str,
 ) -> FreeRotor:
     return FreeRotor(
         basis=basis,
         plane_rows=np.array([basis.node_row(plane.node) for plane in planes]),
         force_rows=np.array([basis.node_row(node) for node in nodes]),
-        lift=lift,
+        lift=gone[0],
+        aside=gone[1],
         mass=float(fe.total_mass),
         description=description,
     )

@@ -30,7 +30,7 @@ from rotordrop.physics import columns as L
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle
-from rotordrop.rotor.parameters import DropModel
+from rotordrop.rotor.parameters import DropModel, pushes
 from rotordrop.rotor.unknowns import smallest_gap
 
 MAGNET_FORCES = slice(L.REMANENT_X, L.REMANENT_Y + 1)
@@ -168,7 +168,7 @@ def build_free_fall(
     forces = np.column_stack([x, y])[2 * m :].ravel()
     order = np.concatenate([x[:m], y[:m], x[m : 2 * m], y[m : 2 * m], forces])
     system = np.insert(np.insert(whole[np.ix_(order, order)], 4 * m, 0.0, axis=0), 4 * m, 0.0, axis=1)
-    system[3 * m : 4 * m, 4 * m] = model.parameters.gravity
+    system[2 * m : 4 * m, 4 * m] = pushes(model.parameters, speed).T.ravel()
     return FreeFall(
         model=model, speed=speed, nodes=unbalance_nodes, planes=planes, magnets=magnets, system=system
     )

@@ -30,10 +30,10 @@ from rotordrop.units import GRAVITY, format_quantity, in_si
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
 
-_AXIAL = (
-    "moves along its axis",
-    ": no sensor of a record shows it. Leave out what is axial (face, axial loads and AMBs, rotor.axial) to "
-    "estimate the radial drop alone; 'rotordrop simulate' and 'study' know it",
+_WEIGHTLESS = (
+    "has no gravity across its axis",
+    ": the fall before the first contact is taken as one under gravity. 'rotordrop simulate' and 'study' "
+    "know such a machine",
 )
 
 
@@ -182,12 +182,16 @@ class Machine(Description):
             beats[beat] = amb.name
 
     @property
+    def pushed(self) -> bool:
+        """Whether loads act across its axis, beside its weight."""
+        return any(load.along is None for load in self.loads)
+
+    @property
     def not_estimated(self) -> str:
         """Why no record of it can be estimated yet; empty where one can."""
         machine = f"the machine {self.name!r}"
         parts: list[tuple[str, tuple[str, str] | None]] = [
-            (f"the rotor of {machine}", _AXIAL if self.axial else None),
-            *((machine, load.beyond_estimates) for load in self.loads),
+            (machine, _WEIGHTLESS if float(self.gravity) <= 0.0 else None),
             (machine, self.base.beyond_estimates if self.base else None),
             *((f"the clearance {one.name!r} of {machine}", one.beyond_estimates) for one in self.clearances),
         ]

@@ -35,14 +35,26 @@ MOST_PIECES = 8
 # of both from the mark of the rotor [rad]. Share of the friction that wears off, after much more than [J].
 SLEEVE_OFF = LAW + MOST_PIECES * LAW_WIDTH
 SLEEVE_OVAL, SLEEVE_ANGLE, WEAR, WEAR_HEAT = range(SLEEVE_OFF + 1, SLEEVE_OFF + 5)
-N_COLUMNS = SLEEVE_OFF + 5
+# Stop around the support: travel up to it [m], stiffness [N/m], damping [N s/m]. Ribbon: stiffness of its
+# springs before they slip [N/m], force at which all slip [N]. Balls by a table over the deflection of the
+# race, at speeds of it [rad/s] that are evenly apart: force and largest load of a ball [N].
+STOP_GAP, STOP_STIFFNESS, STOP_DAMPING, RIBBON_STIFFNESS, RIBBON_SLIP = range(SLEEVE_OFF + 5, SLEEVE_OFF + 10)
+TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(SLEEVE_OFF + 10, SLEEVE_OFF + 14)
+MOST_SPEEDS, TABLE_POINTS = 6, 128
+TABLE_FORCE, TABLE_LOAD = 0, 1
+N_COLUMNS = TABLE + MOST_SPEEDS * 2 * TABLE_POINTS
+
+YIELDS = np.array([0.25, 0.75, 1.25, 1.75])
+"""Travels at which the springs of a ribbon slip, over their mean [1]: chosen."""
 
 # States of a departure: displacement, then velocity of foundation and of tilt (x, y), slip over its travel
-# [1], heat rubbed into the contact [J], angle of the cage [rad].
-FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, N_STATES = 0, 4, 8, 9, 10, 11, 12
+# [1], heat rubbed into the contact [J], angle of the cage [rad], stretch of each spring of a ribbon [m].
+FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, STRETCH = 0, 4, 8, 9, 10, 11, 12
+N_STATES = STRETCH + 2 * len(YIELDS)
 KINDS = (
     *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY) * 2,
     *(L.INTERNAL, L.INTERNAL, L.HEAT, L.ANGLE),
+    *(L.INTERNAL,) * (2 * len(YIELDS)),
 )
 """Kind of each of these states."""
 
@@ -220,7 +232,89 @@ def support_force(
     rates[SLIP_Y] = (vy - speed * zy) / s[SLIP_TRAVEL]
     slip = s[SLIP_FORCE]
     lost = damp_x * vx + damp_y * vy + slip * speed * (zx * zx + zy * zy)
-    return c * first - z * second + slip * zx, c * second + z * first + slip * zy, damp_x, damp_y, lost
+    stop_x, stop_y, by_stop = stop_force(s, x, y, vx, vy)
+    held_x, held_y, by_ribbon = ribbon_force(s, own, rates, vx, vy)
+    F_x = c * first - z * second + slip * zx + stop_x + held_x
+    F_y = c * second + z * first + slip * zy + stop_y + held_y
+    return F_x, F_y, damp_x, damp_y, lost + by_stop + by_ribbon
+
+
+@lean_kernel
+def stop_force(s: Array, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
+    """Force of a stop [N] on a support moved by (x, y) [m] at a rate [m/s], and the power it takes [W].
+
+    Source: spring and dashpot in parallel (Kelvin and Voigt) beyond a gap, which do not pull.
+    """
+    h = math.sqrt(x * x + y * y)
+    depth = h - s[STOP_GAP]
+    if s[STOP_STIFFNESS] == 0.0 or depth <= 0.0:
+        return 0.0, 0.0, 0.0
+    rate = (x * vx + y * vy) / h
+    elastic = s[STOP_STIFFNESS] * depth
+    force = max(elastic + s[STOP_DAMPING] * rate, 0.0)
+    return force * x / h, force * y / h, (force - elastic) * rate
+
+
+@lean_kernel
+def ribbon_force(s: Array, own: Array, rates: Array, vx: float, vy: float) -> tuple[float, float, float]:
+    """Force of a ribbon [N] on its support at a velocity [m/s], and the power it takes [W].
+
+    Its springs stick until each is stretched by a travel of its own and slide then. Fills the rates of their
+    stretches [m/s]. Source: Iwan 1966, Jenkins elements in parallel, isotropic in the plane.
+    """
+    count = YIELDS.shape[0]
+    spring = s[RIBBON_STIFFNESS] / count
+    F_x = F_y = lost = 0.0
+    for i in range(count):
+        at = STRETCH + 2 * i
+        zx, zy = own[at], own[at + 1]
+        rates[at], rates[at + 1] = vx, vy
+        if spring == 0.0:
+            rates[at] = rates[at + 1] = 0.0
+            continue
+        stretch, outwards = math.sqrt(zx * zx + zy * zy), zx * vx + zy * vy
+        if outwards > 0.0 and stretch >= YIELDS[i] * s[RIBBON_SLIP] / s[RIBBON_STIFFNESS]:
+            slide = outwards / (stretch * stretch)
+            rates[at], rates[at + 1] = vx - slide * zx, vy - slide * zy
+            lost += spring * outwards
+        F_x += spring * zx
+        F_y += spring * zy
+    return F_x, F_y, lost
+
+
+@lean_kernel
+def from_table(s: Array, what: int, way: float, spin: float) -> float:
+    """Force or largest ball load [N] of a race deflected by a way [m] that turns [rad/s].
+
+    Source: table of the row, by cubics through its points and straight between its speeds.
+    """
+    place = way / s[TABLE_WAY_STEP]
+    i = min(int(place), TABLE_POINTS - 3)
+    u = place - i
+    speeds = int(s[TABLE_SPEEDS])
+    turn = min(abs(spin) / s[TABLE_SPEED_STEP], speeds - 1.0)
+    j = min(int(turn), max(speeds - 2, 0))
+    found = 0.0
+    for k in range(min(speeds, 2)):
+        share = turn - j if k == 1 else 1.0 - (turn - j)
+        at = TABLE + ((j + k) * 2 + what) * TABLE_POINTS + i
+        b, c, d = s[at], s[at + 1], s[at + 2]
+        # the force of a race that goes the other way has the other sign
+        a = s[at - 1] if i > 0 else (-c if what == TABLE_FORCE else c)
+        bent = 2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)
+        found += share * (b + 0.5 * u * (c - a + u * bent))
+    return found
+
+
+@lean_kernel
+def table_energy(s: Array, way: float, spin: float) -> float:
+    """Energy [J] of a race deflected by a way [m] at a spin [rad/s]. Source: Simpson's rule on the force."""
+    steps = 64
+    energy = 0.0
+    for k in range(steps + 1):
+        weight = 1.0 if k in (0, steps) else (4.0 if k % 2 == 1 else 2.0)
+        energy += weight * from_table(s, TABLE_FORCE, way * k / steps, spin)
+    return energy * way / (3.0 * steps)
 
 
 @lean_kernel
@@ -270,6 +364,11 @@ def stored_energy(s: Array, own: Array, springs: Array, x: float, y: float) -> f
         energy = (first + second) * (1.0 + 0.5 * k * (x * x + y * y))
     else:
         energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
+    depth = math.sqrt(x * x + y * y) - s[STOP_GAP]
+    if depth > 0.0:
+        energy += 0.5 * s[STOP_STIFFNESS] * depth * depth
+    for i in range(STRETCH, N_STATES):
+        energy += 0.5 * s[RIBBON_STIFFNESS] / YIELDS.shape[0] * own[i] * own[i]
     energy += 0.5 * s[SLIP_FORCE] * s[SLIP_TRAVEL] * (own[SLIP_X] ** 2 + own[SLIP_Y] ** 2)
     energy += mode_energy(s[FOUNDATION_MODE : FOUNDATION_MODE + MODE_WIDTH], own[FOUNDATION : FOUNDATION + 4])
     energy += mode_energy(s[TILT_MODE : TILT_MODE + MODE_WIDTH], own[TILT : TILT + 4])

@@ -21,6 +21,7 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
+from rotordrop.physics.load import load_now
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
@@ -237,6 +238,16 @@ def _loads(machine: Machine, basis: RotorBasis, uniform: Array) -> dict[str, Arr
         "load_shape": np.ascontiguousarray(np.array(shapes).reshape(len(shapes), basis.size)),
         "load_points": points,
     }
+
+
+def pushes(p: KernelParameters, speed: float) -> Array:
+    """Modal forces (m, 2) of gravity and of what pushes the rotor across its axis at power-off, at a speed
+    [rad/s].
+    """
+    found = np.column_stack([np.zeros(len(p.gravity)), p.gravity])
+    for row, shape in zip(p.load, p.load_shape, strict=True):
+        found += np.outer(shape, load_now(row, p.load_points, 0.0, speed))
+    return found
 
 
 def _rubs(machine: Machine, basis: RotorBasis) -> dict[str, Any]:

@@ -10,8 +10,10 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
+from rotordrop.physics import columns as L
 from rotordrop.physics.hertz import LineContact
 from rotordrop.physics.linear_algebra import product, solve
+from rotordrop.physics.load import load_now
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes
 
 if TYPE_CHECKING:
@@ -24,12 +26,28 @@ def weight_vector(fe: RotorFE, gravity: float) -> Array:
     return -gravity * product(fe.mass, fe.rigid_shapes[:, 0])
 
 
+def load_vectors(fe: RotorFE, machine: Machine, time: float, speed: float) -> Array:
+    """Nodal forces of loads across the axis in x and y [N, N m], (2, 2N), at a time [s] and speed [rad/s]."""
+    found = np.zeros((2, fe.size))
+    for load in machine.loads:
+        row, points = load.course(float(machine.speed.nominal))
+        row[L.LOAD_END] = len(points)
+        if load.along is None:
+            found += np.outer(load_now(row, points, time, speed), fe.node_row(load.node))
+    return found
+
+
 def rest_on(
-    fe: RotorFE, nodes: Sequence[int], gravity: float, compliance: Sequence[float] | None = None
+    fe: RotorFE,
+    nodes: Sequence[int],
+    gravity: float,
+    compliance: Sequence[float] | None = None,
+    beside: Array | None = None,
 ) -> tuple[Array, Array]:
     """Shape in y (2N,) [m, rad] of a rotor under its weight, and upward reactions [N], (P,), held at P nodes.
 
-    Gravity in m/s²; each support gives way by its compliance [m/N], or is rigid.
+    Gravity in m/s²; each support gives way by its compliance [m/N], or is rigid. ``beside`` (2N,) are nodal
+    forces beside the weight [N, N m]; without gravity the plane may be any.
     """
     held = len(set(nodes))
     if held < 2 or held < len(nodes):
@@ -42,7 +60,8 @@ def rest_on(
     # reactions scaled to the stiffness of the shaft, so that the system is well conditioned
     scale = float(np.max(np.diag(fe.stiffness)))
     system = np.block([[fe.stiffness, -scale * rows.T], [-scale * rows, -(scale**2) * give]])
-    right = np.concatenate([weight_vector(fe, gravity), np.zeros(held)])
+    pulled = weight_vector(fe, gravity) + (0.0 if beside is None else beside)
+    right = np.concatenate([pulled, np.zeros(held)])
     try:
         solution = solve(system, right)
     except np.linalg.LinAlgError as error:

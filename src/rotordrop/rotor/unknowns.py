@@ -28,6 +28,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.table import row_of, rows, structure_rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
+from rotordrop.physics import columns as L
 from rotordrop.physics.linear_algebra import solve
 from rotordrop.rotor.parameters import DropModel
 
@@ -216,6 +217,8 @@ def _unknown(
     model: DropModel, row: Parameter, owner: str, index: int, quantity: Known, known: Prior, **rest: Any
 ) -> Unknown:
     def factor(entry: Entry) -> float:
+        if entry.array == "load":
+            return model.machine.loads[index].unit[(L.LOAD_X, L.LOAD_Y).index(entry.column)]
         if entry.rule is Rule.RATIO:
             described = model.parameters.bearing[index, entry.column] if entry.array == "bearing" else 1.0
             return float(described) / float(quantity)
@@ -284,9 +287,19 @@ def drop_unknowns(model: DropModel) -> Iterator[Unknown]:
     for row in structure_rows("drop"):
         if (quantity := row.stated(machine)) is not None:
             yield _unknown(model, row, "", 0, quantity, prior(row, quantity))
+    yield from _of_loads(model)
     yield from _from_mark(model)
     for row in AERO:
         yield of_drop(row, "", 0, math.log(aero_time_constant(machine)), row.guess_sigma)
+
+
+def _of_loads(model: DropModel) -> Iterator[Unknown]:
+    """Forces across the axis; those along it no sensor shows, and a course over time is as described."""
+    weight = model.machine.rotor.mass * float(model.machine.gravity)
+    for index, (name, load) in enumerate(parts_of(model.machine, "load")):
+        for row in structure_rows("load"):
+            if load.along is None and (force := row.stated(load)) is not None:
+                yield _unknown(model, row, name, index, force, prior(row, force, weight))
 
 
 def _from_mark(model: DropModel) -> Iterator[Unknown]:

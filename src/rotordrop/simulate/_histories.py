@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rotordrop.arrays import Array
@@ -115,6 +117,9 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     row = p.bearing[b]
     balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
     dx, dy = race_deflection(b, y, p)
+    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+        spin = y[p.bearing_at[b, L.RACE_SPIN]]
+        return departure.table_energy(p.departure[b], math.sqrt(dx * dx + dy * dy), spin)
     if row[L.FAST_SPEED_STEP] > 0.0:
         grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)

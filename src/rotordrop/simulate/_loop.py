@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.physics import ball_set, ball_table, mount
+from rotordrop.physics import ball_set, ball_table, departure, mount
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
@@ -31,6 +31,7 @@ from rotordrop.simulate._rhs import (
     drop_derivative,
     face_values,
     race_deflection,
+    race_travel,
     ring_travel,
     rises_with_travel,
     rows_of,
@@ -398,19 +399,30 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     The stress on the outer race is zero where it carries the same loads as the inner one, which governs.
     """
     dx, dy = race_deflection(b, y, p)
+    spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
+    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+        way = math.sqrt(dx * dx + dy * dy)
+        load = max(departure.from_table(p.departure[b], departure.TABLE_LOAD, way, spin), 0.0)
+        return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
+    return deflected_loads(b, dx, dy, ring_travel(b, y, p), along, spin, p)
+
+
+@inner_kernel
+def deflected_loads(
+    b: int, dx: float, dy: float, way: float, along: float, spin: float, p: KernelParameters
+) -> tuple[float, float, float]:
+    """`race_loads` of a deflected race; arguments as of `deflected_force`."""
     numbers, grid = p.bearing[b][L.ROLLING : L.ROLLING_END], p.bearing[b, L.FAST : L.FAST_END]
     if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
-        spin = y[p.bearing_at[b, L.RACE_SPIN]]
         inner, outer = ball_table.fast_loads(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
         stress = numbers[ball_set.STRESS_COEFFICIENT] * cube_root(inner)
         return max(inner, outer), stress, grid[ball_table.OUTER_STRESS] * cube_root(outer)
-    axial = p.bearing_at[b, L.FACE_STATES]
-    if axial >= 0:
+    if p.bearing_at[b, L.FACE_STATES] >= 0:
         loaded, relieved = rows_of(b, p)
-        load, stress = ball_set_load(numbers, loaded, dx, dy, -y[axial])
-        other, beside = ball_set_load(numbers, relieved, dx, dy, y[axial])
+        load, stress = ball_set_load(numbers, loaded, dx, dy, -along)
+        other, beside = ball_set_load(numbers, relieved, dx, dy, along)
         return max(load, other), max(stress, beside), 0.0
-    load, stress = ball_set_load(numbers, p.balls[b], dx, dy, ring_travel(b, y, p))
+    load, stress = ball_set_load(numbers, p.balls[b], dx, dy, way)
     return load, stress, 0.0
 
 

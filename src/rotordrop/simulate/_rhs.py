@@ -206,22 +206,47 @@ def rises_with_travel(b: int, p: KernelParameters) -> bool:
 
 
 @inner_kernel
+def race_travel(b: int, y: Array, p: KernelParameters) -> float:
+    """Axial displacement [m] of the race of one bearing; zero of one that has no face."""
+    at = p.bearing_at[b, L.FACE_STATES]
+    return y[at] if at >= 0 else 0.0
+
+
+@inner_kernel
+def deflected_force(
+    b: int, x: float, z: float, way: float, along: float, spin: float, p: KernelParameters, work: Scratch
+) -> tuple[float, float, float]:
+    """`ball_force` of a race deflected by (x, z) and moved by ``along`` [m], at a spin [rad/s], whose sprung
+    rings have gone a ``way`` [m].
+    """
+    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+        grid = p.bearing[b, L.FAST : L.FAST_END]
+        return ball_table.fast_force(grid, p.ball_table[b], p.balls[b], x, z, spin, work.balls[0], work.blend)
+    numbers = p.bearing[b][L.ROLLING : L.ROLLING_END]
+    if p.bearing_at[b, L.FACE_STATES] >= 0:
+        F_x, F_y = two_row_force(numbers, rows_of(b, p), x, z, along, work.balls)
+    else:
+        F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
+    return F_x, F_y, 0.0
+
+
+@inner_kernel
 def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
     """Force of the balls of one bearing [N] against the deflection of its race, x and y.
 
     The last number is the slope of their energy by the speed of the race [J s], of balls with inertia.
     """
     x, z = race_deflection(b, y, p)
+    spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
+    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+        way = math.sqrt(x * x + z * z)
+        rise = departure.from_table(p.departure[b], departure.TABLE_FORCE, way, spin) / max(way, 1e-15)
+        _, own = departing(b, y, p)
+        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
+        return F_x, F_y, 0.0
+    F_x, F_y, by_spin = deflected_force(b, x, z, ring_travel(b, y, p), along, spin, p, work)
     if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
-        grid = p.bearing[b, L.FAST : L.FAST_END]
-        spin = y[p.bearing_at[b, L.RACE_SPIN]]
-        return ball_table.fast_force(grid, p.ball_table[b], p.balls[b], x, z, spin, work.balls[0], work.blend)
-    numbers, way = p.bearing[b][L.ROLLING : L.ROLLING_END], ring_travel(b, y, p)
-    axial = p.bearing_at[b, L.FACE_STATES]
-    if axial >= 0:
-        F_x, F_y = two_row_force(numbers, rows_of(b, p), x, z, y[axial], work.balls)
-    else:
-        F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
+        return F_x, F_y, by_spin
     if p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)

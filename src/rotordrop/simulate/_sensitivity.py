@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from rotordrop.arrays import Array, Integers
-from rotordrop.physics import aerodynamics, ball_table, landing_sleeve, mount, ring, support
+from rotordrop.physics import aerodynamics, ball_table, face, landing_sleeve, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
@@ -24,11 +24,16 @@ from rotordrop.simulate._rhs import (
     aerodynamic_deceleration,
     mount_states,
     race_deflection,
+    race_travel,
     relative_motion,
     ring_travel,
+    rows_of,
     support_deflection,
     true_motion,
 )
+
+FACE_STEP = 1e-9
+"""Step [m], [m/s] of the difference by which the law of a face is differentiated."""
 
 Slopes = tuple[float, float, float]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
@@ -130,6 +135,12 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         F_x, F_y, k_xx, k_xy, k_yy, w_x, w_y = ball_table.fast_gradient(
             grid, p.ball_table[b], p.balls[b], dx, dy, y[spin]
         )
+    elif p.bearing_at[b, L.FACE_STATES] >= 0:
+        entries, along = row[L.BALL_SET : L.BALL_SET_END], race_travel(b, y, p)
+        loaded, relieved = rows_of(b, p)
+        F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, loaded, dx, dy, -along)
+        G_x, G_y, g_xx, g_xy, g_yy = ball_set_gradient(entries, relieved, dx, dy, along)
+        F_x, F_y, k_xx, k_xy, k_yy = F_x + G_x, F_y + G_y, k_xx + g_xx, k_xy + g_xy, k_yy + g_yy
     else:
         entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
         F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
@@ -203,6 +214,42 @@ def _ring_jacobian(
         J[at + 1, h + j] -= slope
         J[at + 1, n_q + r + j] -= by_force * along * C / mass
         J[at + 1, n_q + h + j] += by_force * along * C / mass
+
+
+@lean_kernel
+def _axial_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
+    """Add the axial motion of rotor and races: faces, balls, and what the balls make of both motions.
+
+    Left out are the friction of a face and the drag that the axial force of the balls puts on the race.
+    """
+    n_q, at = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.AXIAL]
+    J[at, at + 1] = 1.0
+    for b in p.faces:
+        own, r, h = p.bearing_at[b, L.FACE_STATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
+        row, (loaded, relieved) = p.bearing[b], rows_of(b, p)
+        numbers, entries = row[L.FACE : L.FACE_END], row[L.BALL_SET : L.BALL_SET_END]
+        dx, dy = race_deflection(b, y, p)
+        z, vz = y[at] - y[own], y[at + 1] - y[own + 1]
+        above = face.face_contact(numbers, z + FACE_STEP, vz, 0.0, 0.0, 0.0)[1]
+        stiff = above - face.face_contact(numbers, z - FACE_STEP, vz, 0.0, 0.0, 0.0)[1]
+        above = face.face_contact(numbers, z, vz + FACE_STEP, 0.0, 0.0, 0.0)[1]
+        loss = above - face.face_contact(numbers, z, vz - FACE_STEP, 0.0, 0.0, 0.0)[1]
+        _one, k_ax, k_ay, k_aa = ball_set_axial_gradient(entries, loaded, dx, dy, -y[own])
+        _other, g_ax, g_ay, g_aa = ball_set_axial_gradient(entries, relieved, dx, dy, y[own])
+        J[own, own + 1] = 1.0
+        for part in range(2):
+            slope = (stiff if part == 0 else loss) / (2.0 * FACE_STEP)
+            held = k_aa + g_aa if part == 0 else row[L.BEARING_DAMPING]
+            J[at + 1, at + part] -= slope / p.spin[L.ROTOR_MASS]
+            J[at + 1, own + part] += slope / p.spin[L.ROTOR_MASS]
+            J[own + 1, at + part] += slope / row[L.RACE_MASS]
+            J[own + 1, own + part] -= (slope + held) / row[L.RACE_MASS]
+        for j in range(2):
+            slope = k_ax - g_ax if j == 0 else k_ay - g_ay
+            J[own + 1, r + j] -= slope / row[L.RACE_MASS]
+            J[own + 1, h + j] += slope / row[L.RACE_MASS]
+            J[n_q + r + j, own] -= slope / row[L.RACE_MASS]
+            J[n_q + h + j, own] += slope / row[L.SUPPORT_MASS_X + j]
 
 
 @inner_kernel
@@ -337,6 +384,8 @@ def drop_jacobian_parts(
         J[i_w, i_w] += aerodynamics.speed_dependent_slope(
             y[i_w], p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC]
         )
+    if p.rotor_at[L.AXIAL] >= 0:
+        _axial_jacobian(y, p, J)
     if p.flags[L.MAGNETS_ACT] != 0:
         _magnet_jacobian(t < p.spin[L.POWER_OFF_DELAY], p, J)
 

@@ -13,7 +13,7 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
-from rotordrop.rotor.parameters import FASTEST, DropModel
+from rotordrop.rotor.parameters import FASTEST, DropModel, pushes
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
 from rotordrop.simulate.magnets import start_loop, with_springs_of
 from rotordrop.units import format_quantity
@@ -190,9 +190,7 @@ def levitated_static(model: DropModel, offset: Array | None, speed: float = 0.0)
     p = model.parameters
     n_a, m = p.magnet_shape.shape
     target = np.zeros((n_a, 2)) if offset is None else np.asarray(offset, dtype=np.float64)
-    load = np.column_stack([np.zeros(m), p.gravity])
-    for row, shape in zip(p.load, p.load_shape, strict=True):
-        load += np.outer(shape, load_now(row, p.load_points, 0.0, speed))
+    load = pushes(p, speed)
     border = p.magnet_shape.T
     matrix = np.block([[np.diag(p.eigenvalue), -border], [p.magnet_shape, np.zeros((n_a, n_a))]])
     # rows of stiff modes are divided by their stiffness: its range would pass for a loss of rank

@@ -33,6 +33,7 @@ ON_UNBALANCE = 3
 SCALE_BEARING = 4
 AT_TYPICAL_DEPTH = 5
 SCALE_MODES = 6
+ON_LOAD = 7
 
 
 class ParameterTargets(NamedTuple):
@@ -141,6 +142,8 @@ def write_values(
             p.spin[column] = value
         elif kind == ON_MAGNET:
             p.magnet[row, column] = value
+        elif kind == ON_LOAD:
+            p.load[row, column] = value
         elif kind == SCALE_MODES:
             for j in range(p.eigenvalue.shape[0]):
                 p.eigenvalue[j] = value * targets.eigenvalue[j]

@@ -10,10 +10,16 @@ from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import kernel
-from rotordrop.physics.ball_set import ball_set_force, ball_set_load
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.simulate._loop import contact_at
-from rotordrop.simulate._rhs import race_deflection, ring_travel
+from rotordrop.simulate._loop import contact_at, deflected_loads
+from rotordrop.simulate._rhs import (
+    Scratch,
+    deflected_force,
+    race_deflection,
+    race_travel,
+    ring_travel,
+    scratch_of,
+)
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
 from rotordrop.track.problem import DropProblem, private_copy
@@ -25,20 +31,29 @@ N_VALUES = 4
 
 @kernel
 def bearing_values(
-    dx: float, dy: float, axial: float, b: int, p: KernelParameters, work: Array, out: Array
+    dx: float,
+    dy: float,
+    axial: float,
+    b: int,
+    p: KernelParameters,
+    work: Scratch,
+    out: Array,
+    along: float = 0.0,
+    spin: float = 0.0,
 ) -> None:
     """Ball force on the race in x and y and its magnitude [N] and the stress [Pa] at a deflection [m].
 
-    The axial offset of the balls is set to ``axial`` [m] and stays so.
+    The axial offset of the balls is set to ``axial`` [m] and stays so. ``along`` [m] is how far a race with
+    faces has moved axially, ``spin`` [rad/s] what balls with inertia turn with; the stress is that of the
+    race that has the larger one.
     """
     p.bearing[b, L.SET_UNKNOWN] = axial
-    entries, balls = p.bearing[b, L.BALL_SET : L.BALL_SET_END], p.balls[b]
-    F_x, F_y = ball_set_force(entries, balls, dx, dy, work)
-    _load, stress = ball_set_load(entries, balls, dx, dy)
+    F_x, F_y, _by_spin = deflected_force(b, dx, dy, 0.0, along, spin, p, work)
+    _load, inner, outer = deflected_loads(b, dx, dy, 0.0, along, spin, p)
     out[FORCE_X] = -F_x
     out[FORCE_Y] = -F_y
     out[FORCE] = np.sqrt(F_x * F_x + F_y * F_y)
-    out[STRESS] = stress
+    out[STRESS] = max(inner, outer)
 
 
 @kernel
@@ -58,7 +73,7 @@ def force_values(
     Gradients are by race deflection x, y and axial offset, less the way of sprung rings. Values are ball
     force on the race x, y, its magnitude [N] and inner-race stress [Pa]; contacts as in `contact_at`.
     """
-    work = np.empty((2, p.balls.shape[2]))
+    work = scratch_of(p)
     above = np.empty(N_VALUES)
     below = np.empty(N_VALUES)
     y = np.zeros(p.rotor_at[L.N_STATES])
@@ -71,13 +86,14 @@ def force_values(
             described = p.bearing[b, L.SET_UNKNOWN]
             axial = described - ring_travel(b, y, p)
             contact_at(times[i], p.bearing_at[b, L.CONTACTS], y, p, contacts[i, b])
-            bearing_values(dx, dy, axial, b, p, work, values[i, b])
+            along, spin = race_travel(b, y, p), y[p.bearing_at[b, L.RACE_SPIN]]
+            bearing_values(dx, dy, axial, b, p, work, values[i, b], along, spin)
             for c in range(3):
                 ex = step_d if c == 0 else 0.0
                 ey = step_d if c == 1 else 0.0
                 es = step_d if c == 2 else 0.0
-                bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above)
-                bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below)
+                bearing_values(dx + ex, dy + ey, axial + es, b, p, work, above, along, spin)
+                bearing_values(dx - ex, dy - ey, axial - es, b, p, work, below, along, spin)
                 for v in range(N_VALUES):
                     gradients[i, b, v, c] = (above[v] - below[v]) / (2.0 * step_d)
             p.bearing[b, L.SET_UNKNOWN] = described
@@ -166,7 +182,7 @@ def force_gradient(problem: DropProblem, mean: Array, b: int) -> Array:
 def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) -> float:
     """Largest Hertz stress [Pa] at the inner race of bearing ``b`` under a static force (2,) [N].
 
-    The preload is that of the parameters ``theta`` (P,); the deflection is along the force.
+    The preload is that of the parameters ``theta`` (P,); the deflection is along the force, the race stands.
     """
     from scipy.optimize import brentq
 
@@ -174,7 +190,7 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
     P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
     size = float(np.hypot(force[0], force[1]))
     along = np.asarray(force) / max(size, 1e-300)
-    work, out = np.empty((2, p.balls.shape[2])), np.empty(N_VALUES)
+    work, out = scratch_of(p), np.empty(N_VALUES)
 
     def lacking(deflection: float) -> float:
         bearing_values(

@@ -28,6 +28,8 @@ SPEED_SIGMA = 0.5
 """Rotor speed at power-off beside its standard error [rad/s]."""
 OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
 """How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
+AXIAL_SIGMA = (1e-6, 1e-4)
+"""The same of axial motion [m], [m/s]: no sensor shows it, and it is as the machine file simulates it."""
 RING_SIGMA = (0.3e-6, 1e-3)
 """The same of rings that springs press on: way [m] and speed [m/s] at power-off, where they rest."""
 
@@ -80,6 +82,10 @@ def prior_at_power_off(
     sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap
     rings = layout.further_at(L.RING_STATES)
     sigma[rings] = np.resize(RING_SIGMA, rings.stop - rings.start)
+    axial = layout.further_at(L.FACE_STATES)
+    sigma[axial] = np.resize(AXIAL_SIGMA, axial.stop - axial.start)
+    if layout.moves_axially:
+        sigma[layout.axial : layout.axial + 2] = AXIAL_SIGMA
     own = layout.further_at(L.BEARING_OWN)
     sigma[own] = np.resize(OWN_SIGMA, own.stop - own.start)
     covariance = np.diag(sigma**2)

@@ -13,8 +13,9 @@ from rotordrop.errors import IdentificationError
 from rotordrop.evidence.ends import held_bearings
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
+from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import DropModel, race_sag, static_sag
-from rotordrop.rotor.statics import settled_sag
+from rotordrop.rotor.statics import rest_on, settled_sag
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
 from rotordrop.series import noise_by_differences
 from rotordrop.simulate.levitation import levitated_static
@@ -26,6 +27,8 @@ from rotordrop.track.unknowns import parameter_targets
 
 FIRST_READINGS = 0.07
 """Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
+AT_STANDSTILL = 1e6
+"""Time at which a load has the value that it keeps [s]."""
 SPEED_READING_SIGMA = 1.0
 SPEED_SPACING = 2.5e-3
 """Time between speed readings that count as independent [s]."""
@@ -331,22 +334,32 @@ def first_level(time: Array, readings: Array, until: float) -> Array:
 
 
 def settled_displacement(problem: DropProblem, theta: Array) -> Array:
-    """Vertical displacement [m] of the resting rotor at each sensor, shape (C,), for parameter values.
+    """Displacement [m] of the resting rotor in x and y at each sensor, shape (2, C), for parameter values.
 
-    Gap, indentation, race and support sag under the static load shares, the line between the bearings, and
-    the bending of the rotor on its touchdown bearings.
+    Gap, indentation, race and support sag under the weight and the loads at standstill, in their direction;
+    the line between the bearings, and the bending of the rotor on its touchdown bearings.
     """
     model = problem.model
     p = _with_theta(problem, theta)
-    loads = np.asarray(model.load_shares)
-    sag = static_sag(p.bearing, race_sag(model.machine.touchdown_bearings, loads), loads)
-    level = -sag.depth(p.bearing[:, L.AIR_GAP])
-    nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings]) - 1
-    z = np.asarray(model.fe.node_positions)
-    line = np.polynomial.Polynomial.fit(z[nodes], level, min(1, len(nodes) - 1)).convert()
-    bend = np.asarray(settled_sag(model.fe, model.machine))[0::2]
+    bearings = model.machine.touchdown_bearings
+    nodes = [bearing.node for bearing in bearings]
+    pull = np.array([np.zeros(len(nodes)), -np.asarray(model.load_shares)])
+    bend = np.array([np.zeros(model.fe.size), settled_sag(model.fe, model.machine)])
+    for load, row in zip(model.machine.loads, p.load, strict=False):  # the ground comes last
+        if load.along is None:
+            force = load_now(row, p.load_points, AT_STANDSTILL, 0.0)
+            shape, held = rest_on(model.fe, nodes, 0.0, beside=model.fe.node_row(load.node))
+            pull, bend = pull - np.outer(force, held), bend + np.outer(force, shape)
+    size = np.hypot(*pull)
+    sag = static_sag(p.bearing, race_sag(bearings, size), size)
+    level = sag.depth(p.bearing[:, L.AIR_GAP]) * pull / np.maximum(size, 1e-12)
+    z, at = np.asarray(model.fe.node_positions), np.array(nodes) - 1
     sensors = np.array([sensor.node for sensor in model.machine.sensors]) - 1
-    return np.asarray(line(z[sensors]) + bend[sensors])
+    lines = [
+        np.polynomial.Polynomial.fit(z[at], along, min(1, len(nodes) - 1)).convert()(z[sensors])
+        for along in level
+    ]
+    return np.asarray(np.array(lines) + bend[:, 0::2][:, sensors], dtype=np.float64)
 
 
 def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
@@ -368,19 +381,22 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     """
     start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
     theta = mean[problem.parameter_slice].copy()
-    height = settled_displacement(problem, theta)
+    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
+    axes = np.array([np.cos(angles), np.sin(angles)])
+    place = settled_displacement(problem, theta)
     slopes = np.zeros((n_c, n_p))
     for k in range(n_p):
-        if not np.any((problem.targets.target[:, 0] == k) & (problem.targets.target[:, 1] == P.ON_BEARING)):
+        kinds = problem.targets.target[problem.targets.target[:, 0] == k, 1]
+        if P.ON_BEARING not in kinds and P.ON_LOAD not in kinds:
             continue
         trial = theta.copy()
         trial[k] += problem.targets.step[k]
-        slopes[:, k] = (settled_displacement(problem, trial) - height) / problem.targets.step[k]
+        moved = settled_displacement(problem, trial) - place
+        slopes[:, k] = np.sum(axes * moved, axis=0) / problem.targets.step[k]
     model = problem.model
     gap = smallest_gap(model.machine)
     # on which place of its landing sleeves a rotor comes to rest is anybody's guess
     reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in model.machine.touchdown_bearings)
-    angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
     nodes = np.array([sensor.node for sensor in model.machine.sensors])
     gain_scratch = np.empty(len(mean))
     for node in np.unique(nodes):
@@ -391,8 +407,8 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
             row = np.zeros(len(mean))
             predicted, observed = 0.0, 0.0
             for weight, c in zip(weights, chosen, strict=True):
-                along = np.sin(angles[c]) * height[c]
-                for k, per_unit in rest_terms(model, problem.unknowns, int(c), float(height[c])):
+                along = float(axes[:, c] @ place[:, c])
+                for k, per_unit in rest_terms(model, problem.unknowns, int(c), float(place[1, c])):
                     along += theta[k] * per_unit
                     row[start + k] += weight * (1.0 + mean[start + n_p + c]) * per_unit
                 growth = 1.0 + mean[start + n_p + c]
@@ -400,7 +416,7 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 observed += weight * tail_level[c]
                 row[start + n_p + c] += weight * along
                 row[start + n_p + n_c + c] += weight
-                row[problem.parameter_slice] += weight * growth * np.sin(angles[c]) * slopes[c]
+                row[problem.parameter_slice] += weight * growth * slopes[c]
             variance = (sigma * gap) ** 2 + reach**2
             F.scalar_update(mean, covariance, row, observed - predicted, variance, gain_scratch)
 

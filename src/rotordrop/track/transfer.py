@@ -32,6 +32,8 @@ def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
     for place, states in one.further:
         if (place, states) in two.further:
             result[:, two.further_at(place)] = means[:, one.further_at(place)]
+    if two.moves_axially and one.moves_axially:
+        result[:, two.axial : two.axial + 2] = means[:, one.axial : one.axial + 2]
     result[:, two.rotor_speed : two.n_dynamic] = means[:, one.rotor_speed : one.n_dynamic]
     _carry_unknowns(coarse, fine, means, result)
     if two.sensor_own:

@@ -15,6 +15,7 @@ _KIND_OF_ARRAY = {
     "spin": P.ON_SPIN,
     "magnet": P.ON_MAGNET,
     "unbalance": P.ON_UNBALANCE,
+    "load": P.ON_LOAD,
     "modes": P.SCALE_MODES,
 }
 _KIND_OF_RULE = {Rule.SCALE: P.SCALE_BEARING, Rule.AT_TYPICAL_DEPTH: P.AT_TYPICAL_DEPTH}

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
+from tests.unit.simulate.test_right_hand_side import a_state, both_jacobians
 
 from rotordrop.elements.face import Face
 from rotordrop.errors import MachineFileError, RecordError
-from rotordrop.evidence.evidence import read_evidence
-from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop.evidence.evidence import insisted
+from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.physics.ball_set import ball_set_energy, two_row_axial_force, two_row_force
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
 from rotordrop.report.machine_content import machine_json
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.report.simulate_summary import simulate_summary
@@ -392,14 +392,37 @@ def test_result_and_machine_are_written_and_read_again(machine, drop, tmp_path):
     assert loads_machine(machine_text(both)) == both
 
 
-def test_an_estimate_of_such_a_machine_is_refused():
-    text = '[[axial_ambs]]\nname = "thrust"\nstiffness = "1e6 N/m"\ndamping = "500 N s/m"\n'
-    machine = loads_machine(machine_text(example_machine("lp400")) + text)
-    record = read_record(example_record_path("lp400_drop_060"), machine)
-    with pytest.raises(
-        RecordError, match=r"moves along its axis, .*no sensor of a record shows it.*Leave out"
-    ):
-        read_evidence(build_drop_model(machine, "quick"), record)
+@pytest.mark.parametrize("deep", [False, True], ids=["in flight", "on its face"])
+def test_jacobian_agrees_with_finite_differences(deep):
+    """But for friction of faces and drag by axial force, which the derivative leaves out."""
+    model = build_drop_model(faced(push(300.0), face=f"{FACE}, friction = 0.0"), "quick")
+    layout, state = model.layout, a_state(model, np.array([12e-6, 18e-6]), 0.3)
+    own = layout.bearing_at()[1, L.FACE_STATES]
+    state[[layout.axial, layout.axial + 1]] = (0.21e-3 if deep else 0.1e-3), 0.02
+    state[[own, own + 1]] = 3e-6, -0.01
+    jacobian, numeric = both_jacobians(model, state, DropCase(speed=SPEED, spin="prescribed"))
+    places = [layout.axial, layout.axial + 1, own, own + 1, *range(layout.race.start, layout.support.stop)]
+    found, expected = (np.delete(one[:, places], layout.race_spin, axis=0) for one in (jacobian, numeric))
+    size = np.maximum(np.max(np.abs(expected), axis=0), 1e-9)
+    assert np.max(np.abs(found - expected) / size) < 1e-4
+    assert (np.abs(numeric[layout.axial + 1, layout.axial]) > 1e6) == deep
+
+
+def test_an_estimate_takes_axial_motion_along_and_a_weightless_rotor_is_refused():
+    from rotordrop.track.prior import AXIAL_SIGMA, prior_at_power_off
+    from rotordrop.track.problem import sensor_rows
+
+    machine = faced(push(300.0))
+    assert machine.not_estimated == ""
+    model = build_drop_model(machine, "quick")
+    rows = sensor_rows(model)
+    _mean, covariance = prior_at_power_off(model, (), rows, np.zeros(len(rows)), (SPEED, 0.1))
+    at = model.layout.axial
+    assert np.sqrt(np.diag(covariance)[at : at + 2]) == pytest.approx(AXIAL_SIGMA)
+    weightless = machine.with_values({"gravity": 0.0})
+    told = r"has no gravity across its axis, with which a record cannot be estimated yet"
+    with pytest.raises(RecordError, match=told):
+        insisted(SimpleNamespace(machine=weightless))
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import a_state, assert_jacobian
 
-from rotordrop.errors import MachineFileError, RecordError, SimulationError, UsageError
+from rotordrop.errors import MachineFileError, SimulationError, UsageError
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics.ball_table import PLACES, fast_energy, fast_force, fast_loads
@@ -139,13 +139,25 @@ def test_springs_and_overspeed_are_refused(fast):
         simulate_drop(fast, DropCase(speed=1.3 * NOMINAL, duration=0.01))
 
 
-def test_a_record_is_not_estimated_with_them(fast):
-    from types import SimpleNamespace
+@pytest.mark.parametrize("spin", [0.0, 0.9])
+def test_an_estimate_has_force_and_stress_of_the_drop(fast, slow, spin):
+    """Of the filter's state: those that the simulated drop has there, and those of slow balls otherwise."""
+    from rotordrop.physics import columns as L
+    from rotordrop.simulate._rhs import scratch_of
+    from rotordrop.track.forces import FORCE, STRESS, bearing_values
 
-    from rotordrop.evidence.evidence import insisted
-
-    with pytest.raises(RecordError, match=r"balls with inertia, with which a record cannot be estimated"):
-        insisted(SimpleNamespace(machine=fast.machine))
+    assert fast.machine.not_estimated == ""
+    state = a_state(fast, np.array([12e-6, 18e-6]), spin)
+    case = DropCase(speed=NOMINAL, start=StateStart(state=state), duration=1e-5, reduction="quick")
+    drop, layout, out = simulate_drop(fast, case), fast.layout, np.empty(4)
+    dx, dy = state[layout.race][:2] - state[layout.support][:2]
+    turn = state[layout.race_spin][0]
+    for model, same in ((fast, True), (slow, spin == 0.0)):
+        p = model.parameters
+        bearing_values(dx, dy, p.bearing[0, L.SET_UNKNOWN], 0, p, scratch_of(p), out, 0.0, turn)
+        force, stress = np.linalg.norm(drop.bearing_force[0, 0]), drop.max_stress[0, 0]
+        assert (out[FORCE] == pytest.approx(force, rel=1e-5)) == same
+        assert (out[STRESS] == pytest.approx(stress, rel=1e-4)) == same
 
 
 def test_loads_of_every_ball_are_refused_not_those_of_slow_ones(fast):

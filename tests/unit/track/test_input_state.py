@@ -11,6 +11,7 @@ from rotordrop.errors import IdentificationError
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
+from rotordrop.simulate._rhs import scratch_of
 from rotordrop.track import _propagation as P
 from rotordrop.track.forces import bearing_values, stress_at_force
 from rotordrop.track.input_state import (
@@ -130,8 +131,7 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
     P.apply_parameters(theta.copy(), problem.targets, p)
     out = np.empty(4)
     for b, deflection in ((0, 12e-6), (1, 25e-6)):
-        work = np.empty((2, p.balls.shape[2]))
-        bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, work, out)
+        bearing_values(0.0, -deflection, p.bearing[b, L.AXIAL_OFFSET], b, p, scratch_of(p), out)
         found = stress_at_force(problem, theta, b, np.array([0.0, -out[2]]))
         assert found == pytest.approx(out[3], rel=1e-6)
     estimate = input_state_estimate(problem, corrections)

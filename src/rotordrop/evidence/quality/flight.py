@@ -122,6 +122,8 @@ def weighed(
     """Weigh the rotor in its flights; None where it never flew."""
     if len({amb.node for amb in machine.ambs}) < 2 or record.speed is None or float(machine.gravity) <= 0.0:
         return None
+    if machine.pushed:  # by what is not known well enough to weigh sensors with
+        return None
     count = len(record.sensors)
     seen: list[tuple[Array, Array]] = []
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
