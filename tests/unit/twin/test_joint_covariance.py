@@ -53,9 +53,15 @@ def stated(problem, covariance, widening):
     }
 
 
+def spread_of(problem, mean, covariance, known):
+    """What a file holds of a fit whose first three entries are no parameters."""
+    fitted = {one.path: one for one in problem.unknowns}
+    return joint_covariance(problem.model, fitted, mean[3:], covariance[3:, 3:], known)
+
+
 def test_spreads_are_those_of_the_intervals(problem, covariance):
     known = as_filed(problem.model.machine, stated(problem, covariance, 1.5))
-    spread = joint_covariance(problem, middle(problem), covariance, known)
+    spread = spread_of(problem, middle(problem), covariance, known)
     sigma = np.sqrt(np.diag(spread.matrix))
     for path in ("NDE.air_gap", "DE.support.mass", "NDE.preload", "DE.friction.dynamic"):
         low, high = known[path].interval_90
@@ -67,7 +73,7 @@ def test_spreads_are_those_of_the_intervals(problem, covariance):
 def test_a_value_that_came_out_as_zero_is_left_out(problem, covariance):
     known = stated(problem, covariance, 1.0)
     known["DE.support.damping"] = Known(value=0.0, interval_90=(0.0, 500.0))
-    spread = joint_covariance(problem, middle(problem), covariance, known)
+    spread = spread_of(problem, middle(problem), covariance, known)
     assert "DE.support.damping" not in spread.paths and "NDE.support.damping" in spread.paths
     assert np.all(np.isfinite(spread.matrix))
 
@@ -82,11 +88,11 @@ def test_a_preload_far_below_its_prior_stays_above_zero(problem, covariance):
     assert known["DE.preload"].value == pytest.approx(0.01 * described, rel=1e-6)
     mean = middle(problem)
     mean[3 + k] = theta
-    assert np.all(np.isfinite(joint_covariance(problem, mean, covariance, known).matrix))
+    assert np.all(np.isfinite(spread_of(problem, mean, covariance, known).matrix))
 
 
 def test_correlations_are_those_of_the_fit(problem, covariance):
-    spread = joint_covariance(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     paths = [one.path for one in problem.unknowns]
     i, j = (paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
     a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
@@ -98,7 +104,7 @@ def test_correlations_are_those_of_the_fit(problem, covariance):
 
 def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
     """Its logarithm is the sum of two: stiffness and ratio."""
-    spread = joint_covariance(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     assert "NDE.support.anisotropy" not in spread.paths
     a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "stiffness_horizontal"))
     paths = [one.path for one in problem.unknowns]
@@ -111,7 +117,7 @@ def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
 def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
     """The force at the typical indentation varies as fitted, whatever exponent is drawn."""
 
-    spread = joint_covariance(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     machine = problem.model.machine
     depth = machine.touchdown_bearings[0].contact.typical_depth(float(np.mean(problem.model.load_shares)))
     k, n = (spread.paths.index(f"NDE.contact.{name}") for name in ("stiffness", "exponent"))
@@ -129,7 +135,7 @@ def calibrated_in_file(problem, spread):
 
 def test_a_later_drop_begins_with_the_correlations_of_the_fit(problem, covariance):
     """Through the file and back, whatever its values mean, and with the variances that its intervals say."""
-    spread = joint_covariance(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
+    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
     unknowns = [replace(one, calibrated=True) for one in problem.unknowns]
     sigma = 1.0 + np.arange(len(unknowns))
     block = np.diag(sigma**2)
@@ -140,7 +146,7 @@ def test_a_later_drop_begins_with_the_correlations_of_the_fit(problem, covarianc
 
 
 def test_a_value_changed_since_errs_alone(problem, covariance):
-    spread = joint_covariance(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     unknowns = [replace(one, calibrated=k != 2) for k, one in enumerate(problem.unknowns)]
     block = np.eye(len(unknowns))
     correlate(calibrated_in_file(problem, spread), unknowns, block)
