@@ -55,7 +55,8 @@ def restart(
     from rotordrop.report.restart_page import restart_numbers, restart_page
     from rotordrop.restart.assumptions import assumptions_of, load_assumptions
     from rotordrop.restart.card import restart_card
-    from rotordrop.restart.next_drop import DROPS, Foreseen, next_drops
+    from rotordrop.restart.foreseen import Foreseen
+    from rotordrop.restart.next_drop import DROPS, next_drops
     from rotordrop.restart.order import in_order
     from rotordrop.study.repeat import COMPARED
 

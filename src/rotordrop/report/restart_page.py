@@ -31,7 +31,7 @@ from rotordrop.restart.card import ANSWERS, RestartCard
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
-    from rotordrop.restart.next_drop import NextDrop
+    from rotordrop.restart.foreseen import NextDrop
 
 _LEVELS: dict[str, Level] = {
     "restart": "good",

@@ -32,7 +32,7 @@ from rotordrop.restart.evidence import (
     require_check,
     suspicions,
 )
-from rotordrop.restart.next_drop import Foreseen, SpeedLimit
+from rotordrop.restart.foreseen import Foreseen, SpeedLimit
 from rotordrop.units import format_chance, format_quantity
 
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]

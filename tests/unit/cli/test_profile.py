@@ -33,7 +33,10 @@ def test_everything_missing_is_asked_for_at_once(strange, tmp_path, capsys):
     profile = tmp_path / "recorder.toml"
     assert run(["profile", str(strange), "--machine", LP400, "-o", str(profile)]) == 3
     told = capsys.readouterr()
-    assert 'channels of S_NDE_A, S_NDE_B, S_DE_A, S_DE_B: likeliest --map "NDE: X1, Y1"' in told.err
+    assert (
+        'channels of S_NDE_A, S_NDE_B, S_DE_A, S_DE_B: likeliest --map "NDE: X1 45 deg, Y1 135 deg"'
+        in told.err
+    )
     assert "there are X1, Y1, X2, Y2" in told.err
     assert '--speed-channel "...", --pulses "..." or --speed "60 Hz"' in told.err
     assert "channel X1: 50 samples at 20000 Hz, 0 to 0.245 (no unit)" in told.out
@@ -69,7 +72,8 @@ def test_a_profile_for_looks_needs_no_speed(strange, tmp_path, capsys):
 
 def test_every_missing_channel_is_named_in_one_message(strange):
     asked = (
-        r'\(4 sensors have none\); it has X1, Y1, X2, Y2\. .*likeliest --map "NDE: X1, Y1" --map "DE: X2, Y2"'
+        r"\(4 sensors have none\); it has X1, Y1, X2, Y2\. .*"
+        r'likeliest --map "NDE: X1 45 deg, Y1 135 deg" --map "DE: X2 45 deg, Y2 135 deg"'
     )
     with pytest.raises(RecordError, match=asked):
         read_record(strange, example_machine("lp400"))

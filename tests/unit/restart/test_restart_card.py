@@ -27,14 +27,8 @@ from rotordrop.restart import load_assumptions, restart_card
 from rotordrop.restart.assumptions import assumptions_of
 from rotordrop.restart.card import ANSWERS, COSTS, FLIPS_WITHIN, SHARES
 from rotordrop.restart.evidence import indicators, suspicions
-from rotordrop.restart.next_drop import (
-    Foreseen,
-    NextDrop,
-    SpeedLimit,
-    found_machine,
-    next_drops,
-    speed_limit,
-)
+from rotordrop.restart.foreseen import Foreseen, NextDrop, SpeedLimit
+from rotordrop.restart.next_drop import found_machine, next_drops, speed_limit
 from rotordrop.restart.order import EarlierDrop, in_order
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns, is_of_a_bearing

@@ -1,0 +1,56 @@
+"""What is foreseen of the next drop: its loads at each speed, and the speed limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rotordrop.known import Known
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextDrop:
+    """The next drop at one speed."""
+
+    speed: float
+    """[rad/s]."""
+    peak_force: dict[str, tuple[Known, Known]]
+    peak_stress: dict[str, tuple[Known, Known]]
+    """Half and 95 % of the drops stay below, by bearing [N, Pa]."""
+    beyond_limit: Known | None = None
+    """Share of the drops that pass a limit at any bearing [1]; None where no limit was given."""
+
+    @property
+    def beyond(self) -> float:
+        """Chance that a limit is passed [1]; zero where none was given."""
+        return 0.0 if self.beyond_limit is None else self.beyond_limit.value
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedLimit:
+    """Up to which speed a drop passes a limit with no more than a chance that is allowed."""
+
+    speed: float | None
+    """[rad/s]; None where even the lowest speed tried passes it more often."""
+    interval_90: tuple[float, float] | None
+    """By the number of simulated drops [rad/s]; cut at the lowest and the highest speed tried."""
+    chance: float
+    """That is allowed [1]."""
+    tried: tuple[float, float]
+    """Lowest and highest speed tried [rad/s]."""
+    drops: int
+    """Simulated drops behind it."""
+
+    @property
+    def needed(self) -> bool:
+        """Whether the highest speed tried passes a limit too often."""
+        return self.speed is None or self.speed < self.tried[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Foreseen:
+    """Next drops by speed, the full one first, and the speed limit where limits were given."""
+
+    drops: tuple[NextDrop, ...] = ()
+    speed_limit: SpeedLimit | None = None
+    of_estimate: bool = False
+    """Whether the machine is the one that the estimate found, with its intervals; else that of its file."""
