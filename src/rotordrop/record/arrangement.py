@@ -141,7 +141,7 @@ def given_planes(
     recording: Recording, profile: Profile
 ) -> list[tuple[str, list[tuple[Channel, float | None]]]]:
     """The planes of a profile: their names, and each channel with its angle [rad] where that is given."""
-    planes = []
+    planes: list[tuple[str, list[tuple[Channel, float | None]]]] = []
     for name, text in profile.planes.items():
         entries = [_ENTRY.fullmatch(entry) for entry in text.split(",")]
         found: list[tuple[Channel, float | None]] = []
@@ -155,6 +155,11 @@ def given_planes(
                 raise UsageError(
                     f'the plane "{name}: {text}": {what}; write "PLANE: CHANNEL angle, CHANNEL angle", as '
                     f'"NDE: X1 0 deg, Y1 90 deg"; there are {have}'
+                )
+            if any(hits[0] is channel for _, others in (*planes, (name, found)) for channel, _ in others):
+                raise UsageError(
+                    f'the plane "{name}: {text}": {hits[0].label} was named before; every channel is of one '
+                    "sensor. Name another one, or leave the plane out: a plane needs two"
                 )
             found.append((hits[0], parse_quantity(entry["angle"], "angle") if entry["angle"] else None))
         planes.append((name, found))

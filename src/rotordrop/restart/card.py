@@ -429,12 +429,15 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         if card.right[name] > RARE
     )
     restart, limited = (format_chance(max(bound, 0.0)) for bound in card.bounds)
-    ranges = f"up to {restart} it may restart" if card.bounds[0] > 0.0 else "it may not restart at all"
+    by = "most_doubt, whatever it costs" if card.bounds[0] == assumed.most_doubt else "by the costs"
+    ranges = f"up to {restart} it may restart ({by})" if card.bounds[0] > 0.0 else "it may not restart at all"
     if card.bounds[1] > max(card.bounds[0], 0.0):
-        ranges += f", up to {limited} with limits"
+        ranges += f", up to {limited} with limits (by the costs)"
+    doubt = 1.0 - card.sound
+    chance = f"{100.0 * doubt:.2g}%" if 0.005 < doubt < 0.095 else format_chance(doubt)
     said.append(
-        f"{card.answer.capitalize()}: something is damaged with {format_chance(1.0 - card.sound)}, and at "
-        f"these costs {ranges}. It costs {card.costs[card.answer]:.2g} {assumed.unit} in "
+        f"{card.answer.capitalize()}: something is damaged with {chance}; {ranges}. "
+        f"It costs {card.costs[card.answer]:.2g} {assumed.unit} in "
         f"expectation{_beside(card)}. The largest doubt is a {in_words(likeliest, assumed)}. Who knew the "
         f"state of the bearings would answer {known}."
     )
@@ -491,9 +494,10 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
 
 
 def _shown(known: Known, kind: str) -> str:
-    ends = known.interval_90 or (known.value,) * 2
-    value, low, high = (format_quantity(number, kind) for number in (known.value, *ends))
-    return f"{value} ({low} to {high})"
+    low, high = known.interval_90 or (known.value,) * 2
+    value, least = (format_quantity(number, kind) for number in (known.value, low))
+    # of few drops even the largest may lie below the quantile
+    return f"{value} ({least} {f'to {format_quantity(high, kind)}' if math.isfinite(high) else 'or more'})"
 
 
 def _of_speed_limit(limit: SpeedLimit) -> str:

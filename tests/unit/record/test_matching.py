@@ -246,6 +246,14 @@ def test_a_map_that_does_not_fit_says_why(text, said, machine):
         record_of(recording(*API), machine.sensors, profile=rules_of(None, [text]))
 
 
+@pytest.mark.parametrize(
+    "planes", [("NDE: VE-101X, VE-101X",), ("NDE: VE-101X, VE-101Y", "DE: VE-101Y, VE-102X")]
+)
+def test_a_channel_that_is_named_twice_is_refused(planes):
+    with pytest.raises(UsageError, match=r"VE-101[XY] was named before; every channel is of one sensor"):
+        arrangement_of(recording(*API), rules_of(None, planes))
+
+
 def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answer(machine):
     """Y stands a quarter turn behind X: the sensors at 135 and 45° were to be X and Y, in this order."""
     with pytest.raises(RecordError, match="likeliest") as asked:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from hashlib import sha256
 from itertools import product
 from pathlib import Path
@@ -244,7 +245,8 @@ def test_it_runs_without_limits_only_where_the_chance_of_a_damaged_bearing_is_sm
     assert held.costs == free.costs
     assert 1.0 - held.sound > ASSUMED.most_doubt
     assert held.answer != "restart"
-    assert any("up to 1% it may restart" in text for text in held.statements)
+    assert any("up to 1% it may restart (most_doubt, whatever it costs)" in text for text in held.statements)
+    assert any("it may restart (by the costs)" in text for text in free.statements)
     good = dict.fromkeys(("turning", "borescope", "coast-down", "lift"), "good")
     turned = restart_card(drop(), ASSUMED, since=[drop()], checks=good)
     assert 1.0 - turned.sound < ASSUMED.most_doubt
@@ -506,7 +508,8 @@ def test_the_speed_limit_is_found_with_an_interval_that_holds_it(seed):
 
 
 def test_the_answer_says_the_next_drop_and_the_speed_limit():
-    known = {"NDE": (Known(value=3e3, drops=24), Known(value=4e3, drops=24))}
+    high = Known(value=4e3, drops=24, interval_90=(3.5e3, math.inf))
+    known = {"NDE": (Known(value=3e3, drops=24), high)}
     after = tuple(
         NextDrop(
             speed=s, peak_force=known, peak_stress=known, beyond_limit=Known(value=v, interval_90=(v, v))
@@ -519,6 +522,7 @@ def test_the_answer_says_the_next_drop_and_the_speed_limit():
     said = " ".join(card.statements)
     assert "as this estimate found the machine, by 24 simulated ones; it passes a limit with 90%" in said
     assert "NDE: force below 3" in said
+    assert re.search(r"\([^()]* or more\) in 95 %", said)
     assert "A speed limit of 39.8 Hz" in said and "take the lower end" in said
     full, limited = (card.costs[name] for name in ("restart", "restart with limits"))
     plain = restart_card(drop(), ASSUMED).costs
