@@ -28,7 +28,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.restart.card import ANSWERS, RestartCard
-from rotordrop.units import format_quantity
+from rotordrop.units import format_chance, format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.restart.foreseen import NextDrop
@@ -105,7 +105,9 @@ def _bearing(card: RestartCard, drop: Drop, name: str) -> Card:
 
 
 def _answers(card: RestartCard) -> Table:
-    bounds = {name: f"{bound:.2g}" for name, bound in zip(ANSWERS, card.bounds, strict=False) if bound > 0.0}
+    bounds = {
+        name: format_chance(bound) for name, bound in zip(ANSWERS, card.bounds, strict=False) if bound > 0.0
+    }
     columns = (
         Column("answer", lambda name: f"{name} ←" if name == card.answer else name),
         Column(f"expected cost [{card.assumptions.unit}]", lambda name: f"{card.costs[name]:.3g}"),

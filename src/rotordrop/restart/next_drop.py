@@ -82,8 +82,8 @@ def next_drops(
     speed: float,
     limits: Mapping[str, float],
     *,
+    chance: float,
     drop: Drop | None = None,
-    chance: float = 0.05,
     shares: Sequence[float] | None = None,
     drops: int = DROPS,
     duration: float = 0.2,
@@ -129,11 +129,12 @@ def next_drops(
     return Foreseen(drops=tuple(made), speed_limit=limit, of_estimate=found is not None)
 
 
-def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit:
+def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit | None:
     """The speed limit by drops at several speeds [rad/s], shape (S,), over their limit [1], shape (S, drops).
 
     The logarithm of a peak over its limit is a parabola of the logarithm of the speed, with the scatter of
     all drops about it. The interval is that of drops drawn again from those simulated, each at all speeds.
+    A draw that failed at any speed (NaN) is left out; None where no other is there.
     """
     low, high = float(speeds.min()), float(speeds.max())
     fine = np.linspace(low, high, 200)
@@ -141,6 +142,8 @@ def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit:
     logs = np.log(np.maximum(ratios, 1e-9))
     sound = np.isfinite(logs).all(axis=0)
     logs = logs[:, sound]
+    if not logs.size:
+        return None
     random = np.random.default_rng(0)
 
     def fastest(of: Array) -> float:

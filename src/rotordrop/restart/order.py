@@ -42,7 +42,7 @@ def in_order(
                 "name estimates of earlier drops"
             )
     dated = all(_day(one.recorded) is not None for one in since)
-    ordered = sorted(since, key=lambda one: _day(one.recorded) or datetime.min) if dated else list(since)
+    ordered = sorted(since, key=_moment) if dated else list(since)
     if not dated and len(since) > 1:
         remarks.append("Not all earlier estimates have a date: they count in the order they are given.")
     later = [
@@ -57,7 +57,13 @@ def in_order(
         remarks.append(f"This drop has no date: all {len(before)} others of the log count as earlier.")
     elif open_:
         remarks.append(f"{open_} of {len(before)} drops of the log have no date, and count as earlier.")
+    if not open_:
+        before.sort(key=_moment)
     return ordered, [one.stresses for one in before], remarks
+
+
+def _moment(one: Drop | EarlierDrop) -> datetime:
+    return _day(one.recorded) or datetime.min
 
 
 def _day(text: str) -> datetime | None:

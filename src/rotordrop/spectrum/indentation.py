@@ -108,8 +108,9 @@ def displacement_history(
     half = None if error is None else NINETY * error
 
     def between(value: float, wide: float = 1.0) -> tuple[float, float] | None:
-        known = half is not None and math.isfinite(value)
-        return (value - wide * half, value + wide * half) if known and half is not None else None
+        if half is None or not math.isfinite(value):
+            return None
+        return value - wide * half, value + wide * half
 
     middles = (np.arange(lowest.size, dtype=np.float64) + 0.5) * per_interval / sampling_rate
     return DisplacementHistory(
@@ -153,8 +154,7 @@ def find_settling(
         for kept, touched in zip(found, (hits.touched, hits.surely, hits.perhaps), strict=True):
             at = before + touched
             kept.append(at[(at >= start) & (at < start + BLOCK)])
-    times = (start_time + np.concatenate(one) / sampling_rate for one in found)
-    begun, surely, perhaps = times
+    begun, surely, perhaps = (start_time + np.concatenate(one) / sampling_rate for one in found)
     return Settling.of(begun, surely, perhaps, start_time + samples / sampling_rate)
 
 

@@ -341,7 +341,11 @@ def test_probabilities_are_reliable_where_the_world_is_as_assumed():
 def test_next_drops_are_at_their_speeds_and_pass_limits_as_they_say():
     machine = example_machine("small")
     full, slower = next_drops(
-        *(machine, 2 * math.pi * 100.0, {"peak_force_N": 1.0}), drops=20, duration=0.01, shares=(1.0, 0.7)
+        *(machine, 2 * math.pi * 100.0, {"peak_force_N": 1.0}),
+        chance=0.05,
+        drops=20,
+        duration=0.01,
+        shares=(1.0, 0.7),
     ).drops
     assert (full.speed, slower.speed) == pytest.approx((2 * math.pi * 100.0, 2 * math.pi * 70.0))
     for name in full.peak_force:
@@ -350,9 +354,11 @@ def test_next_drops_are_at_their_speeds_and_pass_limits_as_they_say():
     assert full.beyond == 1.0, "a newton is passed by every drop"
     between = 0.5 * sum(known[0].value for known in full.peak_force.values()) / len(full.peak_force)
     high = {"peak_force_N": 1e9, "peak_stress_Pa": 1e12}
-    (none,) = next_drops(machine, 2 * math.pi * 100.0, high, drops=20, duration=0.01, shares=(1.0,)).drops
+    (none,) = next_drops(
+        machine, 2 * math.pi * 100.0, high, chance=0.05, drops=20, duration=0.01, shares=(1.0,)
+    ).drops
     assert none.beyond == 0.0 < between
-    (unasked,) = next_drops(machine, 2 * math.pi * 100.0, {}, drops=20, duration=0.01).drops
+    (unasked,) = next_drops(machine, 2 * math.pi * 100.0, {}, chance=0.05, drops=20, duration=0.01).drops
     assert unasked.beyond_limit is None
 
 
@@ -464,8 +470,8 @@ def test_a_gap_that_became_smaller_is_named_as_a_contradiction_and_no_evidence()
     assert not any("contradiction" in text for text in scattered.statements)
 
 
-def logged(recorded, name="old"):
-    return EarlierDrop(record=name, recorded=recorded, stresses={"NDE": value(6e9)})
+def logged(recorded, name="old", stress=6e9):
+    return EarlierDrop(record=name, recorded=recorded, stresses={"NDE": value(stress)})
 
 
 def test_drops_count_by_their_dates():
@@ -480,6 +486,9 @@ def test_drops_count_by_their_dates():
     _, earlier, said = in_order(now, [], [logged(""), logged("2026-03-01")])
     assert len(earlier) == 2
     assert said == ["1 of 2 drops of the log have no date, and count as earlier."]
+    _, earlier, said = in_order(now, [], [logged("2026-03-01", stress=2e9), logged("2026-02-01", stress=1e9)])
+    assert [one["NDE"].value for one in earlier] == [1e9, 2e9]
+    assert not said
     _, _, said = in_order(drop(), [early, drop()], [logged("2026-03-01")])
     assert said == [
         "Not all earlier estimates have a date: they count in the order they are given.",
@@ -505,6 +514,9 @@ def test_the_speed_limit_is_found_with_an_interval_that_holds_it(seed):
     assert speed_limit(speeds, 0.1 * ratios, 0.05).speed == 100.0
     assert not speed_limit(speeds, 0.1 * ratios, 0.05).needed
     assert speed_limit(speeds, 10.0 * ratios, 0.05).speed is None
+    failed = np.where(np.arange(len(ratios[0])) < 3, np.nan, ratios)
+    assert speed_limit(speeds, failed, 0.05).drops == found.drops - 3 * len(speeds)
+    assert speed_limit(speeds, np.full_like(ratios, np.nan), 0.05) is None
 
 
 def test_the_answer_says_the_next_drop_and_the_speed_limit():
@@ -562,6 +574,6 @@ def test_next_drops_are_of_the_machine_that_the_estimate_found():
     friction = next(one for one in unknowns if one.path == "NDE.friction.dynamic")
     assert math.sqrt(spread.matrix[at, at]) == pytest.approx(0.1 * friction.sigma, rel=1e-6)
     assert found_machine(machine, published(machine=machine.name)) is None
-    (one,) = next_drops(machine, 600.0, {}, drop=estimate, drops=3, duration=0.01).drops
-    assert next_drops(machine, 600.0, {}, drop=estimate, drops=2, duration=0.005).of_estimate
+    (one,) = next_drops(machine, 600.0, {}, chance=0.05, drop=estimate, drops=3, duration=0.01).drops
+    assert next_drops(machine, 600.0, {}, chance=0.05, drop=estimate, drops=2, duration=0.005).of_estimate
     assert one.beyond_limit is None

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rotordrop.elements.load import Load
 from rotordrop.evidence.free_rotor import held_by, motion_of
 from rotordrop.evidence.initial_state import build_free_fall, kernel_state
-from rotordrop.rotor.parameters import DropModel
+from rotordrop.machine import Machine
+from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.statics import levitated_sag, rest_on
 from rotordrop.simulate.case import DropCase, LevitatedStart, StateStart
 from rotordrop.simulate.drop import simulate_drop
@@ -25,6 +28,19 @@ def test_released_straight_rotor_falls_as_galileo_says(model: DropModel) -> None
     m = fall.n_modes
     place = model.parameters.bearing_shape @ later[m : 2 * m]
     assert place == pytest.approx(np.full(2, -0.5 * 9.81 * 6e-3**2), rel=1e-9)
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.5 * np.pi, -2.5])
+def test_a_load_and_gravity_change_the_momentum_of_a_falling_rotor(truth: Machine, direction: float) -> None:
+    """Newton's second law of the whole rotor, wherever the load acts and however it bends it."""
+    load = Load(node=9, direction=f"{direction} rad", force="60 N")
+    model = build_drop_model(truth.model_copy(update={"loads": (load,)}), Reduction(modes=6, attachment=True))
+    fall = build_free_fall(model, SPEED, (8, 22))
+    rates = fall.system[fall.velocity, fall.one].reshape(2, fall.n_modes)
+    momentum = model.fe.rigid_shapes[:, 0] @ model.fe.mass @ model.basis.shapes
+    weight = truth.rotor.mass * 9.81
+    expected = (60.0 * np.cos(direction), 60.0 * np.sin(direction) - weight)
+    assert rates @ momentum == pytest.approx(expected, rel=1e-6)
 
 
 def test_fall_agrees_with_the_compiled_drop_to_the_first_contact(model: DropModel) -> None:
