@@ -69,6 +69,7 @@ CASES = {
         speed=150.0,
         hidden="balls.held_preload = true",
         known='bearing: preload_kind = "spring", spring_rate = "{rate} N/m", '
+        'ring_mass = {{ guess = "{ring} kg", range = ["{lighter} kg", "{heavier} kg"] }}, '
         "fit_friction = {{ guess = 0.02, range = [0.0, 0.05] }}",
         guessed='bearing: preload_kind = "spring"',
     ),
@@ -111,6 +112,7 @@ def measures(machine: Machine) -> dict[str, str]:
     weight = float(max(bearing_load_shares(machine)))
     soft = float(machine.touchdown_bearings[0].support.stiffness)
     stop, radius = 4.0 * weight / soft, float(bearing.bore_radius)
+    ring = 0.04 * float(bearing.race.mass)  # light: those of the bench follow without any mass
     found = {
         "stop": stop,
         "less": 0.6 * stop,
@@ -120,6 +122,9 @@ def measures(machine: Machine) -> dict[str, str]:
         "spring": 0.8 * soft,
         "slip": 1.5 * weight,
         "rate": 0.003 * soft,
+        "ring": ring,
+        "lighter": 0.25 * ring,
+        "heavier": 4.0 * ring,
         "push": 0.3 * 2.0 * weight,
         "thrust": 0.8 * weight,
         "half": 0.4 * weight,
@@ -138,7 +143,7 @@ def described(machine: Machine, lines: str) -> Machine:
     for index, part in enumerate(bearings):
         if own.startswith("bearing: "):
             wanted = own.removeprefix("bearing: ").strip()
-            for key in ("ball_material", "fit_friction", "spring_rate"):
+            for key in ("ball_material", "fit_friction", "ring_mass", "spring_rate"):
                 wanted = wanted.replace(f", {key}", f"\n{key}")
             part = part.replace("\ncontact_angle", f"\n{wanted}\ncontact_angle", 1)
         elif own.strip() and (index == 1 or not of_thrust):

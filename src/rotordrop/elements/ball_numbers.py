@@ -44,7 +44,7 @@ from rotordrop.physics.ball_table import BallTable, ball_table
 from rotordrop.physics.contact import contact_energy, depth_at
 from rotordrop.physics.fast_balls import FastBalls, centred_balls, offset_on_springs
 from rotordrop.physics.hertz import compliance, race_contact
-from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
+from rotordrop.physics.ring import STOP_STIFFNESS, ring_damping, row_rigidity, seat_on_springs
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -247,6 +247,7 @@ class BallNumbers(BearingNumbers):
             numbers[ring.STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
             numbers[ring.BALLS] = self.constants.ball_count
             numbers[ring.ROWS] = self.constants.row_count
+            numbers[ring.DAMPING] = ring_damping(self.constants)
         return numbers
 
     def speed_table(self, fastest: float) -> BallTable | None:

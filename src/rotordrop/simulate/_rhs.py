@@ -558,8 +558,10 @@ def add_race(
 
 
 @lean_kernel
-def add_rings(b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls: Array) -> float:
-    """Rates of sprung outer rings under a radial force F [N]; power that their friction takes [W]."""
+def add_rings(
+    b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls: Array
+) -> tuple[float, float]:
+    """Rates of sprung outer rings under a radial force F [N]; power that balls and fit take of them [W]."""
     at, row = p.bearing_at[b, L.RING_STATES], p.bearing[b]
     x, z = race_deflection(b, y, p)
     numbers = row[L.RING : L.RING_END]
@@ -568,8 +570,9 @@ def add_rings(b: int, F: float, y: Array, p: KernelParameters, dy: Array, balls:
     friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
     rows = numbers[ring.ROWS]
     dy[at] = y[at + 1]
-    dy[at + 1] = (pushed / rows - held - friction) / numbers[ring.MASS]
-    return float(rows * friction * y[at + 1])
+    damped = numbers[ring.DAMPING] * row[L.BEARING_DAMPING] * y[at + 1]
+    dy[at + 1] = (pushed / rows - held - friction - damped) / numbers[ring.MASS]
+    return float(rows * damped * y[at + 1]), float(rows * friction * y[at + 1])
 
 
 @lean_kernel
@@ -752,7 +755,10 @@ def bearing_accelerations(
     else:
         dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
-    by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls) if sprung else 0.0
+    by_fit = 0.0
+    if sprung:
+        by_rings, by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls)
+        by_balls += by_rings
     sx = y[n_q + h]
     sy = y[n_q + h + 1]
     by_support = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy

@@ -200,7 +200,7 @@ def _ring_jacobian(
     )
     J[at, at + 1] = 1.0
     J[at + 1, at] -= (k_aa / rows + rate - by_force * (along_x * k_ax + along_y * k_ay)) / mass
-    J[at + 1, at + 1] -= by_speed / mass
+    J[at + 1, at + 1] -= (by_speed + numbers[ring.DAMPING] * C) / mass
     for j in range(2):
         axial, along = (k_ax, along_x) if j == 0 else (k_ay, along_y)
         # as the rings give way, the force of the balls falls
