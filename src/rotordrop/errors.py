@@ -86,11 +86,14 @@ class NothingFallsError(RecordError):
         What it does.
     remedy : str
         The way out.
+    moved : tuple of float, optional
+        How far the shaft goes [m] and with which acceleration [m/s²], where it leaves its place too slowly.
     """
 
-    def __init__(self, seen: str, remedy: str) -> None:
+    def __init__(self, seen: str, remedy: str, moved: tuple[float, float] | None = None) -> None:
         self.seen = seen
         self.remedy = remedy
+        self.moved = moved
         super().__init__(f"nothing falls in the record: {seen}; {remedy}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from operator import attrgetter, itemgetter
 from pathlib import Path as FilePath
@@ -34,7 +34,7 @@ from rotordrop.evidence.paths import (
 from rotordrop.evidence.quality import Finding, Kind, gate, not_seen, stops
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
-from rotordrop.evidence.quality.motion import check_fall, check_given_gap
+from rotordrop.evidence.quality.motion import check_fall, check_given_gap, check_slow_fall
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
@@ -154,6 +154,11 @@ class Look:
     """1X before the drop against the mark of the shaft, per plane; empty without a keyphasor."""
     notes: tuple[str, ...]
     """What was guessed."""
+
+    @property
+    def unit_doubted(self) -> bool:
+        """Whether gravity or the air gap contradict the unit of the readings, so that no length holds."""
+        return _unit_doubted(self.findings)
 
     @property
     def impacts(self) -> tuple[Impact, ...]:
@@ -286,11 +291,16 @@ def look(
             )
         if evidence is None:
             findings = ranked([*findings, *check_fall(motion)])
+        if _unit_doubted(findings):
+            raise NothingFallsError("no length is known", "give the right unit")
     except NothingFallsError as error:
         unseen = not_seen(evidence, fell=False)
         notes = guessed if ends is None else guessed[1:]  # what held one end is no news where none fell
         rest = tuple(one for one in findings if one.message != error.seen)
-        return _look_at_held(read, rest, unseen, every, notes, machine, str(error))
+        held = _look_at_held(read, rest, unseen, every, notes, machine, str(error))
+        if held.contacts or evidence is not None or error.moved is None:
+            return held
+        return replace(held, findings=ranked([*rest, *check_slow_fall(*error.moved)]))
     turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
@@ -316,11 +326,12 @@ def _look_at_held(
     machine: Machine | None,
     why: str,
 ) -> Look:
-    """A record in which nothing falls: contacts, whirl and levels."""
+    """A record in which nothing falls: contacts, whirl, levels; the levels alone where the unit is wrong."""
     motion = held_motion(record, gaps)
     contacts: list[HeldContact] = []
     whirls: list[Whirl] = []
-    for path, plane, gap in zip(motion.paths, record.planes, gaps, strict=True):
+    seen = [] if _unit_doubted(findings) else zip(motion.paths, record.planes, gaps, strict=True)
+    for path, plane, gap in seen:
         found = held_contacts(
             path.name,
             motion.time,
@@ -392,6 +403,10 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
         synchronous=(),
         notes=record.notes,
     )
+
+
+def _unit_doubted(findings: Iterable[Finding]) -> bool:
+    return any(one.kind == Kind.WRONG_UNIT and one.severity == "stop" for one in findings)
 
 
 _FEWEST = 16

@@ -20,7 +20,7 @@ from rotordrop.record.record import Record
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import GRAVITY
 
-_SLOWEST_FALL = 0.2
+SLOWEST_FALL = 0.2
 """Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
 
 BEYOND = 0.06
@@ -204,26 +204,26 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     )
     reach = np.percentile(away, 98, axis=0)
     usual = np.max(away[:first], axis=0)
-    if np.any(reach < 4.0 * usual) or np.any(reach < 5e-6):
+    still = bool(np.any(reach < 4.0 * usual))
+    moved = np.min(away / np.maximum(reach, 1e-15), axis=1) > FALLEN_SHARE
+    sunk = int(np.argmax(moved))
+    found = [fall_accelerations(path, far, rate) for path, far in zip(away.T, reach, strict=True)]
+    fastest = max(float(one.max()) for one in found)
+    if still or np.any(reach < 5e-6):
         raise NothingFallsError(
             f"the shaft strays by {1e6 * float(np.max([reach, usual])):.3g} µm in all and by "
             f"{1e6 * float(np.max(usual)):.3g} µm in its first 10 ms, as one that its magnets hold "
             "throughout, or one that was dropped before",
             "give a recording in which the rotor is let go: this one ends before that or begins after it",
+            None if still else (float(np.max(reach)), fastest),
         )
-    moved = np.min(away / reach, axis=1) > FALLEN_SHARE
-    sunk = int(np.argmax(moved))
-    found = [fall_accelerations(path, far, rate) for path, far in zip(away.T, reach, strict=True)]
-    fastest = max(float(one.max()) for one in found)
-    if fastest < _SLOWEST_FALL * GRAVITY:
-        in_mil = 25.4 * fastest  # a fall in which an orbit has a part, or a slower one, by `_SLOWEST_FALL`
-        likely = _SLOWEST_FALL * GRAVITY < in_mil < 2.0 * GRAVITY
-        mil = f": if it is in mil, it fell with {in_mil:.2g} m/s²" if likely else ""
+    if fastest < SLOWEST_FALL * GRAVITY:
         raise NothingFallsError(
             f"the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm with {fastest:.2g} m/s², as one "
-            f"that swings on its bearings; a rotor falls with up to {GRAVITY:g} m/s²",
+            f"that swings on its bearings; a fall shows {SLOWEST_FALL * GRAVITY:.2g} m/s² or more",
             "give the recording of the drop, the readings at standstill belong to --tail; if it is that, "
-            f"correct unit or sampling rate{mil}",
+            "correct unit or sampling rate",
+            (float(np.max(reach)), fastest),
         )
     window, largest = round(_LASTS * rate), np.percentile(away, 99.9, axis=0)
     if len(away) - sunk > window:

@@ -10,6 +10,7 @@ from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.look import RELEASE_ERROR
+from rotordrop.evidence.quality import Kind
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -52,6 +53,10 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
     notes = tuple(Statement(note) for note in seen.notes)
     facts = _facts(seen)
+    given = any(plane.gap_interval_90 is None for plane in seen.planes)
+    # what a gap that was given makes false stands before the numbers
+    doubted = [one for one in seen.findings if given and one.kind == Kind.WRONG_AIR_GAP]
+    others = [one for one in seen.findings if one not in doubted]
     read = Statement(f"Read: {dict(facts)['channels']}; {dict(facts)['samples']}.")
     timeline = (
         Column("record time", lambda row: format_moment(row[0], 4)),
@@ -66,8 +71,9 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         # the terminal shows neither the facts nor the sections
         verdict=(
+            *quality_statements(doubted),
             *_verdict(seen),
-            *quality_statements(seen.findings),
+            *quality_statements(others),
             *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
@@ -89,7 +95,10 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     record, facts = seen.record, _facts(seen)
     notes = tuple(Statement(note) for note in seen.notes)
     read = Statement(f"Read: {dict(facts)['samples']}.")
-    if seen.contacts:
+    doubted = seen.unit_doubted
+    if doubted:
+        said = [Statement("No number of a drop is shown before the unit is right.")]
+    elif seen.contacts:
         ends = dict.fromkeys(one.plane for one in seen.contacts)
         parts = [f"{sum(one.plane == end for one in seen.contacts)} at {end}" for end in ends]
         said = [
@@ -119,22 +128,26 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         f"either side (chosen), from {LEAST_PERIODS} periods in a stretch on: below, a step looks "
         "like a tone. Its frequency is known to half the spacing of the points (±)."
     )
-    summary = [table(seen.levels, levels, "Levels, in the unit of each channel", stands_out)]
+    unit = "as it was read, which is doubted" if doubted else "of each channel"
+    summary = [table(seen.levels, levels, f"Levels, in the unit {unit}", stands_out)]
     if seen.contacts:
         summary.insert(0, _contact_table(seen))
     spectra = Section("Spectrum", figures=tuple(_spectrum(level) for level in seen.levels)) if drawn else None
     return ReportContent(
         title=f"A look at {record.name}",
         subtitle=(
-            "no drop in this record"
+            "a drop is not determined: the unit of the readings is in doubt"
+            if doubted
+            else "no drop in this record"
             if seen.motion.paths
             else "a drop is not determined: no pair of channels shows a plane"
         ),
         facts=facts,
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         verdict=(
+            *(quality_statements(seen.findings) if doubted else ()),
             *said,
-            *quality_statements(seen.findings),
+            *(() if doubted else quality_statements(seen.findings)),
             *(() if drawn else (Statement(seen.not_seen), read, *notes)),
         ),
         cards=(),

@@ -42,11 +42,12 @@ def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:
 
 
 def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:
-    """The findings as sentences, the serious ones first."""
+    """The findings as sentences, the serious ones first; what would stop an estimate with its way out."""
     order = list(LEVELS)
     return tuple(
         Statement(
-            f"Channel {found.channel}: {found.message}" if found.channel else found.message,
+            (f"Channel {found.channel}: " if found.channel else "")
+            + (f"{found.message}; {found.remedy}" if found.severity == "stop" else found.message),
             LEVELS[found.severity],
         )
         for found in sorted(findings, key=lambda found: order.index(found.severity))

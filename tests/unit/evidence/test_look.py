@@ -15,9 +15,11 @@ from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
 from rotordrop.evidence.quality import Kind
+from rotordrop.evidence.quality.motion import check_slow_fall
 from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine
 from rotordrop.record.examples import example_record_path
+from rotordrop.record.record import read_record
 from rotordrop.report.look_page import look_page
 
 RATE = 20_000.0
@@ -113,7 +115,10 @@ def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_left_out():
 def test_a_given_gap_that_the_record_contradicts_is_named_with_both_numbers(tmp_path):
     time, path, _ = fall_and_bounce()
     file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
-    (found,) = look(file, gap="0.4 mm").findings
+    seen = look(file, gap="0.4 mm")
+    (found,) = seen.findings
+    # it stood below the numbers that it makes false
+    assert look_page(seen, drawn=False).verdict[0].text.endswith(found.message)
     assert found.kind == Kind.WRONG_AIR_GAP and found.severity == "warning"
     told = re.search(r"air gap of (\d+) µm \((\d+) to (\d+)\) at NDE, 400 µm was given", found.message)
     own, low, high = map(float, told.groups())
@@ -478,7 +483,41 @@ def test_a_unit_in_which_the_shaft_falls_faster_than_gravity_is_doubted(tmp_path
         r"falls (\S+) times as fast as gravity .* a unit factor of (\d+\.?\d*)", found[0].message
     )
     assert float(told[1]) == pytest.approx(factor, rel=0.4) and float(told[2]) == factor
-    assert found[0].severity == "warning" and "correct it there" in found[0].remedy
+    assert found[0].severity == "stop" and "which unit is it?" in found[0].remedy
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["machine file", "alone"])
+@pytest.mark.parametrize(("unit", "said"), [("mil", r"25\.4 "), ("mm", "1000 "), ("nm", r"0\.001 ")])
+def test_no_number_of_a_drop_is_shown_in_a_unit_that_gravity_contradicts(unit, said, known, tmp_path, capsys):
+    """A gap of 6329 to 7984 µm stood above the warning that the unit is wrong."""
+    record, machine = example_record_path("lp400_drop_060"), load_machine(example_path("lp400"))
+    readings = read_record(record, machine)
+    sensors = ";".join(f"{one.name} [{unit}]" for one in readings.sensors)
+    table = np.column_stack([readings.time, 1e6 * readings.signals, readings.speed / (2.0 * np.pi)])
+    file = tmp_path / "drop.csv"
+    np.savetxt(file, table, "%.6g", ";", header=f"Time [s];{sensors};Speed [Hz]", comments="")
+    seen = look(file, machine=machine if known else None)
+    assert not seen.drops and not seen.planes and not seen.contacts
+    assert run(["look", str(file), *([str(example_path("lp400"))] if known else [])]) == 0
+    told = capsys.readouterr().out
+    first = told.split("problem: ")[1].split("\n")[0]
+    assert "note: " not in told.split("problem: ")[0]
+    assert re.search(f"unit factor of {said}", first) and re.search("unit", first.split("; ")[-1])
+    assert "air gap  " not in told and "impacts" not in told
+    assert "Levels, in the unit as it was read, which is doubted" in " ".join(told.split())
+
+
+def test_a_unit_is_offered_only_where_it_makes_a_fall_as_stated():
+    """Mil were offered in which the rotor falls with 14 m/s², beside a bound of 9.81."""
+    for factor in (25.4, 40.0, 150.0, 300.0):
+        (found,) = check_slow_fall(276e-6 / factor, 14.0 / factor) or (None,)
+        if factor == 300.0:
+            assert found is None
+            continue
+        told = re.search(r"one of (\d+) µm with (\S+) m/s², and a fall shows (\S+) to (\S+) m", found.message)
+        _, fallen, least, most = map(float, told.groups())
+        assert least <= fallen <= most
+    assert check_slow_fall(64.2e-6, 1.1) == []  # the bundled tail: 1.6 mm with 28 m/s² in mil
 
 
 def test_the_step_of_a_drop_is_no_line_of_its_channel(tmp_path):
@@ -498,6 +537,7 @@ def test_a_tail_is_told_to_be_one(tmp_path):
     seen = look(example_record_path("lp400_drop_060_tail"))
     assert not seen.drops and "as one that swings on its bearings" in seen.no_fall
     assert "the readings at standstill belong to --tail" in seen.no_fall
+    assert not seen.unit_doubted
     assert not any("held by its magnets" in note for note in seen.notes)
 
 

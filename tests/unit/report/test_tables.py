@@ -197,7 +197,7 @@ def test_findings_tell_channel_time_and_remedy_the_serious_ones_first() -> None:
         ]
     )
     assert [(s.level, s.text) for s in section.statements] == [
-        ("bad", "Channel S_NDE_A: clipped at 500 µm"),
+        ("bad", "Channel S_NDE_A: clipped at 500 µm; use a larger range"),
         ("warning", "Channel S_DE_B: 50 Hz hum of 1.2 µm peak"),
     ]
     assert section.tables[0].rows[1] == (

@@ -13,8 +13,10 @@ from rotordrop.arrays import Array
 from rotordrop.errors import NoDropError, NothingFallsError
 from rotordrop.evidence.events import expected_gap, fall_accelerations, nominal_gaps, planes_at_bearings
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
+from rotordrop.evidence.paths import SLOWEST_FALL
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY
+from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.units import GRAVITY, format_quantity
 
 if TYPE_CHECKING:
@@ -38,6 +40,15 @@ _FACTORS = {
 _NO_FALL = 7.0
 """Acceleration of all planes over gravity from which on what is seen is no fall in the unit as read [1]:
 orbits made it 0.4 to 4.2 in 29 drops, and 25.4 times that where mil and µm are mixed up."""
+
+_FASTEST_FALL = 2.0
+"""Acceleration of a plane over gravity up to which a unit makes a likely fall of a motion [1] (chosen)."""
+
+_WHICH_UNIT = (
+    "which unit is it? That of the file or the profile was taken; give the right one in a profile, "
+    '[units] "CHANNEL" = "mil", or the right sampling rate, [time] step'
+)
+"""What to do where the fall contradicts the unit."""
 
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
@@ -158,8 +169,37 @@ def check_fall(motion: Motion) -> list[Finding]:
             message=f"the shaft falls {ratio:.2g} times as fast as gravity lets it ({fast}), through gaps "
             f"of {gaps}; a unit factor of {factor:.4g} ({_FACTORS[factor]}) would explain it, and so would a "
             f"clock that is {math.sqrt(ratio):.2g} times too fast",
-            remedy="the unit was taken from the file or the profile: correct it there, or the sampling rate",
-            severity="warning",
+            remedy=_WHICH_UNIT,
+            severity="stop",
+        )
+    ]
+
+
+def check_slow_fall(distance: float, acceleration: float) -> list[Finding]:
+    """Name the unit in which a shaft that moves too slowly [m, m/s²] would fall through a usual gap.
+
+    Readings at standstill may look like that too: nothing else tells them apart without a machine.
+    """
+    fitting = [
+        factor
+        for factor in _FACTORS
+        if factor < 1.0
+        and SLOWEST_FALL < acceleration / factor / GRAVITY < _FASTEST_FALL
+        and USUAL_GAP[0] < distance / factor < USUAL_GAP[1]
+    ]
+    if not fitting:
+        return []
+    factor = min(fitting, key=lambda one: abs(math.log(acceleration / one / GRAVITY)))
+    return [
+        Finding(
+            kind=Kind.WRONG_UNIT,
+            message=f"the shaft moves away by {1e6 * distance:.3g} µm with {acceleration:.2g} m/s², which is "
+            f"no fall; a unit factor of {factor:.4g} ({_FACTORS[factor]}) would make it one of "
+            f"{1e6 * distance / factor:.0f} µm with {acceleration / factor:.2g} m/s², and a fall shows "
+            f"{SLOWEST_FALL * GRAVITY:.2g} to {_FASTEST_FALL * GRAVITY:.2g} m/s² "
+            "where an orbit has a part in it",
+            remedy=_WHICH_UNIT,
+            severity="stop",
         )
     ]
 
