@@ -1,21 +1,25 @@
 """Lives of machines whose bearings are damaged by drops: what the restart card makes of them.
 
-Usage: python studies/restart/lives.py [LIVES] [SEED]
+Usage: python studies/restart/lives.py LIVES SEED FILE [SECONDS]
 
 The lives know nothing of the card's equations: their damages have other sizes (gamma in place of log-normal),
 other chances (those assumed times a factor of each machine), dents by a logistic law of the true stress,
 and risks of their own. Estimates are published values with errors, as `rotordrop estimate` states them. After
 every drop the card is asked, its best check is made while one pays, and its answer is carried out. Costs are
-expectations under the true state. Prints the table.
+expectations under the true state. Each life is a line of FILE (JSON) and is lived once: a run that was
+stopped, or that has used its SECONDS of processor time, goes on where it was. Prints the table.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import sys
+import time
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise, product
+from pathlib import Path
 
 import numpy as np
 from scipy.stats import gamma
@@ -24,6 +28,7 @@ from rotordrop.estimate.published import Bearing, Drop, Parameter, Unbalance, Va
 from rotordrop.known import NINETY
 from rotordrop.restart import restart_card
 from rotordrop.restart.assumptions import assumptions_of
+from rotordrop.restart.order import earlier_drop
 from rotordrop.severity.statistics import Statistics
 
 MACHINES, MOST_DROPS, ENDS = 20, 8, ("NDE", "DE")
@@ -51,18 +56,17 @@ class Machine:
 
 @dataclass
 class Score:
-    """What is counted."""
+    """What is counted of one life."""
 
     stated: list[tuple[float, bool]] = field(default_factory=list)
     regret: float = 0.0
     stake: float = 0.0
-    answers: Counter[str] = field(default_factory=Counter)
+    answers: list[str] = field(default_factory=list)
     restarts: int = 0
     damaged_restarts: int = 0
     stated_restarts: float = 0.0
     named: int = 0
     best: int = 0
-    cards: int = 0
 
 
 def drawn(random: np.random.Generator, base) -> Machine:
@@ -125,6 +129,8 @@ def published(state, random: np.random.Generator, stress: float) -> Drop:
         consistent=True,
         machine="m",
         record="r",
+        recorded="",
+        record_sha256="",
         unbalance=[
             Unbalance(node=1, amount_kg_m=stated(size, ERROR["unbalance"], True), phase_rad=None, sentence="")
         ],
@@ -169,28 +175,47 @@ def read(drop: Drop, kind: str, end: str) -> float:
     return found if kind == "worn" else math.log(found)
 
 
-def true_posterior(machine: Machine, drops: list[Drop], stresses: list[float]) -> dict[str, float]:
-    """Chance of every kind by the laws of the lives, whichever drop did the damage."""
-    found = {}
-    for kind in KINDS:
-        sound = 1.0
-        for end in places(kind):
-            each = np.full(len(stresses), machine.chance[kind])
-            if kind == "brinelled":
-                each = 1.0 - (1.0 - each) * (1.0 - np.array([dent(one) for one in stresses]))
-            left = np.cumprod(1.0 - each)
-            done = -np.diff(left, prepend=1.0)
-            odds = done / left[-1]
-            if kind in MEAN:
-                y = np.array([read(one, kind, end) for one in drops])
-                wide = math.hypot(ERROR[kind], HEALTHY[kind])
-                for j in range(1, len(drops)):
-                    shifted = y - MEAN[kind] * SIZES[:, None] * (np.arange(len(drops)) >= j)
-                    beyond = shifted.var(axis=1) - y.var()
-                    odds[j - 1] *= np.mean(np.exp(np.clip(-0.5 * len(drops) * beyond / wide**2, -200, 200)))
-            sound /= 1.0 + odds.sum()
-        found[kind] = 1.0 - sound
-    return found
+def first_done(machine: Machine, kind: str, drops: list[Drop], stresses: list[float]) -> np.ndarray:
+    """Weights of each drop to be the first that did a kind of damage, and of none."""
+    later = np.ones(len(stresses) + 1)
+    for end in places(kind):
+        each = np.full(len(stresses), machine.chance[kind])
+        if kind == "brinelled":
+            each = 1.0 - (1.0 - each) * (1.0 - np.array([dent(one) for one in stresses]))
+        left = np.cumprod(1.0 - each)
+        odds = -np.diff(left, prepend=1.0) / left[-1]
+        if kind in MEAN:
+            y = np.array([read(one, kind, end) for one in drops])
+            wide = math.hypot(ERROR[kind], HEALTHY[kind])
+            for j in range(1, len(drops)):
+                shifted = y - MEAN[kind] * SIZES[:, None] * (np.arange(len(drops)) >= j)
+                beyond = shifted.var(axis=1) - y.var()
+                odds[j - 1] *= np.mean(np.exp(np.clip(-0.5 * len(drops) * beyond / wide**2, -200, 200)))
+        later *= [1.0 + odds[j:].sum() for j in range(len(odds) + 1)]
+    return np.append(-np.diff(later), 1.0)
+
+
+def true_states(
+    machine: Machine, drops: list[Drop], stresses: list[float], checks: list[dict[str, str]], assumed
+) -> dict[tuple[bool, ...], float]:
+    """Chance of every set of kinds, summed over the drops that may have done each."""
+    after = len(stresses)
+    weights = [first_done(machine, kind, drops, stresses) for kind in KINDS]
+    when = np.meshgrid(*[np.arange(after + 1)] * len(KINDS), indexing="ij")
+    weight = math.prod(np.meshgrid(*weights, indexing="ij"))
+    for drop, made in enumerate(checks):
+        for name, outcome in made.items():
+            check = assumed.checks[name]
+            unseen = (1.0 - check.false_alarm) * math.prod(
+                np.where(at <= drop, 1.0 - check.shows.get(kind, 0.0), 1.0)
+                for kind, at in zip(KINDS, when, strict=True)
+            )
+            weight = weight * (unseen if outcome == "good" else 1.0 - unseen)
+    weight = weight / weight.sum()
+    return {
+        flags: float(weight[np.ix_(*(range(after) if yes else [after] for yes in flags))].sum())
+        for flags in product((False, True), repeat=len(KINDS))
+    }
 
 
 def dent(stress: float) -> float:
@@ -211,12 +236,11 @@ def least(states, assumed) -> float:
     return min(sum(w * c[a] for w, _, c in states) for a in allowed)
 
 
-def best_checks(machine: Machine, chance: dict[str, float], assumed) -> dict[str, float]:
-    """What each check is worth by the laws of the lives."""
+def best_checks(machine: Machine, chance: dict[tuple[bool, ...], float], assumed) -> dict[str, float]:
+    """What each check is worth by the laws of the lives, with the chance of every set of kinds."""
     states = []
-    for flags in product((False, True), repeat=len(KINDS)):
+    for flags, weight in chance.items():
         present = {k for k, yes in zip(KINDS, flags, strict=True) if yes}
-        weight = math.prod(chance[k] if k in present else 1.0 - chance[k] for k in KINDS)
         states.append((weight, present, costs_of(machine, present, assumed)))
 
     def after(states, check):
@@ -246,7 +270,9 @@ def live(machine: Machine, random: np.random.Generator, base, score: Score) -> N
     assumed = base.model_copy(update=machine.costs)
     state = {(k, end): 0.0 for k in KINDS for end in places(k)}
     there: set[str] = set()
-    known, stresses = [published(state, random, 0.5 * machine.stress)], []
+    # a drop test of new bearings, after which everything was found sound
+    known = [published(state, random, 0.5 * machine.stress)]
+    earlier = [replace(earlier_drop(known[0]), checks={"inspection": "good"})]
     true_stresses: list[float] = []
     for _ in range(MOST_DROPS):
         stress = machine.stress * random.lognormal(0.0, 0.15)
@@ -261,10 +287,12 @@ def live(machine: Machine, random: np.random.Generator, base, score: Score) -> N
                     state[kind, end] = effect(kind, random) if kind in MEAN else 1.0
         drop = published(state, random, stress)
         checks: dict[str, str] = {}
-        card = restart_card(drop, assumed, since=known, earlier=stresses)
+        card = restart_card(drop, assumed, earlier=earlier)
         spent = 0.0
         if (named := card.best_check) is not None:
-            worth = best_checks(machine, true_posterior(machine, [*known, drop], true_stresses), assumed)
+            before = [one.checks for one in earlier[1:]]
+            chance = true_states(machine, [*known, drop], true_stresses, before, assumed)
+            worth = best_checks(machine, chance, assumed)
             score.named += 1
             # two checks within a hundredth of a day are one
             score.best += worth[named.name] >= max(worth.values()) - 0.01
@@ -272,10 +300,9 @@ def live(machine: Machine, random: np.random.Generator, base, score: Score) -> N
             bad = random.random() < shows(assumed.checks[check.name], there)
             checks[check.name] = "bad" if bad else "good"
             spent += assumed.checks[check.name].days
-            card = restart_card(drop, assumed, since=known, earlier=stresses, checks=checks)
-        score.cards += 1
+            card = restart_card(drop, assumed, earlier=earlier, checks=checks)
         score.stated.append((1.0 - card.sound, bool(there)))
-        score.answers[card.answer] += 1
+        score.answers.append(card.answer)
         true = costs_of(machine, there, assumed)
         score.regret += spent + true[card.answer] - min(true.values())
         score.stake += max(true.values()) - min(true.values())
@@ -286,34 +313,59 @@ def live(machine: Machine, random: np.random.Generator, base, score: Score) -> N
         if card.answer in ("inspect first", "replace"):
             return
         known.append(drop)
-        stresses.append({end: drop.bearings[end].numbers["peak_stress_Pa"] for end in ENDS})
+        earlier.append(replace(earlier_drop(drop), checks=checks))
 
 
 def main() -> None:
     """Live and print."""
-    lives = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    base, score = assumptions_of({}, "the package"), Score()
+    lives, seed, file = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+    seconds = float(sys.argv[4]) if len(sys.argv) > 4 else math.inf
+    base = assumptions_of({}, "the package")
     random = np.random.default_rng(seed)
     machines = [drawn(random, base) for _ in range(MACHINES)]
-    for k in range(lives):
-        live(machines[k % MACHINES], random, base, score)
-    print(f"{lives} lives of {MACHINES} machines, seed {seed}, {score.cards} cards\n")
-    print("| stated chance of a damage | cards | stated | damaged |\n| --- | --- | --- | --- |")
-    edges = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0001)
-    for low, high in pairwise(edges):
-        part = [(p, d) for p, d in score.stated if low <= p < high]
-        if part:
-            mean, share = (100 * sum(x) / len(part) for x in zip(*part, strict=True))
-            print(f"| {low:.0%} to {min(high, 1):.0%} | {len(part)} | {mean:.1f} % | {share:.1f} % |")
-    print(f"\nanswers: {dict(score.answers)}")
-    share = score.regret / score.stake
-    print(f"regret over an oracle: {score.regret:.1f} of {score.stake:.1f} at stake = {share:.1%}")
+    lived = file.read_text().splitlines() if file.exists() else []
+    with file.open("a") as out:
+        for k in range(len(lived), lives):
+            if time.process_time() > seconds:
+                break
+            score = Score()
+            live(machines[k % MACHINES], np.random.default_rng([seed, k]), base, score)
+            lived.append(json.dumps(asdict(score)))
+            print(lived[-1], file=out, flush=True)
+    print(f"{len(lived)} lives of {MACHINES} machines, seed {seed}")
+    told([Score(**json.loads(line)) for line in lived])
+
+
+def told(scores: list[Score]) -> None:
+    """Print the reliability diagram, with the standard error of whole lives, and the rest."""
+    print("\n| stated chance of a damage | cards | lives | stated | damaged |")
+    print("| --- | --- | --- | --- | --- |")
+    for low, high in pairwise((0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.0001)):
+        of_life = [[(p, d) for p, d in one.stated if low <= p < high] for one in scores]
+        of_life = [np.array(cards, dtype=float) for cards in of_life if cards]
+        if of_life:
+            cards = np.concatenate(of_life)
+            mean, share = 100.0 * cards.mean(axis=0)
+            # cards of one life share its damage: the sum of each life is one draw
+            error = 100.0 * math.sqrt(sum((of[:, 1] - of[:, 0]).sum() ** 2 for of in of_life)) / len(cards)
+            print(
+                f"| {low:.0%} to {min(high, 1):.0%} | {len(cards)} | {len(of_life)} | {mean:.1f} % | "
+                f"{share:.1f} ± {error:.1f} % |"
+            )
+
+    def total(name: str) -> float:
+        return sum(getattr(one, name) for one in scores)
+
+    print(f"\nanswers: {dict(Counter(answer for one in scores for answer in one.answers))}")
     print(
-        f"restart with a damaged bearing: {score.damaged_restarts} of {score.restarts}; "
-        f"by the chances stated {score.stated_restarts:.1f}"
+        f"regret over an oracle: {total('regret'):.1f} of {total('stake'):.1f} at stake = "
+        f"{total('regret') / total('stake'):.1%}"
     )
-    print(f"named check the best: {score.best} of {score.named}")
+    print(
+        f"restart with a damaged bearing: {total('damaged_restarts')} of {total('restarts')}; "
+        f"by the chances stated {total('stated_restarts'):.1f}"
+    )
+    print(f"named check the best: {total('best')} of {total('named')}")
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rotordrop.restart.order import EarlierDrop
+    from rotordrop.restart.order import EarlierDrop, MadeCheck
 
 
 def restart(
@@ -28,7 +28,9 @@ def restart(
     bearings: Annotated[str, Option(metavar="NAME", help="Set of touchdown bearings in the log.")] = "1",
     check: Annotated[
         list[str] | None,
-        Option(metavar="CHECK", help='A check that was made, "turning=bad" or "lift=good"; repeat it.'),
+        Option(
+            metavar="CHECK", help='A check that was made, "turning=bad", "2026-03-14 lift=good"; repeat it.'
+        ),
     ] = None,
     assumptions: Annotated[
         Path | None,
@@ -57,7 +59,7 @@ def restart(
     from rotordrop.restart.card import restart_card
     from rotordrop.restart.foreseen import Foreseen
     from rotordrop.restart.next_drop import DROPS, next_drops
-    from rotordrop.restart.order import in_order
+    from rotordrop.restart.order import in_order, with_checks
     from rotordrop.study.repeat import COMPARED
 
     described, drop = load_machine(machine), read_drop(estimate)
@@ -90,29 +92,33 @@ def restart(
                 f"--since {path} and {estimate} are of one recording; name the estimate of an earlier drop"
             )
     logged = [] if log is None else _logged(log, drop.machine, bearings, drop.record_sha256)
-    since_then, earlier, remarks = in_order(drop, before, logged)
+    history, remarks = in_order(drop, before, logged)
+    earlier, made = with_checks(drop, history, _checks(check or ()))
     card = restart_card(
         drop,
         assumed,
-        since=since_then,
-        checks=_checks(check or ()),
         earlier=earlier,
+        checks=made,
         foreseen=found,
         remarks=remarks,
     )
     deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
 
 
-def _checks(written: list[str] | tuple[str, ...]) -> dict[str, str]:
-    """Checks and their outcomes as they are written on the command line."""
-    found = {}
+def _checks(written: list[str] | tuple[str, ...]) -> list[MadeCheck]:
+    """Checks as they are written on the command line, an earlier one with its date before it."""
+    from rotordrop.restart.order import MadeCheck
+
+    found = []
     for text in written:
-        name, equals, outcome = (part.strip() for part in text.partition("="))
+        left, equals, outcome = (part.strip() for part in text.partition("="))
         if not equals:
-            raise UsageError(f'--check {text!r}; expected a check and its outcome, "turning=bad"')
-        if name in found:
-            raise UsageError(f"--check {name} is given twice; give the outcome that counts")
-        found[name] = outcome
+            raise UsageError(
+                f'--check {text!r}; expected a check and its outcome, "turning=bad", or one after an earlier '
+                'drop with its date, "2026-03-14 turning=bad"'
+            )
+        day, _, name = left.rpartition(" ")
+        found.append(MadeCheck(name=name, outcome=outcome, day=day.strip()))
     return found
 
 
@@ -133,6 +139,7 @@ def _logged(log: str, machine: str, bearings: str, sha256: str) -> list[EarlierD
         EarlierDrop(
             record=drop.record,
             recorded=drop.recorded,
+            sha256=drop.sha256,
             stresses={
                 one.bearing: Value(
                     value=math.sqrt(one.lower * one.upper) if one.value is None else one.value,

@@ -44,6 +44,7 @@ from rotordrop.report.replay_sections import (
 from rotordrop.report.restart_page import restart_section
 from rotordrop.restart import RestartCard, restart_card
 from rotordrop.restart.assumptions import assumptions_of
+from rotordrop.restart.order import earlier_drop
 from rotordrop.severity.numbers import NOTE, SEVERITY
 from rotordrop.units import format_second
 
@@ -95,8 +96,8 @@ def estimate_page(
 
 def assumed_card(estimate: Estimate, since: Drop | None = None) -> RestartCard:
     """The restart card of a drop by the assumptions of the package, and by an earlier drop."""
-    earlier = () if since is None else (since,)
-    return restart_card(published_drop(estimate), assumptions_of({}, "the assumptions"), since=earlier)
+    earlier = () if since is None else (earlier_drop(since),)
+    return restart_card(published_drop(estimate), assumptions_of({}, "the assumptions"), earlier=earlier)
 
 
 def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:

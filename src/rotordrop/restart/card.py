@@ -20,10 +20,11 @@ from typing import Literal
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.estimate.published import Drop, Value
+from rotordrop.estimate.published import Drop
 from rotordrop.known import Known
-from rotordrop.restart.assumptions import Assumptions, Check
+from rotordrop.restart.assumptions import Assumptions
 from rotordrop.restart.evidence import (
+    INSPECTED,
     Indicator,
     Suspicion,
     contradictions,
@@ -33,6 +34,7 @@ from rotordrop.restart.evidence import (
     suspicions,
 )
 from rotordrop.restart.foreseen import Foreseen, SpeedLimit
+from rotordrop.restart.order import EarlierDrop
 from rotordrop.units import format_chance, format_quantity
 
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]
@@ -108,7 +110,9 @@ class RestartCard:
     checks: tuple[CheckValue, ...]
     """Checks that have not been made, the most valuable first."""
     made: dict[str, str]
-    """Checks that were made, with their outcome."""
+    """Checks that were made after this drop, with their outcome."""
+    carried: tuple[tuple[str, dict[str, str]], ...]
+    """Checks that were made after earlier drops, by their record, in order."""
     flips: tuple[Flip, ...]
     """Assumptions on which the answer hangs, the nearest first."""
     foreseen: Foreseen
@@ -129,9 +133,8 @@ def restart_card(
     drop: Drop,
     assumed: Assumptions,
     *,
-    since: Sequence[Drop] = (),
+    earlier: Sequence[EarlierDrop] = (),
     checks: Mapping[str, str] | None = None,
-    earlier: Sequence[Mapping[str, Value]] = (),
     foreseen: Foreseen = NOTHING_FORESEEN,
     remarks: Sequence[str] = (),
 ) -> RestartCard:
@@ -143,14 +146,11 @@ def restart_card(
         Published estimate of the drop.
     assumed : Assumptions
         Costs, kinds of damage and checks.
-    since : sequence of Drop
-        Estimates of earlier drops with the same bearings in their order, best from the first on: what changed
-        since is evidence.
+    earlier : sequence of EarlierDrop
+        Drops that this set of bearings took before, in their order, with what is known of each: its estimate,
+        its peak stresses, the checks made after it. All of it counts until the set is another one.
     checks : mapping of str to "good" or "bad"
-        Checks that were made, with their outcome.
-    earlier : sequence of mapping of str to Value
-        Drops that this set of bearings took before, in their order, as the peak stress [Pa] of each bearing;
-        empty where it is not known.
+        Checks that were made after this drop, with their outcome.
     foreseen : Foreseen
         What the next drop would be, and the speed limit.
     remarks : sequence of str
@@ -162,23 +162,21 @@ def restart_card(
         For a check or an outcome that nobody knows, or estimates of two machines.
     """
     made = dict(checks or {})
-    for name, outcome in made.items():
+    carried = tuple((one.record, dict(one.checks)) for one in earlier if one.checks)
+    for name, outcome in [pair for of in (made, *(of for _, of in carried)) for pair in of.items()]:
         require_check(name, outcome, assumed)
-    found = indicators(drop, since, len(earlier), assumed)
-    suspected = suspicions(drop, found, earlier, assumed, len(since))
-    before = _Case.of(suspected, assumed, foreseen)
-    case = before.after(made)
-    shown = [
-        replace(one, probability=one.probability * case.share(one.kind) / before.share(one.kind))
-        for one in suspected
-    ]
+    found = indicators(drop, earlier, assumed)
+    suspected = suspicions(drop, found, earlier, assumed, inspected=made.get(INSPECTED) == "good")
+    history = _History(suspected, [*(one.checks for one in earlier), made], assumed)
+    case = _Case.of(history, foreseen)
+    shown = [replace(one, probability=history.chance(k)) for k, one in enumerate(suspected)]
     costs = case.expected()
     answer = case.answer
     right = case.right()
     left = sorted(
         (case.value_of(name, made) for name in assumed.checks if name not in made), key=lambda one: -one.value
     )
-    alone = not made and all(abs(math.log(one.ratio)) < SAYS_SOMETHING for one in found)
+    alone = not made and not carried and all(abs(math.log(one.ratio)) < SAYS_SOMETHING for one in found)
     card = RestartCard(
         answer=answer,
         bounds=case.bounds,
@@ -190,14 +188,81 @@ def restart_card(
         indicators=found,
         checks=tuple(left),
         made=made,
-        flips=_flips(suspected, assumed, foreseen, made, answer),
+        carried=carried,
+        flips=_flips(history, foreseen, answer),
         foreseen=foreseen,
         prior_alone=alone,
         assumptions=assumed,
         statements=(),
     )
-    said = [*_said(card, drop, since), *contradictions(found), *remarks]
+    compared = any(one.estimate is not None for one in earlier)
+    said = [*_said(card, drop, compared), *contradictions(found), *remarks]
     return replace(card, statements=tuple(said))
+
+
+@dataclass(frozen=True)
+class _History:
+    """What the drops may have done and what the checks after each of them showed, the present one last."""
+
+    suspected: Sequence[Suspicion]
+    checks: Sequence[Mapping[str, str]]
+    assumed: Assumptions
+
+    @property
+    def states(self) -> Array:
+        """Kinds present (1) or not (0) in each state, the sound one first, shape (states, kinds)."""
+        return np.array(list(product((0.0, 1.0), repeat=len(self.assumed.damages))))
+
+    def weights(self) -> Array:
+        """Probability of each state now, times that of what all checks showed, shape (states,).
+
+        A kind is there from the first drop on that did it at any bearing, until the set is another one; each
+        check sees what was there then. Source: forward recursion of a hidden Markov chain.
+        """
+        kinds, drops = list(self.assumed.damages), len(self.checks)
+        later = np.ones((len(kinds), drops + 1))  # relative weight of "not before this drop"
+        for one in self.suspected:
+            after = np.append(np.cumsum(one.odds[::-1])[::-1], 0.0)
+            later[kinds.index(one.kind)] *= 1.0 + after
+        states = self.states
+        weights, begun = np.zeros(len(states)), 0
+        weights[0] = 1.0
+        for k, made in enumerate(self.checks):
+            made = {name: outcome for name, outcome in made.items() if name != INSPECTED}
+            if not made and k + 1 < drops:
+                continue
+            grid = weights.reshape((2,) * len(kinds))
+            for axis, share in enumerate(later[:, k + 1] / later[:, begun]):
+                sound, damaged = np.take(grid, 0, axis), np.take(grid, 1, axis)
+                grid = np.stack([share * sound, damaged + (1.0 - share) * sound], axis)
+            weights, begun = grid.ravel(), k + 1
+            for name, outcome in made.items():
+                bad = chance_of_bad(self.assumed, name, states)
+                weights = weights * (bad if outcome == "bad" else 1.0 - bad)
+        return np.asarray(weights)
+
+    def chance(self, k: int) -> float:
+        """Chance of one suspicion, all checks counted [1]."""
+        one = self.suspected[k]
+        without = replace(one, odds=(0.0,) * len(one.odds))
+        others = replace(self, suspected=[*self.suspected[:k], without, *self.suspected[k + 1 :]])
+        return float(1.0 - (1.0 - one.probability) * others.weights().sum() / self.weights().sum())
+
+    def scaled(self, kind: str, factor: float) -> _History:
+        """The same with other odds of a kind of damage."""
+        moved = [
+            replace(one, odds=tuple(factor * odds for odds in one.odds)) if one.kind == kind else one
+            for one in self.suspected
+        ]
+        return replace(self, suspected=moved)
+
+
+def chance_of_bad(assumed: Assumptions, name: str, states: Array) -> Array:
+    """Chance that a check is bad in each state, shape (states,); each damage shows by itself."""
+    check = assumed.checks[name]
+    shown = np.array([check.shows.get(kind, 0.0) for kind in assumed.damages])
+    unseen = np.prod(1.0 - states * shown, axis=1)
+    return np.asarray(1.0 - (1.0 - check.false_alarm) * unseen)
 
 
 @dataclass(frozen=True)
@@ -215,41 +280,24 @@ class _Case:
     """Up to which chance of a damage it restarts, and up to which it runs with limits [1]."""
 
     @classmethod
-    def of(cls, suspected: Sequence[Suspicion], assumed: Assumptions, foreseen: Foreseen) -> _Case:
-        kinds = list(assumed.damages)
-        states = np.array(list(product((0.0, 1.0), repeat=len(kinds))))
-
-        def weighed(chance: Callable[[Suspicion], float]) -> Array:
-            sound = np.ones(len(kinds))
-            for one in suspected:
-                sound[kinds.index(one.kind)] *= 1.0 - chance(one)
-            return np.asarray(np.prod(np.where(states > 0.0, 1.0 - sound, sound), axis=1))
-
-        weights = weighed(lambda one: one.probability)
+    def of(cls, history: _History, foreseen: Foreseen) -> _Case:
+        assumed, states, weights = history.assumed, history.states, history.weights()
         costs = _costs(assumed, states, _beyond(foreseen, assumed))
-        usual = weighed(lambda one: assumed.damages[one.kind].prior)[1:]
+        sound = np.ones(len(assumed.damages))
+        for one in history.suspected:
+            kind = list(assumed.damages).index(one.kind)
+            sound[kind] *= 1.0 - assumed.damages[one.kind].prior
+        usual = np.prod(np.where(states > 0.0, 1.0 - sound, sound), axis=1)[1:]
         ends = np.column_stack([costs[:, 0], costs[:, 1:] @ usual / usual.sum()])
         restart = min(_cheapest_up_to(ends[0], ends[1:]), assumed.most_doubt)
         bounds = restart, max(restart, _cheapest_up_to(ends[1], ends[2:]))
         return cls(assumed, states, costs, weights / weights.sum(), bounds)
 
-    def after(self, made: Mapping[str, str]) -> _Case:
-        """The same once checks were made."""
-        weights = self.weights
-        for name, outcome in made.items():
-            bad = self._bad(self.assumed.checks[name])
-            weights = weights * (bad if outcome == "bad" else 1.0 - bad)
+    def after(self, name: str, outcome: str) -> _Case:
+        """The same once one more check was made."""
+        bad = chance_of_bad(self.assumed, name, self.states)
+        weights = self.weights * (bad if outcome == "bad" else 1.0 - bad)
         return replace(self, weights=weights / weights.sum())
-
-    def share(self, kind: str) -> float:
-        """Probability that a kind of damage is there, at whichever bearing [1]."""
-        return float(self.weights @ self.states[:, list(self.assumed.damages).index(kind)])
-
-    def _bad(self, check: Check) -> Array:
-        """Chance of a bad outcome in each state; each damage shows by itself."""
-        shown = np.array([check.shows.get(kind, 0.0) for kind in self.assumed.damages])
-        unseen = np.prod(1.0 - self.states * shown, axis=1)
-        return np.asarray(1.0 - (1.0 - check.false_alarm) * unseen)
 
     def expected(self) -> dict[Answer, float]:
         """Expected cost of each answer."""
@@ -276,9 +324,9 @@ class _Case:
 
     def outcomes(self, name: str) -> list[tuple[float, _Case]]:
         """What a check may say: the chance of each outcome [1], and what is known then."""
-        bad = self._bad(self.assumed.checks[name])
+        bad = chance_of_bad(self.assumed, name, self.states)
         shares = (("bad", float(bad @ self.weights)), ("good", float((1.0 - bad) @ self.weights)))
-        return [(share, self.after({name: outcome})) for outcome, share in shares]
+        return [(share, self.after(name, outcome)) for outcome, share in shares]
 
     def cost_of(self, name: str) -> float:
         """What a check costs [unit of the assumptions]."""
@@ -366,23 +414,17 @@ def _costs(a: Assumptions, present: Array, beyond: tuple[float, float]) -> Array
     )
 
 
-def _flips(
-    suspected: Sequence[Suspicion],
-    assumed: Assumptions,
-    foreseen: Foreseen,
-    made: Mapping[str, str],
-    answer: Answer,
-) -> tuple[Flip, ...]:
+def _flips(history: _History, foreseen: Foreseen, answer: Answer) -> tuple[Flip, ...]:
     """The smallest factor on each cost and each prior that changes the answer."""
+    assumed = history.assumed
 
     def scaled_cost(name: str, factor: float) -> _Case:
         value = getattr(assumed, name) * factor
         changed = assumed.model_copy(update={name: min(value, 1.0) if name in SHARES else value})
-        return _Case.of(suspected, changed, foreseen).after(made)
+        return _Case.of(replace(history, assumed=changed), foreseen)
 
     def scaled_prior(kind: str, factor: float) -> _Case:
-        moved = [_with_prior_odds(one, factor) if one.kind == kind else one for one in suspected]
-        return _Case.of(moved, assumed, foreseen).after(made)
+        return _Case.of(history.scaled(kind, factor), foreseen)
 
     tried: list[tuple[str, Callable[[float], _Case]]] = [
         *((label, partial(scaled_cost, name)) for name, label in COSTS.items()),
@@ -406,19 +448,12 @@ def _flips(
     return tuple(sorted(found, key=lambda one: abs(math.log(one.factor))))
 
 
-def _with_prior_odds(one: Suspicion, factor: float) -> Suspicion:
-    odds = factor * one.probability / (1.0 - one.probability)
-    return replace(one, probability=odds / (1.0 + odds))
-
-
-def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
+def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     """The card in sentences, the answer first."""
     assumed, likeliest = card.assumptions, card.suspicions[0]
     said = []
     if card.prior_alone:
-        missing = (
-            "there is no earlier estimate to compare with" if not since else "no parameter moved clearly"
-        )
+        missing = "no parameter moved clearly" if compared else "there is no earlier estimate to compare with"
         said.append(
             f"The assumptions alone decide this: {missing}, and no check was made. Make one before you rely "
             "on the answer."
@@ -441,6 +476,7 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         f"expectation{_beside(card)}. The largest doubt is a {in_words(likeliest, assumed)}. Who knew the "
         f"state of the bearings would answer {known}."
     )
+    said += _of_earlier_checks(card)
     said += _of_next_drop(card.foreseen)
     best = card.best_check
     if best is not None:
@@ -463,6 +499,16 @@ def _said(card: RestartCard, drop: Drop, since: Sequence[Drop]) -> list[str]:
         "--assumptions."
     )
     return said
+
+
+def _of_earlier_checks(card: RestartCard) -> Iterator[str]:
+    """Checks that count though they followed an earlier drop."""
+    if card.carried:
+        each = (
+            f"{', '.join(f'{name} {outcome}' for name, outcome in made.items())} after {record}"
+            for record, made in card.carried
+        )
+        yield f"Checks of earlier drops of these bearings count too: {'; '.join(each)}."
 
 
 def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:

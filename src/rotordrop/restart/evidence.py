@@ -1,4 +1,4 @@
-"""What an estimate says of the damage a drop may have done: a prior and a likelihood ratio of every kind."""
+"""What the drops of a set of bearings may have damaged: odds of every kind by drop."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
+from rotordrop.restart.order import EarlierDrop
 from rotordrop.units import format_chance
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
@@ -25,6 +26,9 @@ ONLY_WIDER = "air_gap"
 """What wear only makes larger."""
 IMPOSSIBLE = 3.0
 """Standard errors from which a change that cannot be is named, one in 740 sound ones; chosen."""
+INSPECTED = "inspection"
+"""Good where the machine was inspected as the answer "inspect first" means it and left sound, its balance
+included: no drop before that has left a damage."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +41,10 @@ class Indicator:
     what: str
     """In words."""
     ratios: tuple[float, ...]
-    """Likelihood with the damage over that without it, for damage done between an earlier estimate and the
-    next, in their order, the present one last [1]."""
+    """Likelihood with the damage over that without it, for damage done by each drop in their order, the
+    present one last; one up to the first estimate, which no change goes back beyond [1]."""
     ratio: float
-    """The same on average, every drop as likely [1]."""
+    """The same on average over the drops after the first estimate [1]."""
     smaller: float | None = None
     """Standard errors by which a gap became smaller, where that is beyond chance [1]."""
 
@@ -53,6 +57,8 @@ class Suspicion:
     bearing: str
     prior: float
     """Chance before the parameters of the estimate are looked at, its peak stress counted [1]."""
+    odds: tuple[float, ...]
+    """Of each drop to have done it, over that none did, in their order, the present one last [1]."""
     probability: float
     """Chance after that [1]."""
 
@@ -72,9 +78,7 @@ class _Moved:
     """Change and its standard error: of the logarithm, or [m] of a number that is no factor."""
 
 
-def indicators(
-    drop: Drop, since: Sequence[Drop], earlier: int, assumed: Assumptions
-) -> tuple[Indicator, ...]:
+def indicators(drop: Drop, earlier: Sequence[EarlierDrop], assumed: Assumptions) -> tuple[Indicator, ...]:
     """What changed since the first of the earlier estimates, as evidence for or against each kind of damage.
 
     Without one nothing is known of a change. A change that the records do not determine says nothing, and
@@ -82,17 +86,21 @@ def indicators(
     """
     if not drop.consistent:
         return ()
-    moved = [(*_parameters(one, drop), *_unbalances(one, drop)) if one.consistent else () for one in since]
-    weights = np.array(_drops_between(len(since), earlier), dtype=float)
+    estimates = {k: one.estimate for k, one in enumerate(earlier) if one.estimate is not None}
+    moved = {
+        k: (*_parameters(one, drop), *_unbalances(one, drop))
+        for k, one in estimates.items()
+        if one.consistent
+    }
     found = []
     for kind, damage, bearing in places(drop, assumed):
         for path, effect in damage.moves.items():
             seen = {
-                k: one for k, of in enumerate(moved) for one in of if (one.place, one.path) == (bearing, path)
+                k: one for k, of in moved.items() for one in of if (one.place, one.path) == (bearing, path)
             }
             if not seen:
                 continue
-            ratios = _ratios(seen, len(since), effect)
+            ratios = _ratios(seen, len(earlier), effect)
             smaller = _shrunk(seen, effect) if path == ONLY_WIDER else None
             if smaller is not None:  # what cannot be says nothing, neither for nor against
                 ratios = np.ones_like(ratios)
@@ -102,7 +110,7 @@ def indicators(
                     bearing=bearing,
                     what=f"{seen[min(seen)].what} since then",
                     ratios=tuple(ratios.tolist()),
-                    ratio=float(weights @ ratios / weights.sum()),
+                    ratio=float(ratios[min(seen) + 1 :].mean()),
                     smaller=smaller,
                 )
             )
@@ -113,12 +121,6 @@ def _shrunk(seen: Mapping[int, _Moved], effect: Effect) -> float | None:
     """Standard errors by which something became smaller since any estimate, where that is beyond chance."""
     below = [-one.change / math.hypot(one.error, math.sqrt(2.0) * effect.healthy) for one in seen.values()]
     return max(below) if max(below) > IMPOSSIBLE else None
-
-
-def _drops_between(estimates: int, earlier: int) -> list[int]:
-    """Drops before each estimate after the first, the present one last; those without one came first."""
-    later = max(estimates - 1, 0)
-    return [max(earlier + 1 - later, 1), *[1] * later]
 
 
 def places(drop: Drop, assumed: Assumptions) -> Iterator[tuple[str, Damage, str]]:
@@ -175,16 +177,16 @@ def contradictions(found: Sequence[Indicator]) -> Iterator[str]:
             )
 
 
-def _ratios(seen: Mapping[int, _Moved], estimates: int, effect: Effect) -> Array:
-    """Likelihood of a series of estimates with damage done before each of them, over that of a sound machine.
+def _ratios(seen: Mapping[int, _Moved], earlier: int, effect: Effect) -> Array:
+    """Likelihood of a series of estimates with damage done by each drop, over that of a sound machine.
 
-    ``seen`` is the change from an estimate to the present one, by the number of that estimate. Every estimate
+    ``seen`` is the change from an estimate to the present one, by the number of its drop. Every estimate
     has an error and the scatter of a sound machine of its own; the value of the sound machine is not known
     (flat prior); the size of the effect is log-normal about its median.
     """
     errors = np.array([one.error for one in seen.values()])
     values = np.array([*(-one.change for one in seen.values()), 0.0])
-    which = np.array([*seen, estimates])
+    which = np.array([*seen, earlier])
     # what two estimates differ by has the errors of both, taken as equal
     weights = 1.0 / (0.5 * np.append(errors, errors.min()) ** 2 + effect.healthy**2)
 
@@ -195,7 +197,7 @@ def _ratios(seen: Mapping[int, _Moved], estimates: int, effect: Effect) -> Array
     sizes = effect.median * np.exp(effect.spread * _NODES)
     sound = 0.5 * misfit(np.zeros((1, len(values))))[0]
     found = []
-    for begun in range(1, estimates + 1):
+    for begun in range(earlier + 1):
         damaged = -0.5 * misfit(sizes[:, None] * (which >= begun))
         most = float(damaged.max())
         # held within e^30: beyond that the shape of the tails decides, which nobody knows
@@ -207,35 +209,40 @@ def _ratios(seen: Mapping[int, _Moved], estimates: int, effect: Effect) -> Array
 def suspicions(
     drop: Drop,
     found: Sequence[Indicator],
-    earlier: Sequence[Mapping[str, Value]],
+    earlier: Sequence[EarlierDrop],
     assumed: Assumptions,
-    estimates: int = 0,
+    *,
+    inspected: bool = False,
 ) -> tuple[Suspicion, ...]:
-    """Probability of every kind of damage at every bearing, by prior, peak stresses and what changed.
+    """Odds of every kind of damage at every bearing by drop: prior, peak stresses and what changed.
 
-    ``earlier`` are the peak stresses of earlier drops by bearing, empty where they are not known, and
-    ``estimates`` is how many estimates the indicators were made of.
-    Source: Bayes' rule over when the damage was done; indicators of one kind at one place count as
+    ``inspected`` says that the machine was inspected after the present drop and left sound.
+    Source: Bayes' rule over which drop did the damage; indicators of one kind at one place count as
     independent.
     """
-    between = _drops_between(estimates, len(earlier))
-    unknown: list[Mapping[str, Value]] = [{}] * (sum(between) - 1 - len(earlier))
+    cleared = [*(one.checks.get(INSPECTED) == "good" for one in earlier), inspected]
+    last = max((k for k, yes in enumerate(cleared) if yes), default=-1)
     made = []
     for kind, damage, bearing in places(drop, assumed):
-        kept = np.full(sum(between), 1.0 - damage.prior)
+        kept = np.full(len(cleared), 1.0 - damage.prior)
         if kind == BRINELLED:
-            stresses = [*unknown, *earlier, {bearing: drop.bearings[bearing].numbers["peak_stress_Pa"]}]
+            now = {bearing: drop.bearings[bearing].numbers["peak_stress_Pa"]}
+            stresses = [*(one.stresses for one in earlier), now]
             kept *= [1.0 - _dented(one[bearing], assumed) if bearing in one else 1.0 for one in stresses]
-        left = np.cumprod(kept)[np.cumsum(between) - 1]
-        chances = -np.diff(left, prepend=1.0)
-        likelihood = np.ones(len(between))
+        kept[: last + 1] = 1.0
+        left = np.cumprod(kept)
+        likelihood = np.ones(len(kept))
         for one in found:
             if (one.kind, one.bearing) == (kind, bearing):
                 likelihood = likelihood * one.ratios
-        odds = float(chances @ likelihood / left[-1])
+        odds = -np.diff(left, prepend=1.0) / left[-1] * likelihood
         made.append(
             Suspicion(
-                kind=kind, bearing=bearing, prior=float(1.0 - left[-1]), probability=odds / (1.0 + odds)
+                kind=kind,
+                bearing=bearing,
+                prior=float(1.0 - left[-1]),
+                odds=tuple(odds.tolist()),
+                probability=float(odds.sum() / (1.0 + odds.sum())),
             )
         )
     return tuple(made)
@@ -256,8 +263,13 @@ def _dented(stress: Value, assumed: Assumptions) -> float:
 
 def require_check(name: str, outcome: str, assumed: Assumptions) -> None:
     """Refuse a check that nobody knows, or an outcome that is neither good nor bad."""
-    if name not in assumed.checks:
-        raise UsageError(f"there is no check {name!r}; there are {', '.join(assumed.checks)}")
+    if name == INSPECTED and outcome == "bad":
+        raise UsageError(
+            "check inspection = 'bad'; state inspection=good once what was found is mended, and count the "
+            "drops of exchanged bearings under a name of their own (log add --bearings)"
+        )
+    if name not in (*assumed.checks, INSPECTED):
+        raise UsageError(f"there is no check {name!r}; there are {', '.join((*assumed.checks, INSPECTED))}")
     if outcome not in ("good", "bad"):
         raise UsageError(f"check {name} = {outcome!r}; expected good or bad")
 

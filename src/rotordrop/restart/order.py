@@ -1,10 +1,10 @@
-"""Which drops came before a drop, by the dates of their records, and in which order."""
+"""The drops of a set of bearings before a drop: what is known of each, in the order of their dates."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, field, replace
+from datetime import datetime, time
 
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, Value
@@ -12,22 +12,52 @@ from rotordrop.estimate.published import Drop, Value
 
 @dataclass(frozen=True, kw_only=True)
 class EarlierDrop:
-    """A drop as a log keeps it."""
+    """What is known of an earlier drop of the same bearings."""
 
     record: str
-    recorded: str
+    recorded: str = ""
     """When it was (ISO 8601); empty where nobody knows."""
-    stresses: Mapping[str, Value]
+    sha256: str = ""
+    """Digest of its recording; empty where it is not known."""
+    estimate: Drop | None = None
+    stresses: Mapping[str, Value] = field(default_factory=dict)
     """Peak Hertz stress by bearing [Pa]."""
+    checks: Mapping[str, str] = field(default_factory=dict)
+    """Checks that were made after it, with their outcome."""
+
+
+def earlier_drop(drop: Drop) -> EarlierDrop:
+    """An earlier drop by its estimate alone."""
+    peaks = {name: one.numbers.get("peak_stress_Pa") for name, one in drop.bearings.items()}
+    return EarlierDrop(
+        record=drop.record,
+        recorded=drop.recorded,
+        sha256=drop.record_sha256,
+        estimate=drop,
+        stresses={name: peak for name, peak in peaks.items() if peak is not None},
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MadeCheck:
+    """A check that was made, with its outcome."""
+
+    name: str
+    outcome: str
+    day: str = ""
+    """When (ISO 8601); empty where it followed the present drop."""
+
+    def __str__(self) -> str:
+        return f"{self.day} {self.name}={self.outcome}".strip()
 
 
 def in_order(
     drop: Drop, since: Sequence[Drop], logged: Sequence[EarlierDrop]
-) -> tuple[list[Drop], list[Mapping[str, Value]], list[str]]:
-    """Earlier estimates and stresses of earlier drops in the order of their dates, and what is to be said.
+) -> tuple[list[EarlierDrop], list[str]]:
+    """Earlier drops in the order of their dates, each once, and what is to be said.
 
-    A drop of the log that was later is left out. Where a date is missing the drop counts as earlier, and the
-    order is the one given.
+    An estimate belongs to the drop of the log with its recording. A drop of the log that was later is left
+    out. Where a date is missing, drops count in the order they are given, those of the log first.
 
     Raises
     ------
@@ -41,9 +71,7 @@ def in_order(
                 f"--since {one.record} is of {one.recorded}, later than {drop.record} of {drop.recorded}; "
                 "name estimates of earlier drops"
             )
-    dated = all(_day(one.recorded) is not None for one in since)
-    ordered = sorted(since, key=_moment) if dated else list(since)
-    if not dated and len(since) > 1:
+    if len(since) > 1 and not all(_day(one.recorded) for one in since):
         remarks.append("Not all earlier estimates have a date: they count in the order they are given.")
     later = [
         one for one in logged if now is not None and (day := _day(one.recorded)) is not None and day > now
@@ -57,12 +85,64 @@ def in_order(
         remarks.append(f"This drop has no date: all {len(before)} others of the log count as earlier.")
     elif open_:
         remarks.append(f"{open_} of {len(before)} drops of the log have no date, and count as earlier.")
-    if not open_:
+    for estimate in since:
+        found = earlier_drop(estimate)
+        same = [k for k, one in enumerate(before) if one.sha256 and one.sha256 == found.sha256]
+        if same:
+            before[same[0]] = replace(before[same[0]], estimate=estimate)
+        else:
+            before.append(found)
+    if all(_day(one.recorded) for one in before):
         before.sort(key=_moment)
-    return ordered, [one.stresses for one in before], remarks
+    return before, remarks
 
 
-def _moment(one: Drop | EarlierDrop) -> datetime:
+def with_checks(
+    drop: Drop, earlier: Sequence[EarlierDrop], made: Sequence[MadeCheck]
+) -> tuple[list[EarlierDrop], dict[str, str]]:
+    """Earlier drops with the checks that followed each, and the checks that followed the present drop.
+
+    A check with a date belongs to the last drop before it; a day without a time ends at midnight.
+
+    Raises
+    ------
+    UsageError
+        If a check was before every drop with a date, or is stated twice of one drop.
+    """
+    found = [dict(one.checks) for one in earlier]
+    now: dict[str, str] = {}
+    dated = [(_day(one.recorded), of) for one, of in zip(earlier, found, strict=True)]
+    for one in made:
+        of = now
+        if one.day:
+            of = _followed(one, [*dated, (_day(drop.recorded), now)], drop)
+        if of.get(one.name, one.outcome) != one.outcome or (of is now and one.name in of):
+            raise UsageError(f"--check {one.name} is given twice of one drop; give the outcome that counts")
+        of[one.name] = one.outcome
+    return [replace(one, checks=of) for one, of in zip(earlier, found, strict=True)], now
+
+
+def _followed(
+    check: MadeCheck, dated: Sequence[tuple[datetime | None, dict[str, str]]], drop: Drop
+) -> dict[str, str]:
+    """The checks of the last drop before a check with a date."""
+    when = _day(check.day)
+    if when is None:
+        raise UsageError(f"--check {str(check)!r}: {check.day!r} is no date; expected one such as 2026-03-14")
+    if dated[-1][0] is None:
+        raise UsageError(f"--check {str(check)!r} has a date, and the record {drop.record} has none")
+    if "T" not in check.day:
+        when = datetime.combine(when, time.max)
+    before = [(day, k) for k, (day, _) in enumerate(dated) if day is not None and day <= when]
+    if not before:
+        raise UsageError(
+            f"--check {str(check)!r} was before every drop that has a date; name its drop with --since "
+            "or --log"
+        )
+    return dated[max(before)[1]][1]
+
+
+def _moment(one: EarlierDrop) -> datetime:
     return _day(one.recorded) or datetime.min
 
 

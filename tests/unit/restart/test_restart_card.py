@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from hashlib import sha256
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from rotordrop.restart.card import ANSWERS, COSTS, FLIPS_WITHIN, SHARES
 from rotordrop.restart.evidence import indicators, suspicions
 from rotordrop.restart.foreseen import Foreseen, NextDrop, SpeedLimit
 from rotordrop.restart.next_drop import found_machine, next_drops, speed_limit
-from rotordrop.restart.order import EarlierDrop, in_order
+from rotordrop.restart.order import EarlierDrop, MadeCheck, earlier_drop, in_order, with_checks
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns, is_of_a_bearing
 
@@ -71,6 +72,11 @@ def drop(stress=2e9, width=0.02, gap=275e-6, stiffness=1e8, unbalance=None, **mo
     )
 
 
+def inspected(one, **checks):
+    """An earlier drop after which the machine was inspected and found sound."""
+    return replace(earlier_drop(one), checks=checks or {"inspection": "good"})
+
+
 def chance(card, kind, where="NDE"):
     return next(one.probability for one in card.suspicions if (one.kind, one.bearing) == (kind, where))
 
@@ -83,23 +89,23 @@ def test_a_mild_first_drop_rests_on_the_assumptions_and_says_so():
 
 
 def test_a_gap_that_grew_speaks_of_wear_and_one_that_did_not_against_it():
-    same = restart_card(drop(), ASSUMED, since=[drop()])
-    grown = restart_card(drop(gap=295e-6), ASSUMED, since=[drop()])
+    same = restart_card(drop(), ASSUMED, earlier=[inspected(drop())])
+    grown = restart_card(drop(gap=295e-6), ASSUMED, earlier=[inspected(drop())])
     assert chance(same, "worn") < 0.01 < 0.9 < chance(grown, "worn")
     assert not grown.prior_alone
     assert chance(grown, "loose") == pytest.approx(chance(same, "loose"))
 
 
 def test_a_softer_support_is_a_loose_one_and_a_stiffer_one_is_not():
-    soft = restart_card(drop(stiffness=0.7e8), ASSUMED, since=[drop()])
-    stiff = restart_card(drop(stiffness=1.3e8), ASSUMED, since=[drop()])
+    soft = restart_card(drop(stiffness=0.7e8), ASSUMED, earlier=[inspected(drop())])
+    stiff = restart_card(drop(stiffness=1.3e8), ASSUMED, earlier=[inspected(drop())])
     assert chance(soft, "loose") > 0.9
     assert chance(stiff, "loose") < 0.01
     assert soft.answer == "inspect first"
 
 
 def test_an_unbalance_that_grew_is_seen_on_the_rotor():
-    card = restart_card(drop(unbalance=5e-5), ASSUMED, since=[drop(unbalance=1.5e-5)])
+    card = restart_card(drop(unbalance=5e-5), ASSUMED, earlier=[inspected(drop(unbalance=1.5e-5))])
     assert chance(card, "unbalance", "") > 0.9
     assert next(one.what for one in card.indicators if one.kind == "unbalance").startswith(
         "unbalance at node 8 × 3.33"
@@ -107,7 +113,7 @@ def test_an_unbalance_that_grew_is_seen_on_the_rotor():
 
 
 def test_likelihood_ratio_is_the_integral_over_the_sizes_of_the_effect():
-    card = restart_card(drop(gap=281e-6), ASSUMED, since=[drop()])
+    card = restart_card(drop(gap=281e-6), ASSUMED, earlier=[inspected(drop())])
     effect = ASSUMED.damages["worn"].moves["air_gap"]
     found = next(one for one in card.indicators if (one.kind, one.bearing) == ("worn", "NDE"))
     own = math.sqrt(2.0) / math.sqrt(1e12 - 1 / 22e-6**2)  # the prior is taken out of both
@@ -130,7 +136,9 @@ def test_stress_near_the_dent_limit_replaces_and_its_own_width_counts():
 
 
 def test_costs_are_those_of_a_sum_over_all_states():
-    card = restart_card(drop(gap=283e-6), BY_COST, since=[drop()], earlier=[{}] * 3)
+    card = restart_card(
+        drop(gap=283e-6), BY_COST, earlier=[EarlierDrop(record="x")] * 3 + [inspected(drop())]
+    )
     kinds = list(ASSUMED.damages)
     absent = dict.fromkeys(kinds, 1.0)
     for one in card.suspicions:
@@ -205,7 +213,9 @@ def test_every_cost_that_can_change_the_answer_is_tried(name, label):
 
 
 def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
-    assert chance(restart_card(drop(), ASSUMED, earlier=[{}] * 9), "worn") == pytest.approx(1 - 0.98**10)
+    assert chance(
+        restart_card(drop(), ASSUMED, earlier=[EarlierDrop(record="x")] * 9), "worn"
+    ) == pytest.approx(1 - 0.98**10)
     known = {"NDE": (Known(value=3e3), Known(value=4e3))}
     after = [
         NextDrop(speed=s, peak_force=known, peak_stress=known, beyond_limit=Known(value=v))
@@ -223,24 +233,25 @@ def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
 
 def test_damage_that_an_earlier_estimate_would_have_shown_counts_no_more():
     """Ten drops of which the last but one was still sound: only the last can have done it."""
-    many = [{}] * 9
-    at_once = restart_card(drop(), ASSUMED, since=[drop()], earlier=many)
-    step_by_step = restart_card(drop(), ASSUMED, since=[drop()] * 10, earlier=many)
+    first, open_ = inspected(drop()), [replace(earlier_drop(drop()), estimate=None)] * 9
+    at_once = restart_card(drop(), ASSUMED, earlier=[first, *open_])
+    step_by_step = restart_card(drop(), ASSUMED, earlier=[first, *[earlier_drop(drop())] * 9])
     assert chance(step_by_step, "worn") < 0.5 * chance(at_once, "worn")
     assert chance(step_by_step, "brinelled") == pytest.approx(chance(at_once, "brinelled"))
-    early = restart_card(drop(gap=285e-6), ASSUMED, since=[drop(), *[drop(gap=285e-6)] * 9], earlier=many)
-    late = restart_card(drop(gap=285e-6), ASSUMED, since=[drop(), *[drop()] * 9], earlier=many)
+    worn = drop(gap=285e-6)
+    early = restart_card(worn, ASSUMED, earlier=[first, *[earlier_drop(worn)] * 9])
+    late = restart_card(worn, ASSUMED, earlier=[first, *[earlier_drop(drop())] * 9])
     assert min(chance(early, "worn"), chance(late, "worn")) > 0.9
 
 
 def test_the_stress_of_earlier_drops_counts():
     hard = {"NDE": Value(value=5.5e9, interval_90=[5.4e9, 5.6e9])}
-    card = restart_card(drop(), ASSUMED, earlier=[hard])
+    card = restart_card(drop(), ASSUMED, earlier=[EarlierDrop(record="x", stresses=hard)])
     assert chance(card, "brinelled") > 0.5 > 0.05 > chance(card, "brinelled", "DE")
 
 
 def test_it_runs_without_limits_only_where_the_chance_of_a_damaged_bearing_is_small_enough():
-    free, held = (restart_card(drop(), a, since=[drop()]) for a in (BY_COST, ASSUMED))
+    free, held = (restart_card(drop(), a, earlier=[inspected(drop())]) for a in (BY_COST, ASSUMED))
     assert free.answer == "restart"
     assert held.costs == free.costs
     assert 1.0 - held.sound > ASSUMED.most_doubt
@@ -248,13 +259,13 @@ def test_it_runs_without_limits_only_where_the_chance_of_a_damaged_bearing_is_sm
     assert any("up to 1% it may restart (most_doubt, whatever it costs)" in text for text in held.statements)
     assert any("it may restart (by the costs)" in text for text in free.statements)
     good = dict.fromkeys(("turning", "borescope", "coast-down", "lift"), "good")
-    turned = restart_card(drop(), ASSUMED, since=[drop()], checks=good)
+    turned = restart_card(drop(), ASSUMED, earlier=[inspected(drop())], checks=good)
     assert 1.0 - turned.sound < ASSUMED.most_doubt
     assert turned.answer == "restart"
 
 
 def test_an_estimate_that_does_not_fit_is_no_evidence():
-    card = restart_card(drop(gap=295e-6, consistent=False), ASSUMED, since=[drop()])
+    card = restart_card(drop(gap=295e-6, consistent=False), ASSUMED, earlier=[inspected(drop())])
     assert not card.indicators
     assert any("not consistent with this record" in text for text in card.statements)
 
@@ -303,7 +314,7 @@ def test_unknown_checks_and_outcomes_are_named():
 
 def test_page_json_and_terminal_say_the_same(capsys):
     one = drop(gap=295e-6, simulated_record=True)
-    card = restart_card(one, ASSUMED, since=[drop()], checks={"turning": "good"})
+    card = restart_card(one, ASSUMED, earlier=[inspected(drop())], checks={"turning": "good"})
     page = restart_page(card, one)
     assert page.title.endswith(card.answer)
     assert "simulated" in page.simulated
@@ -331,7 +342,7 @@ def test_probabilities_are_reliable_where_the_world_is_as_assumed():
         moved = math.sqrt(2.0) * effect.healthy * random.standard_normal() + own * random.standard_normal()
         moved += worn * effect.median * math.exp(effect.spread * random.standard_normal())
         one = drop(gap=275e-6 + moved)
-        found = suspicions(one, indicators(one, [drop()], 0, world), [], world, 1)
+        found = suspicions(one, indicators(one, [inspected(drop())], world), [inspected(drop())], world)
         stated.append(next(s.probability for s in found if (s.kind, s.bearing) == ("worn", "NDE")))
         true.append(worn)
     error = math.sqrt(sum(p * (1 - p) for p in stated))
@@ -400,7 +411,7 @@ def test_the_command_counts_the_stress_of_logged_drops_and_every_earlier_estimat
         for of in (alone, card)
     ]
     assert dents[0] < 0.05 < 0.8 < dents[1]
-    assert {len(one["ratios"]) for one in card["indicators"]} == {2}
+    assert {len(one["ratios"]) for one in card["indicators"]} == {3}
     assert run([*call, "--since", str(places["now"])]) == UsageError.exit_code
     assert "are of one recording" in capsys.readouterr().err
     assert run([*call, "--log", log, "--bearings", "3"]) == UsageError.exit_code
@@ -436,7 +447,7 @@ def test_worse_evidence_never_gives_a_milder_answer(owner, seed):
                 unbalance=1.5e-5 * math.exp(1.2 * sizes[2]),
             )
             made = {name: ("good", "", "bad")[how] for name, how in at.items() if how != 1}
-            card = restart_card(one, assumed, since=[drop(unbalance=1.5e-5)], checks=made)
+            card = restart_card(one, assumed, earlier=[inspected(drop(unbalance=1.5e-5))], checks=made)
             seen.add(card.answer)
             return HARDER[card.answer], 1.0 - card.sound
 
@@ -454,11 +465,11 @@ def test_a_bad_check_at_a_worn_gap_stops_the_machine_too():
     """At the costs of the package running with limits was cheaper than new bearings, and so the answer."""
     worn = drop(gap=284e-6)
     for checks in ({}, {"lift": "bad"}, {"lift": "bad", "tail": "bad"}):
-        assert HARDER[restart_card(worn, ASSUMED, since=[drop()], checks=checks).answer] == 2
+        assert HARDER[restart_card(worn, ASSUMED, earlier=[inspected(drop())], checks=checks).answer] == 2
 
 
 def test_a_gap_that_became_smaller_is_named_as_a_contradiction_and_no_evidence():
-    card = restart_card(drop(gap=255e-6), ASSUMED, since=[drop()])
+    card = restart_card(drop(gap=255e-6), ASSUMED, earlier=[inspected(drop())])
     (said, _) = [
         text
         for text in card.statements
@@ -466,7 +477,7 @@ def test_a_gap_that_became_smaller_is_named_as_a_contradiction_and_no_evidence()
     ]
     assert "NDE.air_gap -20 µm since then, where a bearing only wears wider" in said
     assert chance(card, "worn") == pytest.approx(0.02)
-    scattered = restart_card(drop(gap=272e-6), ASSUMED, since=[drop()])
+    scattered = restart_card(drop(gap=272e-6), ASSUMED, earlier=[inspected(drop())])
     assert not any("contradiction" in text for text in scattered.statements)
 
 
@@ -477,19 +488,16 @@ def logged(recorded, name="old", stress=6e9):
 def test_drops_count_by_their_dates():
     now = drop(recorded="2026-03-14T15:09")
     early, late = drop(recorded="2025-01-01", record="a"), drop(recorded="2026-02-01", record="b")
-    since, earlier, said = in_order(
-        now, [late, early], [logged("2026-03-01"), logged("2026-04-01", name="new")]
-    )
-    assert [one.record for one in since] == ["a", "b"]
-    assert len(earlier) == 1
+    earlier, said = in_order(now, [late, early], [logged("2026-03-01"), logged("2026-04-01", name="new")])
+    assert [one.record for one in earlier] == ["a", "b", "old"]
     assert said == ["Later than this drop and left out: 1 of the log, new (2026-04-01)."]
-    _, earlier, said = in_order(now, [], [logged(""), logged("2026-03-01")])
+    earlier, said = in_order(now, [], [logged(""), logged("2026-03-01")])
     assert len(earlier) == 2
     assert said == ["1 of 2 drops of the log have no date, and count as earlier."]
-    _, earlier, said = in_order(now, [], [logged("2026-03-01", stress=2e9), logged("2026-02-01", stress=1e9)])
-    assert [one["NDE"].value for one in earlier] == [1e9, 2e9]
+    earlier, said = in_order(now, [], [logged("2026-03-01", stress=2e9), logged("2026-02-01", stress=1e9)])
+    assert [one.stresses["NDE"].value for one in earlier] == [1e9, 2e9]
     assert not said
-    _, _, said = in_order(drop(), [early, drop()], [logged("2026-03-01")])
+    _, said = in_order(drop(), [early, drop()], [logged("2026-03-01")])
     assert said == [
         "Not all earlier estimates have a date: they count in the order they are given.",
         "This drop has no date: all 1 others of the log count as earlier.",
@@ -577,3 +585,121 @@ def test_next_drops_are_of_the_machine_that_the_estimate_found():
     (one,) = next_drops(machine, 600.0, {}, chance=0.05, drop=estimate, drops=3, duration=0.01).drops
     assert next_drops(machine, 600.0, {}, chance=0.05, drop=estimate, drops=2, duration=0.005).of_estimate
     assert one.beyond_limit is None
+
+
+def by_hand(assumed, odds, checks):
+    """Chance of each kind by the sum over every drop that may have done each of them, none included."""
+    kinds, drops = list(assumed.damages), len(checks)
+    total, there = 0.0, dict.fromkeys(kinds, 0.0)
+    for when in product(range(drops + 1), repeat=len(kinds)):
+        weight = math.prod(
+            1.0 if at == drops else odds[kind][at] for kind, at in zip(kinds, when, strict=True)
+        )
+        for k, made in enumerate(checks):
+            for name, outcome in made.items():
+                check = assumed.checks[name]
+                unseen = (1.0 - check.false_alarm) * math.prod(
+                    1.0 - check.shows.get(kind, 0.0) for kind, at in zip(kinds, when, strict=True) if at <= k
+                )
+                weight *= unseen if outcome == "good" else 1.0 - unseen
+        total += weight
+        for kind, at in zip(kinds, when, strict=True):
+            there[kind] += weight * (at < drops)
+    return {kind: share / total for kind, share in there.items()}
+
+
+def test_checks_of_earlier_drops_count_as_a_sum_over_the_drops_that_did_the_damage():
+    """A check sees what was there when it was made; the drops are those of one bearing."""
+    one, two, now = (drop(gap=gap, unbalance=1.5e-5) for gap in (275e-6, 276e-6, 280e-6))
+    for each in (one, two, now):
+        each.bearings.pop("DE")
+    checks = [{"lift": "good", "turning": "bad"}, {"tail": "bad"}, {"lift": "bad", "coast-down": "good"}]
+    earlier = [inspected(one, **checks[0]), inspected(two, **checks[1])]
+    card = restart_card(now, ASSUMED, earlier=earlier, checks=checks[2])
+    odds = {one.kind: one.odds for one in card.suspicions}
+    expected = by_hand(ASSUMED, odds, checks)
+    assert {one.kind: one.probability for one in card.suspicions} == pytest.approx(expected)
+    assert card.sound < 1.0 - max(expected.values())
+
+
+def test_a_bad_check_of_an_earlier_drop_is_not_forgotten_and_a_good_one_counts_less_than_now():
+    plain, bad, good = (
+        restart_card(
+            drop(), ASSUMED, earlier=[inspected(drop(), inspection="good"), inspected(drop(), **checks)]
+        )
+        for checks in ({"lift": "good"}, {"turning": "bad"}, {"turning": "good"})
+    )
+    assert chance(bad, "brinelled") > 5.0 * chance(plain, "brinelled")
+    assert chance(good, "brinelled") < chance(plain, "brinelled")
+    assert any("turning bad after drop.h5" in text for text in bad.statements)
+    now = restart_card(
+        drop(),
+        ASSUMED,
+        earlier=[inspected(drop()), inspected(drop(), lift="good")],
+        checks={"turning": "good"},
+    )
+    assert chance(now, "brinelled") < chance(good, "brinelled")
+
+
+def test_damage_of_the_first_drop_stays_possible_where_nothing_looked_for_it():
+    """No change since an estimate says nothing of what was there at it; an inspection does."""
+    unseen = restart_card(drop(), ASSUMED, earlier=[earlier_drop(drop())])
+    assert chance(unseen, "worn") == pytest.approx(0.02, abs=0.003)
+    assert chance(restart_card(drop(), ASSUMED, earlier=[inspected(drop())]), "worn") < 0.01
+    looked_over = restart_card(drop(stress=6.5e9), ASSUMED, checks={"inspection": "good"})
+    assert looked_over.sound == 1.0
+    assert looked_over.answer == "restart"
+    with pytest.raises(UsageError, match="check inspection = 'bad'; state inspection=good once"):
+        restart_card(drop(), ASSUMED, checks={"inspection": "bad"})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_worse_earlier_check_never_gives_a_milder_answer(seed):
+    random, names = np.random.default_rng(seed), list(ASSUMED.checks)
+    for _ in range(4):
+        made = [
+            {name: ("good", "bad")[random.integers(2)] for name in names if random.random() < 0.4}
+            for _ in range(3)
+        ]
+
+        def answer(made):
+            earlier = [
+                inspected(drop(unbalance=1.5e-5), **of) if of else earlier_drop(drop()) for of in made[:2]
+            ]
+            card = restart_card(drop(gap=277e-6), ASSUMED, earlier=earlier, checks=made[2])
+            return HARDER[card.answer], 1.0 - card.sound
+
+        k, name = random.integers(3), names[random.integers(len(names))]
+        grades = []
+        for outcome in ("good", "", "bad"):
+            of = {key: how for key, how in made[k].items() if key != name} | (
+                {name: outcome} if outcome else {}
+            )
+            grades.append(answer([*made[:k], of, *made[k + 1 :]]))
+        for milder, harder in pairwise(grades):
+            assert harder[0] >= milder[0] and harder[1] >= milder[1] - 1e-9
+
+
+def test_a_check_with_a_date_belongs_to_the_last_drop_before_it():
+    now = drop(recorded="2026-03-14T15:09")
+    earlier = [logged("2026-01-05T10:00", name="a"), logged("2026-02-01", name="b")]
+
+    def placed(*made):
+        found, of_now = with_checks(
+            now, earlier, [MadeCheck(name="lift", outcome="bad", day=day) for day in made]
+        )
+        return [dict(one.checks) for one in found], of_now
+
+    bad = {"lift": "bad"}
+    assert placed("2026-01-05") == ([bad, {}], {}), "a day ends at midnight"
+    assert placed("2026-02-20", "") == ([{}, bad], bad)
+    assert placed("2026-03-14") == ([{}, {}], bad)
+    with pytest.raises(UsageError, match="'2025-12-01 lift=bad' was before every drop that has a date"):
+        placed("2025-12-01")
+    with pytest.raises(UsageError, match="'soon' is no date; expected one such as 2026-03-14"):
+        placed("soon")
+    with pytest.raises(UsageError, match="--check lift is given twice"):
+        placed("", "2026-03-15")
+    now = drop()
+    with pytest.raises(UsageError, match=r"has a date, and .* has none"):
+        placed("2026-02-20")
