@@ -157,6 +157,7 @@ def _extension(name: str, title: str, frame: str, sign: str = "") -> Extension:
         joined=", ",
         frame=frame,
         rows=rows,
+        begins_as_base_model=True,
     )
 
 

@@ -329,6 +329,8 @@ class Extension:
     """What stands around the words on all parts."""
     nothing: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Values found, by field below the part, with which the extension says what the base model says."""
+    begins_as_base_model: bool = False
+    """Whether a machine computes with the values to begin with what it computes without the extension."""
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
@@ -407,6 +409,7 @@ def of_one_unknown(
         joined=", " if frame else "; ",
         frame=frame or "{}",
         rows=(row,),
+        begins_as_base_model=not row.lag,
     )
 
 

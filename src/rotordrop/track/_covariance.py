@@ -14,14 +14,21 @@ LARGEST_VARIANCE = 1e30
 """Beyond the square of every unknown in its SI unit: the cubic term of a stiff support is 1e11 1/m²."""
 
 
+BLOCK = 16
+"""Rows and columns taken together where a matrix meets its transpose, so that both stay in the cache."""
+
+
 @lean_kernel
 def symmetrise(P: Array) -> None:
     """Replace a matrix by its symmetric part in place."""
-    for i in range(P.shape[0]):
-        for j in range(i):
-            value = 0.5 * (P[i, j] + P[j, i])
-            P[i, j] = value
-            P[j, i] = value
+    n = P.shape[0]
+    for top in range(0, n, BLOCK):
+        for left in range(0, top + 1, BLOCK):
+            for i in range(top, min(top + BLOCK, n)):
+                for j in range(left, min(left + BLOCK, i)):
+                    value = 0.5 * (P[i, j] + P[j, i])
+                    P[i, j] = value
+                    P[j, i] = value
 
 
 @lean_kernel

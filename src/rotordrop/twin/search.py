@@ -38,16 +38,15 @@ from rotordrop.track.calibration import (
     converged,
     is_inconsistent,
     track,
-    window_end,
 )
 from rotordrop.track.consistency import DIRECTIONS, consistency_checks, judged_by
 from rotordrop.track.noise_size import forward_passes, likeliest_noise, likelihood_of
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
-from rotordrop.track.transfer import transferred
 from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
+from rotordrop.twin.rises import Rises, carried
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked_parameters import parameters
 
@@ -443,17 +442,17 @@ class Search:
         """Passes with another machine over the first window whole, linearised at a fit that is known."""
         problems = self.drops.coarse(machine)
         last = replace(BLIND_SCHEDULE[-1], passes=passes)
-        return track(problems, (last,), references=_carried(known, problems))
+        return track(problems, (last,), references=carried(known, problems))
 
     def refine(self, first: Candidate) -> Candidate:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.drops.fine(first.machine)
-        carried = _carried(first.fit, fine)
+        there = carried(first.fit, fine)
         # The finer basis may lie in the valley that the coarse one only came near: turned axes of a support
         # were found at one bearing by the coarse one and at both by the finer, some passes later.
         passes = MOST_REPEATS if first.accepted else 1
 
-        start = converged(fine, CALIBRATION_STAGE, carried, passes=passes)
+        start = converged(fine, CALIBRATION_STAGE, there, passes=passes)
         found = self.at_rest(first, start.trajectories, likeliest_noise(start, CALIBRATION_STAGE))
         if not self.drops.calibrate_only and is_doubtful(first.fit, found.fit):
             # With noise of the usual size, which a whole drop seldom has, the same minimum is found again.
@@ -487,8 +486,7 @@ class Search:
         yet moves peaks and gaps: a rotor 3 % softer moved a peak by 4.6 %, a lag of 80 µs by 5.3 %.
         """
         while (kept := len(found.accepted)) < MOST_EXTENSIONS:
-            rising = [pair for pair in self.rises(found) if pair[0] > 0.0]
-            for _, extension in sorted(rising, key=lambda pair: -pair[0])[:MOST_TRIED]:
+            for extension in self.rising(found)[:MOST_TRIED]:
                 found = self._beside(found, extension)
                 if len(found.accepted) > kept:
                     break
@@ -496,33 +494,27 @@ class Search:
                 break
         return found
 
-    def rises(self, found: Candidate) -> list[tuple[float, Extension]]:
-        """Rise of the log likelihood of the first impacts [1] with every extension, linearised at a fit.
+    def rising(self, found: Candidate) -> list[Extension]:
+        """The extensions that make the whole drop likelier, linearised at a fit; most first.
 
-        An extension that says nothing costs what its unknowns leave open, so that most fall.
+        Only those are asked about the whole that make the first impacts likelier.
         """
         able = [one for one in EXTENSIONS if one.values(found.machine)]
-        first = found.fit.problems[0]
-        end = window_end(CALIBRATION_STAGE, first.first_contact, first.fall_time)
-        counts = [int(np.searchsorted(one.time, end, side="right")) for one in found.fit.problems]
+        early = self.rises(found, CALIBRATION_STAGE).of_all(able)
+        if not self.drops.calibrate_only:
+            there = [extension for rise, extension in early if rise > 0.0]
+            early = self.rises(found, WHOLE_STAGE).apart(there) if there else []
+        return [one for rise, one in sorted(early, key=lambda pair: -pair[0]) if rise > 0.0]
 
-        def unlikelihood(machine: Machine) -> float:
-            problems = self.drops.fine(machine)
-            carried = _carried(found.fit, problems)
-            references = [means[:count] for means, count in zip(carried, counts, strict=True)]
-            passes = forward_passes(problems, references, CALIBRATION_STAGE, found.noise_factor)
-            return sum(likelihood_of(one) for one in passes)
-
-        with ThreadPoolExecutor(max_workers=THREADS) as pool:
-            described = pool.submit(unlikelihood, found.machine)
-
-            def rise(one: Extension) -> float:
-                with_it = unlikelihood(one.added_to(found.machine))
-                if not one.base_values(found.machine):
-                    return described.result() - with_it
-                return unlikelihood(one.as_base_model(found.machine)) - with_it
-
-            return list(zip(pool.map(rise, able), able, strict=True))
+    def rises(self, found: Candidate, stage: Stage) -> Rises:
+        """What every extension would bring over the window of a stage."""
+        return Rises(
+            drops=self.drops,
+            machine=found.machine,
+            fit=found.fit,
+            stage=stage,
+            noise=found.noise_factor,
+        )
 
     def _beside(self, found: Candidate, extension: Extension) -> Candidate:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
@@ -552,7 +544,7 @@ class Search:
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""
-        references = _carried(found.fit, self.drops.fine(machine))
+        references = carried(found.fit, self.drops.fine(machine))
         return self.at_rest(replace(found, machine=machine), references, found.noise_factor)
 
     def without_silent(self, found: Candidate, described: Machine) -> Candidate:
@@ -661,12 +653,6 @@ def _other_start(problem: DropProblem, number: int) -> DropProblem:
     start[chosen] = np.clip(start[chosen], low, high)
     start[problem.gap_entries] = problem.start[problem.gap_entries]
     return replace(problem, start=start)
-
-
-def _carried(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
-    """Trajectories of a fit in the coordinates of other problems of the same drops."""
-    drops = zip(known.problems, problems, known.trajectories, strict=True)
-    return [transferred(one, two, means) for one, two, means in drops]
 
 
 def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
