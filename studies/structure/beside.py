@@ -2,8 +2,8 @@
 
 Usage: python studies/structure/beside.py MACHINE CASE SEED [SEED ...]
 
-Machines are those of ``extensions.py``. The base model is fitted from guesses, and every extension gets one
-pass over the first impacts, as an estimate gives it. Writes ``results/beside.json``.
+Machines are those of ``extensions.py``. The base model is fitted from guesses, and every extension is weighed
+over the first impacts, as an estimate does it. Writes ``results/beside.json``.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from pathlib import Path
 
 from extensions import CASES, SPEED_HZ, recorded
 
+from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.machine.examples import example_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.twin.problems import Drops
-from rotordrop.twin.search import Candidate, Search
+from rotordrop.twin.search import CALIBRATION_STAGE, Candidate, Search
 
 FOUND = Path(__file__).parent / "results" / "beside.json"
 CASES["cross-axis 2 %"] = ({"sensors": {"cross_axis": 0.02}}, {}, "cross-axis sensitivity")
@@ -34,7 +35,8 @@ def rises(kind: str, case: str, seed: int) -> dict[str, float] | str:
         found = search.refine(Candidate(machine=machine, fit=search.fit_base(machine)))
     except RotordropError as error:
         return str(error)
-    return {one.name: round(rise, 1) for rise, one in search.rises(found)}
+    able = [one for one in EXTENSIONS if one.values(machine)]
+    return {one.name: round(rise, 1) for rise, one in search.rises(found, CALIBRATION_STAGE).of_all(able)}
 
 
 def main() -> None:

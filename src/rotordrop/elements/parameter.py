@@ -330,7 +330,8 @@ class Extension:
     nothing: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Values found, by field below the part, with which the extension says what the base model says."""
     begins_as_base_model: bool = False
-    """Whether a machine computes with the values to begin with what it computes without the extension."""
+    """Whether a machine with the values to begin with computes what it does without, and knows of everything
+    else what it does without."""
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
@@ -387,10 +388,13 @@ def of_one_unknown(
     neutral: float,
     sentence: Callable[[Any, Values, float], str] | tuple[str, float],
     frame: str = "",
+    *,
+    alone: bool = True,
 ) -> Extension:
     """An extension whose one unknown has a value with which it says what the base model says.
 
-    The words on a part, or a unit and its size [SI] for name and value; a frame lists the parts in it.
+    The words on a part, or a unit and its size [SI] for name and value; a frame lists the parts in it. With
+    ``alone`` nothing else is known less with it.
     """
 
     def said(part: Any, found: Values, load: float) -> str:
@@ -409,7 +413,7 @@ def of_one_unknown(
         joined=", " if frame else "; ",
         frame=frame or "{}",
         rows=(row,),
-        begins_as_base_model=not row.lag,
+        begins_as_base_model=alone and not row.lag,
     )
 
 

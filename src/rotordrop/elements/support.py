@@ -368,6 +368,7 @@ EXTENSIONS: tuple[Extension, ...] = (
         "turned support axes",
         0.0,
         _axes,
+        alone=False,  # their ratio is free with it
     ),
     of_one_unknown(
         Parameter(

@@ -23,7 +23,6 @@ from rotordrop.track.smoother import (
     Smoothed,
     Storage,
     forward,
-    parameter_sample,
     pass_settings,
     smooth,
 )
@@ -90,13 +89,11 @@ FITTING_NIS = 1.25
 """Mean normalised innovation squared up to which a model fits its record [1]."""
 LOOSER = (1.0, 8.0, 32.0)
 """Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
-MOST_REPEATS, SMALL_CHANGE, SMALL_STEP = 6, 5.0, 0.3
-"""Repeats of a window, and what ends them [1]: a change of the log likelihood, or a step of the parameters
-over their standard errors (root mean square). One step was 0.2 to 0.5 of the one before, or contacts that
-come and go kept it at 0.2 for ever.
+MOST_REPEATS, SMALL_CHANGE = 6, 5.0
+"""Repeats of a window, and the change of the log likelihood that ends them [1].
 
-A fall of the likelihood does not end them: on a rotor of 6 t it fell by 48 in one pass of the whole drop and
-rose by 194 in the next three, and the peak moved by 9 %.
+A fall does not end them: on a rotor of 6 t it fell by 48 in one pass of the whole drop and rose by 194 in the
+next three, and the peak moved by 9 %.
 """
 THREADS = 2
 """Passes over the same drops that run side by side [1]."""
@@ -203,7 +200,7 @@ def converged(
     noise_factor: float = 1.0,
     progress: Progress | None = None,
 ) -> TrackedDrops:
-    """A fit after as many passes over a window as still change it, or as are allowed.
+    """A fit after as many passes over a window as still change the likelihood, or as are allowed.
 
     Parameters
     ----------
@@ -229,28 +226,10 @@ def converged(
 
     fit = passed(0, references)
     for number in range(1, passes):
-        if last_step(fit, references) < SMALL_STEP:
-            break
-        before, references = fit.negative_log_likelihood, fit.trajectories
-        fit = passed(number, references)
+        before, fit = fit.negative_log_likelihood, passed(number, fit.trajectories)
         if abs(fit.negative_log_likelihood - before) < SMALL_CHANGE:
             break
     return fit
-
-
-def last_step(fit: TrackedDrops, references: Sequence[Array]) -> float:
-    """Step of the parameters from where a fit was linearised, over their standard errors [1]: the root mean
-    square, in the drop with the largest.
-
-    ``references`` are the trajectories of that place, shape (M, n) each.
-    """
-    steps = []
-    for problem, smoothed, reference in zip(fit.problems, fit.smoothed, references, strict=True):
-        at, chosen = parameter_sample(smoothed), problem.parameter_slice
-        variance = np.diag(smoothed.covariance(at))[chosen]
-        way = smoothed.means[at][chosen] - reference[min(at, len(reference) - 1)][chosen]
-        steps.append(math.sqrt(float(np.mean((way**2 / variance)[variance > 0.0]))))
-    return max(steps)
 
 
 def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:

@@ -24,9 +24,11 @@ from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.track.calibration import Stage, TrackedDrops, track
+from rotordrop.twin import rises as rises_module
 from rotordrop.twin import search as search_module
 from rotordrop.twin.calibrated import with_found
 from rotordrop.twin.problems import Drops
+from rotordrop.twin.rises import Rises
 from rotordrop.twin.search import (
     CALIBRATION_STAGE,
     FIRST_OTHER_START,
@@ -190,7 +192,8 @@ ASKED = asked_for(1)
 class Weighed:
     """A search that weighs extensions by made-up negative log likelihoods of the machines that have them.
 
-    ``first`` are those of the first impacts, linearised beside the fit; ``rest`` those of a fit at rest.
+    ``first`` are those of the first impacts and of the whole drop, linearised beside the fit; ``rest`` those
+    of a fit at rest.
     What ``rest`` does not hold is lost; ``back`` is that of a base model fitted once more, and lost where
     it is infinite.
     """
@@ -202,11 +205,13 @@ class Weighed:
         self.rest, self.back = rest, back
         monkeypatch.setattr(search_module, "forward_passes", lambda problems, *_: problems)
         monkeypatch.setattr(
-            search_module, "likelihood_of", lambda one: first.get(has(one.machine), first[frozenset()])
+            Rises, "_unlikelihood", lambda _, machine: first.get(has(machine), first[frozenset()])
         )
+        monkeypatch.setattr(Rises, "at_once", Rises.apart)
+        monkeypatch.setattr(search_module, "likelihood_of", lambda _: first[frozenset()])
         monkeypatch.setattr(search_module, "converged", lambda problems, *_, **__: self.fit(problems))
         monkeypatch.setattr(search_module, "likeliest_noise", lambda *_: 0.125)
-        monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
+        monkeypatch.setattr(rises_module, "transferred", lambda _one, _two, means: means)
         monkeypatch.setattr(search_module, "parameters", lambda *_, **__: ())
 
     def problems(self, machine: Machine) -> Any:
@@ -520,7 +525,7 @@ def test_a_fit_that_its_prior_or_the_first_impacts_hardly_allow_is_begun_again_f
         return moved_fit(1000.0 if len(begun) <= 2 else other, further=2, **case)
 
     monkeypatch.setattr(search_module, "converged", converged)
-    monkeypatch.setattr(search_module, "transferred", lambda _one, _two, means: means)
+    monkeypatch.setattr(rises_module, "transferred", lambda _one, _two, means: means)
     monkeypatch.setattr(search_module, "likeliest_noise", lambda *_: 0.125)
     monkeypatch.setattr(search_module, "forward_passes", lambda *_: [SimpleNamespace(nll=2000.0)])
     monkeypatch.setattr(search_module, "likelihood_of", lambda one: one.nll)
