@@ -59,6 +59,12 @@ def refuse_beside(option: str, others: Mapping[str, object]) -> None:
         raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 
+def machine_first(first: Path, second: Path) -> tuple[Path, Path]:
+    """A machine file and a record in this order, in whichever they were given: machine files are .toml."""
+    exchanged = second.suffix.lower() == ".toml" and first.suffix.lower() != ".toml"
+    return (second, first) if exchanged else (first, second)
+
+
 Reduction = StrEnum("Reduction", ["accurate", "quick", "full"])
 """Presets of the reduction of the rotor."""
 

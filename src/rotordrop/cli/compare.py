@@ -69,7 +69,9 @@ def compare(
     for path in estimates:
         for name, drop in read_drops(path).items():
             taken = any(name == other.name for other in drops)
-            drops.append(ComparedDrop(f"{path.stem}: {name}" if taken else name, drop))
+            alike = sum(other.stem == path.stem for other in estimates) > 1
+            called = f"{path.resolve().parent.name}/{path.stem}" if alike else path.stem
+            drops.append(ComparedDrop(f"{called}: {name}" if taken or alike else name, drop))
     if len(drops) < 2:
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
@@ -107,7 +109,13 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")
-    found = changes(*(read_drop(path) for path in estimates))
+    before, after = (read_drop(path) for path in estimates)
+    if before.record_sha256 and before.record_sha256 == after.record_sha256:
+        raise UsageError(
+            f"{estimates[0]} and {estimates[1]} are of one recording, so nothing changed; name the "
+            "estimate of another drop"
+        )
+    found = changes(before, after)
     content = asdict(found) | {"sentence": found.sentence()}
     deliver(finite(content), json, lambda out: _print_changes(found, out))
 

@@ -26,10 +26,14 @@ Licence = StrEnum("Licence", {"zero": "CC0-1.0", "by": "CC-BY-4.0", "share_alike
 
 
 def look(
-    record: Annotated[Path, Argument(metavar="RECORD", help="Recorded drop.", show_default=False)],
-    machine: Annotated[
-        Path | None, Argument(metavar="[MACHINE]", help="Machine description, if there is one.")
-    ] = None,
+    files: Annotated[
+        list[Path],
+        Argument(
+            metavar="[MACHINE] RECORD",
+            help="Recorded drop, and its machine description, a .toml file, if there is one.",
+            show_default=False,
+        ),
+    ],
     gap: Annotated[float | None, measured("length", 'Radial air gap, "250 um".')] = None,
     speed: Annotated[float | None, measured("speed", 'Speed at the drop, "9000 rpm".')] = None,
     mapping: options.Planes = None,
@@ -59,9 +63,12 @@ def look(
 
     Example: rotordrop look record.csv --report look.html
     """
+    if len(files) > 2:
+        raise UsageError(f"look takes one record and its machine file, and {len(files)} files are given")
+    machine, record = (None, files[0]) if len(files) == 1 else options.machine_first(*files)
     if split is not None and machine is None:
         raise UsageError(
-            "--split needs the machine file too: rotordrop look both.h5 machine.toml --split parts"
+            "--split needs the machine file too: rotordrop look machine.toml both.h5 --split parts"
         )
     others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
     for option, given in (("--split", split), ("--share", share)):
@@ -335,6 +342,7 @@ def waterfall(
     from rotordrop.spectrum.machine_candidates import machine_candidates
     from rotordrop.spectrum.waterfall import WaterfallSettings, settings_for
 
+    machine, record = options.machine_first(machine, record)
     described = load_machine(machine)
     signal, simulated = _signal(described, record, mapping or (), profile)
     if against is Against.speed and signal.profile is None:

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from rotordrop.restart.order import EarlierDrop, MadeCheck
 
 
+CHECKS = ("lift", "coast-down", "turning", "borescope", "tail")
+"""Checks of the package by name; assumptions of your own may name others."""
+CHECK_HELP = (
+    f'A check that was made, "turning=bad", "2026-03-14 lift=good"; of {", ".join(CHECKS)}; repeat it.'
+)
+
+
 def restart(
     machine: options.Machine,
     estimate: Annotated[Path, Argument(metavar="ESTIMATE", help="Estimate of the drop (.json).")],
@@ -29,7 +36,8 @@ def restart(
     check: Annotated[
         list[str] | None,
         Option(
-            metavar="CHECK", help='A check that was made, "turning=bad", "2026-03-14 lift=good"; repeat it.'
+            metavar="CHECK",
+            help=CHECK_HELP,
         ),
     ] = None,
     assumptions: Annotated[
@@ -114,8 +122,8 @@ def _checks(written: list[str] | tuple[str, ...]) -> list[MadeCheck]:
         left, equals, outcome = (part.strip() for part in text.partition("="))
         if not equals:
             raise UsageError(
-                f'--check {text!r}; expected a check and its outcome, "turning=bad", or one after an earlier '
-                'drop with its date, "2026-03-14 turning=bad"'
+                f'--check {text!r}; expected one of {", ".join(CHECKS)} and its outcome, "turning=bad", or one '
+                'after an earlier drop with its date, "2026-03-14 turning=bad"'
             )
         day, _, name = left.rpartition(" ")
         found.append(MadeCheck(name=name, outcome=outcome, day=day.strip()))

@@ -88,7 +88,7 @@ def estimate_page(
     weighed = card or assumed_card(estimate, since)
     return replace(
         estimate_summary(estimate, origin),
-        to_do=inspection_section(estimate),
+        to_do=inspection_section(estimate, weighed),
         sections=_sections(estimate, since, weighed),
         lead=FRONT,
     )

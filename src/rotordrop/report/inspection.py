@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import AirGap, BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.report.content import Column, Section, Statement, table
 from rotordrop.report.quantity import Quantity, shown
+
+if TYPE_CHECKING:
+    from rotordrop.restart.card import RestartCard
 
 SCOPE = (
     "A suggestion from this drop alone. How many drops a set of touchdown bearings may take, and what is "
@@ -21,14 +26,19 @@ SETTLE_FIRST = (
 )
 
 
-def inspection_section(estimate: Estimate) -> Section:
-    """Suggest the next step of inspection, the gravest reason first."""
+def inspection_section(estimate: Estimate, card: RestartCard | None = None) -> Section:
+    """Suggest the next step of inspection, the gravest reason first, in keeping with a restart card."""
     said = [] if estimate.consistent else [Statement(SETTLE_FIRST, "bad")]
+    runs = card is not None and card.answer in ("restart", "restart with limits")
+    when = "at the next standstill" if runs else "before the next start"
+    if card is not None:
+        told = f"{card.answer.capitalize()}: the answer of the restart card, by expected cost; see its part."
+        said.append(Statement(told, "notice" if runs else "warning"))
     for bearing in estimate.bearings:
         highest = bearing.peak_stress.known.high
         if highest >= STATIC_STRESS:
             text = (
-                f"{bearing.name}: look at balls and raceways for indentations before the next start. The "
+                f"{bearing.name}: look at balls and raceways for indentations {when}. The "
                 f"peak stress may be as high as {shown(highest, 'pressure', 3)}; from "
                 f"{shown(STATIC_STRESS, 'pressure')} on ISO 76 expects a permanent indentation of a "
                 "ten-thousandth of the ball diameter."

@@ -264,6 +264,10 @@ def _verdict(seen: Look) -> list[Statement]:
     ]
     if seen.standstill is not None:
         said.append(f"The shaft came to rest {seen.standstill - drop.release:.3g} s after the release.")
+    if not seen.whirls:
+        said.append("It did not whirl: nowhere does it run round its race by two turns or more.")
+    elif forward := [whirl for whirl in seen.whirls if whirl.turns > 0]:
+        said.append(f"From {forward[0].start:.4g} s: {forward[0].words}.")
     grave = [f"From {whirl.start:.4g} s: {whirl.words}." for whirl in seen.whirls if whirl.turns < 0][:3]
     if len(seen.drops) > 1:
         grave.append(f"The record holds {len(seen.drops)} drops; the numbers are those of the first.")

@@ -27,7 +27,7 @@ from rotordrop.report.content import (
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
-from rotordrop.restart.card import ANSWERS, RestartCard
+from rotordrop.restart.card import ANSWERS, RestartCard, answer_in
 from rotordrop.units import format_chance, format_quantity
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _flips(card: RestartCard) -> Table:
     columns = (
         Column("assumption", "of"),
         Column("times", lambda one: f"{one.factor:.2g}"),
-        Column("answer then", "answer"),
+        Column("answer then", lambda one: answer_in(card, one)),
     )
     return table(card.flips, columns, "Where the answer flips")
 

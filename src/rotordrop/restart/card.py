@@ -448,6 +448,13 @@ def _flips(history: _History, foreseen: Foreseen, answer: Answer) -> tuple[Flip,
     return tuple(sorted(found, key=lambda one: abs(math.log(one.factor))))
 
 
+def answer_in(card: RestartCard, one: Flip) -> str:
+    """The answer of a flip in words, which names no speed limit that was sought and not found."""
+    limit = card.foreseen.speed_limit
+    sought = limit is not None and limit.speed is None and one.answer == "restart with limits"
+    return f"{one.answer}, other ones than of speed" if sought else one.answer
+
+
 def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     """The card in sentences, the answer first."""
     assumed, likeliest = card.assumptions, card.suspicions[0]
@@ -455,8 +462,12 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     if card.prior_alone:
         missing = "no parameter moved clearly" if compared else "there is no earlier estimate to compare with"
         said.append(
-            f"The assumptions alone decide this: {missing}, and no check was made. Make one before you rely "
-            "on the answer."
+            f"The assumptions alone decide this: {missing}, and no check was made. "
+            + (
+                "Make one before you rely on the answer."
+                if card.best_check
+                else "None of them pays by these costs: state your own before you rely on the answer."
+            )
         )
     known = ", ".join(
         f"{name} ({format_chance(card.right[name])})"
@@ -489,7 +500,7 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     else:
         said.append("None of the checks pays: none can change the answer at its cost.")
     for one in card.flips[:3]:
-        said.append(f"The answer becomes “{one.answer}” where {one.of} is {_times(one.factor)}.")
+        said.append(f"The answer becomes “{answer_in(card, one)}” where {one.of} is {_times(one.factor)}.")
     if not card.flips:
         said.append(f"No cost and no prior within a factor of {FLIPS_WITHIN:g} changes the answer.")
     if not drop.consistent:

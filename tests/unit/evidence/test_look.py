@@ -4,11 +4,13 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
 
+from rotordrop.cli._options import machine_first
 from rotordrop.cli.app import run
 from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.estimate.published import drops_of
@@ -610,6 +612,18 @@ def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys
         f"look({record!r}); assert not {{'numba', 'pint', 'plotly', 'scipy'}} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_machine_and_record_come_in_either_order_and_ranges_say_of_what(turned, capsys):
+    """`look` and `waterfall` asked for them in opposite orders; a range stood without its 90 %."""
+    files = [str(example_path("lp400")), str(example_record_path("lp400_drop_060"))]
+    assert run(["look", *(files[::-1] if turned else files)]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"largest distance .* 90 %: \d+ to \d+ µm +90 %: \d+ to \d+ µm", told)
+    assert "It did not whirl" in told  # the tutorial says that a look says so
+    first, second = (Path(one) for one in files)
+    assert machine_first(second, first) == machine_first(first, second) == (first, second)
 
 
 def test_the_terminal_says_what_was_read_and_guessed(capsys):

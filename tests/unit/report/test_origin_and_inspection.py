@@ -8,6 +8,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from rotordrop.estimate.bearing_drop import AirGap, BearingDrop, simulated_bearings
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.known import Known
@@ -82,6 +84,16 @@ def test_a_stress_whose_interval_reaches_the_static_limit_asks_for_a_look_at_the
     assert said.level == "warning"
     assert "NDE: look at balls and raceways" in said.text
     assert "as high as 4\u202f210 MPa" in said.text
+
+
+@pytest.mark.parametrize(("answer", "when"), [("restart", "next standstill"), ("replace", "next start")])
+def test_what_to_do_keeps_to_the_restart_card(drop_result: DropResult, answer: str, when: str) -> None:
+    """It asked to open the bearings before the next start beside a card that said to restart."""
+    nde, de = simulated_bearings(drop_result)
+    above = estimate(drop_result, bearings=(stressed(nde, 3.9e9, 4.21e9), de))
+    card: Any = SimpleNamespace(answer=answer)
+    told, opened, *_ = inspection_section(above, card).statements
+    assert told.text.startswith(answer.capitalize()) and when in opened.text
 
 
 def test_a_model_that_does_not_fit_is_to_be_settled_before_anything_else(drop_result: DropResult) -> None:

@@ -16,6 +16,8 @@ from scipy.integrate import quad
 from tests.published import bearing, published, value
 
 from rotordrop.cli.app import run
+from rotordrop.cli.compare import _deliver_changes
+from rotordrop.cli.restart import CHECKS, _checks
 from rotordrop.document import read_document
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Joint, Parameter, Unbalance, Value
@@ -27,7 +29,7 @@ from rotordrop.report.restart_page import restart_numbers, restart_page
 from rotordrop.report.terminal import print_summary
 from rotordrop.restart import load_assumptions, restart_card
 from rotordrop.restart.assumptions import assumptions_of
-from rotordrop.restart.card import ANSWERS, COSTS, FLIPS_WITHIN, SHARES
+from rotordrop.restart.card import ANSWERS, COSTS, FLIPS_WITHIN, SHARES, Flip, answer_in
 from rotordrop.restart.evidence import indicators, suspicions
 from rotordrop.restart.foreseen import Foreseen, NextDrop, SpeedLimit
 from rotordrop.restart.next_drop import found_machine, next_drops, speed_limit
@@ -703,3 +705,36 @@ def test_a_check_with_a_date_belongs_to_the_last_drop_before_it():
     now = drop()
     with pytest.raises(UsageError, match=r"has a date, and .* has none"):
         placed("2026-02-20")
+
+
+def test_the_checks_of_the_package_are_named_where_they_are_asked_for(capsys):
+    """Help and error named none of them."""
+    names = tuple(assumptions_of({}, "the assumptions").checks)
+    assert names == CHECKS
+    assert run(["restart", "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert all(name in told.replace("- ", "-") for name in names)  # a terminal breaks after a hyphen
+    with pytest.raises(UsageError, match="expected one of lift, coast-down, turning"):
+        _checks(["turning"])
+
+
+def test_no_check_is_asked_for_where_none_pays_and_no_speed_limit_offered_where_none_was_found():
+    """ "Make one" stood beside "none of the checks pays", limits beside "no speed limit"."""
+    limit = SpeedLimit(speed=None, interval_90=None, chance=0.01, tried=(60.0, 600.0), drops=20)
+    card = restart_card(drop(), assumptions_of({}, "the assumptions"), foreseen=Foreseen(speed_limit=limit))
+    assert card.prior_alone
+    assert ("Make one" in card.statements[0]) == (card.best_check is not None)
+    free = restart_card(drop(), assumptions_of({"machine_cost": 1e-3, "most_doubt": 1.0}, "mine"))
+    assert free.best_check is None and free.prior_alone and "Make one" not in free.statements[0]
+    flip = Flip(of="a day of standstill", factor=2.0, answer="restart with limits")
+    assert answer_in(card, flip) == "restart with limits, other ones than of speed"
+    assert answer_in(free, flip) == "restart with limits"
+
+
+def test_changes_of_one_recording_are_refused(tmp_path):
+    """Two estimates of one recording were compared without a word."""
+    places = [str(tmp_path / f"{name}.json") for name in "ab"]
+    for place in places:
+        write_json(Path(place), drop(record_sha256=sha256(b"one").hexdigest()).as_json(), sealed=True)
+    with pytest.raises(UsageError, match="are of one recording, so nothing changed"):
+        _deliver_changes([Path(place) for place in places], None)
