@@ -122,8 +122,8 @@ def _checks(written: list[str] | tuple[str, ...]) -> list[MadeCheck]:
         left, equals, outcome = (part.strip() for part in text.partition("="))
         if not equals:
             raise UsageError(
-                f'--check {text!r}; expected one of {", ".join(CHECKS)} and its outcome, "turning=bad", or one '
-                'after an earlier drop with its date, "2026-03-14 turning=bad"'
+                f'--check {text!r}; expected one of {", ".join(CHECKS)} and its outcome, "turning=bad", or '
+                'one after an earlier drop with its date, "2026-03-14 turning=bad"'
             )
         day, _, name = left.rpartition(" ")
         found.append(MadeCheck(name=name, outcome=outcome, day=day.strip()))
