@@ -22,10 +22,11 @@ from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, Plac
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
 from rotordrop_bench import Violations, hidden_machine
-from rotordrop_bench.ball_tables import fast_pair, held_pair, thrust_pair
+from rotordrop_bench.ball_tables import fast_pair, held_pair, table_row, thrust_pair
 from rotordrop_bench.recording import true_drop
 from rotordrop_bench.settled import settled_coordinates, without_magnets
 from rotordrop_bench.structure import departures_of, violated
+from rotordrop_bench.violations import BallsViolation
 
 SPEED = 2.0 * np.pi * 120.0
 LEVITATED = LevitatedStart(rotor_angle=1.0, remanent_force=np.array([[2.0, 30.0], [-3.0, 20.0]]))
@@ -136,6 +137,7 @@ PRESENT = {
     "ribbon": {"support": {"ribbon_stiffness": "6e7 N/m", "ribbon_slip": "300 N"}},
     "held preload": {"balls": {"held_preload": True}},
     "thrust": {"balls": {"thrust": "400 N"}},
+    "seat play": {"balls": {"seat_play": "5 um"}},
 }
 
 
@@ -198,6 +200,21 @@ def test_tables_of_balls_have_the_force_of_the_drop_model_in_its_limit(known):
     least = constants.preload_ball_load
     assert held_pair(constants, 0.0) == pytest.approx((0.0, least), rel=1e-6, abs=1e-6)
     assert thrust_pair(constants, 0.0, 1000.0)[1] > 1.5 * least
+
+
+def test_a_seat_with_play_holds_the_bearing_behind_it(known):
+    """Within the play it gives no force; behind it, that of a bearing without, moved by the play."""
+    bearing, play = known.touchdown_bearings[0], 5e-6
+    loose, tight = (
+        table_row(bearing, BallsViolation.model_validate(balls), 200.0, SPEED)
+        for balls in ({"seat_play": f"{play} m"}, {"thrust": "1e-9 N"})
+    )
+    rows = [np.concatenate([np.zeros(D.TABLE_SPEEDS), row]) for row in (loose, tight)]
+    for way in (0.0, 1e-6, 2.5e-6):  # the table rounds the corner within a step or two of it
+        assert D.from_table(rows[0], D.TABLE_FORCE, way, 0.0) == pytest.approx(0.0, abs=1.0)
+    for way in (4e-6, 12e-6):
+        moved = D.from_table(rows[0], D.TABLE_FORCE, way + play, 0.0)
+        assert moved == pytest.approx(D.from_table(rows[1], D.TABLE_FORCE, way, 0.0), rel=5e-3)
 
 
 def ball_sum(numbers, way):

@@ -1,4 +1,4 @@
-"""Force over deflection of ball bearings by solutions of their own: held preload, thrust, fast balls.
+"""Force over deflection of ball bearings by solutions of their own: held preload, thrust, fast balls, play.
 
 A pair of rows is a smooth ring of balls, whose loads follow from where the grooves go.
 """
@@ -40,8 +40,8 @@ def table_row(bearing: TouchdownBearing, balls: BallsViolation, load: float, nom
     constants = numbers.constants
     if not (constants.preloaded and len(constants.axial_signs) == 2):
         raise UsageError(
-            f"{bearing.name}: held_preload, thrust and inertia of balls need a preloaded pair of rows; "
-            "leave them out of its violations"
+            f"{bearing.name}: held_preload, thrust, inertia and seat_play of balls need a preloaded pair of "
+            "rows; leave them out of its violations"
         )
     turn = (FASTEST * nominal / (D.MOST_SPEEDS - 1)) if balls.inertia else 1.0
     speeds = turn * np.arange(D.MOST_SPEEDS if balls.inertia else 1)
@@ -64,7 +64,8 @@ def _solution(
         return lambda way: fast_pair(bearing, constants, way, omega)
     if balls.held_preload:
         return lambda way: held_pair(constants, way)
-    return lambda way: thrust_pair(constants, way, float(balls.thrust))
+    play = float(balls.seat_play)
+    return lambda way: thrust_pair(constants, max(way - play, 0.0), float(balls.thrust))
 
 
 def _ring(constants: Any) -> tuple[Array, float]:

@@ -173,11 +173,17 @@ LATER_DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
 recordings of other code were estimated: masses of rings, speed signal, clock, noise and tilt."""
 
 
+LATEST_DEPARTURES: dict[str, Callable[[_Measures, int], Parts]] = {
+    "seat play": lambda m, size: {"balls": {"seat_play": _si((0.01, 0.04)[size] * m.gap, "m")}},
+}
+"""Departures that came with version 3; sizes are chosen: those of fits from h6/H7 to worn seats."""
+
+
 def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...]) -> Parts:
     """Violations of a machine [file units] that hold all the departures named, each in its size.
 
-    The machine is as its owner knows it; a kind is a name from `DEPARTURES`, from `LATER_DEPARTURES`, or
-    "unbalance jump".
+    The machine is as its owner knows it; a kind is a name from `DEPARTURES`, `LATER_DEPARTURES`,
+    `LATEST_DEPARTURES`, or "unbalance jump".
     """
     shares = [float(share) for share in bearing_load_shares(machine)]
     bearing = machine.touchdown_bearings[shares.index(max(shares))]
@@ -196,8 +202,9 @@ def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...
         contact=contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping)),
     )
     parts: Parts = {}
+    known = {**DEPARTURES, **LATER_DEPARTURES, **LATEST_DEPARTURES, "unbalance jump": _jump}
     for kind, size in kinds:
-        for part, keys in {**DEPARTURES, **LATER_DEPARTURES, "unbalance jump": _jump}[kind](m, size).items():
+        for part, keys in known[kind](m, size).items():
             parts[part] = parts.get(part, {}) | keys
     if "centre" in parts:  # the bearings stand apart from each other, or nothing would change
         parts["bearing"] = {machine.touchdown_bearings[0].name: {"centre": parts.pop("centre")}}

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import cycle
 
-from rotordrop_bench.departures import DEPARTURES, LARGE, LATER_DEPARTURES, SLIGHT
+from rotordrop_bench.departures import DEPARTURES, LARGE, LATER_DEPARTURES, LATEST_DEPARTURES, SLIGHT
 from rotordrop_bench.rotors import ROTORS
 
-VERSION = "2"
+VERSION = "3"
 """Changes whenever a drop of the list does; scores of different versions are not comparable."""
 
 
@@ -68,6 +68,8 @@ RATES = (10e3, 50e3, 100e3)
 
 FIRST_LATER = 101
 """Number of the first drop that came with version 2."""
+FIRST_LATEST = 201
+"""Number of the first drop that came with version 3."""
 
 
 def _listed() -> tuple[BenchDrop, ...]:
@@ -125,7 +127,27 @@ def _later() -> tuple[BenchDrop, ...]:
     return tuple(found)
 
 
-LISTS: dict[str, tuple[BenchDrop, ...]] = {"1": _listed(), VERSION: _later()}
+def _latest() -> tuple[BenchDrop, ...]:
+    """Every rotor once, slight and large in turn, at the second of its speeds."""
+    (kind,) = LATEST_DEPARTURES
+    found = []
+    for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(((SLIGHT, "slight"), (LARGE, "large"))))):
+        number = FIRST_LATEST + i
+        found.append(
+            BenchDrop(
+                name=f"drop_{number:03d}",
+                family=f"seat play, {word}",
+                rotor=rotor,
+                speed=SPEEDS[rotor][1],
+                machine_seed=1500 + i,
+                drop_seed=9000 + number,
+                departures=((kind, size),),
+            )
+        )
+    return tuple(found)
+
+
+LISTS: dict[str, tuple[BenchDrop, ...]] = {"1": _listed(), "2": _later(), VERSION: _latest()}
 """What came with each version; the drops of an earlier one stay as they are, bit for bit."""
 DROPS: tuple[BenchDrop, ...] = tuple(drop for drops in LISTS.values() for drop in drops)
 """All drops of the bench, in order."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
@@ -153,7 +154,7 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
             off_x, off_y, _, _ = D.sleeve(row, angle, 0.0, -1.0)
             row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = math.hypot(off_x, off_y), 0.0
             row[D.SLEEVE_ANGLE] = math.atan2(off_y, off_x) - angle
-    found = settled_coordinates(plain)
+    found = _on_their_tables(model, settled_coordinates(plain))
     places, mass = list(range(n_q)), list(coordinate_masses(model))
     for row, at in zip(parameters.departure, parameters.bearing_at[:, L.DEPARTURE], strict=True):
         for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
@@ -189,6 +190,30 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
         force_and_stiffness,
         model.machine.name,
     )[:n_q]
+
+
+def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
+    """Rest of the model that does not depart, let down to where tables of balls carry its static loads.
+
+    Within the play of a seat nothing holds a race: no step would lead out of it.
+    """
+    layout, rows = model.layout, model.parameters.departure
+    down = np.zeros(len(model.machine.touchdown_bearings))
+    ways = (coordinates[layout.support] - coordinates[layout.race])[1::2]
+    for b, load in enumerate(model.load_shares):
+        if rows[b, D.TABLE_SPEEDS] > 0.0:
+            reach = rows[b, D.TABLE_WAY_STEP] * (D.TABLE_POINTS - 3)
+
+            def lacking(way: float, b: int = b, load: float = float(load)) -> float:
+                return float(D.from_table(rows[b], D.TABLE_FORCE, way, 0.0)) - load
+
+            down[b] = max(brentq(lacking, 0.0, reach) - ways[b], 0.0)
+    found = coordinates.copy()
+    found[layout.race][1::2] -= down
+    nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
+    positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
+    found[layout.modal_y] += rigid_amplitudes(model, positions, -down[:, None])[:, 0]
+    return found
 
 
 def _force_and_stiffness(

@@ -339,6 +339,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "spring preload": ("balls.held_preload",),
     "thrust": ("balls.thrust",),
     "fast balls": ("balls.inertia",),
+    "seat play": ("balls.seat_play",),
     "ball phase": ("balls.first_ball_angle", "balls.turn"),
     "bearing centres": ("centre.x", "centre.y"),
     "sensor lag": ("sensors.time_constant",),

@@ -239,17 +239,25 @@ class BallsViolation(Violation):
     """Axial load of the bearing [N]."""
     inertia: bool = False
     """Whether the centrifugal force of the balls acts."""
+    seat_play: Length = default(0.0, "no play")
+    """Way of the bearing in its seat, from the middle, before the seat holds it [m]."""
 
     @property
     def tabulated(self) -> bool:
         """Whether the balls have a load of their own over the deflection of the race."""
-        return self.held_preload or self.inertia or float(self.thrust) > 0.0
+        return self._of_the_table() > 0
+
+    def _of_the_table(self) -> int:
+        lengths = float(self.thrust) > 0.0, float(self.seat_play) > 0.0
+        return self.held_preload + self.inertia + sum(lengths)
 
     def check(self) -> None:
         """Refuse two of what a table holds one of."""
         super().check()
-        if self.held_preload + self.inertia + (float(self.thrust) > 0.0) > 1:
-            raise Misfit("balls have one of 'held_preload', 'thrust' and 'inertia'; leave out the others")
+        if self._of_the_table() > 1:
+            raise Misfit(
+                "balls have one of 'held_preload', 'thrust', 'inertia' and 'seat_play'; leave out the others"
+            )
 
 
 class SleeveViolation(Violation):
