@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -66,7 +67,7 @@ def restart(
     from rotordrop.restart.assumptions import assumptions_of, load_assumptions
     from rotordrop.restart.card import restart_card
     from rotordrop.restart.foreseen import Foreseen
-    from rotordrop.restart.next_drop import DROPS, next_drops
+    from rotordrop.restart.next_drop import DROPS, lift_now, next_drops
     from rotordrop.restart.order import in_order, with_checks
     from rotordrop.study.repeat import COMPARED
 
@@ -93,6 +94,7 @@ def restart(
                 drops=count,
                 progress=bar,
             )
+        found = replace(found, lift=lift_now(described, drop=drop))
     before = [read_drop(one) for one in since or ()]
     for path, one in zip(since or (), before, strict=True):
         if one.record_sha256 == drop.record_sha256:

@@ -33,7 +33,7 @@ from rotordrop.restart.evidence import (
     require_check,
     suspicions,
 )
-from rotordrop.restart.foreseen import Foreseen, SpeedLimit
+from rotordrop.restart.foreseen import Foreseen, LiftNow, SpeedLimit
 from rotordrop.restart.order import EarlierDrop
 from rotordrop.units import format_chance, format_quantity
 
@@ -488,7 +488,7 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
         f"state of the bearings would answer {known}."
     )
     said += _of_earlier_checks(card)
-    said += _of_next_drop(card.foreseen)
+    said += [*_of_next_drop(card.foreseen), *_of_lift(card.foreseen.lift)]
     best = card.best_check
     if best is not None:
         hours = 24.0 * best.cost / assumed.day_cost
@@ -548,6 +548,26 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
         yield f"{name}: {'; '.join(parts)}."
     if foreseen.speed_limit is not None:
         yield _of_speed_limit(foreseen.speed_limit)
+
+
+def _of_lift(lift: LiftNow | None) -> Iterator[str]:
+    """Whether it may be lifted now."""
+    if lift is None:
+        return
+    low, high = (format_chance(end) for end in lift.probability.interval_90 or (lift.probability.value,) * 2)
+    count = lift.probability.drops
+    within = ""
+    if lift.took is not None:
+        within = " within " + " to ".join(format_quantity(one, "time", 3) for one in lift.took)
+    needs = [
+        f"{'more than the' if amount is None else f'{amount:.3g} A of'} {lift.limit[name]:.3g} A of {name}"
+        for name, amount in lift.current.items()
+    ]
+    yield (
+        f"May it be lifted now? From where it rests, {format_chance(lift.probability.value)} of {count} "
+        f"simulated lifts succeed (90 %: {low} to {high}){within}; no damage is simulated. To carry the "
+        f"weight there takes {', '.join(needs)}."
+    )
 
 
 def _shown(known: Known, kind: str) -> str:

@@ -47,10 +47,27 @@ class SpeedLimit:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LiftNow:
+    """Whether the magnets lift the rotor from where it rests, by simulated lifts at standstill."""
+
+    probability: Known
+    """Share of the lifts that succeed [1]."""
+    took: tuple[float, float] | None
+    """Shortest and longest time of those until the rotor touches nothing any more [s]; None without one."""
+    current: dict[str, float | None]
+    """Current of each AMB that carries its share of the weight there [A]; None where its limit does not."""
+    limit: dict[str, float]
+    """Limit of the current of each AMB [A]."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Foreseen:
-    """Next drops by speed, the full one first, and the speed limit where limits were given."""
+    """Next drops by speed, the full one first, the speed limit where limits were given, and the lift where
+    the magnets are described.
+    """
 
     drops: tuple[NextDrop, ...] = ()
     speed_limit: SpeedLimit | None = None
+    lift: LiftNow | None = None
     of_estimate: bool = False
     """Whether the machine is the one that the estimate found, with its intervals; else that of its file."""

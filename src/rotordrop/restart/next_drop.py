@@ -1,4 +1,4 @@
-"""What the next drop would be if the machine was restarted, and up to which speed it keeps to the limits."""
+"""What the next drop would be, up to which speed it keeps to limits, whether the rotor can be lifted now."""
 
 from __future__ import annotations
 
@@ -13,12 +13,17 @@ from rotordrop.estimate.published import Drop, Parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
-from rotordrop.restart.foreseen import Foreseen, NextDrop, SpeedLimit
+from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop, SpeedLimit
+from rotordrop.rotor.magnet_loop import carrying_currents
 from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.study.repeat import COMPARED, repeat_study
+from rotordrop.rotor.unknowns import all_unknowns, smallest_gap
+from rotordrop.study.distributions import Distribution
+from rotordrop.study.plan import Study
+from rotordrop.study.quantities import LIFT
+from rotordrop.study.repeat import COMPARED, OFF_CENTRE, repeat_study
 from rotordrop.study.run import run_study
 from rotordrop.study.summary import StudyResults, exceedance
+from rotordrop.track.prior import fall_time
 from rotordrop.twin.calibrated import as_filed, machine_values
 from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED
@@ -31,6 +36,12 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 measured."""
 DRAWN_AGAIN = 400
 """Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
+
+LIFTS = 12
+"""Simulated lifts; chosen, not measured: the interval of the share says what they tell."""
+LIFT_BEGINS, LIFT_ENDS = 40.0, 60.0
+"""When the magnets take the rotor up again, and the end, over the time of a fall [1]. By then a rotor that
+does not turn lay still on simulated drops; ten lifts took two falls at most (chosen)."""
 
 
 def found_machine(machine: Machine, drop: Drop) -> Machine | None:
@@ -127,6 +138,45 @@ def next_drops(
         fewest = min(map(len, ratios))  # each draw at every speed
         limit = speed_limit(np.array(shares) * speed, np.array([one[:fewest] for one in ratios]), chance)
     return Foreseen(drops=tuple(made), speed_limit=limit, of_estimate=found is not None)
+
+
+def lift_now(
+    machine: Machine, *, drop: Drop | None = None, lifts: int = LIFTS, seed: int = 1
+) -> LiftNow | None:
+    """Simulate lifts from where the rotor rests, at standstill; None without a magnet in its loop.
+
+    The machine is that of ``drop``, by its estimate, where there is one, and varies as that leaves it open;
+    the place of each magnet varies too. Damage is not simulated.
+    """
+    if not machine.has_loops:
+        return None
+    at = (None if drop is None else found_machine(machine, drop)) or machine
+    fall, gap = fall_time(at), smallest_gap(at)
+    off_centre = Distribution(shape="normal", numbers=(0.0, OFF_CENTRE * gap))
+    origin = at.calibration
+    study = Study(
+        name=f"lift of {at.name}",
+        machine=at,
+        drops=lifts,
+        seed=seed,
+        duration=LIFT_ENDS * fall,
+        relevitate=LIFT_BEGINS * fall,
+        speed=0.0,
+        vary={f"{amb.name}.offset_{axis}": off_centre for amb in at.ambs for axis in "xy"},
+        calibrated=origin is not None and origin.joint is not None,
+        shard=20,
+    )
+    with TemporaryDirectory() as folder:
+        results = run_study(study, Path(folder) / "lifts")
+    took = results.column("lift_time")
+    took = took[np.isfinite(took)]
+    described = [amb for amb in at.ambs if amb.magnet is not None]
+    return LiftNow(
+        probability=exceedance(results.column(LIFT), 0.5),
+        took=(float(took.min()), float(took.max())) if len(took) else None,
+        current=carrying_currents(at, build_drop_model(at).fe),
+        limit={amb.name: float(amb.magnet.current_limit) for amb in described if amb.magnet is not None},
+    )
 
 
 def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit | None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import Controller, Magnet
@@ -152,13 +153,9 @@ class MagnetSummary:
 
 def magnet_summaries(machine: Machine, fe: RotorFE) -> tuple[MagnetSummary, ...]:
     """What every described magnet of a machine amounts to."""
-    nodes = [amb.node for amb in machine.ambs]
-    masses = np.full(len(nodes), machine.rotor.mass / max(1, len(nodes)))
-    if len(set(nodes)) == len(nodes) > 1:
-        masses = rest_on(fe, nodes, 1.0)[1]
-    depth = max(bearing.air_gap.value for bearing in machine.touchdown_bearings)
+    depth = _depth(machine)
     found = []
-    for amb, mass in zip(machine.ambs, masses.tolist(), strict=True):
+    for amb, mass in zip(machine.ambs, _carried_masses(machine, fe), strict=True):
         if amb.magnet is None:
             continue
         (by_current, by_way), limit = amb.magnet.slopes, amb.magnet.current_limit.value
@@ -175,6 +172,40 @@ def magnet_summaries(machine: Machine, fe: RotorFE) -> tuple[MagnetSummary, ...]
             )
         )
     return tuple(found)
+
+
+def carrying_currents(machine: Machine, fe: RotorFE) -> dict[str, float | None]:
+    """Current [A] of every described magnet that carries its share of the weight of a rotor at rest in the
+    touchdown bearings; None where the limit of the current does not.
+    """
+    depth = _depth(machine)
+    found: dict[str, float | None] = {}
+    for amb, mass in zip(machine.ambs, _carried_masses(machine, fe), strict=True):
+        if amb.magnet is None:
+            continue
+        weight, most = mass * float(machine.gravity), amb.magnet.current_limit.value
+
+        def spare(current: float, magnet: Magnet = amb.magnet, weight: float = weight) -> float:
+            return magnet.pull(-depth, current) - weight
+
+        if spare(most) < 0.0:
+            found[amb.name] = None
+        else:
+            found[amb.name] = float(brentq(spare, 0.0, most)) if spare(0.0) < 0.0 else 0.0
+    return found
+
+
+def _depth(machine: Machine) -> float:
+    """Way [m] from the centre of the magnets to a rotor at rest in its touchdown bearings."""
+    return max(bearing.air_gap.value for bearing in machine.touchdown_bearings)
+
+
+def _carried_masses(machine: Machine, fe: RotorFE) -> list[float]:
+    """Mass [kg] that each AMB carries as a point."""
+    nodes = [amb.node for amb in machine.ambs]
+    if len(set(nodes)) == len(nodes) > 1:
+        return [float(mass) for mass in rest_on(fe, nodes, 1.0)[1]]
+    return [machine.rotor.mass / max(1, len(nodes))] * len(nodes)
 
 
 def _margins(magnet: Magnet, controller: Controller, mass: float) -> Margins | None:
