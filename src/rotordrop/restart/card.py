@@ -555,7 +555,8 @@ def _of_lift(lift: LiftNow | None) -> Iterator[str]:
     if lift is None:
         return
     low, high = (format_chance(end) for end in lift.probability.interval_90 or (lift.probability.value,) * 2)
-    count = lift.probability.drops
+    count = lift.probability.drops or 0
+    succeeded = round(count * lift.probability.value)
     within = ""
     if lift.took is not None:
         within = " within " + " to ".join(format_quantity(one, "time", 3) for one in lift.took)
@@ -564,9 +565,9 @@ def _of_lift(lift: LiftNow | None) -> Iterator[str]:
         for name, amount in lift.current.items()
     ]
     yield (
-        f"May it be lifted now? From where it rests, {format_chance(lift.probability.value)} of {count} "
-        f"simulated lifts succeed (90 %: {low} to {high}){within}; no damage is simulated. To carry the "
-        f"weight there takes {', '.join(needs)}."
+        f"May it be lifted now? From where it rests, {succeeded} of {count} simulated lifts succeed{within} "
+        f"(chance, 90 %: {low} to {high}); no damage is simulated. The control current that carries the "
+        f"weight there is {', '.join(needs)}."
     )
 
 

@@ -55,7 +55,7 @@ class LiftNow:
     took: tuple[float, float] | None
     """Shortest and longest time of those until the rotor touches nothing any more [s]; None without one."""
     current: dict[str, float | None]
-    """Current of each AMB that carries its share of the weight there [A]; None where its limit does not."""
+    """Control current of each AMB that carries its share of the weight there [A]; None beyond its limit."""
     limit: dict[str, float]
     """Limit of the current of each AMB [A]."""
 

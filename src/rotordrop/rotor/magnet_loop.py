@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import Controller, Magnet
@@ -175,9 +174,11 @@ def magnet_summaries(machine: Machine, fe: RotorFE) -> tuple[MagnetSummary, ...]
 
 
 def carrying_currents(machine: Machine, fe: RotorFE) -> dict[str, float | None]:
-    """Current [A] of every described magnet that carries its share of the weight of a rotor at rest in the
-    touchdown bearings; None where the limit of the current does not.
+    """Control current [A] with which each described magnet carries its share of a rotor that rests in the
+    touchdown bearings; None where that is beyond its limit.
     """
+    from scipy.optimize import brentq  # slow to load, and most commands do without
+
     depth = _depth(machine)
     found: dict[str, float | None] = {}
     for amb, mass in zip(machine.ambs, _carried_masses(machine, fe), strict=True):
