@@ -35,7 +35,8 @@ from rotordrop.web.workspace import Workspace
 
 PACKAGE = Path(str(resources.files("rotordrop")))
 MACHINES, WATCHERS = 50, 2
-NOISE = 0.02  # added to each record [µm], so that no two are alike
+NOISE, NOISY = 0.02, 200  # added to some samples of each record [µm], so that no two are alike
+BUNCH = 16  # records at most that arrive together
 LOOK_S = 3.0  # pause between two looks at what is done
 SPAN = (-0.12, 0.33)  # of a record [s] about its zero
 DAMAGES = (
@@ -60,11 +61,14 @@ def templates() -> tuple[list[str], np.ndarray]:
     return ["Zeit [s]", *names, "Drehzahl [rpm]"], np.column_stack(columns)
 
 
-def csv(head: str, names: list[str], values: np.ndarray) -> bytes:
+def rows_of(values: np.ndarray) -> list[str]:
+    """Rows of a record as a German Excel writes them."""
+    return [";".join(f"{value:.5f}" for value in row).replace(".", ",") for row in values]
+
+
+def csv(head: str, names: list[str], rows: list[str]) -> bytes:
     """A record as a German Excel writes it."""
-    lines = [head, ";".join(names)]
-    lines += [";".join(f"{value:.5f}" for value in row).replace(".", ",") for row in values]
-    return ("\r\n".join(lines) + "\r\n").encode("latin-1")
+    return ("\r\n".join([head, ";".join(names), *rows]) + "\r\n").encode("latin-1")
 
 
 def damaged(kind: str, whole: bytes, names: list[str], values: np.ndarray, head: str) -> bytes:
@@ -87,12 +91,13 @@ def damaged(kind: str, whole: bytes, names: list[str], values: np.ndarray, head:
         worse[rows // 2 :, 0] -= 0.05
     else:
         worse[:, 1] = worse[0, 1]
-    return csv(head, names, worse)
+    return csv(head, names, rows_of(worse))
 
 
 def written(folder: Path, records: int, estimated: int, draw: random.Random) -> dict[str, tuple[str, str]]:
     """Write all records beside the folder that is watched; kind of damage and serial number by name."""
     names, values = templates()
+    plain = rows_of(values)
     noise = np.random.default_rng(draw.randrange(2**32))
     made = {}
     known = set(draw.sample(range(records), estimated))
@@ -101,10 +106,11 @@ def written(folder: Path, records: int, estimated: int, draw: random.Random) -> 
         serial = f"{'K' if k in known else 'U'}{4700 + draw.randrange(MACHINES // 2)}"
         in_head = draw.random() < 0.3
         head = f"Messung 14.03.2026 15:09;Anlage {serial if in_head else 'Halle 3'}"
+        first = draw.randrange(len(values) - NOISY)
         noisy = values.copy()
-        noisy[:, 1:5] += NOISE * noise.standard_normal((len(values), 4))
-        noisy[:, 0] += 1e-5 * k
-        whole, kind = csv(head, names, noisy), ""
+        noisy[first : first + NOISY, 1:5] += NOISE * noise.standard_normal((NOISY, 4))
+        rows = [*plain[:first], *rows_of(noisy[first : first + NOISY]), *plain[first + NOISY :]]
+        whole, kind = csv(head, names, rows), ""
         if k in bad:
             kind = DAMAGES[len([one for one in made.values() if one[0]]) % len(DAMAGES)]
             whole = damaged(kind, whole, names, noisy, head)
@@ -210,7 +216,7 @@ def main() -> None:
     start, asked, sizes = time.time(), 0.0, []
     killing = Killing(place, kept, watchers, draw, every)
     while time.time() - start < 3.0 * 3600.0:
-        for _ in range(draw.randrange(4)):
+        for _ in range(draw.randrange(BUNCH)):
             if waiting:
                 arrive(place, waiting.pop(), draw)
         time.sleep(draw.uniform(0.1, 0.5))
