@@ -86,9 +86,13 @@ def parts_of(record: Path) -> dict[str, Path]:
     if record.suffix.lower() == ".cfg":
         samples = (record.with_suffix(suffix) for suffix in (".dat", ".DAT"))
         found |= {f"beside {file.name}": file for file in samples if file.is_file()}
+    stem = record.stem.lower()
+    wanted = {f"{stem}{end}".lower() for end in TAIL}
     with suppress(OSError):
-        for file in sorted(record.parent.iterdir()):
-            if file.stem.lower() in {f"{record.stem}{end}".lower() for end in TAIL} and file.is_file():
+        # by plain strings: a folder may hold ten thousand records, and each is asked for its tail
+        beside = [name for name in os.listdir(record.parent) if name.lower().startswith(stem)]  # noqa: PTH208
+        for file in (record.parent / name for name in sorted(beside)):
+            if file.stem.lower() in wanted and file.is_file():
                 found["tail"] = file
     return found
 

@@ -22,7 +22,9 @@ from rotordrop.files import write_json
 from rotordrop.ledger import logged_drops
 from rotordrop.watch import Kept, Watcher, read_fleet
 from rotordrop.watch.again import reestimate
-from rotordrop.watch.kept import Arrived, arrived, keep_status, status_of
+from rotordrop.watch.fleet import Fleet
+from rotordrop.watch.kept import STATUS_FILE, Arrived, arrived, keep_status, parts_of, status_of
+from rotordrop.watch.watcher import CLOCKS_APART_S
 from rotordrop.web.running import publish, write_state
 from rotordrop.web.workspace import Workspace
 
@@ -417,6 +419,29 @@ def test_a_machine_file_that_comes_later_is_used(machines, drops, kept, watcher)
     watcher()[0].run(once=True)
     told = status_of(kept.job(number))
     assert (told["serial"], told["outcome"]) == ("9000", "quarantined")  # an x is no record
+
+
+def test_a_watcher_that_begins_anew_asks_no_head_again_while_the_machines_stay(
+    machines, drops, kept, watcher, monkeypatch
+):
+    """With thousands of records it did nothing else for half a minute; the next kill came before."""
+    (drops / "9000.csv").write_text("x")
+    number = kept.take(Arrived.at(drops / "9000.csv"))
+    found(kept, number, "look", {"findings": [], "speed_rad_per_s": None})
+    watcher()[0].run(once=True)
+    file = kept.job(number).path / STATUS_FILE
+    asked = []
+    monkeypatch.setattr(Fleet, "of", lambda _, name, record: asked.append(name) or (None, "unknown"))
+    for later, times in ((2.0 * CLOCKS_APART_S, 0), (0.5 * CLOCKS_APART_S, 1)):
+        os.utime(file, (time.time() + later,) * 2)
+        watcher()[0].run(once=True)
+        assert len(asked) == times
+
+
+def test_the_tail_of_a_record_is_found_in_whatever_case(drops):
+    for name in ("Drop.csv", "drop_TAIL.csv", "drop_tail2.csv", "other_tail.csv"):
+        (drops / name).write_text("x")
+    assert parts_of(drops / "Drop.csv") == {"record": drops / "Drop.csv", "tail": drops / "drop_TAIL.csv"}
 
 
 def test_the_command_says_what_is_missing(tmp_path, machines, drops, capsys):
