@@ -36,10 +36,7 @@ def restart(
     bearings: Annotated[str, Option(metavar="NAME", help="Set of touchdown bearings in the log.")] = "1",
     check: Annotated[
         list[str] | None,
-        Option(
-            metavar="CHECK",
-            help=CHECK_HELP,
-        ),
+        Option(metavar="CHECK", help=CHECK_HELP),
     ] = None,
     assumptions: Annotated[
         Path | None,

@@ -120,10 +120,10 @@ def _density_beside(mean: Array, covariance: Array, others: Array) -> float:
 def _log_density(mean: Array, covariance: Array) -> float:
     """Logarithm of the normal density of zero."""
     sigma = np.sqrt(np.diag(covariance))
-    sign, determinant = np.linalg.slogdet(covariance / np.outer(sigma, sigma))
+    way, correlation = mean / sigma, covariance / np.outer(sigma, sigma)
+    sign, determinant = np.linalg.slogdet(correlation)
     if sign <= 0.0:
         return -math.inf
-    way = mean / sigma
-    square = float(way @ np.linalg.solve(covariance / np.outer(sigma, sigma), way))
+    square = float(way @ np.linalg.solve(correlation, way))
     scale = float(determinant + 2.0 * np.log(sigma).sum()) + len(mean) * math.log(2.0 * math.pi)
     return -0.5 * (square + scale)

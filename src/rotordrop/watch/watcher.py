@@ -8,6 +8,7 @@ holds its lock, which the system takes back from a dead one.
 from __future__ import annotations
 
 import json
+import math
 import os
 import shlex
 import shutil
@@ -85,6 +86,8 @@ class Watcher:
     complain: Callable[[str], None] = lambda line: None
     _fleet: Fleet = field(init=False)
     _machine_files: set[Arrived] = field(default_factory=set)
+    _machines_changed: float = 0.0
+    """When the last of them was written or moved there [s]."""
     _mine: dict[str, int] = field(default_factory=dict)
     """Drops that are worked on, and the lock of each."""
     _ended: set[str] = field(default_factory=set)
@@ -110,6 +113,7 @@ class Watcher:
             raise UsageError(f"{self.folder} is no folder; name the one in which records arrive")
         self._fleet = read_fleet(self.machines)
         self._machine_files = _standing_in(self.machines)
+        self._machines_changed = _last_change(self._machine_files)
         self.kept.prepare()
         self._runner = Runner(self.kept.space)
 
@@ -161,7 +165,7 @@ class Watcher:
         """Read the machine files again where one has changed; what has a machine now is tried again."""
         if (now := _standing_in(self.machines)) == self._machine_files:
             return
-        self._machine_files = now
+        self._machine_files, self._machines_changed = now, _last_change(now)
         try:
             self._fleet = read_fleet(self.machines)
             self._ended.clear()
@@ -220,8 +224,7 @@ class Watcher:
         To ask the head of every record again took a watcher half a minute of 4,700 before it took the next.
         """
         with suppress(OSError):
-            changed = max((one.path.stat().st_ctime for one in self._machine_files), default=0.0)
-            return (job.path / STATUS_FILE).stat().st_mtime > changed + CLOCKS_APART_S
+            return (job.path / STATUS_FILE).stat().st_mtime > self._machines_changed + CLOCKS_APART_S
         return False
 
     def _names(self, job: Job, status: dict[str, Any]) -> tuple[Path, Path]:
@@ -415,6 +418,14 @@ class Watcher:
         )
         ended = time.monotonic()
         self._next_overview = ended + max(self.every, (ended - now) / OVERVIEW_SHARE)
+
+
+def _last_change(files: set[Arrived]) -> float:
+    """When the last of some files was written or moved to its place [s]; without end where one is gone."""
+    try:
+        return max((one.path.stat().st_ctime for one in files), default=0.0)
+    except OSError:
+        return math.inf  # every record is asked again
 
 
 def _standing_in(folder: Path) -> set[Arrived]:
