@@ -217,6 +217,22 @@ def test_a_seat_with_play_holds_the_bearing_behind_it(known):
         assert moved == pytest.approx(D.from_table(rows[1], D.TABLE_FORCE, way, 0.0), rel=5e-3)
 
 
+def test_a_loose_bearing_lies_in_its_seat_and_is_not_damped_there(known):
+    """Levitated, its race has sunk by the play; a push aside meets damping behind the play, not within."""
+    play = 5e-6
+    hidden = hidden_machine(known, 1, violations(balls={"seat_play": f"{play} m"}), drawn=False)
+    model, state = hidden.model, hidden.model.at_rest()
+    (x, down), pushed = range(model.layout.race.start, model.layout.race.start + 2), 1e-3
+    support = model.layout.support.start
+    assert state[down] - state[support + 1] == pytest.approx(-play, rel=0.01)
+    state[model.layout.n_coordinates + x] = pushed
+    for way, damped in ((0.5 * play, False), (2.0 * play, True)):
+        state[down] = state[support + 1] - way
+        rates = model.layout.zeros()
+        drop_derivative(0.0, state, model.parameters, rates, scratch_of(model.parameters))
+        assert bool(rates[model.layout.n_coordinates + x] < -pushed) == damped
+
+
 def ball_sum(numbers, way):
     entries = numbers.entries()
     return ball_set_force(entries, numbers.places(), way, 0.0, np.empty((2, numbers.places().shape[1])))

@@ -174,8 +174,18 @@ def _further(
     spring, slip = v.support.ribbon_stiffness, v.support.ribbon_slip
     if spring is not None and slip is not None:
         row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = float(spring), float(slip)
+    row[D.LOOSE_WAY] = float(v.balls.seat_play)
     if v.balls.tabulated:
         row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
+
+
+def loosened(model: DropModel) -> DropModel:
+    """The model whose races, where they are loose in their seats, lie in them by their weight."""
+    bearing = model.parameters.bearing.copy()
+    for row, own in zip(bearing, model.parameters.departure, strict=False):
+        if own[D.LOOSE_WAY] > 0.0:
+            row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(model.machine.gravity)
+    return replace(model, parameters=model.parameters._replace(bearing=bearing))
 
 
 def pushed(model: DropModel, violations: Violations) -> DropModel:

@@ -36,10 +36,12 @@ MOST_PIECES = 8
 SLEEVE_OFF = LAW + MOST_PIECES * LAW_WIDTH
 SLEEVE_OVAL, SLEEVE_ANGLE, WEAR, WEAR_HEAT = range(SLEEVE_OFF + 1, SLEEVE_OFF + 5)
 # Stop around the support: travel up to it [m], stiffness [N/m], damping [N s/m]. Ribbon: stiffness of its
-# springs before they slip [N/m], force at which all slip [N]. Balls by a table over the deflection of the
-# race, at speeds of it [rad/s] that are evenly apart: force and largest load of a ball [N].
+# springs before they slip [N/m], force at which all slip [N]. Way of the race within which its bearing is
+# loose in its seat [m]. Balls by a table over the deflection of the race, at speeds of it [rad/s] that are
+# evenly apart: force and largest load of a ball [N].
 STOP_GAP, STOP_STIFFNESS, STOP_DAMPING, RIBBON_STIFFNESS, RIBBON_SLIP = range(SLEEVE_OFF + 5, SLEEVE_OFF + 10)
-TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(SLEEVE_OFF + 10, SLEEVE_OFF + 14)
+LOOSE_WAY = SLEEVE_OFF + 10
+TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(SLEEVE_OFF + 11, SLEEVE_OFF + 15)
 MOST_SPEEDS, TABLE_POINTS = 6, 128
 TABLE_FORCE, TABLE_LOAD = 0, 1
 N_COLUMNS = TABLE + MOST_SPEEDS * 2 * TABLE_POINTS
@@ -304,6 +306,15 @@ def from_table(s: Array, what: int, way: float, spin: float) -> float:
         bent = 2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)
         found += share * (b + 0.5 * u * (c - a + u * bent))
     return found
+
+
+@lean_kernel
+def held_share(s: Array, x: float, y: float) -> float:
+    """Share of the damping of the balls that acts on a race moved by (x, y) [m]: none while it is loose.
+
+    Source: a bearing that its seat does not press moves freely in it.
+    """
+    return 0.0 if x * x + y * y < s[LOOSE_WAY] * s[LOOSE_WAY] else 1.0
 
 
 @lean_kernel

@@ -74,7 +74,8 @@ class DropModel:
             if weight > 0.0:
                 seat = numbers_of(bearing).seat(weight)
                 sag = weight / p[b, L.SUPPORT_STIFFNESS_Y]
-                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - sag
+                loose = self.parameters.departure[b, departure.LOOSE_WAY] if self.layout.departing else 0.0
+                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - loose - sag
                 state[self.layout.support][2 * b + 1] = -sag
         return state
 

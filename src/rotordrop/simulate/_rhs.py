@@ -548,7 +548,10 @@ def add_race(
     wx = y[n_q + r] - y[n_q + h]
     wy = y[n_q + r + 1] - y[n_q + h + 1]
     numbers = row[L.ROLLING : L.ROLLING_END]
-    F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin])
+    held = 1.0
+    if p.bearing_at[b, L.DEPARTURE] >= 0:
+        held = departure.held_share(p.departure[b], y[r] - y[h], y[r + 1] - y[h + 1])
+    F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin], held)
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
