@@ -19,9 +19,8 @@ BLOCK = 16
 
 
 @lean_kernel
-def symmetrise(P: Array) -> None:
-    """Replace a matrix by its symmetric part in place."""
-    n = P.shape[0]
+def symmetrise(P: Array, n: int) -> None:
+    """Replace the first ``n`` rows and columns of a matrix by their symmetric part in place."""
     for top in range(0, n, BLOCK):
         for left in range(0, top + 1, BLOCK):
             for i in range(top, min(top + BLOCK, n)):

@@ -37,40 +37,37 @@ SIGN_WIDTH = math.sqrt(0.5 * math.pi)
 
 
 @lean_kernel
-def scalar_update(
-    mean: Array, P: Array, row: Array, innovation: float, variance: float, gain: Array
-) -> float:
-    """Update mean and covariance in place with one scalar measurement; returns the innovation's variance.
+def gain_beside(P: Array, row: Array, before: Array, count: int, gain: Array) -> None:
+    """Fill ``gain`` (n,) with the covariance of the estimate and a reading of a row (n,).
 
-    The covariance takes the Joseph form, written out for a scalar, which stays symmetric and positive.
-    ``row`` (n,) is the measurement's derivative by the estimate, ``gain`` (n,) receives the Kalman gain.
+    ``before`` (C, n) are what the ``count`` readings taken before will take off ``P`` (n, n), see `take_off`.
     """
-    # Readings have independent noise, so they are taken one at a time and no matrix is inverted: S, the
-    # variance of the innovation, is a number.
-    n = mean.shape[0]
-    for i in range(n):
-        gain[i] = 0.0
+    n = P.shape[0]
+    gain[:] = 0.0
     for j in range(n):
-        value = row[j]
-        if value != 0.0:
+        if row[j] != 0.0:
             for i in range(n):
-                gain[i] += P[j, i] * value
-    S = variance
-    for j in range(n):
-        S += row[j] * gain[j]
-    # The short form P − K h P would do on paper; where a reading is much sharper than what is known, it takes
-    # the difference of two nearly equal numbers, and a variance may come out negative.
-    inverse = 1.0 / S
+                gain[i] += P[j, i] * row[j]
+    for c in range(count):
+        seen = 0.0
+        for i in range(n):
+            seen += before[c, i] * row[i]
+        for i in range(n):
+            gain[i] -= before[c, i] * seen
+
+
+@lean_kernel
+def take_off(P: Array, before: Array, count: int) -> None:
+    """Take what readings tell off a covariance: ``a aᵀ`` of each, a row of ``before`` (C, n).
+
+    All at once, for the matrix is fetched once then; a symmetric one stays so to the last bit.
+    """
+    n = P.shape[0]
     for i in range(n):
-        spread = gain[i]
-        weight = spread * inverse
-        for j in range(n):
-            k_j = gain[j] * inverse
-            P[i, j] -= weight * gain[j] + spread * k_j - S * weight * k_j
-    for i in range(n):
-        gain[i] /= S
-        mean[i] += gain[i] * innovation
-    return S
+        for c in range(count):
+            weight = before[c, i]
+            for j in range(n):
+                P[i, j] -= weight * before[c, j]
 
 
 @lean_kernel
@@ -154,6 +151,7 @@ def forward_pass(
     impulses = np.zeros(p.bearing.shape[0])
     row = np.empty(n)
     gain = np.empty(n)
+    told = np.empty((n_c + 1, n))
     theta = mean[s : s + n_p].copy()
     moved = np.empty(s + n_p)
     keep = transitions.shape[0] > 0
@@ -194,10 +192,13 @@ def forward_pass(
             drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
             largest = settings.fall_impulse if times[i] < settings.fall_end else np.inf
             add_process_noise(P, p, settings, impulses, drift, largest)
+            # Rounding leaves what has moved lopsided by a little, and sample by sample the error would grow.
+            symmetrise(P, s)
             if keep:
                 transitions[i] = F
         elif keep:
             transitions[i] = 0.0
+        count = 0
         for c in range(n_c + 1):
             value = speed[i] if c == n_c else readings[i, c]
             innovations[i, c] = np.nan
@@ -221,13 +222,21 @@ def forward_pass(
                 row[:] = 0.0
                 row[i_w] = 1.0
                 predicted = mean[i_w]
+            # Readings have independent noise, so they are taken one at a time and no matrix is inverted.
+            gain_beside(P, row, told, count, gain)
+            S = variance + np.dot(row, gain)
+            root = math.sqrt(S)
+            for j in range(n):
+                told[count, j] = gain[j] / root
+                gain[j] /= S
+                mean[j] += gain[j] * (value - predicted)
+            count += 1
             innovations[i, c] = value - predicted
-            innovation_variances[i, c] = scalar_update(mean, P, row, value - predicted, variance, gain)
+            innovation_variances[i, c] = S
             if keep:
                 rows[i, c] = row
                 gains[i, c] = gain
-        # Rounding leaves P lopsided by a little, and sample by sample the error would grow.
-        symmetrise(P)
+        take_off(P, told, count)
         means[i] = mean
         if covariances.shape[1] > 0:
             pack(P, covariances[i])
@@ -347,4 +356,4 @@ def backward_pass(
             Lam[:columns, :columns] += body
             Lam[:columns, s:] += cross
             Lam[s:, :columns] += cross.T
-        symmetrise(Lam)
+        symmetrise(Lam, n)

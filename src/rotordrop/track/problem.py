@@ -19,7 +19,6 @@ from rotordrop.rotor.statics import rest_on, settled_sag
 from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
 from rotordrop.series import noise_by_differences
 from rotordrop.simulate.levitation import levitated_static
-from rotordrop.track import _filter as F
 from rotordrop.track import _propagation as P
 from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
 from rotordrop.track.sensor_form import SensorForm, rest_terms, sensor_form
@@ -398,7 +397,6 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     # on which place of its landing sleeves a rotor comes to rest is anybody's guess
     reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in model.machine.touchdown_bearings)
     nodes = np.array([sensor.node for sensor in model.machine.sensors])
-    gain_scratch = np.empty(len(mean))
     for node in np.unique(nodes):
         chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
         if len(chosen) == 0:
@@ -418,7 +416,10 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * slopes[c]
             variance = (sigma * gap) ** 2 + reach**2
-            F.scalar_update(mean, covariance, row, observed - predicted, variance, gain_scratch)
+            shown = covariance @ row
+            size = variance + float(row @ shown)
+            covariance -= np.outer(shown, shown) / size
+            mean += shown * ((observed - predicted) / size)
 
 
 def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:

@@ -12,7 +12,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Extension
 from rotordrop.machine import Machine
-from rotordrop.track.calibration import THREADS, Stage, TrackedDrops, one_pass, stage_settings, window_end
+from rotordrop.track.calibration import THREADS, Stage, TrackedDrops, window_end
 from rotordrop.track.noise_size import forward_passes, likelihood_of
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.transfer import transferred
@@ -77,19 +77,19 @@ class Rises:
         for extension in extensions:
             machine = extension.added_to(machine)
         problems = self.drops.fine(machine)
-        settings = stage_settings(problems[0], self.stage, self.noise)
-        found = one_pass(problems, settings, self._references(problems), self._end)
+        found = forward_passes(problems, self._references(problems), self.stage, self.noise)
         had = {one.path for one in self.fit.problems[0].unknowns}
         rises = np.zeros(len(extensions))
-        for number, (problem, smoothed) in enumerate(zip(problems, found, strict=True)):
+        for number, (problem, drop) in enumerate(zip(problems, found, strict=True), start=1):
             new = [k for k, one in enumerate(problem.unknowns) if one.path not in had]
             at = problem.n_dynamic + np.array(new)
             begin = np.array([problem.unknowns[k].begin for k in new])
             before = problem.mean[at] - begin, problem.covariance[np.ix_(at, at)]
-            after = smoothed.means[0][at] - begin, smoothed.covariance(0)[np.ix_(at, at)]
+            # what does not change is known in the end as well as a smoother would know it
+            after = drop.means[drop.done - 1][at] - begin, drop.last[np.ix_(at, at)]
             for e, extension in enumerate(extensions):
-                # what several drops say of the machine has come to the first one
-                if number == 0 or extension.owner == "drop":
+                # what all drops say of the machine has come to the last one
+                if number == len(problems) or extension.owner == "drop":
                     others = np.array([problem.unknowns[k].parameter not in extension.rows for k in new])
                     rises[e] += _density_beside(*before, others) - _density_beside(*after, others)
         return list(zip(rises.tolist(), extensions, strict=True))
