@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -126,6 +126,8 @@ class Peak:
     known: Known
     time: float
     origin: Origin
+    time_interval_90: tuple[float, float] | None = None
+    """Interval that holds the time of the true peak with 90 % probability [s], where one is known."""
 
     @property
     def value(self) -> float:
@@ -209,6 +211,12 @@ class BearingDrop:
     """Numbers that are not stated, by field name, and why."""
     impacts: tuple[Impact, ...] = ()
     """Every contact in the order of its beginning; `after_flight` marks those that are impacts."""
+    count_interval_90: tuple[int, int] | None = None
+    """Interval that holds the number of impacts with 90 % probability, where one is known."""
+    contact_from_interval_90: tuple[float, float] | None = None
+    """The same of `contact_from` [s]."""
+    largest: Known | None = None
+    """Largest distance of the rotor from the centre [m], where its error is known."""
     impact_force: str = "contact force"
     """Name of the force whose peak the impacts state."""
     first_contact: FirstContact | None = None
@@ -247,6 +255,22 @@ class BearingDrop:
     def contact_from(self) -> float | None:
         """When the last impact began, the rotor in contact from there on [s]; None where it was not."""
         return lasting_from(self.touched, float(self.force.time[-1]))
+
+
+def when_largest(history: History, band: Band, doubt: float) -> tuple[float, float]:
+    """Interval of the time of a peak [s], 90 %: from the first to the last value that may be the largest.
+
+    Each value has the error that its band shows, independent of that of the peak; ``doubt`` is half the
+    interval of the instant from which the times count [s].
+    """
+    at = int(np.argmax(history.values))
+    half = band.upper - history.values
+    times = history.time[history.values + np.hypot(half, half[at]) >= history.values[at]]
+    moment = history.time[at]
+    return (
+        float(moment - math.hypot(moment - times[0], doubt)),
+        float(moment + math.hypot(times[-1] - moment, doubt)),
+    )
 
 
 def deepest(motion: Motion, start: float, end: float, gap: float) -> FirstContact:
@@ -337,8 +361,8 @@ def mean_late(force: History) -> float | None:
 def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = None) -> published.Bearing:
     """What is published of one bearing, found from a record or simulated."""
     numbers = {
-        "peak_force_N": Value.of_known(bearing.peak_force.known, bearing.peak_force.time),
-        "peak_stress_Pa": Value.of_known(bearing.peak_stress.known, bearing.peak_stress.time),
+        f"peak_{name}": Value.of_known(one.known, one.time, one.time_interval_90)
+        for name, one in (("force_N", bearing.peak_force), ("stress_Pa", bearing.peak_stress))
     }
     for path, known in {**bearing.values, **(severity or {})}.items():
         numbers[path] = Value.of_known(known)
@@ -359,8 +383,18 @@ def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = 
             )
             for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
         ],
-        **({"not_stated": dict(bearing.missing)} if bearing.missing else {}),
+        **_where_known(
+            impacts_interval_90=bearing.count_interval_90,
+            contact_from_interval_90_s=bearing.contact_from_interval_90,
+            largest_displacement_m=None if bearing.largest is None else Value.of_known(bearing.largest),
+            not_stated=dict(bearing.missing),
+        ),
     )
+
+
+def _where_known(**parts: object) -> dict[str, Any]:
+    """Parts of the document that are known; pairs are lists there."""
+    return {name: list(part) if isinstance(part, tuple) else part for name, part in parts.items() if part}
 
 
 def finite(value: float | None) -> float | None:

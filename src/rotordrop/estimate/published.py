@@ -52,11 +52,16 @@ class Value(Document):
     unit: str = ABSENT
     time_s: float = ABSENT
     """When, from power-off."""
+    time_interval_90_s: Pair = ABSENT
+    """Interval that holds the time with 90 % probability."""
 
     @classmethod
-    def of_known(cls, known: Known, time: float | None = None) -> Value:
-        """As a result states it, with the time [s] of a peak."""
-        when = {} if time is None else {"time_s": time}
+    def of_known(
+        cls, known: Known, time: float | None = None, between: tuple[float, float] | None = None
+    ) -> Value:
+        """As a result states it, with the time [s] of a peak and its interval."""
+        when = {"time_s": time, "time_interval_90_s": between and list(between)}
+        when = {name: one for name, one in when.items() if one is not None}
         return cls.model_validate({**known.as_json(), **when})
 
     @property
@@ -101,6 +106,12 @@ class Bearing(Document):
     numbers: dict[str, Value]
     stress_statistics_Pa: Statistics
     impacts: list[Impact]
+    impacts_interval_90: Pair = ABSENT
+    """Interval that holds the number of impacts with 90 % probability."""
+    contact_from_interval_90_s: Pair = ABSENT
+    """The same of when the last of them began, the rotor in contact from there on."""
+    largest_displacement_m: Value = ABSENT
+    """Largest distance of the rotor from the centre in the estimated part."""
     not_stated: dict[str, str] = ABSENT
     """Numbers that are not stated, and why."""
 

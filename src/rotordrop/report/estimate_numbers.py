@@ -8,10 +8,10 @@ from pathlib import Path
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.parameter import Parameter, Role
 from rotordrop.elements.table import published
-from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.bearing_drop import BearingDrop, Origin, Peak
 from rotordrop.known import Known
 from rotordrop.report.content import Card, Column, KeyFigure, Statement, Table, table
-from rotordrop.report.quantity import Quantity, shown
+from rotordrop.report.quantity import Quantity, shown, with_interval
 from rotordrop.severity.numbers import LOADS
 
 MEANS = (
@@ -31,7 +31,7 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         "peak_force_N": bearing.peak_force.known,
         "peak_stress_Pa": bearing.peak_stress.known,
     }
-    times = {"peak_force_N": bearing.peak_force.time, "peak_stress_Pa": bearing.peak_stress.time}
+    peaks = {"peak_force_N": bearing.peak_force, "peak_stress_Pa": bearing.peak_stress}
     figures = []
     for load in LOADS:
         field, label = load.field, f"{load.label[0].upper()}{load.label[1:]}"
@@ -39,22 +39,30 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         if field not in known and not reason:
             continue
         value = Quantity.of(known.get(field), load.kind, range_only=not certain)
-        at = f"at {shown(times[field], 'time', 3)}" if field in times and certain else ""
+        at = moment_of(peaks[field]) if field in peaks and certain else ""
         note = "; ".join(filter(None, (at, reason)))
         figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
     source = f"by the {bearing.peak_force.origin.value}"
     return Card(f"{bearing.name} touchdown bearing, {source}", tuple(figures))
 
 
+def moment_of(peak: Peak) -> str:
+    """When a peak was, in words; nothing where it was estimated and its error is not known."""
+    if peak.origin is Origin.SIMULATION:
+        return f"at {shown(peak.time, 'time', 3)}"
+    if peak.time_interval_90 is None:
+        return ""
+    return f"at {with_interval(peak.time, 'time', peak.time_interval_90)}"
+
+
 def static_limit_statement(bearing: BearingDrop, *, certain: bool = True) -> Statement:
     """Set a peak stress beside the stress of the static load rating, as information."""
     peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
-    stress, (low, high) = peak.value, peak.ends
-    share = f"{100.0 * stress / STATIC_STRESS:.0f} %"
-    if not certain:
-        share = f"{100.0 * low / STATIC_STRESS:.0f} to {100.0 * high / STATIC_STRESS:.0f} %"
+    stress, high = peak.value, peak.ends[1]
+    share = " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in peak.ends))
+    between = f" ({peak.interval_text})" if peak.interval_text else ""
     text = (
-        f"{bearing.name}: the peak stress of {peak.text} is {share} of the "
+        f"{bearing.name}: the peak stress of {peak.text}{between} is {share} % of the "
         f"{shown(STATIC_STRESS, 'pressure')} at which ISO 76 defines the static load rating of ball "
         "bearings (information, not an acceptance limit)."
     )

@@ -11,10 +11,11 @@ import numpy as np
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
+from rotordrop.known import Known
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
 from rotordrop.report.estimate_numbers import static_limit_statement
 from rotordrop.report.estimate_page import estimate_verdict, names_in
-from rotordrop.report.quantity import Quantity, shown
+from rotordrop.report.quantity import NO_INTERVAL, Quantity, shown, with_interval
 from rotordrop.report.record_quality import unseen_in
 
 LONGEST_VERDICT, LONGEST = 270, 185
@@ -35,9 +36,10 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     # what hides a loss first, then what is a warning
     limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
     said = limits[: MOST_LIMITS if estimate.consistent else MOST_LIMITS - 1]
-    peaks = [Quantity.of(b.peak_stress.known, "pressure") for b in estimate.bearings]
-    stresses = [one.value if estimate.consistent else one.ends[1] for one in peaks]
-    shares = ", ".join(f"{100.0 * one / STATIC_STRESS:.0f}" for one in stresses)
+    shares = ", ".join(
+        " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in (peak.low, peak.high)))
+        for peak in (b.peak_stress.known for b in estimate.bearings)
+    )
     rated = f"peak stress {shares} % of the {shown(STATIC_STRESS, 'pressure')} of C0 (ISO 76)"
     assumed = ", ".join(dict.fromkeys((*estimate.assumed.values(), rated)))
     remedies = dict.fromkeys(_remedies(estimate))
@@ -74,54 +76,52 @@ def _loads(estimate: Estimate) -> Table:
     """Loads of every bearing, one line each."""
     certain = estimate.consistent
 
-    def number(known: object, kind: str) -> str:
+    def number(known: Known | None, kind: str) -> str:
+        if known is None or known.interval_90 is None:
+            return NO_INTERVAL
         one = Quantity.of(known, kind, range_only=not certain)
         return f"{one.text} ({one.interval_text})" if one.interval_text else one.text
 
-    def mean(b: BearingDrop) -> str:
-        known = b.values.get(MEAN)
-        return b.missing.get(MEAN, "–") if known is None else number(known, "force")
+    def load(b: BearingDrop, field: str, known: Known | None, kind: str = "force") -> str:
+        return b.missing.get(field) or number(known, kind)
 
     lines: dict[str, Callable[[BearingDrop], str]] = {
-        "peak bearing force": lambda b: number(b.peak_force.known, "force"),
-        "at (from power-off), towards": _moment,
-        "peak Hertz stress": lambda b: number(b.peak_stress.known, "pressure"),
-        "impacts (contacts)": _impacts,
-        "largest displacement": lambda b: _displacement(b, certain=certain),
-        "mean force, 150 to 200 ms": mean,
+        "peak bearing force": lambda b: load(b, "peak_force_N", b.peak_force.known),
+        "at (from power-off)": lambda b: with_interval(
+            b.peak_force.time, "time", b.peak_force.time_interval_90
+        ),
+        "peak Hertz stress": lambda b: load(b, "peak_stress_Pa", b.peak_stress.known, "pressure"),
+        "impacts": lambda b: (
+            b.missing.get("impacts") or with_interval(len(b.touched), "count", b.count_interval_90)
+        ),
+        "in contact from": lambda b: with_interval(b.contact_from, "time", b.contact_from_interval_90),
+        **({"largest displacement": lambda b: number(b.largest, "length")} if certain else {}),
+        "over the air gap": lambda b: _over_gap(b, certain=certain),
+        "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
     }
     what = "90 % intervals" if certain else "90 % ranges"
     columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
     for bearing in estimate.bearings:
         values = {name: of(bearing) for name, of in lines.items()}
         columns.append(Column(bearing.name, values.__getitem__))
-    return table(lines, columns)
+    known = [name for name, of in lines.items() if any(of(b) != NO_INTERVAL for b in estimate.bearings)]
+    return table(known, columns)
 
 
-def _impacts(b: BearingDrop) -> str:
-    """How many impacts and contacts, and from when on the rotor stayed in contact."""
-    lasts = "" if b.contact_from is None else f", in contact from {shown(b.contact_from, 'time', 3)}"
-    return b.missing.get("impacts", f"{len(b.touched)} ({len(b.impacts)}){lasts}")
+def _over_gap(b: BearingDrop, *, certain: bool) -> str:
+    """The largest distance from the centre over the air gap; as a range, if not certain.
 
-
-def _moment(b: BearingDrop) -> str:
-    """When the force is largest, and where the rotor presses then."""
-    when = shown(b.peak_force.time, "time", 4)
-    if b.force_vector is None:
-        return when
-    x, y = -b.force_vector[int(np.argmin(np.abs(b.force.time - b.peak_force.time)))]
-    return f"{when}, {math.degrees(math.atan2(y, x)):.0f}° (bottom −90°)"
-
-
-def _displacement(b: BearingDrop, *, certain: bool) -> str:
-    """The largest distance from the centre, over the air gap, too; that alone, as a range, if not certain.
-
-    A gain error is in displacement and gap alike, and not in their ratio.
+    A gain error is in displacement and gap alike, and not in their ratio: of an estimate that is not certain
+    the gap alone has an error that counts, of one that is they count as independent.
     """
-    farthest = float(np.nanmax(b.motions[-1].radial.values))
-    known = b.values.get("air_gap_m")
-    if known is not None and not certain:
-        return f"{farthest / known.high:.2f} to {farthest / max(known.low, 1e-9):.2f} × the air gap"
-    if known is None:
-        return shown(farthest, "length")
-    return f"{shown(farthest, 'length')}, {farthest / known.value:.2f} × the air gap"
+    gap = b.values.get("air_gap_m")
+    if gap is None or (certain and b.largest is None):
+        return NO_INTERVAL
+    if not certain or b.largest is None:
+        farthest = float(np.nanmax(b.motions[-1].radial.values))
+        return f"{farthest / gap.high:.2f} to {farthest / max(gap.low, 1e-9):.2f}"
+    ratio = b.largest.value / gap.value
+    doubt = ratio * math.hypot(
+        0.5 * (b.largest.high - b.largest.low) / b.largest.value, 0.5 * (gap.high - gap.low) / gap.value
+    )
+    return with_interval(ratio, "dimensionless", (ratio - doubt, ratio + doubt))

@@ -53,6 +53,8 @@ IN_OTHER_UNITS: dict[str, tuple[float, str]] = {
 ALL_OF_IT = 0.01
 """Part of a half width below which the record has none of it [1]."""
 PLACES_OF_SCIENCE = (-4, 7)
+NO_INTERVAL = "–"
+"""In place of an estimated number whose interval is not known."""
 FIXED_PLACES = {"count": 0, "probability": 1}
 THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
 _OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
@@ -214,6 +216,14 @@ def places_of(values: Iterable[float], kind: str, digits: int = 3) -> int:
 def shown(value: object, kind: str, digits: int = 4) -> str:
     """A value [SI] in words: number and unit."""
     return Quantity.of(value, kind, digits).text
+
+
+def with_interval(value: float | None, kind: str, interval_90: tuple[float, float] | None) -> str:
+    """An estimated value [SI] with its interval; one whose interval is not known is not shown."""
+    if value is None or interval_90 is None:
+        return NO_INTERVAL
+    one = Quantity(value=value, kind=kind, interval_90=interval_90)
+    return f"{one.text} ({one.interval_text})"
 
 
 def display_unit(kind: str, system: System = "SI") -> tuple[float, str]:

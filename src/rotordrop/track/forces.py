@@ -22,7 +22,7 @@ from rotordrop.simulate._rhs import (
 )
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
-from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.problem import WATCHED, DropProblem, private_copy
 from rotordrop.track.smoother import Smoothed, parameter_sample
 
 FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
@@ -118,6 +118,8 @@ class ForceHistory:
     friction_force: Array
     contact_power: Array
     """Indentation [m], normal and friction force [N], power lost in the contact [W], shape (N, B)."""
+    indentation_sigma: Array
+    """Standard deviation of the indentation [m], that of a bearing centre left out, shape (N, B)."""
     azimuth: Array
     """Direction of the contact normal from race to rotor [rad ccw from +x]; NaN in flight, shape (N, B)."""
     displacement: Array
@@ -160,6 +162,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         contact_force=contacts[..., 1],
         friction_force=contacts[..., 2],
         contact_power=contacts[..., 5],
+        indentation_sigma=_indentation_sigma(problem, smoothed),
         azimuth=np.where(touching, np.arctan2(contacts[..., 4], contacts[..., 3]), np.nan),
         displacement=displacement,
         displacement_sigma=displacement_sigma,
@@ -214,10 +217,27 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
 def _standard_deviations(smoothed: Smoothed, gradients: Array) -> Array:
     sigma = np.empty(gradients.shape[:3])
     for b in range(gradients.shape[1]):
-        block = smoothed.watched[:, 5 * b : 5 * b + 3, 5 * b : 5 * b + 3]
+        block = _block(smoothed, b)[:, :3, :3]
         g = gradients[:, b]
         sigma[:, b] = np.sqrt(np.maximum(np.einsum("nvi,nij,nvj->nv", g, block, g), 0.0))
     return sigma
+
+
+def _block(smoothed: Smoothed, b: int) -> Array:
+    """Covariance of the watched functions of one bearing, shape (N, `WATCHED`, `WATCHED`)."""
+    own = slice(WATCHED * b, WATCHED * (b + 1))
+    return smoothed.watched[:, own, own]
+
+
+def _indentation_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
+    """Standard deviation of the distance between rotor and race less the air gap [m], shape (N, B)."""
+    found = []
+    for b, name in enumerate(problem.model.bearing_names):
+        apart = smoothed.means @ problem.watched_rows(name)[5:7].T
+        along = np.column_stack([apart / np.hypot(*apart.T)[:, None], np.full(len(apart), -1.0)])
+        variance = np.einsum("ni,nij,nj->n", along, _block(smoothed, b)[:, 5:, 5:], along)
+        found.append(np.sqrt(np.maximum(variance, 0.0)))
+    return np.stack(found, axis=1)
 
 
 def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
@@ -231,7 +251,7 @@ def displacements_of(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, A
     """Displacement at the bearings and its standard deviation [m]."""
     values, sigma = [], []
     for b, name in enumerate(problem.model.bearing_names):
-        values.append(smoothed.means @ problem.watched_rows(name)[3:].T)
-        variance = np.diagonal(smoothed.watched, axis1=1, axis2=2)[:, 5 * b + 3 : 5 * b + 5]
+        values.append(smoothed.means @ problem.watched_rows(name)[3:5].T)
+        variance = np.diagonal(_block(smoothed, b), axis1=1, axis2=2)[:, 3:5]
         sigma.append(np.sqrt(np.maximum(variance, 0.0)))
     return np.stack(values, axis=1), np.stack(sigma, axis=1)

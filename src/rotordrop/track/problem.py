@@ -39,6 +39,8 @@ NOISE_FLOOR = 0.1e-6
 USUAL_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
 """How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
+WATCHED = 8
+"""Functions that are watched of a bearing, see `DropProblem.watched_rows`."""
 SMOOTHED_FRICTION_SPEED = 0.15
 """Sliding speed [m/s] below which the filter smooths friction: the spin of a race is not known better, so the
 mean of the friction law over what is possible is what a linearisation may use."""
@@ -173,14 +175,15 @@ class DropProblem:
         return estimate[first : first + n_c], estimate[first + n_c : first + 2 * n_c]
 
     def watched_rows(self, name: str) -> Array:
-        """Linear functions of the estimate that forces and orbit at a bearing depend on, shape (5, n).
+        """Linear functions of the estimate that forces, orbit and contacts at a bearing depend on.
 
         Deflection of race against support in x and y [m], axial offset of the ball rows [m], displacement of
-        the rotor in x and y [m].
+        the rotor in x and y [m], that against the race, or the support where there is none [m], and the air
+        gap [m], shape (`WATCHED`, n).
         """
         layout = self.model.layout
         b = self.model.bearing_names.index(name)
-        rows = np.zeros((5, len(self.mean)))
+        rows = np.zeros((WATCHED, len(self.mean)))
         for axis in range(2):
             rows[axis, layout.race.start + 2 * b + axis] = 1.0
             rows[axis, layout.support.start + 2 * b + axis] = -1.0
@@ -189,11 +192,16 @@ class DropProblem:
             rows[2, ring] = -1.0
         rows[3, layout.modal_x] = self.model.parameters.bearing_shape[b]
         rows[4, layout.modal_y] = self.model.parameters.bearing_shape[b]
+        race, support = layout.bearing_at()[b, [L.RACE, L.SUPPORT]]
+        met = race if race >= 0 else support
+        rows[5:7] = rows[3:5]
+        rows[[5, 6], [met, met + 1]] = -1.0
+        rows[7, self.entries_that_set("bearing", b, L.AIR_GAP)] = 1.0
         return rows
 
     @property
     def watched(self) -> Array:
-        """The watched functions of all bearings, shape (5 B, n)."""
+        """The watched functions of all bearings, shape (`WATCHED` B, n)."""
         return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
 
 

@@ -273,6 +273,7 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
 
 def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
     measured = _measured(drop, judged, drop.problem.readings)
+    low, high = drop.evidence.power_off.interval_90
     found = []
     for b in range(len(drop.problem.model.bearing_names)):
         values: dict[str, Known] = bearing_values(
@@ -289,6 +290,7 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
                 values,
                 judged.widening,
                 held,
+                0.5 * (high - low),
             )
         )
     return tuple(found)

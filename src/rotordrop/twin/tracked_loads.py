@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +25,12 @@ from rotordrop.estimate.bearing_drop import (
     Peak,
     deepest,
     mean_late,
+    when_largest,
 )
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.known import NINETY, Known, Status
+from rotordrop.record.impacts import after_flights, lasting_from
+from rotordrop.series import runs_of
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
@@ -399,8 +403,12 @@ def bearing_drop(
     values: Mapping[str, Known],
     widening: float,
     cross_check: InputEstimate | None,
+    doubt: float,
 ) -> BearingDrop:
-    """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m]."""
+    """Everything about one bearing; ``measured`` (N, 2) is the motion that its sensors show [m].
+
+    ``doubt`` is half the 90 % interval of power-off [s], from which times count.
+    """
     name = problem.model.bearing_names[b]
     gap = values[AIR_GAP.field]
     low, high = gap.interval_90 or (gap.value, gap.value)
@@ -410,9 +418,18 @@ def bearing_drop(
     shown = Motion(
         label="measured", time=forces.time, displacement=measured[: len(forces.time)], role="measured"
     )
+    peak_force, peak_stress = (
+        replace(peak, time_interval_90=when_largest(history, band, doubt))
+        for peak, history, band in (
+            (loads.peak_force, loads.force, loads.force_band),
+            (loads.peak_stress, loads.stress, loads.stress_band),
+        )
+    )
     impacts: tuple[Impact, ...] = ()
+    seen: dict[str, Any] = {}
     if loads.peak_force.origin is Origin.TWIN:
         impacts = twin_impacts(forces, b, widening, cross_check)
+        seen = race_moved(forces, b, gap, widening, doubt)
     first = impacts[0] if impacts else None
     ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))
     return BearingDrop(
@@ -425,25 +442,52 @@ def bearing_drop(
         stress=loads.stress,
         stress_band=loads.stress_band,
         preload_stress=float(loads.stress.values[0]),
-        peak_force=loads.peak_force,
-        peak_stress=loads.peak_stress,
+        peak_force=peak_force,
+        peak_stress=peak_stress,
         values={**values, **loads.means},
         missing=loads.missing,
         impacts=impacts,
         impact_force="bearing force",
         first_contact=None if first is None else deepest(estimated, first.start, ends, gap.value),
+        **seen,
     )
+
+
+def race_moved(forces: ForceHistory, b: int, gap: Known, widening: float, doubt: float) -> dict[str, Any]:
+    """Intervals of the largest displacement, of how many impacts there are, and of when the last one began.
+
+    Impacts are counted with the race as found, and nearer and farther by the 90 % error of the indentation;
+    contacts of a nearer race may begin and end a sample outside those that the samples show.
+    """
+    place = forces.displacement[:, b]
+    radius = np.hypot(*place.T)
+    at = int(np.argmax(radius))
+    sigma = float(np.hypot(*(place[at] / radius[at] * forces.displacement_sigma[at, b])))
+    half, step = NINETY * widening * forces.indentation_sigma[:, b], float(forces.time[1] - forces.time[0])
+    begun = []
+    for moved, outside in ((0.0, 0.0), (half, step), (-half, 0.0)):
+        first, samples = runs_of(forces.indentation[:, b] + moved > 0.0)
+        starts, ends = forces.time[first] - outside, forces.time[first + samples - 1] + outside
+        begun.append(starts[after_flights(starts, ends, gap.value)])
+    counts = [len(one) for one in begun]
+    lasts = [one[-1] for one in begun if len(one)]
+    seen = {
+        "count_interval_90": (min(counts), max(counts)),
+        "largest": with_interval(float(radius[at]), sigma, widening, "m"),
+    }
+    if len(begun[0]) and lasting_from(begun[0], float(forces.time[-1])) is not None:
+        early, late = (math.hypot(end - lasts[0], doubt, step) for end in (min(lasts), max(lasts)))
+        seen["contact_from_interval_90"] = (lasts[0] - early, lasts[0] + late)
+    return seen
 
 
 def twin_impacts(
     forces: ForceHistory, b: int, widening: float, cross_check: InputEstimate | None
 ) -> tuple[Impact, ...]:
     """Every impact at a bearing in the order of their beginning; intervals hold a given cross-check."""
-    touching = forces.indentation[:, b] > 0.0
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], touching.astype(int), [0]])))
     found = []
-    for first, last in zip(edges[0::2], edges[1::2], strict=True):
-        impact = _impact(forces, b, int(first), int(last), widening)
+    for first, samples in zip(*runs_of(forces.indentation[:, b] > 0.0), strict=True):
+        impact = _impact(forces, b, int(first), int(first + samples), widening)
         found.append(impact if cross_check is None else _impact_holding(impact, cross_check, b))
     return tuple(found)
 

@@ -220,7 +220,8 @@ def _label(estimate: Estimate, column: str) -> str:
 def _events(estimate: Estimate) -> list[dict[str, Any]]:
     """What happened when, times [s] from power-off: the estimate knows better than the first look.
 
-    A first touch has the interval of power-off and its own, by its timing or by the steps of the force.
+    A first touch has the interval of power-off and its own, by its timing or by the steps of the force. What
+    has no interval is left out.
     """
     events = [(0.0, "power-off")]
     timed = [contact.timing_error for contact in estimate.replay.contacts] if estimate.replay else []
@@ -232,10 +233,18 @@ def _events(estimate: Estimate) -> list[dict[str, Any]]:
             low, high = estimate.drop_instant.interval_90
             half = math.hypot(0.5 * (high - low), NINETY * own)
             events.append((first, f"first touch at {bearing.name} (± {1e3 * half:.2g} ms)"))
-        if bearing.contact_from is not None:
-            events.append((bearing.contact_from, f"last impact at {bearing.name}, in contact from here on"))
         peak = bearing.peak_force
-        events.append((peak.time, f"largest force at {bearing.name}"))
+        for time, between, words in (
+            (
+                bearing.contact_from,
+                bearing.contact_from_interval_90,
+                f"last impact at {bearing.name}, in contact from here on",
+            ),
+            (peak.time, peak.time_interval_90, f"largest force at {bearing.name}"),
+        ):
+            if time is not None and between is not None:
+                early, late = (1e3 * abs(end - time) for end in between)
+                events.append((time, f"{words} (−{early:.2g}, +{late:.2g} ms)"))
     return [{"time": time, "words": words} for time, words in sorted(events) if math.isfinite(time)]
 
 

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from rotordrop.estimate.bearing_drop import AirGap, BearingDrop, History, Impact, Motion, Origin, highest
+from rotordrop.estimate.bearing_drop import (
+    AirGap,
+    Band,
+    BearingDrop,
+    History,
+    Impact,
+    Motion,
+    Origin,
+    highest,
+    published_bearing,
+    when_largest,
+)
 from rotordrop.known import Known
 from rotordrop.record.impacts import shortest_flight
 from rotordrop.units import GRAVITY
@@ -71,3 +84,32 @@ def test_an_impact_ends_a_flight_between_contacts() -> None:
 
 def test_without_contacts_no_impact_is_told() -> None:
     assert fallen().touched.tolist() == [] and fallen().contact_from is None
+
+
+def test_a_peak_may_be_wherever_the_force_may_be_largest() -> None:
+    """Two impacts of 100 and 96 N: errors of 5 N leave open which was larger, of 1 N do not."""
+    time = np.arange(0.0, 0.05, 1e-4)
+    values = sum(size * np.exp(-(((time - at) / 1e-3) ** 2)) for size, at in ((100.0, 0.01), (96.0, 0.03)))
+    force = History(label="estimated", time=time, values=values)
+
+    def within(error: float, doubt: float = 0.0) -> tuple[float, float]:
+        return when_largest(force, Band(time=time, lower=values - error, upper=values + error), doubt)
+
+    low, high = within(5.0)
+    assert 0.009 < low < 0.01 and 0.03 <= high < 0.031
+    low, high = within(1.0)
+    # a share of √2 % below the top lies √(√2 %) widths beside it
+    assert (low, high) == pytest.approx((0.01 - 0.119e-3, 0.01 + 0.119e-3), abs=0.5e-4)
+    assert within(1.0, 1e-3) == pytest.approx((0.009, 0.011), abs=0.02e-3)
+
+
+def test_times_and_counts_are_published_with_their_intervals() -> None:
+    drop = fallen((BEGUN[0], BEGUN[0] + CONTACT))
+    plain = published_bearing(drop).model_dump(exclude_none=True)
+    assert not {"impacts_interval_90", "contact_from_interval_90_s"} & plain.keys()
+    peak = replace(drop.peak_force, time_interval_90=(0.01, 0.02))
+    known = replace(drop, peak_force=peak, count_interval_90=(1, 3), contact_from_interval_90=(0.007, 0.03))
+    told = published_bearing(known).model_dump(exclude_none=True)
+    assert told["peak_force_N"]["time_interval_90_s"] == [0.01, 0.02]
+    assert told["impacts_interval_90"] == [1, 3]
+    assert told["contact_from_interval_90_s"] == [0.007, 0.03]

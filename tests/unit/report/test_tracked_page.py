@@ -44,7 +44,11 @@ def test_card_document_figure_and_table_agree_on_every_peak(estimate: Estimate) 
             assert figure.value.value == entry["value"] == peak.value
             assert figure.value.interval_90 == tuple(entry["interval_90"]) == peak.interval_90
             assert entry["time_s"] == peak.time
-            assert figure.note == f"at {1e3 * peak.time:.2f} ms"
+            assert peak.time_interval_90 is not None
+            early, late = peak.time_interval_90
+            assert entry["time_interval_90_s"] == [early, late]
+            assert early < peak.time < late
+            assert re.fullmatch(r"at \d+\.\d+ ms \(\d+\.\d+ to \d+\.\d+ ms\)", figure.note)
         cell = statistics["maximum"][k]
         assert isinstance(cell, Quantity) and cell.value == bearing.peak_stress.value
         mark = next(one for one in loads.layout.annotations if one.xref == f"x{2 * k + 2}")

@@ -12,7 +12,7 @@ from rotordrop.track import _propagation as P
 from rotordrop.track import smoother
 from rotordrop.track._covariance import is_covariance, pack, unpack
 from rotordrop.track.calibration import one_pass
-from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.problem import WATCHED, DropProblem, private_copy
 from rotordrop.track.smoother import (
     PassSettings,
     Smoothed,
@@ -283,7 +283,7 @@ def test_a_covariance_that_was_not_kept_is_refused(filtered):
         smooth(filtered).covariance(7)
 
 
-def test_the_watched_rows_are_deflection_offset_and_displacement(flight):
+def test_the_watched_rows_are_deflection_offset_displacement_and_what_parts_rotor_and_race(flight):
     name = flight.model.bearing_names[1]
     rows, layout = flight.watched_rows(name), flight.model.layout
     estimate = np.zeros(len(flight.mean))
@@ -291,10 +291,15 @@ def test_the_watched_rows_are_deflection_offset_and_displacement(flight):
     estimate[layout.race.start + 3], estimate[layout.support.start + 3] = -4e-6, 1e-6
     estimate[layout.modal_y] = 1e-5
     shape = flight.model.parameters.bearing_shape[1]
-    np.testing.assert_allclose(rows @ estimate, [3e-6, -5e-6, 0.0, 0.0, 1e-5 * shape.sum()], atol=1e-18)
+    gap = [u.path for u in flight.unknowns].index(f"{name}.air_gap")
+    estimate[flight.n_dynamic + gap] = 7e-6
+    moved = 1e-5 * shape.sum()
+    np.testing.assert_allclose(
+        rows @ estimate, [3e-6, -5e-6, 0.0, 0.0, moved, -5e-6, moved + 4e-6, 7e-6], atol=1e-18
+    )
     offset = [u.path for u in flight.unknowns].index(f"{name}.preload")
     assert rows[2, flight.n_dynamic + offset] == 1.0
-    np.testing.assert_array_equal(flight.watched[5:], rows)
+    np.testing.assert_array_equal(flight.watched[WATCHED:], rows)
 
 
 def test_missing_readings_are_left_out(flight):

@@ -14,7 +14,7 @@ from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.track.consistency import CORRELATION_LIMIT, innovation_checks, nuisance_check
 from rotordrop.track.forces import displacements_of
-from rotordrop.track.problem import first_level
+from rotordrop.track.problem import WATCHED, first_level
 from rotordrop.track.smoother import Forward
 
 
@@ -32,9 +32,9 @@ def test_the_first_level_of_a_channel_is_the_mean_of_what_it_read() -> None:
 
 def test_a_displacement_is_as_uncertain_as_its_covariance_says() -> None:
     dice = np.random.default_rng(2)
-    roots = dice.normal(size=(6, 10, 10))
+    roots = dice.normal(size=(6, 2 * WATCHED, 2 * WATCHED))
     watched = roots @ roots.transpose(0, 2, 1)
-    rows = {name: dice.normal(size=(5, 4)) for name in ("NDE", "DE")}
+    rows = {name: dice.normal(size=(WATCHED, 4)) for name in ("NDE", "DE")}
     problem: Any = SimpleNamespace(
         model=SimpleNamespace(bearing_names=("NDE", "DE")), watched_rows=lambda name: rows[name]
     )
@@ -43,7 +43,8 @@ def test_a_displacement_is_as_uncertain_as_its_covariance_says() -> None:
     for b, name in enumerate(rows):
         for axis in range(2):
             assert values[:, b, axis] == pytest.approx(smoothed.means @ rows[name][3 + axis])
-            assert sigma[:, b, axis] ** 2 == pytest.approx(watched[:, 5 * b + 3 + axis, 5 * b + 3 + axis])
+            place = WATCHED * b + 3 + axis
+            assert sigma[:, b, axis] ** 2 == pytest.approx(watched[:, place, place])
     smoothed.watched = -watched
     assert np.all(displacements_of(problem, smoothed)[1] == 0.0)  # below zero by rounding only
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
 from rotordrop.known import NINETY, Known
+from rotordrop.record.impacts import shortest_flight
+from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.twin.tracked_loads import (
     loads_of_cross_check,
+    race_moved,
     widened_to,
     widened_to_cross_check,
     with_interval,
@@ -71,3 +76,39 @@ def test_a_preload_far_from_its_prior_widens_the_mean_stress() -> None:
     value = own.means["mean_stress_Pa"].value
     assert stress.low == pytest.approx(0.9 * (42.0 / 679.0) ** (1 / 3) * value)
     assert stress.high >= 1.1 * (1046.0 / 679.0) ** (1 / 3) * value * (1.0 - 1e-9)
+
+
+def test_an_impact_is_sure_whose_flight_is_one_with_the_race_nearer_and_farther() -> None:
+    """Two contacts with a flight as long as the shortest that ends in an impact, and one much longer."""
+    gap, step, error = Known(value=300e-6, unit="m"), 5e-5, 0.5e-6
+    time = np.arange(0.0, 0.1, step)
+    flight = shortest_flight(gap.value)
+    touching = np.zeros(len(time), dtype=bool)
+    begins = (0.008, 0.009 + flight, 0.010 + 3.0 * flight)
+    for begin in begins:
+        touching |= (time >= begin) & (time < begin + 1e-3)
+    off = np.minimum.reduce([np.abs(time - at) for begin in begins for at in (begin, begin + 1e-3)])
+    blank = {one.name: np.zeros((len(time), 1)) for one in fields(ForceHistory)}
+    place = np.zeros((len(time), 1, 2))
+    place[:, 0, 1] = -np.linspace(0.0, 310e-6, len(time))
+    forces = ForceHistory(
+        **{
+            **blank,
+            "time": time,
+            "displacement": place,
+            "displacement_sigma": np.full_like(place, 2e-6),
+            # the rotor nears the race and leaves it by 10 mm/s
+            "indentation": (np.where(touching, 1.0, -1.0) * 0.01 * (off + 0.3 * step))[:, None],
+            "indentation_sigma": np.full((len(time), 1), error),
+        }
+    )
+    seen = race_moved(forces, 0, gap, 1.0, 0.0)
+    assert seen["count_interval_90"] == (2, 3)
+    low, high = seen["contact_from_interval_90"]
+    moved = NINETY * error / 0.01 + step
+    assert begins[2] - moved - step < low < begins[2] < high <= begins[2] + moved + step
+    assert seen["largest"].value == pytest.approx(310e-6)
+    assert seen["largest"].high == pytest.approx(310e-6 + NINETY * 2e-6)
+    sharp = replace(forces, indentation_sigma=np.zeros((len(time), 1)))
+    assert race_moved(sharp, 0, gap, 1.0, 0.0)["count_interval_90"] in ((2, 3), (2, 2))
+    assert race_moved(forces, 0, gap, 20.0, 0.0)["count_interval_90"][1] >= 3
