@@ -155,9 +155,9 @@ def section(estimate: Estimate, heading: str) -> Section:
 def test_headline_intervals_and_why_there_is_none(drop: Estimate) -> None:
     force, stress = estimate_page(drop).cards[0].figures[:2]
     assert force.value.interval_90 == (3000.0, 3700.0)
-    assert "at 9.00 ms" in force.note
+    assert " ms" not in force.note  # of a time that a replay finds no error is known
     assert stress.value.interval_90 is None
-    assert stress.note == "at 9.00 ms; no interval: 2 draws, at least 64 are needed"
+    assert stress.note == "no interval: 2 draws, at least 64 are needed"
 
 
 def test_the_route_warnings_and_horizon_are_named(drop: Estimate) -> None:
