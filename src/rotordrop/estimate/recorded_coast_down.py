@@ -12,11 +12,13 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Missing, known, read_evidence
+from rotordrop.evidence.paths import Motion, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.record.axes import along_sensors
+from rotordrop.record.impacts import Settling
 from rotordrop.record.record import Record
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
@@ -98,6 +100,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         air_gap=dict(zip(names, map(float, gaps), strict=True)),
         air_gap_error=None if sigmas is None else dict(zip(names, map(float, sigmas), strict=True)),
         centre=centre,
+        settling=_settlings(evidence.motion, off),
         sampling_rate=record.sampling_rate,
         start_time=float(record.time[first]) - off,
         profile=None if time is None or speed is None else fit_speed_profile(time, speed, power_off=0.0),
@@ -105,6 +108,16 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         speed=speed,
         recorded=True,
     )
+
+
+def _settlings(motion: Motion | Missing, off: float) -> dict[str, Settling]:
+    """Impacts of the fall after power-off [s] by plane, as a look at the record finds them."""
+    falls = () if isinstance(motion, Missing) else drops_of(motion)
+    if isinstance(motion, Missing) or not falls:
+        return {}
+    fall = with_impacts(motion, min(falls, key=lambda one: abs(one.release - off)))
+    pairs = zip(motion.paths, fall.settlings, strict=True)
+    return {path.name: settling.after(off) for path, settling in pairs}
 
 
 def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -292,6 +292,16 @@ class Settling:
             count_interval_90=(len(surely), len(perhaps)),
             contact_from=last,
             contact_from_interval_90=between,
+        )
+
+    def after(self, start: float) -> Settling:
+        """The same, in time from a start [s]."""
+        last, between = self.contact_from, self.contact_from_interval_90
+        return replace(
+            self,
+            touched=self.touched - start,
+            contact_from=None if last is None else last - start,
+            contact_from_interval_90=None if between is None else (between[0] - start, between[1] - start),
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -94,6 +94,8 @@ class CoastDownSignal:
     """Where the displacements count from, in words."""
     standstill: float | None = None
     """When the rotor stopped [s], where that is known and need not be found, as in a simulation."""
+    settling: Mapping[str, Settling] = field(default_factory=dict)
+    """Impacts in the planes in which a look at the record has found them; sought in the others."""
     force_and_stress: tuple[Mapping[str, Any], ...] = ()
     """When indentation, force and stress were largest, one entry per bearing and quantity, as a simulation
     knows it; empty for a recording, which shows displacement only."""
@@ -195,7 +197,9 @@ def analyse_coast_down(
             for name, plane in signal.planes.items()
         }
     settled = {
-        name: find_settling(
+        name: signal.settling[name]
+        if name in signal.settling
+        else find_settling(
             moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
         )
         for name, moved in signal.planes.items()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+from rotordrop.evidence.look import look
 from rotordrop.machine import example_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
@@ -100,6 +101,19 @@ def test_a_swing_along_the_race_is_no_bounce(machine, record):
         words = settling_words(settled, moved, signal.sampling_rate)
         told = float(re.search(r"at (\d+) µm from the centre in the end", words)[1])
         assert 1e-6 * told == pytest.approx(signal.air_gap[name] + 4e-6, abs=3.5e-6)
+
+
+def test_impacts_are_those_of_a_look_at_the_record(machine, record):
+    """One circle, one rule: counts, times and their intervals are the same, from power-off on."""
+    signal, looked = recorded_coast_down(machine, record), look(record, machine=machine)
+    off = looked.planes[0].settling.touched[0] - signal.settling["NDE"].touched[0]
+    for plane in looked.planes:
+        found = signal.settling[plane.plane]
+        assert found.touched + off == pytest.approx(plane.settling.touched, abs=1e-9)
+        assert found.count_interval_90 == plane.settling.count_interval_90
+        assert found.contact_from + off == pytest.approx(plane.settling.contact_from, abs=1e-9)
+        begun = plane.settling.contact_from_interval_90
+        assert np.add(found.contact_from_interval_90, off) == pytest.approx(begun, abs=1e-9)
 
 
 def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record):
