@@ -452,7 +452,7 @@ def answer_in(card: RestartCard, one: Flip) -> str:
     """The answer of a flip in words, which names no speed limit that was sought and not found."""
     limit = card.foreseen.speed_limit
     sought = limit is not None and limit.speed is None and one.answer == "restart with limits"
-    return f"{one.answer}, other ones than of speed" if sought else one.answer
+    return f"{one.answer} (no speed limit was found)" if sought else one.answer
 
 
 def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:

@@ -727,7 +727,7 @@ def test_no_check_is_asked_for_where_none_pays_and_no_speed_limit_offered_where_
     free = restart_card(drop(), assumptions_of({"machine_cost": 1e-3, "most_doubt": 1.0}, "mine"))
     assert free.best_check is None and free.prior_alone and "Make one" not in free.statements[0]
     flip = Flip(of="a day of standstill", factor=2.0, answer="restart with limits")
-    assert answer_in(card, flip) == "restart with limits, other ones than of speed"
+    assert answer_in(card, flip) == "restart with limits (no speed limit was found)"
     assert answer_in(free, flip) == "restart with limits"
 
 
