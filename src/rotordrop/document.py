@@ -154,7 +154,8 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
     except OSError as fault:
         raise UsageError(f"{path} cannot be read ({fault.strerror}). {way_out}") from fault
     except (ValueError, RecursionError) as fault:
-        raise UsageError(f"{path} is not JSON ({fault}). {way_out}") from fault
+        why = "it is no UTF-8 text" if isinstance(fault, UnicodeDecodeError) else str(fault)
+        raise UsageError(f"{path} is not JSON ({why}). {way_out}") from fault
     if not isinstance(content, dict):
         raise UsageError(f"{path} holds a {type(content).__name__}; expected an object. {way_out}")
     if DIGEST not in content:

@@ -65,6 +65,9 @@ def look(
     """
     if len(files) > 2:
         raise UsageError(f"look takes one record and its machine file, and {len(files)} files are given")
+    if len(files) == 2 and all(file.suffix.lower() not in ("", ".toml") for file in files):
+        told = " and ".join(str(file) for file in files)
+        raise UsageError(f"look takes one record and its machine file (.toml), and {told} are two records")
     machine, record = (None, files[0]) if len(files) == 1 else options.machine_first(*files)
     if split is not None and machine is None:
         raise UsageError(

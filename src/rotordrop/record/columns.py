@@ -97,7 +97,8 @@ def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequenc
             stand = (f"{c.label} {math.degrees(at):.4g} deg" for c, at in zip(pair, angles, strict=True))
             if any(sensor.name in missing for sensor in found):
                 options.append(f'--map "{plane}: {", ".join(stand)}"')
-        return f"likeliest {' '.join(options)}"
+        stand = "X a quarter turn before Y; without angles they are the sensors in their order"
+        return f"likeliest {' '.join(options)} ({stand})"
     return " ".join(f'--map "{name}=..."' for name in missing[:8])
 
 

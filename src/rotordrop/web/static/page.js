@@ -12,7 +12,7 @@ import { drawAll, FIGURES, isShown, lines, loadView, traces } from "./panels.js"
 import { rotorTab } from "./rotor.js";
 import * as server from "./server.js";
 import { by, events, files, homeView, impacts, origin, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
-import { cards, facts, findings, impactTable, make, sentence, table, timeline } from "./tables.js";
+import { cards, facts, findings, impactTable, levelOf, make, sentence, table, timeline } from "./tables.js";
 import { cutFiles, drawFall, fallFiles, fallSeen, fallWanted, openFall } from "./waterfall.js";
 import * as units from "./units.js";
 
@@ -34,7 +34,7 @@ function goImpact(index) {
 const TABS = {
   Impacts: () => {
     const source = state.estimate && state.estimate.impacts.length ? state.estimate : state.look, list = impacts();
-    return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact)] : [make("p", { text: "No impacts." })]),
+    return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact), ...levelOf(list.map((one) => one.numbers))] : [make("p", { text: "No impacts." })]),
       ...(source === state.estimate ? [make("p", { class: "small", text: "By the estimated contacts, in place of the count of the first look, which has the displacement alone. The report lists every contact." })] : []),
       make("span", { class: "files", of: [make("button", { text: "as Python", on: { click: () => showLines(lines(source === state.look ? "look" : "estimate", "impacts")) } })] })];
   },

@@ -21,6 +21,9 @@ const number = (cell) => {
   const [text, interval] = cell[chosen()].map((one) => one && one.replace(/(\d) (?=[^\d\s(]+( \(|$))/g, "$1\u00a0"));
   return [make("span", { class: "value", text }), ...(interval ? [make("span", { class: "interval", text: interval })] : [])];
 };
+const LEVEL = "Small beside a value: its 90 % interval.";
+export const levelOf = (rows) => (rows.some((row) => row.some((cell) => typeof cell !== "string" && cell[chosen()][1])) ? [make("p", { class: "small", text: LEVEL })] : []);
+
 const cellOf = (cell, first) => (typeof cell === "string"
   ? make(first ? "th" : "td", first ? { scope: "row", text: cell } : { text: cell })
   : make("td", { class: "number", of: number(cell) }));
@@ -31,7 +34,7 @@ export function table({ caption, note, columns, rows }) {
   const head = make("tr", { of: columns.map((column, i) => make("th", { scope: "col", text: headOf(column), class: rows[0] && typeof rows[0][i] !== "string" ? "number" : null })) });
   const body = rows.map((row) => make("tr", { of: row.map((cell, i) => cellOf(cell, i === 0)) }));
   const parts = [...(caption ? [make("caption", { text: caption })] : []), make("thead", { of: [head] }), make("tbody", { of: body })];
-  return make("div", { class: "table", of: [make("table", { of: parts }), ...(note ? [make("p", { class: "small", text: note })] : [])] });
+  return make("div", { class: "table", of: [make("table", { of: parts }), ...levelOf(rows), ...(note ? [make("p", { class: "small", text: note })] : [])] });
 }
 
 export function cards(list) {
