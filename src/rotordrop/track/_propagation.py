@@ -328,28 +328,6 @@ def jacobian_product(
 ) -> None:
     """Product of the whole Jacobian, listed part and contacts, with a full matrix."""
     sparse_product(entries, columns, starts, V, out)
-    add_contact_products(touching, g, p, V, moved, out)
-
-
-@lean_kernel
-def times_identity(
-    J: Array, touching: Integers, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array
-) -> None:
-    """The product of `jacobian_product` where ``V`` (s, columns) is the identity and zeros behind it."""
-    s = J.shape[0]
-    for i in range(s):
-        for j in range(s):
-            out[i, j] = J[i, j]
-        for j in range(s, out.shape[1]):
-            out[i, j] = 0.0
-    add_contact_products(touching, g, p, V, moved, out)
-
-
-@lean_kernel
-def add_contact_products(
-    touching: Integers, g: Array, p: KernelParameters, V: Array, moved: Array, out: Array
-) -> None:
-    """Add the products of all contacts that touch; arguments as of `add_contact_product`."""
     for c in range(touching.shape[0]):
         if touching[c] != 0:
             add_contact_product(c, g[c], p, V, moved, out)
@@ -435,10 +413,7 @@ def propagate(
             contact_at(now + 0.5 * h, c, middle, p, contact)
             impulses[p.contact_at[c, L.CONTACT_BEARING]] += h * contact[1]
         # F <- exp(hJ) F + what the parameters add, to third order at least: at second light modes would grow
-        if stretch > 0:
-            jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
-        else:
-            times_identity(J, touching, g, p, F, moved, first)
+        jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
         for i in range(s):
             for j in range(columns - s):
                 first[i, s + j] += B[i, j]
