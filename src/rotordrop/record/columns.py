@@ -94,9 +94,9 @@ def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequenc
             leads = math.sin(angles[1] - angles[0]) > 0.0
             if leads != (axes != "LR") and axes in ("XY", "HV", "LR"):
                 angles.reverse()
-            stand = (f"{c.label} {math.degrees(at):.4g} deg" for c, at in zip(pair, angles, strict=True))
+            placed = (f"{c.label} {math.degrees(at):.4g} deg" for c, at in zip(pair, angles, strict=True))
             if any(sensor.name in missing for sensor in found):
-                options.append(f'--map "{plane}: {", ".join(stand)}"')
+                options.append(f'--map "{plane}: {", ".join(placed)}"')
         stand = "X a quarter turn before Y; without angles they are the sensors in their order"
         return f"likeliest {' '.join(options)} ({stand})"
     return " ".join(f'--map "{name}=..."' for name in missing[:8])
