@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from rotordrop.elements.load import Load
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.errors import SimulationError
+from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
 from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force
@@ -31,6 +32,7 @@ from rotordrop_bench.violations import BallsViolation
 SPEED = 2.0 * np.pi * 120.0
 LEVITATED = LevitatedStart(rotor_angle=1.0, remanent_force=np.array([[2.0, 30.0], [-3.0, 20.0]]))
 FOUNDATION = {"mass": "400 kg", "frequency": "85 Hz", "frequency_horizontal": "70 Hz"}
+THRUST = {"thrust": "400 N", "gap": "20 um", "arm": "40 mm"}
 AXES = {"axes_angle": "30 deg", "stiffness_ratio": 0.65, "damping_ratio": 0.8}
 
 
@@ -136,7 +138,7 @@ PRESENT = {
     "stop": {"support": {"stop_gap": "8 um", "stop_stiffness": "5e8 N/m", "stop_damping": 0.2}},
     "ribbon": {"support": {"ribbon_stiffness": "6e7 N/m", "ribbon_slip": "300 N"}},
     "held preload": {"balls": {"held_preload": True}},
-    "thrust": {"balls": {"thrust": "400 N"}},
+    "thrust": {"bearing": {"DE": {"face": THRUST}}},
     "seat play": {"balls": {"seat_play": "5 um"}},
 }
 
@@ -202,12 +204,119 @@ def test_tables_of_balls_have_the_force_of_the_drop_model_in_its_limit(known):
     assert thrust_pair(constants, 0.0, 1000.0)[1] > 1.5 * least
 
 
+@pytest.mark.parametrize("thrust", [100.0, 1500.0])
+def test_a_ring_of_balls_under_a_thrust_has_the_forces_of_the_pair_at_rest(known, thrust):
+    """The kernel's sum where the axial forces balance; its energy rises by its forces."""
+    bearing = known.touchdown_bearings[1]
+    row = departures_of(known, violations(bearing={"DE": {"face": THRUST | {"thrust": f"{thrust} N"}}}))[1]
+    for way in (0.0, 15e-6):
+        force, load, along = thrust_pair(numbers_of(bearing).constants, way, thrust)
+        across, lengthwise, _energy = D.ring_of_balls(row, way, along)
+        assert (across, lengthwise) == pytest.approx((force, thrust), rel=1e-9, abs=1e-6)
+        assert D.hardest_ball(row, way, along) == pytest.approx(load, rel=2e-3)
+        step = 1e-9
+        for x, z, slope in ((step, 0.0, across), (0.0, step, lengthwise)):
+            up, down = (D.ring_of_balls(row, way + s * x, along + s * z)[2] for s in (1.0, -1.0))
+            assert (up - down) / (2.0 * step) == pytest.approx(slope, rel=1e-5, abs=1e-3)
+
+
+def axial(model, result):
+    """Force of the face [N], axial way of race and rotor [m] at DE."""
+    row, first = model.parameters.departure[1], model.parameters.bearing_at[1, L.DEPARTURE]
+    states = result.state[:, first : first + D.N_STATES]
+    push = np.array([D.landed(row, own, 0.0, 0.0, 1.0)[0] for own in states])
+    return push, states[:, D.AXIAL + 1], states[:, D.AXIAL]
+
+
+def test_a_rotor_let_go_lands_as_a_mass_that_falls_on_a_spring(model):
+    """A face so soft that it alone gives way: F = W (1 + √(1 + 2 k h / W)), without loss."""
+    W, h, k = 400.0, 200e-6, 1e6
+    soft = THRUST | {"gap": f"{h} m", "stiffness": f"{k} N/m", "damping": 0.0}
+    landing = departed(model, bearing={"DE": {"face": soft}})
+    found = simulate_drop(landing, DropCase(speed=SPEED, duration=0.05))
+    push, race, rotor = axial(landing, found)
+    mass = model.machine.rotor.mass
+    assert found.time[push > 0.0][0] == pytest.approx(math.sqrt(2.0 * h * mass / W), abs=2e-4)
+    yields = 1.0 / k + np.max(race) / np.max(push)
+    assert np.max(push) == pytest.approx(W * (1.0 + math.sqrt(1.0 + 2.0 * h / (yields * W))), rel=2e-3)
+    assert np.max(rotor) > h + np.max(push) / k
+
+
+def test_a_landed_rotor_that_is_damped_presses_with_its_thrust(model):
+    """The steady limit: what the bench knew before, its balls as `thrust_pair` has them."""
+    damped = THRUST | {"stiffness": "5e6 N/m", "damping": 8.0}
+    landing = departed(model, bearing={"DE": {"face": damped}})
+    found = simulate_drop(landing, DropCase(speed=SPEED, duration=0.12))
+    push, race, _rotor = axial(landing, found)
+    late = found.time > 0.105
+    assert np.max(push) > 450.0
+    assert push[late] == pytest.approx(400.0, rel=0.01)
+    ways = np.linalg.norm(found.race_displacement - found.support_displacement, axis=-1)[late, 1]
+    constants = numbers_of(model.machine.touchdown_bearings[1]).constants
+    still = np.array([thrust_pair(constants, way, 400.0) for way in ways[::50]])
+    assert race[late][::50] == pytest.approx(still[:, 2], rel=0.02)
+    stress = constants.stress_coefficient_inner * np.cbrt(still[:, 1])
+    assert found.max_stress[late, 1][::50] == pytest.approx(stress, rel=5e-3)
+
+
+def test_a_landing_moves_as_that_of_a_machine_file_does(known):
+    """Two sets of equations for face and balls; no damping of the face, that of the race as the package's."""
+    bearing, arm = known.touchdown_bearings[1], 40e-3
+    face = {
+        "gap": "20 um",
+        "inner_radius": f"{arm - 1e-6} m",
+        "outer_radius": f"{arm + 1e-6} m",
+        "damping": "0 s/m",
+    }
+    described = known.completed_with(
+        {
+            "touchdown_bearings": (known.touchdown_bearings[0], bearing.changed(face=face)),
+            "loads": (Load(node=2, direction="axial", force="400 N"),),
+        }
+    )
+    case = DropCase(speed=SPEED, duration=0.012)
+    theirs = simulate_drop(build_drop_model(described, "quick"), case)
+    landing = departed(build_drop_model(known, "quick"), bearing={"DE": {"face": THRUST | {"damping": 0.0}}})
+    landing.parameters.departure[1, D.ALONG] = 1.0
+    ours = simulate_drop(landing, case)
+    _push, race, rotor = axial(landing, ours)
+    assert rotor == pytest.approx(theirs.axial_displacement, abs=2e-4 * np.max(rotor))
+    assert race == pytest.approx(theirs.race_axial_displacement(1), abs=2e-3 * np.max(race))
+    assert ours.race_speed[-1] == pytest.approx(theirs.race_speed[-1], rel=1e-4)
+
+
+def test_a_rotor_under_thrust_rests_on_softer_balls(known):
+    """Its contact angles are steeper: less of each load is radial."""
+    plain, pressed = (
+        hidden_machine(known, 3, violations(**parts), reduction="quick", drawn=False)
+        for parts in ({"centre": {"x": "1 nm"}}, {"bearing": {"DE": {"face": THRUST | {"thrust": "2 kN"}}}})
+    )
+    ways = []
+    for hidden in (plain, pressed):
+        rest, layout = settled_coordinates(hidden.model), hidden.model.layout
+        ways.append((rest[layout.support] - rest[layout.race])[3])
+    load, constants = hidden.model.load_shares[1], numbers_of(known.touchdown_bearings[1]).constants
+    assert thrust_pair(constants, ways[1], 2000.0)[0] == pytest.approx(load, rel=2e-3)
+    assert ways[1] > 1.2 * ways[0]
+
+
+def test_a_thrust_on_two_faces_is_refused(known):
+    with pytest.raises(UsageError, match=r"thrust at NDE and DE; the rotor lands on one face"):
+        hidden_machine(known, 3, violations(face=THRUST))
+
+
+def test_a_thrust_beside_a_table_of_balls_is_refused(known):
+    parts = {"DE": {"face": THRUST, "balls": {"held_preload": True}}}
+    with pytest.raises(UsageError, match=r"DE: balls under a thrust have no 'held_preload'"):
+        hidden_machine(known, 3, violations(bearing=parts))
+
+
 def test_a_seat_with_play_holds_the_bearing_behind_it(known):
     """Within the play it gives no force; behind it, that of a bearing without, moved by the play."""
     bearing, play = known.touchdown_bearings[0], 5e-6
     loose, tight = (
         table_row(bearing, BallsViolation.model_validate(balls), 200.0, SPEED)
-        for balls in ({"seat_play": f"{play} m"}, {"thrust": "1e-9 N"})
+        for balls in ({"seat_play": f"{play} m"}, {"seat_play": "1e-12 m"})
     )
     rows = [np.concatenate([np.zeros(D.TABLE_SPEEDS), row]) for row in (loose, tight)]
     for way in (0.0, 1e-6, 2.5e-6):  # the table rounds the corner within a step or two of it

@@ -99,7 +99,7 @@ CASES = {
     "thrust": Case(
         rotor="6 t",
         speed=35.0,
-        hidden='bearing.DE.balls.thrust = "{thrust} N"',
+        hidden='bearing.DE.face = {{ thrust = "{thrust} N", gap = "1 um", arm = "{arm} m" }}',
         known=FACE + '\n[[loads]]\nnode = 11\ndirection = "axial"\nforce = "{thrust} N"',
         guessed=FACE + '\n[[loads]]\nnode = 11\ndirection = "axial"\nforce = "{half} N"',
     ),
@@ -130,6 +130,7 @@ def measures(machine: Machine) -> dict[str, str]:
         "half": 0.4 * weight,
         "inner": radius,
         "outer": 1.15 * radius,
+        "arm": 1.077 * radius,
     }
     return {name: f"{value:.6g}" for name, value in found.items()}
 

@@ -1,4 +1,4 @@
-"""Force over deflection of ball bearings by solutions of their own: held preload, thrust, fast balls, play.
+"""Force over deflection of ball bearings by solutions of their own: held preload, fast balls, play; thrust.
 
 A pair of rows is a smooth ring of balls, whose loads follow from where the grooves go.
 """
@@ -18,7 +18,7 @@ from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
 from rotordrop.physics import departure as D
 from rotordrop.rotor.parameters import FASTEST
-from rotordrop_bench.violations import BallsViolation
+from rotordrop_bench.violations import BallsViolation, FaceViolation
 
 LARGEST_LOADS = 60.0
 """Load over the static load of a bearing up to which its table goes, with room besides [1]; chosen."""
@@ -35,14 +35,7 @@ def table_row(bearing: TouchdownBearing, balls: BallsViolation, load: float, nom
 
     ``load`` is its static load [N], ``nominal`` the nominal speed of the machine [rad/s].
     """
-    numbers = numbers_of(bearing)
-    assert isinstance(numbers, BallNumbers)
-    constants = numbers.constants
-    if not (constants.preloaded and len(constants.axial_signs) == 2):
-        raise UsageError(
-            f"{bearing.name}: held_preload, thrust, inertia and seat_play of balls need a preloaded pair of "
-            "rows; leave them out of its violations"
-        )
+    numbers, constants = _pair(bearing, "held_preload, inertia and seat_play of balls")
     turn = (FASTEST * nominal / (D.MOST_SPEEDS - 1)) if balls.inertia else 1.0
     speeds = turn * np.arange(D.MOST_SPEEDS if balls.inertia else 1)
     free = constants.groove_distance * (1.0 - math.cos(constants.contact_angle))
@@ -57,6 +50,35 @@ def table_row(bearing: TouchdownBearing, balls: BallsViolation, load: float, nom
     return row
 
 
+def face_row(bearing: TouchdownBearing, face: FaceViolation) -> Array:
+    """Entries of a departure from `THRUST` up to `TABLE_SPEEDS`: a face and the pair of rows behind it."""
+    _, constants = _pair(bearing, "a thrust on its face")
+    stiffness, slope = float(face.stiffness), constants.axial_offset / constants.radial_offset
+    row = np.zeros(D.TABLE_SPEEDS)
+    row[[D.THRUST, D.FACE_GAP, D.FACE_STIFFNESS]] = float(face.thrust), float(face.gap), stiffness
+    row[D.FACE_DAMPING] = 2.0 * float(face.damping) * math.sqrt(stiffness * float(bearing.race.mass))
+    row[[D.FACE_FRICTION, D.FACE_ARM]] = float(face.friction), float(face.arm)
+    row[D.ALONG] = 2.0 * slope * slope  # equal dashpots along the lines of contact
+    row[[D.RING_BALL, D.RING_GROOVES]] = constants.ball_stiffness, constants.groove_distance
+    row[[D.RING_RADIAL, D.RING_AXIAL]] = constants.radial_offset, constants.axial_offset
+    places = SMEARED * len(constants.ball_angles) // 2
+    row[[D.RING_PLACES, D.RING_SHARE]] = places, len(constants.ball_angles) / places
+    return row[D.THRUST :]
+
+
+def _pair(bearing: TouchdownBearing, what: str) -> tuple[BallNumbers, Any]:
+    """Numbers and constants of a preloaded pair of rows, which what a violation asks for needs."""
+    numbers = numbers_of(bearing)
+    assert isinstance(numbers, BallNumbers)
+    constants = numbers.constants
+    if not (constants.preloaded and len(constants.axial_signs) == 2):
+        raise UsageError(
+            f"{bearing.name}: {what} needs a preloaded pair of rows, which this bearing is not; leave "
+            "it out of its violations"
+        )
+    return numbers, constants
+
+
 def _solution(
     bearing: TouchdownBearing, constants: Any, balls: BallsViolation, omega: float
 ) -> Callable[[float], Solved]:
@@ -65,7 +87,7 @@ def _solution(
     if balls.held_preload:
         return lambda way: held_pair(constants, way)
     play = float(balls.seat_play)
-    return lambda way: thrust_pair(constants, max(way - play, 0.0), float(balls.thrust))
+    return lambda way: thrust_pair(constants, max(way - play, 0.0), 0.0)[:2]
 
 
 def _ring(constants: Any) -> tuple[Array, float]:
@@ -104,8 +126,11 @@ def held_pair(constants: Any, way: float) -> Solved:
     return 2.0 * radial, load
 
 
-def thrust_pair(constants: Any, way: float, thrust: float) -> Solved:
-    """A rigid pair whose race carries a thrust [N] too: one row gains what the other loses."""
+def thrust_pair(constants: Any, way: float, thrust: float) -> tuple[float, float, float]:
+    """A rigid pair whose race carries a thrust [N] too: one row gains what the other loses.
+
+    Radial force, largest load of a ball [N], way along the axis [m].
+    """
     along = 0.0
     for _ in range(NEWTON_STEPS):
         one = _row(constants, way, constants.axial_offset + along)
@@ -114,7 +139,7 @@ def thrust_pair(constants: Any, way: float, thrust: float) -> Solved:
         along += step
         if abs(step) < 1e-13:
             break
-    return one[0] + other[0], max(one[3], other[3])
+    return one[0] + other[0], max(one[3], other[3]), along
 
 
 def fast_pair(bearing: TouchdownBearing, constants: Any, way: float, omega: float) -> Solved:

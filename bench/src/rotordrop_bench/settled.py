@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rotordrop.arrays import Array
+from rotordrop.elements.ball_numbers import BallNumbers
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
@@ -22,6 +23,7 @@ from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.levitation import rigid_amplitudes
+from rotordrop_bench.ball_tables import thrust_pair
 
 MOST_ITERATIONS = 100
 SMALLEST_CHANGE = 1e-15
@@ -156,11 +158,20 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
             row[D.SLEEVE_ANGLE] = math.atan2(off_y, off_x) - angle
     found = _on_their_tables(model, settled_coordinates(plain))
     places, mass = list(range(n_q)), list(coordinate_masses(model))
-    for row, at in zip(parameters.departure, parameters.bearing_at[:, L.DEPARTURE], strict=True):
+    start, thrust = list(found), [0.0] * n_q
+    for b, row in enumerate(parameters.departure):
+        first = parameters.bearing_at[b, L.DEPARTURE]
         for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
             if row[mode + D.COMPLIANCE] > 0.0:
-                places += [at + place, at + place + 1]
+                places += [first + place, first + place + 1]
                 mass += [1.0 / row[mode + D.COMPLIANCE]] * 2
+                start, thrust = [*start, 0.0, 0.0], [*thrust, 0.0, 0.0]
+        if (push := float(row[D.THRUST])) > 0.0:
+            along = _way_along(model, b)
+            places += [first + D.AXIAL, first + D.AXIAL + 1]
+            mass += [parameters.spin[L.ROTOR_MASS], parameters.bearing[b, L.RACE_MASS]]
+            start += [along + row[D.FACE_GAP] + push / row[D.FACE_STIFFNESS], along]
+            thrust += [push, 0.0]
     at, masses = np.array(places), np.array(mass)
     velocities = np.where(at < n_q, at + n_q, at + 2)
     work = scratch_of(parameters)
@@ -183,13 +194,21 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
         return force(coordinates), 0.5 * (stiffness + stiffness.T)
 
     return lowest_energy(
-        np.concatenate([found, np.zeros(len(at) - n_q)]),
+        np.array(start),
         masses,
         float(np.max(np.abs(parameters.gravity))),
-        lambda q: _energy(completed(q), parameters) - load_potential(model, q),
+        lambda q: _energy(completed(q), parameters) - load_potential(model, q) - float(np.dot(thrust, q)),
         force_and_stiffness,
         model.machine.name,
     )[:n_q]
+
+
+def _way_along(model: DropModel, b: int) -> float:
+    """Axial way [m] of a race that carries its static load and the thrust on its face."""
+    numbers = numbers_of(model.machine.touchdown_bearings[b])
+    assert isinstance(numbers, BallNumbers)
+    thrust = float(model.parameters.departure[b, D.THRUST])
+    return thrust_pair(numbers.constants, numbers.deflection(float(model.load_shares[b]))[0], thrust)[2]
 
 
 def _on_their_tables(model: DropModel, coordinates: Array) -> Array:

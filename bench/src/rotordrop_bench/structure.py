@@ -13,6 +13,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.clearance import Clearance
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
@@ -20,7 +21,7 @@ from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop_bench.ball_tables import table_row
+from rotordrop_bench.ball_tables import face_row, table_row
 from rotordrop_bench.violations import BearingViolations, Violations
 
 PULL_LASTS, PULL_POINTS = 6.0, 61
@@ -166,7 +167,7 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
 def _further(
     row: Array, bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float
 ) -> None:
-    """Fill stop, ribbon and table of balls."""
+    """Fill stop, ribbon, face and table of balls."""
     gap, stiffness = v.support.stop_gap, v.support.stop_stiffness
     if gap is not None and stiffness is not None:
         loss = 2.0 * float(v.support.stop_damping) * math.sqrt(float(stiffness) * float(bearing.support.mass))
@@ -175,6 +176,13 @@ def _further(
     if spring is not None and slip is not None:
         row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = float(spring), float(slip)
     row[D.LOOSE_WAY] = float(v.balls.seat_play)
+    if float(v.face.thrust) > 0.0:
+        if v.balls.tabulated:
+            raise UsageError(
+                f"{bearing.name}: balls under a thrust have no 'held_preload', 'inertia' or 'seat_play' in "
+                "the bench; leave out those or 'face'"
+            )
+        row[D.THRUST : D.TABLE_SPEEDS] = face_row(bearing, v.face)
     if v.balls.tabulated:
         row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
 

@@ -337,7 +337,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "stop": ("support.stop_gap",),
     "ribbon": ("support.ribbon_slip",),
     "spring preload": ("balls.held_preload",),
-    "thrust": ("balls.thrust",),
+    "thrust": ("face.thrust",),
     "fast balls": ("balls.inertia",),
     "seat play": ("balls.seat_play",),
     "ball phase": ("balls.first_ball_angle", "balls.turn"),

@@ -235,8 +235,6 @@ class BallsViolation(Violation):
     """Whether the balls turn with the cage as the race spins up."""
     held_preload: bool = False
     """Whether the preload is a force that holds whatever the race does, as that of long springs."""
-    thrust: Force = default(0.0, "none")
-    """Axial load of the bearing [N]."""
     inertia: bool = False
     """Whether the centrifugal force of the balls acts."""
     seat_play: Length = default(0.0, "no play")
@@ -248,16 +246,32 @@ class BallsViolation(Violation):
         return self._of_the_table() > 0
 
     def _of_the_table(self) -> int:
-        lengths = float(self.thrust) > 0.0, float(self.seat_play) > 0.0
-        return self.held_preload + self.inertia + sum(lengths)
+        return self.held_preload + self.inertia + (float(self.seat_play) > 0.0)
 
     def check(self) -> None:
         """Refuse two of what a table holds one of."""
         super().check()
         if self._of_the_table() > 1:
-            raise Misfit(
-                "balls have one of 'held_preload', 'thrust', 'inertia' and 'seat_play'; leave out the others"
-            )
+            raise Misfit("balls have one of 'held_preload', 'inertia' and 'seat_play'; leave out the others")
+
+
+class FaceViolation(Violation):
+    """An axial force that no magnet holds after power-off, and the face that the rotor lands on."""
+
+    thrust: Force = default(0.0, "none")
+    """Axial force on the rotor from power-off on [N]."""
+    gap: Length = default(0.0, "of no effect without thrust")
+    """Way of the rotor before it lands [m]."""
+    arm: PositiveLength = default(1.0, "of no effect without thrust")
+    """Radius at which the face rubs [m]."""
+    stiffness: Stiffness = default(1e9, "a steel shoulder on a ring, chosen")
+    """Stiffness of the face [N/m]."""
+    damping: NonNegativeNumber = default(0.05, "steel on steel, chosen")
+    """Damping ratio of the race on it [1]."""
+    friction: NonNegativeNumber = default(0.1, "as between rotor and race")
+    """Friction coefficient of the face [1]."""
+
+    together: ClassVar = (("thrust", "gap", "arm"),)
 
 
 class SleeveViolation(Violation):
@@ -296,6 +310,8 @@ class BearingViolations(Violation):
     """The air gap."""
     balls: BallsViolation = BallsViolation()
     """The balls."""
+    face: FaceViolation = FaceViolation()
+    """The face of the race."""
     sleeve: SleeveViolation = SleeveViolation()
     """The landing sleeve of the rotor."""
     centre: CentreViolation = CentreViolation()
@@ -467,6 +483,12 @@ class Violations(BearingViolations):
                         f"the violations name the {what} {name!r}, which the machine does not have; "
                         f"it has {', '.join(there)}"
                     )
+        landing = [b.name for b in machine.touchdown_bearings if float(self.of_bearing(b.name).face.thrust)]
+        if len(landing) > 1:
+            raise UsageError(
+                f"the violations have a thrust at {' and '.join(landing)}; the rotor lands on one face: give "
+                f"'face' to one of them, as bearing.{landing[0]}.face"
+            )
         nodes = len(machine.rotor.node_positions)
         for what, part in (
             ("unbalance comes", self.unbalance_jump),

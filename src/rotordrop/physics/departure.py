@@ -41,22 +41,37 @@ SLEEVE_OVAL, SLEEVE_ANGLE, WEAR, WEAR_HEAT = range(SLEEVE_OFF + 1, SLEEVE_OFF + 
 # evenly apart: force and largest load of a ball [N].
 STOP_GAP, STOP_STIFFNESS, STOP_DAMPING, RIBBON_STIFFNESS, RIBBON_SLIP = range(SLEEVE_OFF + 5, SLEEVE_OFF + 10)
 LOOSE_WAY = SLEEVE_OFF + 10
-TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(SLEEVE_OFF + 11, SLEEVE_OFF + 15)
+# Axial force on the rotor [N] that no magnet holds after power-off, and the face of the race that it lands
+# on: gap [m], stiffness [N/m], damping [N s/m], friction [1] and its arm [m]. Axial damping of a pair of rows
+# over the radial one [1]; one ball of it [N/m^1.5], distance of its grooves, their radial and their axial
+# offset [m], places in half a ring that stand for the balls of a row, and how many balls each stands for.
+THRUST, FACE_GAP, FACE_STIFFNESS, FACE_DAMPING, FACE_FRICTION, FACE_ARM = range(LOOSE_WAY + 1, LOOSE_WAY + 7)
+ALONG, RING_BALL, RING_GROOVES, RING_RADIAL, RING_AXIAL, RING_PLACES, RING_SHARE = range(
+    LOOSE_WAY + 7, LOOSE_WAY + 14
+)
+TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(LOOSE_WAY + 14, LOOSE_WAY + 18)
 MOST_SPEEDS, TABLE_POINTS = 6, 128
 TABLE_FORCE, TABLE_LOAD = 0, 1
 N_COLUMNS = TABLE + MOST_SPEEDS * 2 * TABLE_POINTS
 
+FACE_POINTS = 12
+"""Points of the ring at which a shoulder slides on a face [1]: chosen."""
+STANDS = 1e-3
+"""Speed [m/s] below which the friction of a face is smoothed: chosen."""
 YIELDS = np.array([0.25, 0.75, 1.25, 1.75])
 """Travels at which the springs of a ribbon slip, over their mean [1]: chosen."""
 
 # States of a departure: displacement, then velocity of foundation and of tilt (x, y), slip over its travel
-# [1], heat rubbed into the contact [J], angle of the cage [rad], stretch of each spring of a ribbon [m].
+# [1], heat rubbed into the contact [J], angle of the cage [rad], stretch of each spring of a ribbon [m],
+# displacement of rotor and race along the axis [m], then their velocities.
 FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, STRETCH = 0, 4, 8, 9, 10, 11, 12
-N_STATES = STRETCH + 2 * len(YIELDS)
+AXIAL = STRETCH + 2 * len(YIELDS)
+N_STATES = AXIAL + 4
 KINDS = (
     *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY) * 2,
     *(L.INTERNAL, L.INTERNAL, L.HEAT, L.ANGLE),
     *(L.INTERNAL,) * (2 * len(YIELDS)),
+    *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY),
 )
 """Kind of each of these states."""
 
@@ -329,6 +344,88 @@ def table_energy(s: Array, way: float, spin: float) -> float:
 
 
 @lean_kernel
+def ring_of_balls(s: Array, way: float, along: float) -> tuple[float, float, float]:
+    """Radial and axial force [N] and energy [J] of a pair of rows whose race has moved by (way, along) [m].
+
+    Source: Hertz's contacts of a smooth ring of balls, summed up over half of it.
+    """
+    places = int(s[RING_PLACES])
+    across = lengthwise = energy = 0.0
+    for i in range(places):
+        _, cosine = sine_cosine(math.pi * (i + 0.5) / places)
+        radial = s[RING_RADIAL] + way * cosine
+        for row in range(2):
+            sense = 1.0 - 2.0 * row
+            axial = s[RING_AXIAL] + sense * along
+            apart = math.sqrt(radial * radial + axial * axial)
+            pressed = apart - s[RING_GROOVES]
+            if pressed > 0.0:
+                load = s[RING_SHARE] * s[RING_BALL] * pressed * math.sqrt(pressed)
+                across += load * radial / apart * cosine
+                lengthwise += sense * load * axial / apart
+                energy += 0.4 * load * pressed
+    return across, lengthwise, energy
+
+
+@lean_kernel
+def hardest_ball(s: Array, way: float, along: float) -> float:
+    """Load [N] of the ball towards which the race has moved by (way, along) [m]. Source: `ring_of_balls`."""
+    radial, axial = s[RING_RADIAL] + way, s[RING_AXIAL] + abs(along)
+    pressed = max(math.sqrt(radial * radial + axial * axial) - s[RING_GROOVES], 0.0)
+    load: float = s[RING_BALL] * pressed * math.sqrt(pressed)
+    return load
+
+
+@lean_kernel
+def face_depth(s: Array, own: Array) -> float:
+    """How deep the shoulder stands in the face of the race [m]; negative before it lands.
+
+    Source: definition.
+    """
+    depth: float = own[AXIAL] - own[AXIAL + 1] - s[FACE_GAP]
+    return depth
+
+
+@lean_kernel
+def landed(
+    s: Array, own: Array, vx: float, vy: float, slip: float
+) -> tuple[float, float, float, float, float, float]:
+    """Force of a shoulder on the face of its race along the axis, x and y [N] and torque on the race [N m].
+
+    ``vx, vy`` is the velocity of the rotor against the race [m/s], ``slip`` what it turns faster [rad/s]. The
+    powers that sliding and the face take [W] come last. Source: spring and dashpot in parallel (Kelvin and
+    Voigt) that do not pull; Coulomb's friction at points of a ring.
+    """
+    depth = face_depth(s, own)
+    if depth <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    elastic, rate = s[FACE_STIFFNESS] * depth, own[AXIAL + 2] - own[AXIAL + 3]
+    push = max(elastic + s[FACE_DAMPING] * rate, 0.0)
+    F_x = F_y = torque = sliding = 0.0
+    for i in range(FACE_POINTS):
+        sine, cosine = sine_cosine(2.0 * math.pi * (i + 0.5) / FACE_POINTS)
+        tx, ty = vx - slip * s[FACE_ARM] * sine, vy + slip * s[FACE_ARM] * cosine
+        pull = s[FACE_FRICTION] * push / (FACE_POINTS * math.sqrt(tx * tx + ty * ty + STANDS * STANDS))
+        F_x += pull * tx
+        F_y += pull * ty
+        torque += pull * s[FACE_ARM] * (ty * cosine - tx * sine)
+        sliding += pull * (tx * tx + ty * ty)
+    return push, F_x, F_y, torque, sliding, (push - elastic) * rate
+
+
+@lean_kernel
+def axial_energy(s: Array, own: Array, rotor_mass: float, race_mass: float) -> float:
+    """Energy [J] of the axial motion of rotor and race, of masses [kg], and of the face between them.
+
+    Source: integral of `landed`.
+    """
+    depth = max(face_depth(s, own), 0.0)
+    energy: float = rotor_mass * own[AXIAL + 2] ** 2 + race_mass * own[AXIAL + 3] ** 2
+    energy += s[FACE_STIFFNESS] * depth * depth
+    return 0.5 * energy
+
+
+@lean_kernel
 def mode_rates(mode: Array, force_x: float, force_y: float, own: Array, rates: Array) -> float:
     """Fill the rates of foundation or tilt, (4,), under a force [N]; returns the power that it takes [W].
 
@@ -378,7 +475,7 @@ def stored_energy(s: Array, own: Array, springs: Array, x: float, y: float) -> f
     depth = math.sqrt(x * x + y * y) - s[STOP_GAP]
     if depth > 0.0:
         energy += 0.5 * s[STOP_STIFFNESS] * depth * depth
-    for i in range(STRETCH, N_STATES):
+    for i in range(STRETCH, AXIAL):
         energy += 0.5 * s[RIBBON_STIFFNESS] / YIELDS.shape[0] * own[i] * own[i]
     energy += 0.5 * s[SLIP_FORCE] * s[SLIP_TRAVEL] * (own[SLIP_X] ** 2 + own[SLIP_Y] ** 2)
     energy += mode_energy(s[FOUNDATION_MODE : FOUNDATION_MODE + MODE_WIDTH], own[FOUNDATION : FOUNDATION + 4])

@@ -23,6 +23,7 @@ from rotordrop.simulate._rhs import (
     mount_states,
     plane_motion,
     project,
+    pushed_along,
     race_deflection,
     ring_travel,
     rows_of,
@@ -120,6 +121,10 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
         spin = y[p.bearing_at[b, L.RACE_SPIN]]
         return departure.table_energy(p.departure[b], math.sqrt(dx * dx + dy * dy), spin)
+    if pushed_along(b, p):
+        s, own = departing(b, y, p)
+        pressed: float = departure.ring_of_balls(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])[2]
+        return pressed + departure.axial_energy(s, own, p.spin[L.ROTOR_MASS], row[L.RACE_MASS])
     if row[L.FAST_SPEED_STEP] > 0.0:
         grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)

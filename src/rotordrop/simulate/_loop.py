@@ -27,9 +27,11 @@ from rotordrop.simulate._rhs import (
     Scratch,
     ball_force,
     contact_values,
+    departing,
     depth_now,
     drop_derivative,
     face_values,
+    pushed_along,
     race_deflection,
     race_travel,
     ring_travel,
@@ -403,6 +405,10 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
         way = math.sqrt(dx * dx + dy * dy)
         load = max(departure.from_table(p.departure[b], departure.TABLE_LOAD, way, spin), 0.0)
+        return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
+    if pushed_along(b, p):
+        s, own = departing(b, y, p)
+        load = departure.hardest_ball(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])
         return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
     return deflected_loads(b, dx, dy, ring_travel(b, y, p), along, spin, p)
 

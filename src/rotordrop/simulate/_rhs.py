@@ -195,12 +195,20 @@ def rows_of(b: int, p: KernelParameters) -> tuple[Array, Array]:
 
 
 @inner_kernel
+def pushed_along(b: int, p: KernelParameters) -> bool:
+    """Whether a departure has the rotor land on the face of the race of one bearing."""
+    pushed: bool = p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.THRUST] > 0.0
+    return pushed
+
+
+@inner_kernel
 def rises_with_travel(b: int, p: KernelParameters) -> bool:
     """Whether the force of a bearing grows with the travel of its race, whatever else stands in the state.
 
     What gives way axially and balls that press outwards leave no order between the two.
     """
     carried: bool = p.bearing_at[b, L.RACE] >= 0 and p.bearing_at[b, L.RING_STATES] < 0
+    carried = carried and not pushed_along(b, p)
     slow: bool = p.bearing[b, L.FAST_SPEED_STEP] == 0.0 and p.bearing_at[b, L.FACE_STATES] < 0
     return carried and slow
 
@@ -242,6 +250,12 @@ def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[fl
         way = math.sqrt(x * x + z * z)
         rise = departure.from_table(p.departure[b], departure.TABLE_FORCE, way, spin) / max(way, 1e-15)
         _, own = departing(b, y, p)
+        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
+        return F_x, F_y, 0.0
+    if pushed_along(b, p):
+        s, own = departing(b, y, p)
+        way = math.sqrt(x * x + z * z)
+        rise = departure.ring_of_balls(s, way, own[departure.AXIAL + 1])[0] / max(way, 1e-15)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
         return F_x, F_y, 0.0
     F_x, F_y, by_spin = deflected_force(b, x, z, ring_travel(b, y, p), along, spin, p, work)
@@ -646,6 +660,46 @@ def add_axial_motion(
 
 
 @lean_kernel
+def add_departing_thrust(
+    t: float, b: int, y: Array, p: KernelParameters, dy: Array
+) -> tuple[float, float, float, float, float]:
+    """Add the axial motion of rotor and race that a departing thrust makes, and the friction of the face.
+
+    Returns the torque on the race [N m] and the power that sliding, the face, the balls and drag take [W].
+    """
+    n_q, r, spin = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
+    s, own = departing(b, y, p)
+    _, rates = departing(b, dy, p)
+    row, shape, at = p.bearing[b], p.bearing_shape[b], departure.AXIAL
+    if s[departure.THRUST] == 0.0:
+        rates[at : at + 4] = 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    _, _, sx, sy = modal_parts(y, p)
+    _, _, ax, ay = modal_parts(dy, p)
+    vx, vy = project(shape, sx) - y[n_q + r], project(shape, sy) - y[n_q + r + 1]
+    slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[spin]
+    push, F_x, F_y, torque, sliding, lost = departure.landed(s, own, vx, vy, slip)
+    for k in range(shape.shape[0]):
+        ax[k] -= shape[k] * F_x
+        ay[k] -= shape[k] * F_y
+    dy[n_q + r] += F_x / row[L.RACE_MASS]
+    dy[n_q + r + 1] += F_y / row[L.RACE_MASS]
+    x, z = race_deflection(b, y, p)
+    held = departure.ring_of_balls(s, math.sqrt(x * x + z * z), own[at + 1])[1]
+    drag = race_drag_torque(
+        abs(held), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
+    )
+    dy[spin] += (torque - drag) / row[L.RACE_INERTIA]
+    thrust = 0.0 if t < p.spin[L.POWER_OFF_DELAY] else s[departure.THRUST]
+    damped = s[departure.ALONG] * row[L.BEARING_DAMPING] * own[at + 3]
+    rates[at], rates[at + 1] = own[at + 2], own[at + 3]
+    rates[at + 2] = (thrust - push) / p.spin[L.ROTOR_MASS]
+    rates[at + 3] = (push - held - damped) / row[L.RACE_MASS]
+    dy[p.rotor_at[L.WORK_IN]] += thrust * own[at + 2]
+    return torque, sliding, lost, damped * own[at + 3], drag * y[spin]
+
+
+@lean_kernel
 def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
     race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
@@ -757,6 +811,12 @@ def bearing_accelerations(
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
         dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
+    by_face, rubbed = 0.0, 0.0
+    if departs:
+        by_face, rubbed, by_landing, by_moving, by_rolling = add_departing_thrust(t, b, y, p, dy)
+        lost += by_landing
+        by_balls += by_moving
+        by_drag += by_rolling
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
     by_fit = 0.0
     if sprung:
@@ -781,9 +841,11 @@ def bearing_accelerations(
         by_support += by_fit
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
+    sliding += rubbed
     power[SLIDING], power[IN_CONTACT] = sliding, lost
     power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
-    return by_sleeve - friction * row[L.ROTOR_RADIUS], by_balls + by_drag + by_support + (sliding + lost)
+    torque = by_sleeve - by_face - friction * row[L.ROTOR_RADIUS]
+    return torque, by_balls + by_drag + by_support + (sliding + lost)
 
 
 @inner_kernel
