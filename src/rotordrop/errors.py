@@ -105,7 +105,7 @@ class UnsettledError(RecordError):
     """Readings do not show the rotor at rest on its touchdown bearings."""
 
     def __init__(self, record: str, seen: str) -> None:
-        self.seen, self.remedy = f"{record} {seen}", "give the readings at standstill as a tail (--tail)"
+        self.seen, self.remedy = f"{record} {seen}", "give the readings at standstill as the settled tail"
         super().__init__(f"{self.seen}; {self.remedy}")
 
 

@@ -304,9 +304,9 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 
 
-def format_moment(time: float, decimals: int = 3) -> str:
-    """Write a time of a record [s] with fixed decimals, as ``"0.214 s"``; never as "-0.000 s"."""
-    text = f"{time:.{decimals}f}"
+def format_moment(time: float) -> str:
+    """Write a time of a record [s] to 0.1 ms, as ``"0.2140 s"``; never as "-0.0000 s"."""
+    text = f"{time:.4f}"
     return f"{text.removeprefix('-') if float(text) == 0.0 else text} s"
 
 

@@ -8,7 +8,9 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.evidence.quality import Finding, Kind, checked, refuse_unusable
 
-NO_TAIL = "no settled tail: the air gap rests on its prior and on the contacts; give one with --tail"
+NO_TAIL = (
+    "no settled tail: the air gap rests on its prior and on the contacts; give the readings at standstill"
+)
 COUNTED_TWICE = (
     "the machine was calibrated on a drop named {}: if it is this one, its readings count twice and the "
     "intervals are too narrow; use the machine file from before the calibration for it"

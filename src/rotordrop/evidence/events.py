@@ -345,7 +345,7 @@ def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:
             f"no drop in the record: it begins with the rotor at "
             f"{format_quantity(float(np.min(start)), 'length')} and moving by up to "
             f"{format_quantity(float(np.ptp(path, axis=0).max()), 'length')}, as one that was dropped before",
-            "give the recording of the drop, with pre-trigger; the readings at standstill belong to --tail",
+            "give the recording of the drop, with pre-trigger; readings at standstill are its settled tail",
             begins_late=True,
         )
     raise NoDropError(

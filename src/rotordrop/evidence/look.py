@@ -180,12 +180,8 @@ class Look:
                 return None
         return touched[0][2]
 
-    def timeline(self, origin_error: float = 0.0) -> tuple[tuple[float, str], ...]:
-        """Events in the order of time: time [s] and words.
-
-        Who shows the times from another instant than the start of the record gives the half width of the 90 %
-        interval of that instant [s], which the intervals then hold.
-        """
+    def timeline(self) -> tuple[tuple[float, str], ...]:
+        """Events in the order of time: time of the record [s] and words, intervals on that clock (90 %)."""
         events = [(float(self.record.time[0]), f"record begins{', rotor levitated' if self.drops else ''}")]
         if not self.drops:
             events.append((float(self.record.time[-1]), "record ends"))
@@ -201,8 +197,7 @@ class Look:
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:
-                own = 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
-                half = 1e3 * math.hypot(own, origin_error)
+                half = 1e3 * 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
                 events.append((plane.touch, f"first touch at {plane.plane} (± {half:.2g} ms)"))
         events += [
             (

@@ -190,7 +190,7 @@ def _gap_note(path: Path) -> str:
             "not determined by this record, because the rotor touched its race in too few directions and "
             f"hardly swung: {low:.0f} to {high:.0f} µm are possible (90 %), {1e6 * path.gap:.0f} µm are taken"
         )
-    return f"{path.name}: air gap {told}; give it with --gap where it is known"
+    return f"{path.name}: air gap {told}; give it where it is known"
 
 
 def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
@@ -221,7 +221,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
         raise NothingFallsError(
             f"the shaft moves away by {1e6 * float(np.max(reach)):.3g} µm with {fastest:.2g} m/s², as one "
             f"that swings on its bearings; a fall shows {SLOWEST_FALL * GRAVITY:.2g} m/s² or more",
-            "give the recording of the drop, the readings at standstill belong to --tail; if it is that, "
+            "give the recording of the drop: readings at standstill are its settled tail; if it is the drop, "
             "correct unit or sampling rate",
             (float(np.max(reach)), fastest),
         )

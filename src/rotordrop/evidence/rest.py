@@ -235,7 +235,7 @@ def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
         raise IdentificationError(
             f"{name}: the rotor is not at rest on its bearings: mean height {_microns(height)} µm, swing "
             f"{_microns(sway)} µm; expected a height near minus the air gap and a swing below {largest:.0%} "
-            "of it. Check polarity and angles of the sensors, or give a later tail (--tail)."
+            "of it. Check polarity and angles of the sensors, or give a later settled tail."
         )
     if turning and np.any(spread > MOST_SPREAD * mean):
         raise IdentificationError(

@@ -101,11 +101,9 @@ def _loads(estimate: Estimate) -> Table:
     }
     what = "90 % intervals" if certain else "90 % ranges"
     columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
-    for bearing in estimate.bearings:
-        values = {name: of(bearing) for name, of in lines.items()}
-        columns.append(Column(bearing.name, values.__getitem__))
-    known = [name for name, of in lines.items() if any(of(b) != NO_INTERVAL for b in estimate.bearings)]
-    return table(known, columns)
+    cells = [{name: of(bearing) for name, of in lines.items()} for bearing in estimate.bearings]
+    columns += [Column(b.name, own.__getitem__) for b, own in zip(estimate.bearings, cells, strict=True)]
+    return table([name for name in lines if any(own[name] != NO_INTERVAL for own in cells)], columns)
 
 
 def _over_gap(b: BearingDrop, *, certain: bool) -> str:

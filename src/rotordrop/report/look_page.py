@@ -59,7 +59,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     others = [one for one in seen.findings if one not in doubted]
     read = Statement(f"Read: {dict(facts)['channels']}; {dict(facts)['samples']}.")
     timeline = (
-        Column("record time", lambda row: format_moment(row[0], 4)),
+        Column("record time", lambda row: format_moment(row[0])),
         Column("event", lambda row: row[1]),
     )
     return ReportContent(
@@ -108,9 +108,12 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         said = [Statement(f"No contact is seen; {seen.no_fall}")]
     else:
         said = [Statement(seen.no_fall)]
-    said += [Statement(f"From {whirl.start:.4g} s: {whirl.words}.", "warning") for whirl in seen.whirls[:3]]
+    said += [
+        Statement(f"From {format_moment(whirl.start)}: {whirl.words}.", "warning")
+        for whirl in seen.whirls[:3]
+    ]
     events = (
-        Column("record time", lambda row: format_moment(row[0], 4)),
+        Column("record time", lambda row: format_moment(row[0])),
         Column("event", lambda row: row[1]),
     )
     levels = (
@@ -186,7 +189,7 @@ def _contact_table(seen: Look) -> Table:
     described = seen.contacts[0].impulse is not None
     columns = (
         Column("plane", "plane"),
-        Column("record time", lambda row: format_moment(row.time, 4)),
+        Column("record time", lambda row: format_moment(row.time)),
         Column("direction", lambda row: f"{degrees(row.azimuth):.0f}°"),
         Column("from the usual place", "distance", "length"),
         Column("approaches with [m/s] (90 %)", lambda row: speed(row.approach, row.approach_interval_90)),
@@ -267,8 +270,10 @@ def _verdict(seen: Look) -> list[Statement]:
     if not seen.whirls:
         said.append("It did not whirl: nowhere does it run round its race by two turns or more.")
     elif forward := [whirl for whirl in seen.whirls if whirl.turns > 0]:
-        said.append(f"From {forward[0].start:.4g} s: {forward[0].words}.")
-    grave = [f"From {whirl.start:.4g} s: {whirl.words}." for whirl in seen.whirls if whirl.turns < 0][:3]
+        said.append(f"From {format_moment(forward[0].start)}: {forward[0].words}.")
+    grave = [
+        f"From {format_moment(whirl.start)}: {whirl.words}." for whirl in seen.whirls if whirl.turns < 0
+    ][:3]
     if len(seen.drops) > 1:
         grave.append(f"The record holds {len(seen.drops)} drops; the numbers are those of the first.")
     return [*map(Statement, said), *(Statement(text, "warning") for text in grave)]
@@ -276,7 +281,7 @@ def _verdict(seen: Look) -> list[Statement]:
 
 def _card(seen: Look, number: int) -> Card:
     plane = seen.planes[number]
-    note = f"at the sensors, at {plane.largest_time:.4g} s"
+    note = f"at the sensors, at {format_moment(plane.largest_time)}"
     settling = plane.settling
     hits = Quantity(
         value=len(settling.touched), kind="count", interval_90=settling.count_interval_90, digits=3
@@ -359,7 +364,7 @@ def _figures(seen: Look) -> tuple[Section, ...]:
 def _impacts(seen: Look) -> Table:
     columns = (
         Column("plane", "plane"),
-        Column("touches at (record time)", lambda impact: format_moment(impact.time, 4)),
+        Column("touches at (record time)", lambda impact: format_moment(impact.time)),
         Column("azimuth", lambda impact: f"{degrees(impact.azimuth):.0f}°"),
         Column("beyond the air gap", "depth", "length"),
         Column("radial velocity before", "approach", "velocity"),

@@ -140,6 +140,11 @@ class Quantity:
         return self._with_unit(self.number)
 
     @property
+    def levelled(self) -> str:
+        """What stands for the number where it stands alone; a range with its level."""
+        return f"90 %: {self.text}" if self.range_only and self.interval_90 else self.text
+
+    @property
     def interval_text(self) -> str:
         """The 90 % interval or else the limits in words; empty when neither is known."""
         if self.range_only or self.text.startswith("<"):

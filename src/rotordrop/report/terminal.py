@@ -98,9 +98,7 @@ def _table(table: Table) -> RenderableType:
 def _cell(cell: Cell) -> str:
     if not isinstance(cell, Quantity):
         return _safe(cell)
-    value, interval = _safe(cell.text), _safe(cell.interval_text)
-    if cell.range_only and cell.interval_90:
-        return f"90 %: {value}"
+    value, interval = _safe(cell.levelled), _safe(cell.interval_text)
     if not interval:
         return value
     lines = [value, f"{'90 %: ' if cell.interval_90 else ''}{interval}", _safe(cell.parts_text)]

@@ -234,10 +234,10 @@ def _window_statement(
         return f"{value * 1e6:{sign}.0f} ± {wide * half * 1e6:.0f} µm"
 
     beyond = size(largest - air_gap, math.sqrt(2.0), "+")
-    first = f"largest displacement {size(largest)} ({beyond} beyond the air gap) at {format_moment(time, 4)}"
+    first = f"largest displacement {size(largest)} ({beyond} beyond the air gap) at {format_moment(time)}"
     if not np.isfinite(later):
         return f"{first}; the signal ends within {window:g} s"
-    second = f"later than {window:g} s at most {size(later)} (at {format_moment(later_time, 2)})"
+    second = f"later than {window:g} s at most {size(later)} (at {format_moment(later_time)})"
     if abs(largest - later) <= 2.0 * noise and time <= window:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     held = "held the maximum" if time <= window else "did not hold the maximum"

@@ -208,6 +208,7 @@ def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
 
 def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
     from rotordrop.evidence.look import look
+    from rotordrop.evidence.quality import Kind
     from rotordrop.units import parse_quantity
     from rotordrop.web.drawn import write_look
 
@@ -223,7 +224,13 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
     )
     if not seen.motion.paths:  # the page asks which channels make a plane
         raise RecordError(seen.no_fall)
-    write_look(replace(seen, record=named(seen.record, job, "record")), job, made, options, machine)
+    answered = (Kind.ENDS_TURNING,) if "tail" in job.read()["files"] else ()
+    seen = replace(
+        seen,
+        record=named(seen.record, job, "record"),
+        findings=tuple(one for one in seen.findings if one.kind not in answered),
+    )
+    write_look(seen, job, made, options, machine)
 
 
 class Pace:

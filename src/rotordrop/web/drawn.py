@@ -50,7 +50,6 @@ def write_look(
     seen: Look, job: Job, made: Path, options: Mapping[str, Any], machine: Machine | None = None
 ) -> None:
     """Write what a look shows: motion of every plane with the speed, and its page as JSON."""
-    from rotordrop.evidence.look import RELEASE_ERROR
     from rotordrop.report.look_page import look_page
     from rotordrop.report.rotor_drawing import rotor_outline
 
@@ -111,10 +110,7 @@ def write_look(
                 }
                 for b, path in enumerate(seen.motion.paths)
             ],
-            "timeline": [
-                {"time": time, "words": words}
-                for time, words in seen.timeline(RELEASE_ERROR if seen.drops else 0.0)
-            ],
+            "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
             **_impacts(
                 impacts,
                 "beyond the air gap" if seen.drops else "from the usual place",

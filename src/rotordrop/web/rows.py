@@ -50,7 +50,7 @@ def table_json(shown: Table) -> dict[str, Any]:
         for told, row in zip(rows, in_units[system].rows, strict=True):
             for cell, written in zip(told, row, strict=True):
                 if isinstance(written, Quantity):
-                    cell[system] = [written.text, written.interval_text]
+                    cell[system] = [written.levelled, written.interval_text]
     columns = [dict(zip(SYSTEMS, head, strict=True)) for head in heads]
     return {"columns": columns, "rows": rows, "caption": shown.caption, "note": shown.note}
 
@@ -61,7 +61,7 @@ def quantity_json(quantity: Quantity) -> dict[str, Any]:
     told: dict[str, Any] = {"value": quantity.value if finite else None, "kind": quantity.kind}
     for system in SYSTEMS:
         shown = replace(quantity, system=system)
-        told[system] = [shown.text, shown.interval_text]
+        told[system] = [shown.levelled, shown.interval_text]
     return told
 
 

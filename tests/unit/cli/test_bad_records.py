@@ -64,7 +64,8 @@ FAULTS = {
     ),
     "unit": (
         factors(1e3, 1e3, 1e3, 1e3),
-        r"wrong unit factor S_NDE_A.*span \S+ × the nominal air gap, a drop 1 to 2\.5 ×; a unit factor of 1",
+        r"wrong unit factor S_NDE_A.*span .* × the air gap of 250 µm in lp400\.toml, a drop 1 to 2\.5 ×; "
+        r"a unit factor of 1.* or its air_gap",
     ),
     "clipping": (
         lambda record: replace(record, signals=np.clip(record.signals, -150e-6, None)),

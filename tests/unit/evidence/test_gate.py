@@ -24,7 +24,7 @@ from rotordrop.evidence.quality import (
 from rotordrop.evidence.quality import fall as quality_fall
 from rotordrop.evidence.quality.arrangement import check_planes
 from rotordrop.evidence.quality.fall import fell_as_described
-from rotordrop.evidence.quality.motion import check_rotation_line, first_motion
+from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
 from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
@@ -70,7 +70,7 @@ def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):
     found = only(whole_drop, machine, severity="warning")
     assert found.kind == "record ends before standstill"
     assert "47.7 Hz (2860 rpm) at 2 s" in found.message
-    assert "--tail" in found.remedy
+    assert "settled tail" in found.remedy
     assert found.time == pytest.approx(2.0)
 
 
@@ -632,8 +632,31 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
     values = {f"{bearing.name}.air_gap": gap for bearing in machine.touchdown_bearings}
     found = check_record(drop, machine.with_values(values))[0]
     assert (found.kind, found.severity) == ("wrong air gap", "stop")
-    assert "× the air gap of the machine file (34 µm, 34 µm; calibrated on drop_060)" in found.message
+    assert "× the air gap of 34 µm in lp400.toml (calibrated on drop_060)" in found.message
     assert found.remedy.startswith("use the machine file from before that estimate")
+
+
+@pytest.mark.parametrize(
+    ("share", "kind", "guess"),
+    [
+        (1 / 4, "wrong air gap", "no unit factor explains it"),
+        (1 / 25.4, "wrong unit factor", "a unit factor of 25.4"),
+    ],
+)
+def test_readings_and_a_gap_that_contradict_each_other_are_both_named(drop, machine, share, kind, guess):
+    """A small machine was refused for a wrong unit factor though the owner's gap was a quarter of its own."""
+    values = {
+        f"{bearing.name}.air_gap": replace(bearing.air_gap, value=share * float(bearing.air_gap), range=None)
+        for bearing in machine.touchdown_bearings
+    }
+    found = check_units(drop, machine.with_values(values))[0]
+    assert (found.kind, found.severity) == (kind, "stop")
+    stated = f"{1e6 * share * float(machine.touchdown_bearings[0].air_gap):.0f} µm"
+    assert re.match(
+        rf"the readings of drop_060 span \d+\.?\d* µm, .* of {stated} in lp400\.toml", found.message
+    )
+    assert guess in found.message and found.message.endswith("a wrong air gap in lp400.toml would too")
+    assert "or its air_gap" in found.remedy
 
 
 def test_a_single_sensor_is_refused_in_words(drop, machine):

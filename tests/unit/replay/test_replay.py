@@ -250,7 +250,7 @@ def test_an_unknown_method_is_named(known: Machine, synthetic: SyntheticDrop) ->
 
 
 def test_a_record_that_ends_before_standstill_needs_a_tail(known: Machine, synthetic: SyntheticDrop) -> None:
-    with pytest.raises(IdentificationError, match=r"the shaft still turns at 5\d\.\d+ Hz .*--tail"):
+    with pytest.raises(IdentificationError, match=r"the shaft still turns at 5\d\.\d+ Hz .*settled tail"):
         estimate_drop(known, synthetic.record, method=Replay())
 
 

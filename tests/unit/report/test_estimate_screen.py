@@ -14,6 +14,7 @@ from rotordrop.estimate.estimate import Estimate, Verdict
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.evidence.quality import NO_CHECK_SEES
 from rotordrop.known import Known
+from rotordrop.report import estimate_screen as screen
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.estimate_screen import estimate_screen
 from rotordrop.report.terminal import print_summary
@@ -58,6 +59,14 @@ def test_every_estimated_number_of_the_first_screen_has_its_interval(estimate: E
     late = replace(estimate.bearings[0], count_interval_90=None, largest=None)
     rows = dict(row[:2] for row in estimate_screen(replace(estimate, bearings=(late, late))).screen.rows)
     assert not {"impacts", "largest displacement", "over the air gap"} & rows.keys()
+
+
+def test_every_cell_of_the_first_screen_is_found_once(estimate: Estimate, monkeypatch) -> None:
+    """The farthest distance of an estimate that is not certain was looked for twice."""
+    asked: list[str] = []
+    monkeypatch.setattr(screen, "_over_gap", lambda b, *, certain: asked.append(b.name) or "1 to 2")
+    screen.estimate_screen(estimate)
+    assert sorted(asked) == sorted(b.name for b in estimate.bearings)
 
 
 def test_what_every_record_leaves_to_assumption_stands_in_one_statement(estimate: Estimate) -> None:

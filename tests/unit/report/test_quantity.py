@@ -9,6 +9,7 @@ import pytest
 
 from rotordrop.known import Known
 from rotordrop.report.quantity import Quantity, with_error, written
+from rotordrop.web.rows import quantity_json
 
 THIN = "\u202f"
 
@@ -89,6 +90,13 @@ def test_what_the_record_leaves_open_stands_apart_from_the_allowance():
     assert Quantity.of(known, "force", range_only=True).parts_text == ""
     assert Quantity.of(replace(known, allowance_90=None), "force").parts_text == ""
     assert Quantity.of(replace(known, allowance_90=50.0), "force").parts_text == "all of it allowance"
+
+
+def test_a_range_that_stands_for_its_number_has_its_level():
+    known = Known(value=2.0, interval_90=(1.0, 3.0))
+    assert Quantity.of(known, "force", range_only=True).levelled == "90 %: 1.0 to 3.0 N"
+    assert Quantity.of(known, "force").levelled == "2.0 N"
+    assert quantity_json(Quantity.of(known, "force", range_only=True))["SI"] == ["90 %: 1.0 to 3.0 N", ""]
 
 
 def test_nothing_is_zero_and_an_interval_without_an_end_goes_on() -> None:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,6 +39,8 @@ def test_a_look_on_the_page_says_what_a_look_in_python_says(served, looked, file
     seen = look(files["record"], machine=load_machine(files["machine"]))
     told = served.ask("GET", f"/api/jobs/{looked}/look/document").told
     document = without_digest(told, "the page", "ask again")
+    (ended,) = (one for one in seen.findings if one.kind == "record ends before standstill")
+    seen = replace(seen, findings=tuple(one for one in seen.findings if one is not ended))  # a tail was sent
     assert document == json.loads(json.dumps({**seen.as_json(), "record": "drop_060"}))
     page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
     assert [impact["time"] for impact in page["impacts"]] == [impact.time for impact in seen.impacts]
@@ -50,17 +53,17 @@ def test_a_look_on_the_page_says_what_a_look_in_python_says(served, looked, file
     )
 
 
-def test_a_first_touch_counted_from_the_release_has_the_interval_of_both(served, looked, files):
+def test_a_first_touch_has_one_interval_on_the_page_and_in_the_document(served, looked, files):
+    """The page added the interval of the release, of which its heading says that times count from it."""
     seen = look(files["record"], machine=load_machine(files["machine"]))
     page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
     assert page["counted_from"] == "the release (± 2 ms)"
     words = [one["words"] for one in page["timeline"] if one["words"].startswith("first touch at ")]
     assert len(words) == len(seen.planes)
+    assert words == [words for _, words in seen.timeline() if words.startswith("first touch at ")]
     for plane in seen.planes:
         low, high = plane.touch_interval_90
-        half = 1e3 * np.hypot(0.5 * (high - low), 2e-3)
-        assert f"first touch at {plane.plane} (± {half:.2g} ms)" in words
-        assert half >= 2.0 > 500.0 * (high - low)
+        assert f"first touch at {plane.plane} (± {500.0 * (high - low):.2g} ms)" in words
 
 
 def test_a_table_holds_every_sample_of_a_window(served, looked, files):

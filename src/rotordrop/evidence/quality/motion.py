@@ -15,7 +15,7 @@ from rotordrop.evidence.events import expected_gap, fall_accelerations, nominal_
 from rotordrop.evidence.levitated import MAINS, OTHER_SUPPLIES, LevitatedModel
 from rotordrop.evidence.paths import SLOWEST_FALL
 from rotordrop.evidence.quality.finding import Finding, Kind
-from rotordrop.known import NINETY
+from rotordrop.known import NINETY, Known
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.units import GRAVITY, format_quantity
 
@@ -99,11 +99,10 @@ def check_units(record: Record, machine: Machine, other_gaps: Sequence[Finding] 
                 suspects.setdefault(round(math.log10(ratio / 1.5)), []).append((name, ratio))
     if suspects and not _sinks(record):
         return []  # nothing falls: the search for the drop says so
-    findings = [_unit_finding(found, machine) for found in suspects.values()]
     explained = any(_nearest(ratio) for found in suspects.values() for _, ratio in found)
-    if explained or not other_gaps or any(one.kind == Kind.WRONG_AIR_GAP for one in findings):
-        return findings
-    return [replace(one, severity="stop") for one in other_gaps if suspects]
+    if not suspects or explained or not other_gaps or _estimated_gap(machine) is not None:
+        return [_unit_finding(found, record, machine) for found in suspects.values()]
+    return [replace(one, severity="stop") for one in other_gaps]
 
 
 def check_gaps(motion: Motion, record: Record, machine: Machine) -> list[Finding]:
@@ -218,34 +217,36 @@ def _nearest(ratio: float) -> float | None:
     return min(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5))) if fitting else None
 
 
-def _unit_finding(found: list[tuple[str, float]], machine: Machine) -> Finding:
-    names = ", ".join(name for name, _ in found)
+def _estimated_gap(machine: Machine) -> Known | None:
+    """An air gap of the machine file that an earlier estimate wrote there."""
+    gaps = (bearing.air_gap for bearing in machine.touchdown_bearings)
+    return next((gap for gap in gaps if gap.status == "estimated"), None)
+
+
+def _unit_finding(found: list[tuple[str, float]], record: Record, machine: Machine) -> Finding:
+    """Readings and machine file contradict each other: the unit of the one, or the gap of the other."""
     ratio = float(np.median([value for _, value in found]))
-    factor = _nearest(ratio)
+    factor, estimated = _nearest(ratio), _estimated_gap(machine)
     guess = (
         f"a unit factor of {factor:.4g} ({_FACTORS[factor]}) would explain it"
         if factor
-        else "no unit factor fits"
+        else "no unit factor explains it"
     )
-    gaps = [bearing.air_gap for bearing in machine.touchdown_bearings]
-    if any(gap.status == "estimated" for gap in gaps):
-        sizes = ", ".join(f"{1e6 * float(gap):.0f} µm" for gap in gaps)
-        source = next((gap.source for gap in gaps if gap.source), "estimated")
-        return Finding(
-            kind=Kind.WRONG_AIR_GAP,
-            message=f"the readings span {ratio:.3g} × the air gap of the machine file ({sizes}; {source}), a "
-            f"drop 1 to 2.5 ×; {guess}, and so would a wrong estimate of the gap",
-            remedy="use the machine file from before that estimate; if it says the same, correct unit or "
-            "sensitivity in the profile or the machine file",
-            severity="stop",
-            channel=names,
-        )
+    file = machine.source_path.name if machine.source_path else "the machine file"
+    sizes = ", ".join(dict.fromkeys(f"{1e6 * float(b.air_gap):.0f} µm" for b in machine.touchdown_bearings))
+    source = "" if estimated is None else f" ({estimated.source or 'estimated'})"
+    span = float(np.median([np.ptp(record.reading(name)) for name, _ in found]))
     return Finding(
-        kind=Kind.WRONG_UNIT,
-        message=f"the readings span {ratio:.3g} × the nominal air gap, a drop 1 to 2.5 ×; {guess}",
-        remedy="correct unit or sensitivity in the profile or the machine file",
+        kind=Kind.WRONG_UNIT if factor and estimated is None else Kind.WRONG_AIR_GAP,
+        message=f"the readings of {record.name} span {format_quantity(span, 'length')}, {ratio:.3g} × the "
+        f"air gap of {sizes} in {file}{source}, a drop 1 to 2.5 ×; {guess}, and a wrong air gap in {file} "
+        "would too",
+        remedy="correct unit or sensitivity in the profile or the machine file, or its air_gap"
+        if estimated is None
+        else "use the machine file from before that estimate; if it says the same, correct unit or "
+        "sensitivity in the profile or the machine file",
         severity="stop",
-        channel=names,
+        channel=", ".join(name for name, _ in found),
     )
 
 
@@ -511,7 +512,7 @@ def check_length(record: Record, drop: float, has_tail: bool) -> list[Finding]:
                 message=f"the shaft still turns at {format_quantity(abs(float(measured[1][-1])), 'speed')} "
                 "at "
                 f"{record.time[-1]:.6g} s",
-                remedy="give the readings at standstill with --tail: the air gap is found from them",
+                remedy="give the readings at standstill as the settled tail: the air gap is found from them",
                 severity="warning",
                 time=float(record.time[-1]),
             )

@@ -41,7 +41,7 @@ const TABS = {
   Events: () => [...(notes().length ? [make("h3", { class: "part", text: "Notes" }), make("ol", { class: "timeline", of: notes().map((note) => make("li", { of: [
       make("button", { class: "link", text: units.eventText(note.time), on: { click: () => { state.cursor = note.time; setView({ from: note.time - 0.05, to: note.time + 0.1 }); } } }), make("span", { text: note.text }),
       make("button", { class: "link", text: "✕", "aria-label": `Remove the note ${note.text}`, on: { click: () => keepNotes(notes().filter((one) => one !== note)).catch(lost) } })] })) }), make("h3", { class: "part", text: "Events" })] : []),
-    make("p", { class: "small", text: `Times count from ${origin()}.` }),
+    make("p", { class: "small", text: `Times count from ${origin()}${state.estimate ? "" : "; an interval beside an event is its own, on the clock of the record"}.` }),
     timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
   Numbers: () => {
     const page = state.estimate || state.look;

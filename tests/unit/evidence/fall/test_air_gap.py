@@ -70,13 +70,13 @@ def test_limits_enclose_the_gap_and_zero_error_dominates(
 
 
 def test_record_that_ends_while_the_shaft_turns_is_no_rest(drop: SyntheticDrop, truth: Machine) -> None:
-    with pytest.raises(RecordError, match=r"shaft still turns at .* Hz .* ends at 0.06 s; .*--tail"):
+    with pytest.raises(RecordError, match=r"shaft still turns at .* Hz .* ends at 0.06 s; .*settled tail"):
         resting_record(drop.record, None, truth)
 
 
 def test_record_without_speed_is_no_rest(drop: SyntheticDrop, truth: Machine) -> None:
     silent = replace(drop.record, speed=None, speed_time=None, speed_readings=None)
-    with pytest.raises(RecordError, match=r"has no measured shaft speed.*--tail"):
+    with pytest.raises(RecordError, match=r"has no measured shaft speed.*settled tail"):
         resting_record(silent, None, truth)
 
 
