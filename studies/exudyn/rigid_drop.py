@@ -96,6 +96,12 @@ def drop(inputs: dict[str, Any], step: float) -> np.ndarray:
                 )
             )
         )
+    solve(system, inputs, step)
+    return np.stack([system.GetSensorStoredData(sensor)[:, 1:3] for sensor in sensors], axis=1)
+
+
+def solve(system: Any, inputs: dict[str, Any], step: float) -> None:
+    """Integrate a system with a constant step [s]."""
     system.Assemble()
     settings = exu.SimulationSettings()
     settings.timeIntegration.numberOfSteps = round(inputs["duration"] / step)
@@ -106,7 +112,6 @@ def drop(inputs: dict[str, Any], step: float) -> np.ndarray:
     settings.timeIntegration.discontinuous.iterationTolerance = 1e9  # an explicit step needs no repetition
     settings.timeIntegration.verboseMode = 0
     system.SolveDynamic(settings, solverType=exu.DynamicSolverType.RK44)
-    return np.stack([system.GetSensorStoredData(sensor)[:, 1:3] for sensor in sensors], axis=1)
 
 
 def main() -> None:

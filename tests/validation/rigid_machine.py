@@ -45,7 +45,13 @@ materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, densi
     return build_drop_model(machine, Reduction(modes=2, attachment=False))
 
 
-def rigid_model(values: dict[str, Any], link: float = LINK, more: str = "") -> DropModel:
+def rigid_model(
+    values: dict[str, Any],
+    link: float = LINK,
+    more: str = "",
+    inertia: tuple[float, float] = (0.01, 0.01),
+    arrangement: str = "single",
+) -> DropModel:
     """Drop model of a rigid rotor.
 
     Parameters
@@ -56,6 +62,10 @@ def rigid_model(values: dict[str, Any], link: float = LINK, more: str = "") -> D
         Stiffness of the balls [N/m].
     more : str
         What the file says beside it.
+    inertia : tuple of float
+        Polar and diametral inertia of the rotor [kg m²].
+    arrangement : str
+        That of the balls: one row, or "X" where a race moves along its axis.
     """
     v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"], "me": 0.0, "phase": 0.0} | values
     half = 0.5 * v["ms"]
@@ -70,14 +80,14 @@ air_gap = "{v["c"]} m"
 bore_radius = "{v["r"]} m"
 damping_time = "0 s"
 bearing = {{ ball_diameter = "{0.3 * v["r"]} m", ball_count = {_BALLS}, pitch_diameter = "{3.0 * v["r"]} m", \
-contact_angle = "15 deg", preload = "100 N", arrangement = "single" }}
+contact_angle = "15 deg", preload = "100 N", arrangement = "{arrangement}" }}
 contact = {{ stiffness = "{v["K"]} N/m^{v["n"]:.4f}", exponent = {v["n"]}, damping = "{v["lam"]} s/m" }}
 friction = {{ static = {v["mu"]}, dynamic = {v["mu"]} }}
 race = {{ mass = "{half} kg", inertia = "{v["I"]} kg m^2", drag_coefficient = 0.0 }}
 support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"]} N s/m" }}
 {more}
 """
-    model = disc_in(bearing, v["m"] - SHAFT, v["g"])
+    model = disc_in(bearing, v["m"] - SHAFT, v["g"], inertia=inertia)
     return replace(model, parameters=linked(model, link, half))
 
 

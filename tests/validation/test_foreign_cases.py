@@ -1,4 +1,4 @@
-"""Drops computed by a code of others: the path of a rigid rotor in two unlike bearings against EXUDYN."""
+"""Drops computed by a code of others, EXUDYN: a rigid rotor in two bearings, and one landing on a face."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import Compute, checks_of
-from rigid_machine import linked
+from rigid_machine import linked, rigid_model
 
 from rotordrop.machine import loads_machine
 from rotordrop.physics import columns as L
@@ -96,7 +96,53 @@ def path_of_exudyn(inputs: Inputs) -> dict[str, float]:
     }
 
 
-CASES: dict[str, Compute] = {"E01": path_of_exudyn}
+def landing_of_exudyn(inputs: Inputs) -> dict[str, float]:
+    """Displacement [m] of a rotor that a thrust lands on a face, and spin of the race there [rad/s]."""
+    b, face = inputs["bearing"], inputs["face"]
+    aside, up, along = (inputs["force"][axis] for axis in ("x", "y", "along"))
+    values = {"m": inputs["mass"], "g": inputs["gravity"], "c": b["air_gap"], "r": b["bore_radius"]}
+    values |= {"K": b["contact_stiffness"], "n": b["contact_exponent"], "lam": 0.0, "mu": b["friction"]}
+    values |= {"ms": b["ring_mass"], "Ks": b["support_stiffness"], "Cs": b["support_damping"]}
+    more = f"""mount = [{{ kind = "stop", gap = "{b["stop_gap"]} m", \
+stiffness = "{b["stop_stiffness"]} N/m", damping = "0 s/m" }}]
+face = {{ gap = "{face["gap"]} m", inner_radius = "{face["arm"] - 1e-9} m", \
+outer_radius = "{face["arm"] + 1e-9} m", stiffness = "{face["stiffness"]} N/m", damping = "0 s/m", \
+friction = {face["friction"]} }}
+[[loads]]
+node = 2
+direction = "{math.atan2(up, aside)} rad"
+force = "{math.hypot(aside, up)} N"
+[[loads]]
+node = 2
+direction = "axial"
+force = "{along} N"
+"""
+    model = rigid_model(
+        values | {"I": b["race_inertia"]},
+        link=inputs["link"],
+        more=more,
+        inertia=(inputs["polar_inertia"], inputs["diametral_inertia"]),
+        arrangement="X",
+    )
+    model.parameters.bearing[:, L.RACE_WEIGHT] = 0.0
+    case = DropCase(
+        speed=inputs["speed"],
+        duration=inputs["duration"],
+        output_step=inputs["compared_step"],
+        tolerance=1e-9,
+        spin="coasting",
+        start=PlacedStart(displacement=np.zeros((1, 2)), velocity=np.array([inputs["velocity"]])),
+    )
+    result = simulate_drop(model, case)
+    paths = np.column_stack([result.displacement[:, 0], result.axial_displacement, result.race_speed[:, 0]])
+    return {
+        f"{name}, {1e3 * time:g} ms": float(value)
+        for time, row in zip(np.round(result.time[1:], 9), paths[1:], strict=True)
+        for name, value in zip(("x", "y", "z", "spin of the race"), row, strict=True)
+    }
+
+
+CASES: dict[str, Compute] = {"E01": path_of_exudyn, "E02": landing_of_exudyn}
 
 
 test_case, test_a_changed_input_is_noticed = checks_of(
@@ -108,5 +154,12 @@ test_case, test_a_changed_input_is_noticed = checks_of(
         ("E01", {"bearings__0__support_damping": 2.55e3}),
         ("E01", {"bearings__1__air_gap": 130.2e-6}),
         ("E01", {"polar_inertia": 0.11}),
+        ("E02", {"force__along": 401.0}),
+        ("E02", {"force__x": 60.1}),
+        ("E02", {"bearing__stop_gap": 20.1e-6}),
+        ("E02", {"bearing__stop_stiffness": 3.03e8}),
+        ("E02", {"face__gap": 100.1e-6}),
+        ("E02", {"face__stiffness": 2.01e8}),
+        ("E02", {"face__friction": 0.121}),
     ],
 )
