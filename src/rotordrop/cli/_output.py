@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.errors import OutputError, UsageError
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 """Columns of what is printed to a file or a pipe; chosen, not measured."""
+
+BETWEEN_LINES_S = 5.0
+"""Pause between two lines on the progress where there is no terminal [s]; chosen, not measured."""
 
 OUTPUTS = ("json", "report", "film", "output", "share")
 """Parameters of the verbs that name files to write; other paths are read."""
@@ -180,14 +184,40 @@ def places_beside(named: Path | None, records: Iterable[Path]) -> list[Path]:
 
 
 @contextmanager
+def _progress_lines(title: str) -> Iterator[Progress]:
+    """Lines for a log: one at most every `BETWEEN_LINES_S`, none where all is done before."""
+    ended, latest, out = Event(), [""], console(sys.stderr)
+
+    def say() -> None:
+        said = ""
+        while not ended.wait(BETWEEN_LINES_S):
+            if latest[0] != said:
+                said = latest[0]
+                with suppress(OSError, ValueError):  # whoever read it has gone
+                    out.print(said)
+
+    def tell(stage: str, fraction: float) -> None:
+        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
+
+    lines = Thread(target=say, daemon=True)
+    lines.start()
+    try:
+        yield tell
+    finally:
+        ended.set()
+        lines.join()
+
+
+@contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
     """Show a bar with the time left on standard error while a long computation runs.
 
     Yields a function to call with the name of the present stage and the fraction done (0 to 1). Where
-    standard error is not a terminal nothing is shown.
+    standard error is not a terminal it gets a line now and then: stage and fraction, if they have changed.
     """
     if not sys.stderr.isatty():
-        yield lambda stage, fraction: None
+        with _progress_lines(title) as told:
+            yield told
         return
     from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bars

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,10 +30,9 @@ from rotordrop.track.smoother import Smoothed, parameter_sample
 from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Search, track_drops
+from rotordrop.twin.steps import Progress, Steps
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
-
-Progress = Callable[[str, float], None]
 
 CONFOUNDED = 0.9
 """Correlation from which two parameters are reported as confounded [1] (chosen)."""
@@ -129,7 +128,7 @@ def calibrate_machine(
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=True)
-    search = Search(drops=drops, progress=progress)
+    search = Search(drops=drops, progress=progress and Steps(progress))
     found = track_drops(search, search.with_rotor(machine))
     machine, tracked = found.machine, found.fit
     checks = {

@@ -9,7 +9,7 @@ weighed once more: a slight departure shows in nothing but the likelihood.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -48,9 +48,8 @@ from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rises import Rises, carried
 from rotordrop.twin.rotor_search import with_found_rotor
+from rotordrop.twin.steps import GUESSES, WEIGHED, WHOLE, Steps
 from rotordrop.twin.tracked_parameters import parameters
-
-Progress = Callable[[str, float], None]
 
 CALIBRATION_STAGE = Stage(until=0.06, force=0.07, share=0.01, passes=1)
 WHOLE_STAGE = replace(CALIBRATION_STAGE, until=0.2)
@@ -229,6 +228,7 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
     base: Candidate | None = None
     if is_calibrated(machine) and not drops.calibrate_only:
         schedule = QUICK_SCHEDULE if quick else CALIBRATED_SCHEDULE
+        search.begins(WHOLE, (WHOLE,) if quick else (WHOLE, WEIGHED))
         fit = track(drops.fine(machine), schedule, progress=search.progress)
         if quick:
             usual = tuple(one.filtered for one in fit.smoothed)
@@ -237,14 +237,16 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         noise = likeliest_noise(fit, CALIBRATED_SCHEDULE[-1])
         found: Candidate | None = search.at_rest(first, fit.trajectories, noise)
     else:
+        search.begins(GUESSES)
         base = Candidate(machine=machine, fit=search.fit_base(machine))
+        search.begins(WHOLE)
         # First: the coarse basis alone may not fit a record that the finer one fits, or lose it there.
         found = search.refine_if_followed(base)
     if found is not None:
+        search.begins(WEIGHED)
         found = search.weighed(found)
     if found is None or not fits(found):
-        if search.progress is not None:
-            search.progress("trying extensions of the base model, and other starts", 0.0)
+        search.begins("trying extensions of the base model, and other starts")
         base = base or Candidate(machine=machine, fit=search.fit_base(machine))
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
         other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
@@ -395,7 +397,12 @@ class Search:
     """Fits of machines to the same drops: a coarse basis finds the parameters, a finer one refines them."""
 
     drops: Drops
-    progress: Progress | None
+    progress: Steps | None
+
+    def begins(self, step: str, of: tuple[str, ...] | None = None) -> None:
+        """Say that a step begins."""
+        if self.progress is not None:
+            self.progress.begin(step, of)
 
     def with_rotor(self, machine: Machine) -> Machine:
         """The machine with its rotor as the records show it, where a beam stands for it."""

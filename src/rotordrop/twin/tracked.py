@@ -17,7 +17,8 @@ from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.twin.mixture import Alternative, probabilities
 from rotordrop.twin.problems import Drops, tail_first
-from rotordrop.twin.search import Accepted, Progress, Search, track_drops
+from rotordrop.twin.search import Accepted, Search, track_drops
+from rotordrop.twin.steps import Progress, Steps
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
 
 
@@ -151,7 +152,8 @@ def followed_drops(
     Each is handed out with its arrays, so that no more than one is held when its result has been made.
     """
     search = Search(
-        drops=Drops(evidence=tuple(tail_first(evidence)), calibrate_only=False), progress=progress
+        drops=Drops(evidence=tuple(tail_first(evidence)), calibrate_only=False),
+        progress=progress and Steps(progress),
     )
     machine = search.with_rotor(machine)
     # The estimate without contact law takes nothing from the passes, which leave a core to it.

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from rotordrop import errors
+from rotordrop.cli import _output
 from rotordrop.cli import app as command_line
 from rotordrop.cli._options import quantity
 
@@ -297,3 +298,21 @@ def test_a_command_of_before_is_told_its_present_name(capsys):
 def test_options_that_would_be_ignored_are_refused(call, message, capsys):
     assert command_line.run(call) == 64
     assert message in capsys.readouterr().err
+
+
+def test_a_log_gets_a_line_on_the_progress_now_and_then(capsys, monkeypatch):
+    """An estimate of half a minute had said nothing where standard error is no terminal."""
+    monkeypatch.setattr(_output, "BETWEEN_LINES_S", 0.01)
+    with _output.progress_bar("estimating") as tell:
+        for stage, share in (("step 1 of 3", 0.0), ("step 2 of 3", 0.3)):
+            tell(stage, share)
+            told, until = "", time.monotonic() + 30.0
+            while stage not in told and time.monotonic() < until:
+                time.sleep(0.01)
+                told += capsys.readouterr().err
+            assert told == f"estimating: {stage} ({100 * share:.0f} %)\n"
+    assert capsys.readouterr() == ("", "")
+    monkeypatch.setattr(_output, "BETWEEN_LINES_S", 60.0)
+    with _output.progress_bar("estimating") as tell:
+        tell("done at once", 1.0)
+    assert capsys.readouterr() == ("", "")

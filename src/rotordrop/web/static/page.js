@@ -93,7 +93,7 @@ function showStatus() {
   if (running) {
     const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
     const stage = running.state === "waiting" ? "waiting for another computation" : running.stage || ({ look: "reading and checking the record", channels: "reading the record" }[verb] || "compiling and preparing");
-    const seconds = Math.round(running.left || 0), left = seconds ? `, this step about ${seconds} s more` : "";
+    const seconds = Math.round(running.left || 0), left = seconds ? `, about ${seconds} s left` : "";
     const bar = make("progress", { max: 1, "aria-label": stage, ...(share > 0 ? { value: share } : {}) });
     say(`${{ channels: "Channels", look: "Looking", estimate: "Estimating", waterfall: "Waterfall" }[verb]}: ${stage} (${Math.round(running.spent)} s${left})`, "notice", bar,
       make("button", { text: "Cancel", id: "cancel", on: { click: async () => { state.job = await server.cancel(state.job.id, verb); await refresh(); } } }));
