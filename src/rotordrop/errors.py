@@ -97,7 +97,15 @@ class NothingFallsError(RecordError):
         super().__init__(f"nothing falls in the record: {seen}; {remedy}")
 
 
-class UnpairedError(RecordError):
+class UnmatchedError(RecordError):
+    """Which channel is which sensor is not told by their names; a page asks it in another way."""
+
+    def __init__(self, seen: str, remedy: str) -> None:
+        self.seen, self.remedy = seen, remedy
+        super().__init__(f"{seen}; {remedy}")
+
+
+class UnpairedError(UnmatchedError):
     """No two channels of a recording look at one plane."""
 
 

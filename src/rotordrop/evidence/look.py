@@ -261,7 +261,7 @@ def look(
     try:
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
-        return _look_at_channels(FilePath(str(record)), profile, str(error))
+        return _look_at_channels(FilePath(str(record)), profile, error)
     machine = None if machine is None else as_dropped(read, machine)
     evidence = None if machine is None else Evidence(record=read, machine=machine, name=read.name)
     passed = None if evidence is None else gate(evidence)
@@ -361,12 +361,14 @@ def _look_at_held(
     )
 
 
-def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, why: str) -> Look:
+def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, why: UnpairedError) -> Look:
     """A recording of single channels: what each reads, on the clock of the first."""
     recording = read_recording(path, rules_of(profile, ()))
     channels = [one for one in recording.channels if len(one.values) >= _FEWEST and np.ptp(one.time) > 0.0]
     if not channels:
-        raise UnpairedError(f"{why}. No channel has the {_FEWEST} readings that show a level alone")
+        raise UnpairedError(
+            f"{why.seen}; no channel has the {_FEWEST} readings that show a level", why.remedy
+        )
     time = channels[0].time
     record = Record(
         time=time,
@@ -390,13 +392,13 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
         not_seen="No check looks at channels of which no two make a plane",
         drops=(),
         levels=levels,
-        no_fall=why,
+        no_fall=why.seen,
         whirls=(),
         planes=(),
         standstill=None,
         speed=None,
         synchronous=(),
-        notes=record.notes,
+        notes=(why.remedy, *record.notes),
     )
 
 

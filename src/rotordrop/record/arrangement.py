@@ -96,19 +96,15 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
             have = listed(f"{channel.label} in {channel.unit or '?'}" for channel in recording.channels)
             raise UnpairedError(
                 f"the recording holds {channels_in_words(len(labels))} that can be displacements (in a unit "
-                f"of length or in volts); a plane needs two. It has {have}: export the "
-                "displacements of a plane together"
+                f"of length or in volts), and a plane needs two; it has {have}",
+                "export the displacements of a plane together",
             )
-        by_two = list(zip(labels[::2], labels[1::2], strict=False))
-        ends = ("NDE", "DE") if len(by_two) == 2 else [f"plane {k + 1}" for k in range(len(by_two))]
-        as_listed = " ".join(
-            f'--map "{end}: {first}, {second}"' for end, (first, second) in zip(ends, by_two, strict=True)
-        )
+        as_listed = " ".join(f'--map "{end}: {two}"' for end, two in planes_as_listed(recording).items())
         raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
-            "their names (X and Y, A and B, H and V, left and right); say which look at one plane: if they "
-            f"are listed in pairs, {as_listed}; angles that are known go with their channels "
-            f'("{labels[0]} 45 deg")'
+            "their names (X and Y, A and B, H and V, left and right)",
+            f"say which look at one plane: if they are listed in pairs, {as_listed}; angles that are known "
+            f'go with their channels ("{labels[0]} 45 deg")',
         )
     sensors = [
         Sensor.model_construct(
@@ -135,6 +131,30 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         angles_known=known,
         notes=notes,
     )
+
+
+def planes_as_listed(recording: Recording) -> dict[str, str]:
+    """Planes and their channels, were these listed in pairs: what is asked where no names tell."""
+    labels = [channel.label for channel in recording.channels if _may_read(channel)]
+    by_two = list(zip(labels[::2], labels[1::2], strict=False))
+    ends = ("NDE", "DE") if len(by_two) == 2 else [f"plane {k + 1}" for k in range(len(by_two))]
+    return {end: ", ".join(two) for end, two in zip(ends, by_two, strict=True)}
+
+
+def seats(channels: Sequence[Channel], sensors: Sequence[Sensor]) -> list[Sensor]:
+    """The sensor of each channel of a plane whose angles are not told: by their names, or in their order.
+
+    Where the names show axes, X stands a quarter turn before Y, counter-clockwise, the right probe before
+    the left.
+    """
+    pairs, _ = pairs_of(channels)
+    axes = pairs[0][2] if len(pairs) == 1 and len(channels) == len(sensors) == 2 else ""
+    if axes not in ("XY", "HV", "LR"):
+        return list(sensors)
+    one, other = sensors
+    if (math.sin(float(other.angle) - float(one.angle)) > 0.0) != (axes != "LR"):
+        one, other = other, one
+    return [one, other] if channels[0] is pairs[0][1][0] else [other, one]
 
 
 def given_planes(
@@ -167,7 +187,7 @@ def given_planes(
 
 
 def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: Profile) -> dict[str, str]:
-    """Channel of each sensor of the machine by the planes of a profile: by angle, or in their order."""
+    """Channel of each sensor of the machine by the planes of a profile: by angle, or as `seats` has it."""
     mapped: dict[str, str] = {}
     for name, entries in given_planes(recording, profile):
         members = [sensor for sensor in sensors if (sensor.bearing or "").lower() == name.lower()]
@@ -178,8 +198,8 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
                 f"the plane {name!r} names {channels_in_words(len(entries))}; the machine has "
                 + (f"{len(members)} sensors there ({stand})" if members else f"the planes {known}")
             )
-        for place, (channel, angle) in enumerate(entries):
-            sensor = members[place]
+        untold = seats([channel for channel, _ in entries], members)
+        for sensor, (channel, angle) in zip(untold, entries, strict=True):
             if angle is not None:
                 apart = [abs(math.remainder(angle - float(s.angle), 2 * math.pi)) for s in members]
                 sensor = members[apart.index(min(apart))]

@@ -7,15 +7,22 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError, UsageError
-from rotordrop.record.arrangement import fitting, pairs_of, plain, sensors_of_planes
+from rotordrop.errors import RecordError, UnmatchedError, UsageError
+from rotordrop.record.arrangement import (
+    fitting,
+    pairs_of,
+    plain,
+    planes_as_listed,
+    seats,
+    sensors_of_planes,
+)
 from rotordrop.record.profile import Profile
 from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, called, listed
 from rotordrop.units import format_quantity, parse_quantity
@@ -38,6 +45,8 @@ class Guess:
     """What was found, in words."""
     missing: tuple[str, ...]
     """What has to be said, each with the way to say it; empty when the profile is complete."""
+    likely: Mapping[str, str]
+    """What is likeliest where it has to be said: sensor -> channel, or plane -> channels without sensors."""
 
 
 def match_sensors(
@@ -56,12 +65,13 @@ def match_sensors(
         # all of them at once, with what would map them
         present = [channel.label for channel in recording.channels]
         close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
-        hint = f"; did you mean {close[0]!r}?" if close else "."
+        hint = f" (did you mean {close[0]!r}?)" if close else ""
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
-        raise RecordError(
-            f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}; it has "
-            f"{listed(present)}{hint} Say which is which, {_likeliest(recording, sensors, missing)}, or keep "
-            "it in a profile with 'rotordrop profile'"
+        raise UnmatchedError(
+            f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}{hint}; it has "
+            f"{listed(present)}",
+            f"say which is which, {_options(recording, sensors, missing)}, or keep it in a profile with "
+            "'rotordrop profile'",
         )
     taken: list[Channel] = []
     for name, channels in hits.items():
@@ -79,27 +89,37 @@ def match_sensors(
     return tuple(taken)
 
 
-def _likeliest(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
-    """Options that would map the sensors without a channel: planes in their order where as many are pairs.
+RULE = "planes in their order, X a quarter turn before Y"
+"""How the likeliest channels of sensors are found where no names tell."""
 
-    With their angles: X stands a quarter turn before Y, counter-clockwise, the right probe before the left.
-    """
+
+def likeliest(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Channel]:
+    """The likeliest channel of each sensor, where as many pairs of channels as planes are found."""
     pairs, _ = pairs_of(recording.channels)
     planes = list(dict.fromkeys(sensor.bearing for sensor in sensors))
     members = [[sensor for sensor in sensors if sensor.bearing == plane] for plane in planes]
-    if len(pairs) == len(planes) and all(len(found) == 2 for found in members):
-        options = []
-        for plane, (_, pair, axes), found in zip(planes, pairs, members, strict=True):
-            angles = [float(sensor.angle) for sensor in found]
-            leads = math.sin(angles[1] - angles[0]) > 0.0
-            if leads != (axes != "LR") and axes in ("XY", "HV", "LR"):
-                angles.reverse()
-            placed = (f"{c.label} {math.degrees(at):.4g} deg" for c, at in zip(pair, angles, strict=True))
-            if any(sensor.name in missing for sensor in found):
-                options.append(f'--map "{plane}: {", ".join(placed)}"')
-        stand = "X a quarter turn before Y; without angles they are the sensors in their order"
-        return f"likeliest {' '.join(options)} ({stand})"
-    return " ".join(f'--map "{name}=..."' for name in missing[:8])
+    if len(pairs) != len(planes) or any(len(found) != 2 for found in members):
+        return {}
+    return {
+        sensor.name: channel
+        for (_, pair, _), found in zip(pairs, members, strict=True)
+        for channel, sensor in zip(pair, seats(pair, found), strict=True)
+    }
+
+
+def _options(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
+    """Options that would map the sensors without a channel: the likeliest planes, with their angles."""
+    likely = likeliest(recording, sensors)
+    if not likely:
+        return " ".join(f'--map "{name}=..."' for name in missing[:8])
+    planes: dict[str, list[str]] = {}
+    at = {sensor.name: sensor for sensor in sensors}
+    for name, channel in likely.items():
+        told = f"{channel.label} {math.degrees(float(at[name].angle)):.4g} deg"
+        planes.setdefault(at[name].bearing or "", []).append(told)
+    lacking = {at[name].bearing or "" for name in missing}
+    maps = " ".join(f'--map "{plane}: {", ".join(two)}"' for plane, two in planes.items() if plane in lacking)
+    return f"likeliest {maps} ({RULE})"
 
 
 def find_speed(
@@ -224,7 +244,7 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     missing: list[str] = []
     if unmapped:
         free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
-        options = _likeliest(recording, sensors, unmapped)
+        options = _options(recording, sensors, unmapped)
         missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
     pairs = [] if sensors else pairs_of(recording.channels)[0]
     planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
@@ -268,7 +288,10 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     found.append(
         f"shaft speed: {speed or 'not known; an estimate needs --speed-channel, --pulses or --speed'}"
     )
-    return Guess(profile=profile, found=tuple(found), missing=tuple(missing))
+    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
+    if not sensors and not planes:
+        likely = planes_as_listed(recording)
+    return Guess(profile=profile, found=tuple(found), missing=tuple(missing), likely=likely)
 
 
 def _with_speed(

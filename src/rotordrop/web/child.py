@@ -21,8 +21,8 @@ from rotordrop.errors import (
     DamagedFileError,
     MachineFileError,
     OutputError,
-    RecordError,
     RotordropError,
+    UnmatchedError,
     UsageError,
 )
 from rotordrop.files import write_json
@@ -78,7 +78,10 @@ def main(folder: str, verb: Verb) -> None:
         publish(job, verb, told["run"], made, of)
         ended = {"state": "done", "fraction": 1.0, "stage": ""}
     except RotordropError as error:
-        ended = {"state": "failed", "error": _without_folder(str(error), job), "code": error.exit_code}
+        said = (
+            f"{error.seen}; say which channel is which" if isinstance(error, UnmatchedError) else str(error)
+        )
+        ended = {"state": "failed", "error": _without_folder(said, job), "code": error.exit_code}
     except MemoryError:
         ended = {
             "state": "failed",
@@ -175,7 +178,7 @@ def _trace(values: Array) -> list[float | None]:
 
 def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     """What a recording holds, which sensors look for a channel, and what could be guessed."""
-    from rotordrop.record.columns import guess_profile
+    from rotordrop.record.columns import RULE, guess_profile
     from rotordrop.record.readers import read_recording
 
     machine, given = machine_of(job), profile_of(job, told["options"])
@@ -202,6 +205,8 @@ def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
             "sensors": sensors,
             "profile": guess.profile.model_dump(exclude_defaults=True, exclude_none=True),
             "missing": list(guess.missing),
+            "likely": dict(guess.likely),
+            "likely_by": RULE if sensors else "channels in their order, two of each plane",
         },
     )
 
@@ -223,7 +228,7 @@ def _look(job: Job, made: Path, told: dict[str, Any]) -> None:
         profile=profile_of(job, options),
     )
     if not seen.motion.paths:  # the page asks which channels make a plane
-        raise RecordError(seen.no_fall)
+        raise UnmatchedError(seen.no_fall, "say which channels look at one plane")
     answered = (Kind.ENDS_TURNING,) if "tail" in job.read()["files"] else ()
     seen = replace(
         seen,

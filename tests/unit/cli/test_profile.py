@@ -72,7 +72,7 @@ def test_a_profile_for_looks_needs_no_speed(strange, tmp_path, capsys):
 
 def test_every_missing_channel_is_named_in_one_message(strange):
     asked = (
-        r"\(4 sensors have none\); it has X1, Y1, X2, Y2\. .*"
+        r"\(4 sensors have none\); it has X1, Y1, X2, Y2; say .*"
         r'likeliest --map "NDE: X1 45 deg, Y1 135 deg" --map "DE: X2 45 deg, Y2 135 deg"'
     )
     with pytest.raises(RecordError, match=asked):

@@ -261,7 +261,8 @@ def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
     )
     file.write_text(text)
     alone = look(file, gap=GAP)
-    assert re.search(r"no two channels of alpha, bravo, c, d, Speed are a pair.*--map", alone.no_fall)
+    assert re.search(r"no two channels of alpha, bravo, c, d, Speed are a pair by", alone.no_fall)
+    assert alone.notes[0].startswith('say which look at one plane: if they are listed in pairs, --map "')
     assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
     file.write_text(
         text.replace("alpha", "a1").replace("bravo", "a2").replace(",c ", ",a3 ").replace(",d ", ",a4 ")
@@ -463,7 +464,7 @@ def test_the_map_that_odd_names_are_asked_with_can_be_given_as_it_stands(tmp_pat
     for name, odd in (("NDE_X", "front"), ("NDE_Y", "probe alpha"), ("DE_X", "K17"), ("DE_Y", "hinten")):
         head = head.replace(name, odd, 1)
     file.write_text(f"{head}\n{rest}")
-    given = re.findall(r'--map "([^"]+)"', look(file).no_fall)
+    given = re.findall(r'--map "([^"]+)"', look(file).notes[0])
     assert given == ["NDE: front, probe alpha", "DE: K17, hinten"]
     seen = look(file, mapping=given)
     assert [plane.plane for plane in seen.planes] == ["NDE", "DE"]
@@ -547,7 +548,7 @@ def test_a_tail_is_told_to_be_one(tmp_path):
 def test_a_record_too_short_for_a_level_says_so(tmp_path):
     file = tmp_path / "short.csv"
     file.write_text("time [s],Force [N]\n" + "".join(f"{k * 1e-3:.3f},{k % 3}\n" for k in range(12)))
-    with pytest.raises(UnpairedError, match=r"No channel has the 16 readings that show a level alone"):
+    with pytest.raises(UnpairedError, match=r"no channel has the 16 readings that show a level"):
         look(file)
 
 

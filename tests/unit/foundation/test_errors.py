@@ -23,6 +23,7 @@ def test_exit_codes_are_those_documented_and_all_different():
         "RecordError": 3,
         "NoDropError": 3,
         "NothingFallsError": 3,
+        "UnmatchedError": 3,
         "UnpairedError": 3,
         "UnsettledError": 3,
         "IdentificationError": 4,

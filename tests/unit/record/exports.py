@@ -278,7 +278,7 @@ SCOPES = [
             "LECROYHDO6104,12345,Waveform\nSegments,1,SegmentSize,60\nSegment,TrigTime,TimeSinceSegment1\n"
             "#1,04-May-2023 10:45:47,0\nTime,Ampl\n" + _rows(VOLTS[:, :1])
         ).encode(),
-        question=r"holds 1 channel that can be displacements .*It has Ampl in \?: export the displacements",
+        question=r"holds 1 channel that can be displacements .*it has Ampl in \?; export the displacements",
     ),
     Export(
         maker="Rigol",
@@ -598,7 +598,7 @@ MONITORS = [
         file="a.csv",
         content=_system1(),
         names=["VE-101X"],
-        question=r"holds 1 channel that can be displacements .*It has VE-101X in um: export the",
+        question=r"holds 1 channel that can be displacements .*it has VE-101X in um; export the",
     ),
     Export(
         maker="HBK",

@@ -47,7 +47,8 @@ def test_spelling_may_differ(machine):
 
 def test_a_missing_channel_is_named_with_what_there_is(machine):
     with pytest.raises(
-        RecordError, match=r"no channel 'S_DE_B' for sensor S_DE_B; it has S_NDE_A, .*did you mean"
+        RecordError,
+        match=r"no channel 'S_DE_B' for sensor S_DE_B \(did you mean 'S_NDE_B'\?\); it has S_",
     ):
         record_of(recording("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_C"), machine.sensors)
 
@@ -214,19 +215,22 @@ API = ("Ch1 VE-101X", "Ch2 VE-101Y", "Ch3 VE-102X", "Ch4 VE-102Y")
 
 
 @pytest.mark.parametrize(
-    "mapping",
+    ("mapping", "read"),
     [
-        ("NDE: Ch1 VE-101X, VE-101Y", "DE: VE-102X, VE-102Y"),
-        ("nde: VE-101X 135 deg, VE-101Y 45 deg", "DE: VE-102Y 45 deg, VE-102X 135 deg"),
-        ("S_NDE_A = VE-101X", "S_NDE_B=Ch2 VE-101Y", "DE: VE-102X, VE-102Y"),
+        (("NDE: Ch1 VE-101X, VE-101Y", "DE: VE-102X, VE-102Y"), (1.0, 0.0, 3.0, 2.0)),
+        (
+            ("nde: VE-101X 135 deg, VE-101Y 45 deg", "DE: VE-102Y 45 deg, VE-102X 135°"),
+            (0.0, 1.0, 2.0, 3.0),
+        ),
+        (("S_NDE_A = VE-101X", "S_NDE_B=Ch2 VE-101Y", "DE: VE-102X, VE-102Y"), (0.0, 1.0, 3.0, 2.0)),
     ],
 )
-def test_a_map_names_planes_or_sensors(mapping, machine):
+def test_a_map_names_planes_or_sensors(mapping, read, machine):
     rules = rules_of(None, mapping)
     readings = [np.full(10, float(k)) for k in range(4)]
     channels = tuple(channel(name, values=values) for name, values in zip(API, readings, strict=True))
     record = record_of(Recording(channels=channels), machine.sensors, profile=rules)
-    np.testing.assert_allclose(record.signals[0], [0.0, 1e-6, 2e-6, 3e-6])
+    np.testing.assert_allclose(record.signals[0], 1e-6 * np.array(read))
 
 
 @pytest.mark.parametrize(
@@ -266,6 +270,30 @@ def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answ
     channels = tuple(channel(name, values=np.full(10, float(k))) for k, name in enumerate(API))
     record = record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given))
     np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_map_without_angles_seats_the_channels_as_the_suggestion_does(machine, swapped):
+    """The suggestion had X a quarter turn before Y; without its angles the same map exchanged the two."""
+    with pytest.raises(RecordError, match="likeliest") as asked:
+        record_of(recording(*API), machine.sensors)
+    angled = re.findall(r'--map "([^"]+)"', str(asked.value))
+    bare = [re.sub(r" \d+ deg", "", text) for text in angled]
+    if swapped:
+        bare = [re.sub(r": (.+), (.+)", r": \2, \1", text) for text in bare]
+    channels = tuple(channel(name, values=np.full(10, float(k))) for k, name in enumerate(API))
+    first, second = (
+        record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given)).signals[0]
+        for given in (angled, bare)
+    )
+    np.testing.assert_array_equal(first, second)
+
+
+def test_channels_that_are_only_counted_are_the_sensors_in_their_order(machine):
+    channels = tuple(channel(f"CH{k}", values=np.full(10, float(k))) for k in range(4))
+    given = ["NDE: CH1, CH0", "DE: CH2, CH3"]
+    record = record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given))
+    np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 2e-6, 3e-6])
 
 
 def test_a_sensor_takes_the_channel_of_its_name_without_counter_and_prefix(machine):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +59,25 @@ def test_what_a_record_does_not_tell_is_asked(served, tmp_path):
     assert served.settled(number, "channels")["state"] == "done"
     told = served.ask("GET", f"/api/jobs/{number}/channels/page").told
     assert "channels of NDE_A, NDE_B, DE_A, DE_B" in told["missing"][0]
+    # what the page chooses is what the command line suggests
+    suggested = re.findall(r"(VE-\d[XY]) (-?\d+) deg", told["missing"][0])
+    angles = {sensor["name"]: f"{math.degrees(sensor['angle']):.0f}" for sensor in told["sensors"]}
+    assert sorted((label, angles[name]) for name, label in told["likely"].items()) == sorted(suggested)
+    assert "X a quarter turn before Y" in told["likely_by"]
+
+
+def test_a_page_asks_for_channels_in_words_of_its_own(served, tmp_path):
+    rows = [f"{i * 5e-5:.5f};" + ";".join(f"{k * i}" for k in range(4)) for i in range(50)]
+    path = tmp_path / "drop.csv"
+    path.write_text("\n".join(["Time [s];alpha [um];bravo [um];c [um];d [um]", *rows]) + "\n")
+    number = served.new_job({"record": path})
+    served.order(f"/api/jobs/{number}/look")
+    told = served.settled(number, "look")["error"]
+    assert told.endswith("say which channel is which") and "--map" not in told
+    served.order(f"/api/jobs/{number}/channels")
+    assert served.settled(number, "channels")["state"] == "done"
+    likely = served.ask("GET", f"/api/jobs/{number}/channels/page").told["likely"]
+    assert likely == {"NDE": "alpha, bravo", "DE": "c, d"}
 
 
 def test_a_shaft_table_that_was_forgotten_is_asked_for_alone(served, files):

@@ -94,7 +94,6 @@ export function tomlOf(table) {
   return [...plain.map(line), ...parts.flatMap(([name, part]) => ["", `[${name}]`, ...Object.entries(part).filter(([, value]) => value !== undefined).map(line)]), ""].join("\n");
 }
 
-const LENGTHS = ["m", "mm", "um", "nm", "mil", "in", "V", "mV", "of full scale", ""];
 const spoken = ({ label, unit, low, high }) => `${label} (${low === null ? "empty" : `${`${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))}`.replaceAll("-", "−")} ${unit || "without a unit"}`})`;
 function drawn(values) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), line = document.createElementNS(svg.namespaceURI, "polyline");
@@ -108,28 +107,17 @@ function drawn(values) {
 const choice = (name, options, chosen, label) => make("select", { name, "aria-label": label, of: options.map(([value, text]) => make("option", { value, text, selected: value === chosen ? "" : null })) });
 const entry = (name, value, placeholder, label) => make("input", { name, value: value || "", placeholder, "aria-label": label, maxlength: 120, autocomplete: "off", size: 12 });
 
-// A channel to begin with: of the plane whose name it carries, else by its number (X1, Y1, X2, Y2).
-function guessed(channels, profile) {
-  const taken = Object.values(profile.channels || {}), number = (label) => Number(label.match(/\d+$/)?.[0] || 0);
-  const free = channels.filter(({ unit, label }) => LENGTHS.includes(unit) && !taken.includes(label)).map(({ label }) => label).sort((a, b) => number(a) - number(b) || a.localeCompare(b));
-  const named = (label, plane) => label.toUpperCase().split(/[^A-Z0-9]+/).includes(plane.toUpperCase());
-  return (plane) => {
-    const at = free.findIndex((label) => named(label, plane));
-    return free.splice(Math.max(at, 0), 1)[0] || "";
-  };
-}
-
 // Which channel is which sensor, and what the recording does not say itself; the answer is kept as a profile.
-export function askChannels({ channels, sensors, profile }, words, sent) {
-  const guess = guessed(channels, profile), rows = [];
+export function askChannels({ channels, sensors, profile, likely, likely_by: rule }, words, sent) {
+  const rows = [];
   const options = [["", "–"], ...channels.map((one) => [one.label, spoken(one)])];
-  const pairs = Object.entries(profile.planes || {}).flatMap(([plane, text]) => text.split(", ").map((said, i) => {
+  const pairs = Object.entries(profile.planes || (sensors.length ? {} : likely)).flatMap(([plane, text]) => text.split(", ").map((said, i) => {
     const [, channel, degrees] = said.match(/^(.*?)(?: +([-+]?[0-9.]+) *(?:deg|°))?$/);
     return { name: `sensor ${i + 1}`, plane, channel, angle: degrees ? (Number(degrees) * Math.PI) / 180 : (i % 2) * Math.PI / 2 };
   }));
   const places = sensors.length ? sensors : pairs.length ? pairs : ["NDE", "NDE", "DE", "DE"].map((plane, i) => ({ name: `sensor ${i + 1}`, plane, angle: (i % 2) * Math.PI / 2 }));
   for (const sensor of places) {
-    const chosen = profile.channels?.[sensor.name] || sensor.channel || guess(sensor.plane), degrees = `${Number(((sensor.angle * 180) / Math.PI).toFixed(1))} deg`;
+    const chosen = profile.channels?.[sensor.name] || sensor.channel || likely[sensor.name] || "", degrees = `${Number(((sensor.angle * 180) / Math.PI).toFixed(1))} deg`;
     rows.push(make("tr", { of: [make("th", { scope: "row", text: sensor.name }),
       make("td", { of: [sensors.length ? make("span", { text: sensor.plane }) : entry("plane", sensor.plane, "NDE", `Plane of ${sensor.name}`)] }),
       make("td", { of: [sensors.length ? make("span", { text: degrees.replace("-", "−").replace(" deg", "°") }) : entry("angle", degrees, "0 deg", `Angle of ${sensor.name}, from +x`)] }),
@@ -146,7 +134,8 @@ export function askChannels({ channels, sensors, profile }, words, sent) {
   by("sensitivity").value = profile.sensitivity || "";
   by("fullscale").value = profile.full_scale || "";
   by("fullscale").parentElement.hidden = !profile.full_scale && !channels.some(({ unit }) => unit === "of full scale");
-  by("channelwords").textContent = words;
+  const supposed = sensors.length ? sensors.some(({ name }) => likely[name] && !profile.channels?.[name]) : !profile.planes && pairs.length;
+  by("channelwords").textContent = [words, supposed ? `Chosen below is what is likeliest: ${rule}.` : ""].filter(Boolean).join(". ");
   by("mapping").showModal();
   by("mapping").querySelector(".main").focus();
   by("mapping").onclose = () => {
