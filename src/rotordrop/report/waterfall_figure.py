@@ -144,12 +144,14 @@ def _mark_orders(figure: go.Figure, fall: Waterfall, level: Array, rows: NDArray
         at, up = k * turning[inside], level[inside]
         curve(figure, at, up, colour=WHITE, width=1.0, dash="dash", hover=None)
         first = int(np.flatnonzero(inside)[np.argmax(turning[inside])])
+        begins = float(k * turning[first])
+        at_edge = fall.frequency[-1] - begins < LEAST_DISTANCE * (fall.frequency[-1] - fall.frequency[0])
         figure.add_annotation(
-            x=float(k * turning[first]),
+            x=begins,
             y=float(level[first]),
             text=plain(f"{k:g}X".replace("-", "\N{MINUS SIGN}")),
             showarrow=False,
-            xanchor="left",
+            xanchor="right" if at_edge else "left",
             yanchor="bottom",
             font={"size": 11, "color": WHITE},
         )

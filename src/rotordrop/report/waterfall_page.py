@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop._version import __version__
+from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.known import Known
 from rotordrop.report.content import (
     Card,
@@ -145,8 +146,29 @@ def frequency_sections(
     )
 
 
+def _covered(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
+    """From which speed to which the signal reaches, and what it cannot show where it ends turning."""
+    signal = analysis.signal
+    if signal.profile is None:
+        return ()
+    lasts = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
+    ends = (signal.start_time, signal.start_time + lasts)
+    first, last = (abs(float(speed)) for speed in signal.profile.speed_at(ends))
+    what = "record" if signal.recorded else "simulation"
+    said = f"The {what} covers the {lasts:.1f} s after power-off, from {shown(first, 'speed')} to "
+    if last <= STANDSTILL:
+        return (Statement(f"{said}standstill."),)
+    return (
+        Statement(
+            f"{said}{shown(last, 'speed')}: it ends before standstill, and says nothing of largest motion, "
+            "lines and resonances below that speed.",
+            "warning",
+        ),
+    )
+
+
 def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
-    said = []
+    said = [*_covered(analysis)]
     for name, plane in analysis.planes.items():
         held = held_maximum(plane.history)
         said.append(Statement(f"{name}: {plane.history.statement}", "good" if held else "warning"))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.unit.spectrum.synthetic import TURN, CoastDown
 
+from rotordrop.report.waterfall_figure import waterfall_figure
 from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.spectrum.candidates import order_candidates
 from rotordrop.spectrum.coast_down import CoastDownAnalysis, CoastDownSignal, analyse_coast_down
+from rotordrop.spectrum.speed_profile import exact_speed_profile
 
 AMPLITUDES = {0.5: 1.5e-6, 1.0: 6e-6, 1.5: 2e-6, 2.0: 4e-6, 2.5: 3e-6, 3.0: 2.5e-6}
 TIME_CONSTANT = 15.0
@@ -42,6 +45,28 @@ def test_every_order_to_three_is_followed_halves_included(analysis: CoastDownAna
     for order, amplitude in AMPLITUDES.items():
         read = track.major_axis[:, track.of(order)]
         assert np.median(read) == pytest.approx(amplitude, rel=0.02), order
+
+
+def test_the_speeds_a_record_covers_are_said_first(analysis: CoastDownAnalysis) -> None:
+    """Of a record that ends turning it was said that the first 0.2 s held the maximum, and no more."""
+    first = waterfall_page(analysis, title="ends").verdict[0]
+    ends = analysis.signal.profile.speed_at(25.0) / TURN
+    assert first.level == "warning" and f" to {ends:.2f} Hz" in first.text
+    assert first.text.startswith("The record covers the 25.0 s after power-off, from ")
+    assert "ends before standstill" in first.text
+    time = np.linspace(0.0, 40.0, 41)
+    down = exact_speed_profile(time, np.maximum(400.0 - 20.0 * time, 0.0))
+    stopped = replace(analysis.signal, profile=down)
+    first = waterfall_page(replace(analysis, signal=stopped), title="stands").verdict[0]
+    assert first.level == "notice" and first.text.endswith(" to standstill.")
+
+
+def test_the_name_of_an_order_at_the_right_edge_stands_within(analysis: CoastDownAnalysis) -> None:
+    fall = next(one for one in analysis.planes["DE"].waterfalls if one.component == "x")
+    top = 2.5 * float(fall.speed.max()) / TURN  # the third order comes in from the right
+    figure = waterfall_figure(fall, "DE", highest=top)
+    anchors = {one.text: one.xanchor for one in figure.layout.annotations if one.text.endswith("X")}
+    assert anchors == {"0.5X": "left", "1X": "left", "2X": "left", "3X": "right"}
 
 
 def test_the_document_holds_the_numbers_put_in(analysis: CoastDownAnalysis) -> None:
