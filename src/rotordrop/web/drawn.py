@@ -105,6 +105,7 @@ def write_look(
                 {
                     "name": path.name,
                     "gap": list(path.wall.interval_90) if math.isfinite(path.gap) else None,
+                    "gap_is": "90 %",
                     "measured": [f"x{b}", f"y{b}"],
                     "radius": f"r{b}",
                 }
@@ -154,7 +155,9 @@ def write_estimate(
             for kind, one in peaks.items()
         }
         ends = None if gap is None else [gap.lower, gap.upper]
-        places.append({"name": bearing.name, "gap": ends, **own, "peaks": shown})
+        known = bearing.values.get("air_gap_m")
+        level = "limits" if ends is None or known is None or list(known.interval_90 or ()) != ends else "90 %"
+        places.append({"name": bearing.name, "gap": ends, "gap_is": level, **own, "peaks": shown})
     impacts = [
         (
             bearing.name,

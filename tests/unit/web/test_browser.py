@@ -30,6 +30,12 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, tmp_pa
         send(browser, list(files.values()))
         browser.until(LOOKED)
         browser.until("document.getElementById('status').innerText.includes('The rotor was released at')")
+        browser.size(820, 1180)  # a tablet: the tabs had begun below its screen
+        browser.until("document.getElementById('tabpanel').getBoundingClientRect().top < innerHeight - 150")
+        assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        browser.size(1280, 800)
+        plots = "[...document.querySelectorAll('#panels .u-over')].map((one) => one.clientHeight)"
+        browser.until(f"Math.max(...{plots}) - Math.min(...{plots}) < 3")  # the last one was half the others
         browser.key("n")
         browser.until("document.querySelector('tr.here')")
         first = words(browser, "tr.here")

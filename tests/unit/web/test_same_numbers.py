@@ -92,6 +92,12 @@ def test_loads_of_every_bearing(estimate: Estimate, page: dict[str, Any], docume
     assert compared >= 6
 
 
+def test_the_gap_that_is_drawn_has_its_level(estimate: Estimate, page: dict[str, Any]) -> None:
+    for place, bearing in zip(page["places"], estimate.bearings, strict=True):
+        assert place["gap"] == list(bearing.values["air_gap_m"].interval_90)
+        assert place["gap_is"] == "90 %"
+
+
 def test_every_impact(estimate: Estimate, page: dict[str, Any], document: dict[str, Any]) -> None:
     in_json = [
         (

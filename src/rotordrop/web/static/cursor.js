@@ -15,14 +15,14 @@ function orbitOf(index) {
   const panel = state.orbits[index], place = state[panel.verb].places[index], forcePanel = state.loaded.find((one) => one.id === "force");
   const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
   const turn = by("orbitof").value === "window" ? null : turnBefore();
-  if (turn) { return { name: place.name, gap: place.gap, paths: paths.map((one) => ofTurn(one, turn, by("orbitof").value === "1X")), others: [], cursor: state.cursor, force: null, impacts: [], angle: null, turn }; }
+  if (turn) { return { name: place.name, gap: place.gap, gapIs: place.gap_is, paths: paths.map((one) => ofTurn(one, turn, by("orbitof").value === "1X")), others: [], cursor: state.cursor, force: null, impacts: [], angle: null, turn }; }
   const others = panel.found.others.map(({ found, columns: [x, y], k }) => ({ x: found[x], y: found[y], k, dash: dashOf(k) }));
   let force = null;
   if (forcePanel && panel.verb === "estimate" && state.cursor !== null) {
     force = { value: forcePanel.found[place.force[0]][nearest(forcePanel.time, state.cursor)], largest: place.peaks.force.value };
   }
   const turning = state.estimate ? state.estimate.speed : null;
-  return { name: place.name, gap: place.gap, paths, others, cursor: state.cursor, force,
+  return { name: place.name, gap: place.gap, gapIs: place.gap_is, paths, others, cursor: state.cursor, force,
     impacts: impacts().filter((one) => one.place === place.name && one.time >= state.view.from && one.time <= state.view.to).map((one) => one.azimuth),
     angle: turning && state.cursor !== null && state.view.to - state.view.from < 2 ? turning * state.cursor : null };
 }

@@ -12,7 +12,7 @@ export const nearest = (time, t) => {
 };
 
 // paths: [{role, time, x, y}]; force: {value, largest} or null; impacts: azimuths; angle of the shaft or null
-export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, impacts, angle, turn }) {
+export function drawOrbit(pen, { name, gap, gapIs, paths, others = [], cursor, force, impacts, angle, turn }) {
   const tone = colours(), size = Math.min(pen.width, pen.height);
   const cx = pen.width / 2, cy = pen.height / 2 + 4, radius = 0.5 * size - 26;
   let reach = gap ? gap[1] : 0;
@@ -60,8 +60,8 @@ export function drawOrbit(pen, { name, gap, paths, others = [], cursor, force, i
   if (turn) { pen.text(turn.seen ? "● mark passes" : "● turn begins, no mark in the record", pen.width - 6, 28, tone.muted, { align: "right", size: 10 }); }
   pen.text(name, 6, 14, tone.ink, { size: 12.5, weight: "600" });
   if (gap) {
-    const words = gap[1] - gap[0] > 1e-6 ? `${written(gap[0] / factor("length"))} to ` : "";
-    pen.text(`gap ${words}${shown(gap[1], "length")}`, pen.width - 6, 14, tone.limit, { align: "right" });
+    const known = gap[1] - gap[0] <= 1e-6, words = known ? `gap ${shown(gap[1], "length")}` : `gap ${written(gap[0] / factor("length"))} to ${shown(gap[1], "length")} (${gapIs})`;
+    pen.text(words, pen.width - 6, 14, tone.limit, { align: "right" });
   }
   const step = 10 ** Math.floor(Math.log10(reach / factor("length") || 1)) * factor("length");
   pen.line([[8, pen.height - 8], [8 + scale * step, pen.height - 8]], tone.ink, 2);

@@ -9,9 +9,9 @@ import { make } from "./tables.js";
 import * as units from "./units.js";
 
 const component = (found, [x, y], signal) => (signal === "x" ? found[x] : signal === "r" ? found[x].map((v, i) => Math.hypot(v, found[y][i])) : found[y]);
-const gapLevels = ([low, high], signal) => {
+const gapLevels = ([low, high], is, signal) => {
   const sides = signal === "r" ? [1] : signal === "x" ? [-1, 1] : [-1];
-  return sides.flatMap((side) => (high - low > 1e-6 ? [side * low, side * high] : [side * high])).map((value) => ({ value, name: "air gap" }));
+  return sides.flatMap((side) => (high - low > 1e-6 ? [side * low, side * high] : [side * high])).map((value) => ({ value, name: high - low > 1e-6 ? `air gap (${is})` : "air gap" }));
 };
 
 function motionPanel(index) {
@@ -24,7 +24,7 @@ function motionPanel(index) {
     title: `${place.name}, ${verb === "estimate" ? "at the bearing" : "sensor plane"}`, others: residual ? [] : othersOf("motion", index, place.name),
     measured: pairs.map(([role, [x, y]]) => ({ label: `${place.name} ${role}`, column: residual ? null : { y, x, r: `${x}|${y}` }[signal] || y, value: (found) => component(found, [x, y], signal) })),
     axis: { y: "y", x: "x", r: "radius", residual: residual ? "measured − estimated" : "y" }[signal],
-    levels: (place.gap && !residual) ? gapLevels(place.gap, signal) : [],
+    levels: (place.gap && !residual) ? gapLevels(place.gap, place.gap_is, signal) : [],
     ofOther: (found, names) => component(found, names, signal),
     curves: (found, tone) => (residual
       ? place.residual.map((name, i) => ({ label: `residual ${"xy"[i]}`, colour: [tone.residual, tone.place2][i], values: found[name], dash: i ? [6, 3] : [] }))

@@ -38,11 +38,11 @@ export function table({ caption, note, columns, rows }) {
 }
 
 export function cards(list) {
-  return make("div", { class: "cards", of: list.map(({ title, figures }) => make("article", {
+  return make("div", { of: [make("div", { class: "cards", of: list.map(({ title, figures }) => make("article", {
     class: "card", of: [make("h3", { text: title }), make("dl", { of: figures.map(({ label, value, note }) => make("div", {
       of: [make("dt", { text: label }), make("dd", { of: [...number(value), ...(note ? [make("span", { class: "note", text: note })] : [])] })]
     })) })]
-  })) });
+  })) }), ...levelOf(list.map(({ figures }) => figures.map(({ value }) => value)))] });
 }
 
 export function impactTable(impacts, columns, here, timeOf, go) {
