@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import rotordrop
-from rotordrop.cli.app import VerbTable
+from rotordrop.cli.app import VerbTable, run
 
 ROOT = Path(__file__).resolve().parents[2]
 VERBS = VerbTable.verbs()
@@ -79,6 +79,24 @@ def test_what_the_readme_imports_is_public():
     assert blocks
     for names in re.findall(r"from rotordrop import ([^\n]+)", "\n".join(blocks)):
         assert {name.strip() for name in names.split(",")} <= set(rotordrop.__all__)
+
+
+def test_the_commands_of_the_readme_name_files_that_are_there_by_then(tmp_path, monkeypatch):
+    """They named files that nobody had written, such as drop3.json."""
+    monkeypatch.chdir(tmp_path)
+    assert run(["init", "--example", "lp400"]) == 0
+    written = {file.name for file in Path("lp400").iterdir()}
+    listed = re.findall(r"^\| `(\S+)`", Path("lp400/README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert written == {*listed, "README.md"}
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    block = next(one for one in re.findall(r"```console\n(.*?)```", text, re.DOTALL) if "lp400" in one)
+    for line in block.splitlines():
+        words = line.split("#")[0].split()
+        outputs = {words[k + 1] for k, word in enumerate(words) if word in ("--report", "--json")}
+        named = {word for word in words if re.fullmatch(r"\w+\.(toml|csv|h5|json|html)", word)}
+        assert named - outputs <= written, line
+        written |= outputs
+    assert {"drop.html", "drop.json"} <= written
 
 
 def test_bundled_recordings_are_called_simulated_everywhere():

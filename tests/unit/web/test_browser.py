@@ -97,7 +97,8 @@ def renamed(files, folder: Path) -> Path:
     named = folder / "mine.h5"
     named.write_bytes(files["record"].read_bytes())
     with h5py.File(named, "a") as file:
-        for old, new in (("S_NDE_A", "X1"), ("S_NDE_B", "Y1"), ("S_DE_A", "X2"), ("S_DE_B", "Y2")):
+        # X stands a quarter turn before Y
+        for old, new in (("S_NDE_A", "Y1"), ("S_NDE_B", "X1"), ("S_DE_A", "Y2"), ("S_DE_B", "X2")):
             place = next(name for name in every(file) if name.endswith(old))
             file.move(place, place.removesuffix(old) + new)
     return named
@@ -123,7 +124,7 @@ def test_twelve_numbers_and_a_record_with_names_of_its_own_get_to_an_estimate(br
         browser.until("document.getElementById('mapping').open", 120)
         assert "NDE_A" in words(browser, "#channelrows")
         chosen = "[...document.querySelectorAll('#channelrows select')].map(one => one.value).join()"
-        assert browser.evaluate(chosen).replace("displacement/", "") == "X1,Y1,X2,Y2"
+        assert browser.evaluate(chosen).replace("displacement/", "") == "Y1,X1,Y2,X2"
         browser.evaluate("document.querySelector('#mapping .main').click()")
         browser.until(LOOKED, 120)
         browser.until("!document.getElementById('estimate').disabled")
