@@ -57,7 +57,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     # what a gap that was given makes false stands before the numbers
     doubted = [one for one in seen.findings if given and one.kind == Kind.WRONG_AIR_GAP]
     others = [one for one in seen.findings if one not in doubted]
-    read = Statement(f"Read: {dict(facts)['channels']}; {dict(facts)['samples']}.")
+    read = Statement(f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}.")
     timeline = (
         Column("record time", lambda row: format_moment(row[0])),
         Column("event", lambda row: row[1]),
@@ -94,7 +94,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     """Contacts of a held rotor, levels and spectra of a record in which nothing falls."""
     record, facts = seen.record, _facts(seen)
     notes = tuple(Statement(note) for note in seen.notes)
-    read = Statement(f"Read: {dict(facts)['samples']}.")
+    read = Statement(f"Samples read: {dict(facts)['samples']}.")
     doubted = seen.unit_doubted
     if doubted:
         said = [Statement("No number of a drop is shown before the unit is right.")]
@@ -105,7 +105,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
             Statement(f"The rotor touched while its magnets hold or pull it: {', '.join(parts)}.", "warning")
         ]
     elif seen.motion.paths:
-        said = [Statement(f"No contact is seen; {seen.no_fall}")]
+        said = [Statement(f"No contact is seen, and {seen.no_fall}")]
     else:
         said = [Statement(seen.no_fall)]
     said += [
@@ -244,12 +244,14 @@ def _verdict(seen: Look) -> list[Statement]:
     ends = "."
     if contact is not None and between is not None:
         ends = (
-            f"; the last one at {format_moment(contact)} (90 %: {' to '.join(map(format_moment, between))}), "
-            "in contact from there on."
+            f", the last at {format_moment(contact)} (90 %: {' to '.join(map(format_moment, between))}); "
+            "from then on it stayed in contact."
         )
     low, high = drop.count_interval_90
     release = f"{format_moment(drop.release)} of the record (± {1e3 * RELEASE_ERROR:g} ms)"
-    said = [f"The rotor was released at {release}, {len(seen.impacts)} impacts (90 %: {low} to {high}){ends}"]
+    count = len(seen.impacts)
+    hits = f"{count} impact{'' if count == 1 else 's'} (90 %: {low} to {high})"
+    said = [f"The rotor was released at {release}; {hits} followed{ends}"]
     if len(seen.planes) > 1:
         first = seen.first_end
         said.append(

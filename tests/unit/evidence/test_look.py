@@ -179,7 +179,7 @@ def test_count_and_last_impact_hold_those_of_the_contacts():
     low, high = seen.drops[0].count_interval_90
     assert low <= 10 <= high
     told = " ".join(one.sentence for one in look_page(seen, drawn=False).verdict)
-    assert f"7 impacts (90 %: {low} to {high}); the last one at 0.0518 s (90 %: " in told
+    assert f"; 7 impacts (90 %: {low} to {high}) followed, the last at 0.0518 s (90 %: " in told
     planes = seen.as_json()["planes"]
     assert [plane["impacts"] for plane in planes] == [5, 2]
     assert all(plane["contact_from_interval_90_s"][0] < plane["contact_from_s"] for plane in planes)

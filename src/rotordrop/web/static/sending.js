@@ -11,7 +11,7 @@ async function rolesOf(found) {
   const shaft = machine ? texts[found.indexOf(machine)].match(/shaft_table\s*=\s*["']([^"']+)["']/)?.[1] : null;
   const config = found.some((file) => /\.cfg$/i.test(file.name)), asked = state.job?.states?.look?.error || ""; // a shaft table that was forgotten
   return found.map((file, i) => (file === machine ? "machine" : texts[i] ? "profile" : file.name === shaft || asked.includes(`'${file.name}'`) || (config && /\.dat$/i.test(file.name)) ? "beside"
-    : /tail|settled|standstill/i.test(file.name) ? "tail" : "record"));
+    : /tail|settled|standstill|stillstand/i.test(file.name) ? "tail" : "record"));
 }
 
 // Ask what the files are; without files, for a machine of twelve numbers for the drop that is open.
