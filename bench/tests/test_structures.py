@@ -260,7 +260,7 @@ def test_a_landed_rotor_that_is_damped_presses_with_its_thrust(model):
 
 
 def test_a_landing_moves_as_that_of_a_machine_file_does(known):
-    """Two sets of equations for face and balls; no damping of the face, that of the race as the package's."""
+    """Two sets of equations for face and balls; no damping of the face."""
     bearing, arm = known.touchdown_bearings[1], 40e-3
     face = {
         "gap": "20 um",
@@ -277,7 +277,6 @@ def test_a_landing_moves_as_that_of_a_machine_file_does(known):
     case = DropCase(speed=SPEED, duration=0.012)
     theirs = simulate_drop(build_drop_model(described, "quick"), case)
     landing = departed(build_drop_model(known, "quick"), bearing={"DE": {"face": THRUST | {"damping": 0.0}}})
-    landing.parameters.departure[1, D.ALONG] = 1.0
     ours = simulate_drop(landing, case)
     _push, race, rotor = axial(landing, ours)
     assert rotor == pytest.approx(theirs.axial_displacement, abs=2e-4 * np.max(rotor))

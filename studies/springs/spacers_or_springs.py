@@ -60,7 +60,8 @@ def signed(percent: float) -> str:
 def main() -> None:
     """Simulate all and write the table."""
     rows = [
-        f"Change against rigid spacers in {DURATION:g} s [%]: largest force at NDE, DE; stress there.",
+        f"Change against rigid spacers in {DURATION:g} s [%]: "
+        "largest force at NDE and DE; largest stress there.",
         "",
         "| rotor | " + " | ".join(KINDS) + " |",
         "| --- |" + " --- |" * len(KINDS),

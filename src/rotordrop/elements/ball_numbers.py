@@ -37,6 +37,7 @@ from rotordrop.physics.ball_set import (
     ball_set_entries,
     ball_set_gradient,
     balls_of,
+    lines_of_contact,
     loose_race_seat,
     static_deflection,
 )
@@ -44,7 +45,7 @@ from rotordrop.physics.ball_table import BallTable, ball_table
 from rotordrop.physics.contact import contact_energy, depth_at
 from rotordrop.physics.fast_balls import FastBalls, centred_balls, offset_on_springs
 from rotordrop.physics.hertz import compliance, race_contact
-from rotordrop.physics.ring import STOP_STIFFNESS, ring_damping, row_rigidity, seat_on_springs
+from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -238,6 +239,11 @@ class BallNumbers(BearingNumbers):
         """Stiffness of a ball, groove distance and offsets, stress coefficient."""
         return ball_set_entries(self.constants)
 
+    @property
+    def lines_of_contact(self) -> float:
+        """As a radial motion projects them."""
+        return lines_of_contact(self.constants)
+
     def rings(self) -> Array:
         """Mass, springs, stop and fit of outer rings that springs press on."""
         numbers, balls = np.zeros(ring.N_ENTRIES), self.balls
@@ -247,7 +253,6 @@ class BallNumbers(BearingNumbers):
             numbers[ring.STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
             numbers[ring.BALLS] = self.constants.ball_count
             numbers[ring.ROWS] = self.constants.row_count
-            numbers[ring.DAMPING] = ring_damping(self.constants)
         return numbers
 
     def speed_table(self, fastest: float) -> BallTable | None:

@@ -206,6 +206,11 @@ class BearingNumbers(ABC):
     def entries(self) -> Array:
         """Numbers of the force law, shape (N,), in the order of `rotordrop.physics.ball_set`."""
 
+    @property
+    def lines_of_contact(self) -> float:
+        """Dashpots along the lines of contact of all rolling elements over the radial damping [1]; none."""
+        return 0.0
+
     def rings(self) -> Array:
         """Numbers of outer rings that springs press on, in the order of `rotordrop.physics.ring`; no such."""
         return np.zeros(ring.N_ENTRIES)

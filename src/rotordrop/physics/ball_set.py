@@ -31,13 +31,15 @@ STRESS_COEFFICIENT = 4
 N_ENTRIES = 5
 
 # Entries of a rolling bearing: its ball set, then its drag and damping, then the axial force of its rows that
-# brakes the race beside the radial one (zero unless the bearing warms); SI units.
+# brakes the race beside the radial one (zero unless the bearing warms), then the dashpots along the lines of
+# contact of all balls over the radial damping [1]; SI units.
 DRAG_COEFFICIENT = N_ENTRIES
 DRAG_SPEED = N_ENTRIES + 1
 PITCH_DIAMETER = N_ENTRIES + 2
 DAMPING = N_ENTRIES + 3
 PRESSED = N_ENTRIES + 4
-ROLLING_N_ENTRIES = N_ENTRIES + 5
+LINES = N_ENTRIES + 5
+ROLLING_N_ENTRIES = N_ENTRIES + 6
 
 LEAST_DAMPING = 1e-9
 """Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""
@@ -146,7 +148,7 @@ def bearing_reaction(
 
     Parameters
     ----------
-    numbers : ndarray, shape (10,)
+    numbers : ndarray, shape (11,)
         Ball set, drag, pitch diameter [m], damping [N s/m] and axial force of the rows [N].
     F_x, F_y : float
         Force of the balls [N], from `ball_set_force`.
@@ -235,6 +237,53 @@ def two_row_axial_force(
     """
     one = ball_set_axial_force(entries, rows[0], dx, dy, work, -dz)
     return one - ball_set_axial_force(entries, rows[1], dx, dy, work, dz)
+
+
+def lines_of_contact(constants: BearingConstants) -> float:
+    """Equal dashpots c along the lines of contact of all N balls together, over the radial damping [1].
+
+    A radial motion meets ``N c cos²α / 2`` of them, with the angle α of the row at rest. Source: projection.
+    """
+    slope = constants.axial_offset / constants.radial_offset
+    return 2.0 * (1.0 + slope * slope)
+
+
+@inner_kernel
+def row_axial_damping(numbers: Array, share: float, ring: float) -> tuple[float, float]:
+    """Damping [N s/m] of a row against axial motion, and its slope [N s/m²] by the way of its rings.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (11,)
+        Ball set, drag, damping [N s/m] and lines of contact [1], as of `bearing_reaction`.
+    share : float
+        Share of the row of all balls [1].
+    ring : float
+        Way of the outer ring from its balls [m], as of `ball_set_force`.
+
+    Notes
+    -----
+    Of the dashpots of `lines_of_contact` an axial motion meets ``c sin²φ``, with the angle φ of now and the
+    race in the middle: at rest ``2 tan²α`` of the radial damping for all rows together. Deep grooves have
+    no angle, and no damping, until the race has moved along. Source: projection.
+    """
+    radial2 = numbers[RADIAL_OFFSET] * numbers[RADIAL_OFFSET]
+    axial = numbers[AXIAL_OFFSET] - ring
+    A2 = radial2 + axial * axial
+    lines = share * numbers[LINES] * numbers[DAMPING]
+    return lines * axial * axial / A2, -2.0 * lines * axial * radial2 / (A2 * A2)
+
+
+@inner_kernel
+def two_row_axial_damping(numbers: Array, rows: tuple[Array, Array], dz: float) -> tuple[float, float]:
+    """Damping [N s/m] against axial motion of a race that has moved by dz [m], and its slope [N s/m²].
+
+    ``numbers`` (11,) as of `row_axial_damping`, ``rows`` as of `two_row_force`. Source: `row_axial_damping`.
+    """
+    loaded, relieved = lane_sum(rows[0][COUNT]), lane_sum(rows[1][COUNT])
+    C, by_ring = row_axial_damping(numbers, loaded / (loaded + relieved), -dz)
+    D, of_other = row_axial_damping(numbers, relieved / (loaded + relieved), dz)
+    return C + D, of_other - by_ring
 
 
 @lean_kernel

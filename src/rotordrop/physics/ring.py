@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 
 # Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers. GROWN is what
-# heat adds to the radial offset of the balls, and no part of what the springs were set to. DAMPING is that of
-# one ring over the radial damping of the race [1].
+# heat adds to the radial offset of the balls, and no part of what the springs were set to.
 MASS = 0
 RATE = 1
 TRAVEL = 2
@@ -32,8 +31,7 @@ FRICTION = 4
 BALLS = 5
 ROWS = 6
 GROWN = 7
-DAMPING = 8
-N_ENTRIES = 9
+N_ENTRIES = 8
 
 SMOOTHING_SPEED = 1e-2
 """Speed of a ring [m/s] below which the friction of its fit is smoothed: chosen, not measured. A hundredth of
@@ -52,22 +50,11 @@ def row_rigidity(constants: BearingConstants) -> float:
     return float(row_axial_stiffness(approach, stiffness, groove, constants.contact_angle))
 
 
-def ring_damping(constants: BearingConstants) -> float:
-    """Axial damping of one ring over the radial damping of the race behind all balls [1].
-
-    Of balls with equal dashpots c along their lines of contact, Z in each of R rows, a radial motion meets
-    ``R Z c cos²α / 2`` and the axial one of a row ``Z c sin²α``. Source: projection, with the angle at the
-    preload.
-    """
-    slope = constants.axial_offset / constants.radial_offset
-    return 2.0 / constants.row_count * slope * slope
-
-
 @inner_kernel
 def preload_force(numbers: Array, entries: Array) -> float:
     """Force [N] of the springs on one ring where the race is centred: what its row says at its offset.
 
-    ``numbers`` (9,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi 2020, eqs.
+    ``numbers`` (8,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi 2020, eqs.
     (3)–(6), for an axial displacement.
     """
     radial, axial = entries[RADIAL_OFFSET] - numbers[GROWN], entries[AXIAL_OFFSET]
@@ -100,7 +87,7 @@ def fit_friction(numbers: Array, F: float, v: float) -> tuple[float, float, floa
 
     Parameters
     ----------
-    numbers : ndarray, shape (9,)
+    numbers : ndarray, shape (8,)
         Rings of the bearing; coefficient [1] on the share of each ring of the radial force.
     F : float
         Radial force through all rings [N].

@@ -273,7 +273,7 @@ def bearing_row(bearing: TouchdownBearing, static_load: float) -> Array:
     row = np.zeros(L.N_BEARING_COLUMNS)
     row[L.BALL_SET : L.BALL_SET_END] = numbers.entries()
     row[L.RING : L.RING_END] = numbers.rings()
-    row[L.PITCH_DIAMETER] = numbers.drag_diameter
+    row[L.PITCH_DIAMETER], row[L.LINES] = numbers.drag_diameter, numbers.lines_of_contact
     row[L.BEARING_DAMPING] = numbers.damping(float(bearing.damping_time), static_load)
     bearing.fill(row)
     return row

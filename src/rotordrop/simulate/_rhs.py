@@ -31,6 +31,8 @@ from rotordrop.physics.ball_set import (
     ball_set_axial_force,
     ball_set_force,
     bearing_reaction,
+    row_axial_damping,
+    two_row_axial_damping,
     two_row_axial_force,
     two_row_force,
 )
@@ -587,7 +589,7 @@ def add_rings(
     friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
     rows = numbers[ring.ROWS]
     dy[at] = y[at + 1]
-    damped = numbers[ring.DAMPING] * row[L.BEARING_DAMPING] * y[at + 1]
+    damped = row_axial_damping(row[L.ROLLING : L.ROLLING_END], 1.0 / rows, y[at])[0] * y[at + 1]
     dy[at + 1] = (pushed / rows - held - friction - damped) / numbers[ring.MASS]
     return float(rows * damped * y[at + 1]), float(rows * friction * y[at + 1])
 
@@ -640,7 +642,7 @@ def add_axial_motion(
         dx, dz = race_deflection(b, y, p)
         numbers, moved = row[L.ROLLING : L.ROLLING_END], y[own + 1]
         held = two_row_axial_force(numbers, rows_of(b, p), dx, dz, y[own], work.balls)
-        damped = row[L.BEARING_DAMPING] * moved
+        damped = two_row_axial_damping(numbers, rows_of(b, p), y[own])[0] * moved
         spin = p.bearing_at[b, L.RACE_SPIN]
         # balls roll under the sum of their loads: the drag of the axial force comes on top
         drag = race_drag_torque(

@@ -15,7 +15,12 @@ from rotordrop.arrays import Array, Integers
 from rotordrop.physics import aerodynamics, ball_table, face, landing_sleeve, mount, ring, support
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import ball_set_axial_gradient, ball_set_gradient
+from rotordrop.physics.ball_set import (
+    ball_set_axial_gradient,
+    ball_set_gradient,
+    row_axial_damping,
+    two_row_axial_damping,
+)
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.spin import race_drag_gradient
@@ -195,12 +200,14 @@ def _ring_jacobian(
     mass, rows = numbers[ring.MASS], numbers[ring.ROWS]
     along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
     elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
+    damping, by_way = row_axial_damping(row[L.ROLLING : L.ROLLING_END], 1.0 / numbers[ring.ROWS], y[at])
     by_drag, _by_spin = race_drag_gradient(
         elastic + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
     )
     J[at, at + 1] = 1.0
     J[at + 1, at] -= (k_aa / rows + rate - by_force * (along_x * k_ax + along_y * k_ay)) / mass
-    J[at + 1, at + 1] -= (by_speed + numbers[ring.DAMPING] * C) / mass
+    J[at + 1, at] -= by_way * y[at + 1] / mass
+    J[at + 1, at + 1] -= (by_speed + damping) / mass
     for j in range(2):
         axial, along = (k_ax, along_x) if j == 0 else (k_ay, along_y)
         # as the rings give way, the force of the balls falls
@@ -236,10 +243,11 @@ def _axial_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
         loss = above - face.face_contact(numbers, z, vz - FACE_STEP, 0.0, 0.0, 0.0)[1]
         _one, k_ax, k_ay, k_aa = ball_set_axial_gradient(entries, loaded, dx, dy, -y[own])
         _other, g_ax, g_ay, g_aa = ball_set_axial_gradient(entries, relieved, dx, dy, y[own])
+        damping, by_way = two_row_axial_damping(row[L.ROLLING : L.ROLLING_END], (loaded, relieved), y[own])
         J[own, own + 1] = 1.0
         for part in range(2):
             slope = (stiff if part == 0 else loss) / (2.0 * FACE_STEP)
-            held = k_aa + g_aa if part == 0 else row[L.BEARING_DAMPING]
+            held = k_aa + g_aa + by_way * y[own + 1] if part == 0 else damping
             J[at + 1, at + part] -= slope / p.spin[L.ROTOR_MASS]
             J[at + 1, own + part] += slope / p.spin[L.ROTOR_MASS]
             J[own + 1, at + part] += slope / row[L.RACE_MASS]

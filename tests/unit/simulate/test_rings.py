@@ -11,7 +11,7 @@ from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics import ring
-from rotordrop.physics.ball_set import COSINE, COUNT
+from rotordrop.physics.ball_set import COSINE, COUNT, DAMPING, row_axial_damping
 from rotordrop.physics.ring import preload_force, seat_on_springs
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import structure_unknowns
@@ -42,7 +42,7 @@ def test_jacobian_agrees_with_finite_differences(way, bearing):
     model = build_drop_model(sprung(bearing=bearing), "quick")
     state = a_state(model, np.array([-40e-6, 15e-6]), 0.98)
     rings = model.layout.further_at(L.RING_STATES)
-    state[rings] = np.resize([way, 4e-3], rings.stop - rings.start)
+    state[rings] = np.resize([way, 0.2], rings.stop - rings.start)
     numeric = assert_jacobian(model, state)
     assert np.max(np.abs(numeric[rings.start + 1])) > 1e6
 
@@ -59,15 +59,18 @@ def test_energy_closes_and_the_fit_takes_some():
     assert losses(model, drop).total == pytest.approx(drop.state[-1, model.layout.dissipated], rel=1e-5)
 
 
-def test_a_ring_is_damped_as_its_balls_are():
+@pytest.mark.parametrize("way", [0.0, 30e-6, -10e-6])
+def test_a_ring_is_damped_as_its_balls_are(way):
     """A dashpot along the line of contact of every ball gives the radial damping and that of a ring."""
-    numbers = sprung().touchdown_bearings[0].bearing.numbers()
+    machine = sprung()
+    numbers = machine.touchdown_bearings[0].bearing.numbers()
+    row = build_drop_model(machine, "quick").parameters.bearing[0, L.ROLLING : L.ROLLING_END]
     balls, constants = numbers.places(), numbers.constants
-    tangent = constants.axial_offset / constants.radial_offset
-    cosine2 = 1.0 / (1.0 + tangent**2)
-    radial = np.sum(balls[COUNT] * cosine2 * balls[COSINE] ** 2)
-    axial = np.sum(balls[COUNT]) / constants.row_count * (1.0 - cosine2)
-    assert numbers.rings()[ring.DAMPING] == pytest.approx(axial / radial, rel=1e-9)
+    rest, now = (np.arctan2(constants.axial_offset - moved, constants.radial_offset) for moved in (0.0, way))
+    radial = np.sum(balls[COUNT] * np.cos(rest) ** 2 * balls[COSINE] ** 2)
+    axial = np.sum(balls[COUNT]) / constants.row_count * np.sin(now) ** 2
+    found = row_axial_damping(row, 1.0 / constants.row_count, way)[0]
+    assert found == pytest.approx(row[DAMPING] * axial / radial, rel=1e-9)
 
 
 def test_rings_swing_out_in_flight_without_friction_of_their_fit():
@@ -78,7 +81,8 @@ def test_rings_swing_out_in_flight_without_friction_of_their_fit():
     drop_derivative(1.0, state, p, rates, scratch_of(p))
     row = p.bearing[1]
     rings = row[L.RING : L.RING_END]
-    lost = rings[ring.ROWS] * rings[ring.DAMPING] * row[L.BEARING_DAMPING] * state[at + 1] ** 2
+    share = 1.0 / rings[ring.ROWS]
+    lost = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, state[at])[0] / share * state[at + 1] ** 2
     assert lost > 0.0
     assert rates[model.layout.dissipated] == pytest.approx(lost, rel=1e-6)
     assert rates[at + 1] == pytest.approx(
