@@ -337,7 +337,7 @@ def test_calibrate_refuses_an_unwritable_output(tmp_path: Path, capsys: pytest.C
 @pytest.mark.parametrize(
     ("profile", "message"),
     [
-        ("", "drop_060_tail cannot be used (2 faults): no drop in the record: the shaft moves away by"),
+        ("", "drop_060_tail cannot be used: no drop in the record: the shaft moves away by"),
         (
             '[speed]\nconstant = "60 Hz"\n',
             "drop_060_tail cannot be used: missing pre-trigger: no drop in the record",

@@ -212,7 +212,7 @@ def test_a_later_and_larger_motion_is_a_warning_in_page_and_document(estimate: E
     )
     told = replace(estimate, later=(later,), warnings=(later.sentence(),))
     words = [statement for statement in estimate_page(told).verdict if statement.level == "warning"]
-    assert any("23.0 µm further out at 0.559 s" in statement.text for statement in words)
+    assert any("23.0 µm further out at 0.5590 s" in statement.text for statement in words)
     (entry,) = estimate_document(told)["later_motion"]
     assert entry["larger"] is True and entry["later_time"] == 0.559
     same = replace(later, later=311e-6)
