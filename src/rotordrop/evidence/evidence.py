@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, RecordError, RotordropError, UnsettledError
+from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.ends import falling, held_bearings
 from rotordrop.evidence.events import (
     AFTER_FALL,
@@ -390,7 +391,12 @@ class Evidence:
             return np.full(len(self.record.sensors), np.nan)
         falling = (self.time >= 0.0) & (self.time <= until)
         runout = self.levitated.unknown_runout(self.record.time[falling], self.angle)
-        return np.asarray(np.sqrt(self.levitated.noise**2 + runout))
+        return np.asarray(np.sqrt(self.slow_noise.variances(self.levitated.noise**2) + runout))
+
+    @property
+    def slow_noise(self) -> SlowNoise:
+        """The part of the noise of all channels that is not white."""
+        return SlowNoise() if self.levitated is None else self.levitated.slow_noise
 
     def readings(self, until: float) -> Array:
         """Readings in the positive directions [m] until a time [s], hum and 2X runout taken off.

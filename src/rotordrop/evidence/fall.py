@@ -9,6 +9,7 @@ treatment.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -67,6 +68,10 @@ _LOWER = 1.0
 """Half a chi square by which another minimum has to be lower to be taken [1]: searches that end in the same
 one differ by less."""
 
+_SPACING = 40e-6
+"""Time between samples at least, where noise is not white [s] (chosen): more of them bring little, and
+its covariance is a full matrix."""
+
 _LEAD = 5e-3
 """Levitated samples kept before the earliest release [s] (chosen)."""
 
@@ -121,13 +126,17 @@ class FallProblem:
     def solve(self, release: float, decay: float) -> tuple[Array, Array]:
         """Best unknown forces and gains, and the weighted residual with the priors."""
         fall, columns = self.columns(self.time, release, decay)
-        weight = 1.0 / self.noise
-        left = (columns * weight[None, :, None]).reshape(-1, columns.shape[-1])
-        right = ((self.deviation - fall) * weight).reshape(-1)
+        left = self.over_noise(columns).reshape(-1, columns.shape[-1])
+        right = self.over_noise(self.deviation - fall).reshape(-1)
         left = np.vstack([left, np.diag(1.0 / self.prior_error)])
         right = np.concatenate([right, self.prior_mean / self.prior_error])
         unknown: Array = np.linalg.solve(left.T @ left, left.T @ right).astype(np.float64)
         return unknown, right - left @ unknown
+
+    def over_noise(self, values: Array) -> Array:
+        """Values along the sensors (T, S, ...) [m] over their noise [1], what is new in each sample."""
+        slow, apart = self.levitated.slow_noise, float(self.time[1] - self.time[0])
+        return slow.over_noise(values, self.noise, self.record.gains, apart)
 
     def named(self, search: Array) -> tuple[float, float]:
         """Release [s] and time constant [s] of the searched numbers."""
@@ -261,7 +270,6 @@ class Fall:
         """
         problem, best = self.problem, self.search
         unknown, residual = self._solved
-        weight = 1.0 / problem.noise
 
         def fall_at(search: Array) -> Array:
             dropped, columns = problem.columns(problem.time, *problem.named(search))
@@ -270,7 +278,7 @@ class Fall:
         columns = problem.columns(problem.time, *problem.named(best))[1]
         steps = _STEP * np.eye(2)
         searched = [(fall_at(best + step) - fall_at(best - step)) / (2.0 * _STEP) for step in steps]
-        of_readings = np.concatenate([columns, np.stack(searched, axis=-1)], axis=-1) * weight[None, :, None]
+        of_readings = problem.over_noise(np.concatenate([columns, np.stack(searched, axis=-1)], axis=-1))
         expected = np.concatenate([1.0 / problem.prior_error, [0.0, 1.0 / REMANENT_TIME[1]]])
         jacobian = -np.vstack([of_readings.reshape(-1, len(expected)), np.diag(expected)])
         late = (np.log(REMANENT_TIME[0]) - best[1]) / REMANENT_TIME[1]
@@ -374,7 +382,9 @@ def _problem(
     responses: Responses,
 ) -> FallProblem:
     origin, end = window
-    keep = (record.time >= origin - _LEAD) & (record.time <= end)
+    keep = np.flatnonzero((record.time >= origin - _LEAD) & (record.time <= end))
+    if len(levitated.slow_noise.channel):
+        keep = keep[:: max(1, math.floor(_SPACING * record.sampling_rate))]
     time = record.time[keep]
     speed = 2 * np.pi * levitated.frequency
     amplitude = float(np.mean(np.abs(levitated.amplitudes[0])))

@@ -499,7 +499,7 @@ class _Levitated:
         free = problem.seen(problem.responses.at(problem.time - fall.instant)[0])
         parts = np.split(free, [2, free.shape[-1] // 2, free.shape[-1] // 2 + 2], axis=-1)
         added = np.concatenate([c for part in parts[1::2] for c in (part.real, -part.imag)], axis=-1)
-        added = (added / problem.noise[None, :, None]).reshape(-1, added.shape[-1])
+        added = problem.over_noise(added).reshape(-1, added.shape[-1])
         whole = np.zeros((len(jacobian), len(places) + len(bend)))
         whole[:, : len(places)], whole[: len(added), len(places) :] = jacobian, -added
         rows = np.vstack([whole, np.eye(whole.shape[1])[len(places) :] / sigma[bend][:, None]])

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import NoDropError
+from rotordrop.evidence.colour import SlowNoise, slow_noise
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -67,6 +68,8 @@ class LevitatedModel:
     start: float
     end: float
     """Window the model was fitted to [s]."""
+    slow_noise: SlowNoise = field(default_factory=SlowNoise)
+    """The part of what is left that is not white."""
 
     def readings(self, time: Array) -> Array:
         """Readings of a rotor that went on levitating [m], shape (N, S)."""
@@ -105,6 +108,7 @@ class LevitatedModel:
             mean=self.mean[chosen],
             amplitudes=self.amplitudes[:, chosen],
             noise=self.noise[chosen],
+            slow_noise=self.slow_noise.of_channels(chosen),
         )
 
 
@@ -130,6 +134,8 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
         When fewer than two revolutions, or hardly any samples, lie before the drop.
     """
     from scipy.optimize import minimize_scalar
+
+    from rotordrop.evidence.quality.channels import damaged_samples
 
     start = float(record.time[0]) if start is None else start
     keep = (record.time >= start) & (record.time <= end)
@@ -161,7 +167,10 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
     scatter = np.sqrt([np.nanmean(rest[a:b]) for a, b in itertools.pairwise(edges)])
     stay = np.flatnonzero(scatter <= _LEFT * np.nanmedian(scatter))
     stays = float(time[edges[stay[-1] + 1] - 1])
-    return found if stays >= found.end else fit_levitated(record, stays, speed=speed, start=start)
+    if stays < found.end:
+        return fit_levitated(record, stays, speed=speed, start=start)
+    left = np.where(damaged_samples(signals), np.nan, signals - found.readings(time))
+    return replace(found, slow_noise=slow_noise(left, record.sampling_rate, found.tones))
 
 
 def _choose_hum(time: Array, signals: Array, frequency: float, span: float) -> float | None:

@@ -1,10 +1,10 @@
 """Forward filter and backward smoother of a drop: state, parameters and sensor errors in one.
 
 The vector estimated is ``[dynamic state (s), parameters (P), sensor gains (C), offsets (C), 1X runout
-cosine and sine (C, C)]``. The forward pass is an extended Kalman filter with analytic sensitivities of the
-drop model; given a reference trajectory (the smoothed one of an earlier pass) it linearises there, so that
-repeated passes are a Gauss–Newton solution of the whole problem. The backward pass is the modified
-Bryson–Frazier smoother: it needs no inverse of a covariance.
+cosine and sine (C, C), slow noise (M)]``. The forward pass is an extended Kalman filter with analytic
+sensitivities of the drop model; given a reference trajectory (the smoothed one of an earlier pass) it
+linearises there, so that repeated passes are a Gauss–Newton solution of the whole problem. The backward pass
+is the modified Bryson–Frazier smoother: it needs no inverse of a covariance.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotordrop.track._propagation import (
     apply_parameters,
     propagate,
 )
-from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row
+from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row, noise_step
 
 Compact = NDArray[np.float32]
 
@@ -122,7 +122,7 @@ def forward_pass(
     sensor_rows : ndarray, shape (C, s)
         Displacement along each sensor's direction from the dynamic state.
     variances, speed_variance : ndarray (C,), float
-        Noise variance of the readings [m²] and of the speed [rad²/s²].
+        Variance of the white noise of the readings [m²] and of the speed [rad²/s²].
     form : SensorForm
         What the sensors do beyond gain, offset and runout.
     reference : ndarray, shape (M, n)
@@ -143,7 +143,7 @@ def forward_pass(
     """
     n = mean_0.shape[0]
     n_c, s = sensor_rows.shape
-    n_p = n - s - 4 * n_c
+    n_p = n - s - 4 * n_c - form.noisy.shape[0]
     i_w, i_a = p.rotor_at[L.ROTOR_SPEED], p.rotor_at[L.ROTOR_ANGLE]
     mean = mean_0.copy()
     y = np.zeros(p.rotor_at[L.N_STATES])
@@ -183,12 +183,13 @@ def forward_pass(
                 mean[:s] = y[:s] + np.dot(F, deviation)
             else:
                 mean[:s] = y[:s]
-            # Only the dynamic states move; parameters and sensor errors are constants (but for their drift),
-            # so of the whole covariance s rows and columns change.
+            # Only the dynamic states move; parameters and sensor errors are constants (but for their drift
+            # and for slow noise), so of the whole covariance s rows and columns change.
             head = np.dot(F, np.ascontiguousarray(P[: s + n_p]))
             P[:s] = head
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
             P[s:, :s] = head[:, s:].T
+            noise_step(mean, P, form)
             drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
             largest = settings.fall_impulse if times[i] < settings.fall_end else np.inf
             add_process_noise(P, p, settings, impulses, drift, largest)
@@ -267,6 +268,7 @@ def backward_pass(
     gains: Array,
     innovations: Array,
     innovation_variances: Array,
+    noise_decay: Array,
     watched: Array,
     kept: Integers,
     smoothed: Array,
@@ -282,6 +284,8 @@ def backward_pass(
     ----------
     first : int
         Where to stop: 0, or 1 where `forward_pass` went on from sample 0.
+    noise_decay : ndarray, shape (M,)
+        What a sample leaves of the slow noise, the last of the estimate.
     watched : ndarray, shape (G, n)
         Linear functions of the estimate whose smoothed covariance is wanted at every sample.
     kept : ndarray, shape (K,)
@@ -356,4 +360,9 @@ def backward_pass(
             Lam[:columns, :columns] += body
             Lam[:columns, s:] += cross
             Lam[s:, :columns] += cross.T
+            for m in range(noise_decay.shape[0]):
+                j = n - noise_decay.shape[0] + m
+                lam[j] *= noise_decay[m]
+                Lam[j, :] *= noise_decay[m]
+                Lam[:, j] *= noise_decay[m]
         symmetrise(Lam, n)

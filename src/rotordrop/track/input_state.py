@@ -11,7 +11,7 @@ Source: twicing, Tukey 1977, Exploratory Data Analysis, chapter 16.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,26 +171,8 @@ def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -
         Sensor errors, air gaps and preload, from the twin or from the record alone.
     """
     count = len(corrections.radius)
-    closed = np.repeat(corrections.radius < corrections.reach, 2, axis=1)
-    readings = ((problem.readings - corrections.offsets) / (1.0 + corrections.gain_errors))[:count]
-    rotor = rotor_of(problem)
-    early = slice(0, int(np.searchsorted(problem.time[:count], SEARCHED * problem.fall_time)))
-    turn = (
-        USUAL_PEAK / problem.fall_time
-    )  # falling and rebounding as fast: twice its momentum under a half sine
-    local = np.broadcast_to(USUAL_PEAK * rotor.weight, closed.shape)
-    for look in range(LOOKS):
-        if look == 1:
-            turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
-        passed = forward_pass(rotor, readings, closed, local, turn)
-        shown, variance = backward_pass(rotor, passed, variances=look == LOOKS - 1)
-        force, fitted = shown[:, : closed.shape[1]], shown[:, closed.shape[1] :]
-        local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
-    # What smoothing took from the peaks is in what is left of the readings: found there in the same way, it
-    # is put back ("twicing").
-    smoothed_peak = _size(force).max(axis=0)
-    force = force + pass_again(rotor, passed, readings - fitted)[:, : closed.shape[1]]
-    peak = _size(force).max(axis=0)
+    rotor, passed, shown, variance, turn = _looked(problem, corrections)
+    force, peak, smoothed_peak = _twiced(rotor, passed, shown, _corrected(problem, corrections))
     put_back = np.minimum(np.abs(peak - smoothed_peak) / np.maximum(peak, 1e-300), 1.0)
     peak_error = np.hypot(LEAST_PEAK_ERROR, PUT_BACK_ERROR * put_back)
     force, variance = force.reshape(count, -1, 2), np.maximum(variance, 0.0).reshape(count, -1, 2)
@@ -218,6 +200,68 @@ def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -
         mean_late=np.hypot(*force[late].mean(axis=0).T) if whole else unknown,
         mean_magnitude_late=level[late].mean(axis=0) if whole else unknown,
     )
+
+
+def peaks_shown(problem: DropProblem, corrections: SensorCorrections, force: Array) -> Array:
+    """Largest magnitude that this estimate would show of given forces (N, B, 2) [N], shape (B,) [N].
+
+    Noise of the sensors hides what contacts faster than the readings resolve have above it: the rotor under
+    these forces is read without noise, and estimated as the readings are.
+    """
+    rotor, passed, shown, _, _ = _looked(problem, corrections)
+    readings = _readings_under(rotor, force.reshape(len(force), -1)[: len(shown)])
+    shown = pass_again(rotor, passed, readings)
+    return _twiced(rotor, passed, shown, readings)[1]
+
+
+def _readings_under(rotor: ForcedRotor, force: Array) -> Array:
+    """What the sensors see of the rotor under forces (N, K) [N], from rest, without weight, shape (N, C)."""
+    f = rotor.forces
+    rates = np.diff(force, axis=0) / rotor.dt
+    x, readings = np.zeros(len(rotor.A)), np.zeros((len(force), len(rotor.C)))
+    for i, rate in enumerate(rates):
+        x[f], x[f.stop : f.stop + len(rate)] = force[i], rate
+        x = rotor.A @ x
+        readings[i + 1] = rotor.C @ x
+    return readings
+
+
+def _corrected(problem: DropProblem, corrections: SensorCorrections) -> Array:
+    """Readings without the errors of the sensors [m], shape (N, C)."""
+    readings = (problem.readings - corrections.offsets) / (1.0 + corrections.gain_errors)
+    return np.asarray(readings[: len(corrections.radius)])
+
+
+def _looked(
+    problem: DropProblem, corrections: SensorCorrections
+) -> tuple[ForcedRotor, Passed, Array, Array, float]:
+    """The rotor, the last pass, what it shows, the variances of its forces, and how fast contacts turn."""
+    closed = np.repeat(corrections.radius < corrections.reach, 2, axis=1)
+    readings, rotor = _corrected(problem, corrections), rotor_of(problem)
+    early = slice(0, int(np.searchsorted(problem.time[: len(readings)], SEARCHED * problem.fall_time)))
+    # falling and rebounding as fast: twice its momentum under a half sine
+    turn = USUAL_PEAK / problem.fall_time
+    local = np.broadcast_to(USUAL_PEAK * rotor.weight, closed.shape)
+    for look in range(LOOKS):
+        if look == 1:
+            turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
+        passed = forward_pass(rotor, readings, closed, local, turn)
+        shown, variance = backward_pass(rotor, passed, variances=look == LOOKS - 1)
+        force = shown[:, : closed.shape[1]]
+        local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
+    return rotor, passed, shown, variance, turn
+
+
+def _twiced(rotor: ForcedRotor, passed: Passed, shown: Array, readings: Array) -> tuple[Array, Array, Array]:
+    """Forces (N, K) [N], their peaks (B,) [N], and the peaks before.
+
+    What smoothing took from the peaks is in what is left of the readings: found there in the same way, it is
+    put back ("twicing").
+    """
+    k = rotor.forces.stop - rotor.forces.start
+    smoothed, fitted = shown[:, :k], shown[:, k:]
+    force = smoothed + pass_again(rotor, passed, readings - fitted)[:, :k]
+    return force, _size(force).max(axis=0), _size(smoothed).max(axis=0)
 
 
 def _stress(problem: DropProblem, theta: Array, b: int, force: Array) -> Array:
@@ -271,7 +315,8 @@ def transition(
 class ForcedRotor:
     """The rotor under unknown forces, in samples: N readings, C channels, K force components, n states.
 
-    ``forces`` are the places of the force components among the states; their rates follow them.
+    ``forces`` are the places of the force components among the states; their rates follow them. Slow noise of
+    the sensors comes last.
     """
 
     dt: float
@@ -283,14 +328,17 @@ class ForcedRotor:
     start_covariance: Array
     variances: Array
     weight: Array
+    fresh: Array = field(default_factory=lambda: np.zeros(0))
+    """Variance that a sample adds to each part of the slow noise [m²], shape (M,)."""
     places: Array | None = None
     """Rows of displacements that are wanted beside the readings, shape (D, n)."""
 
     @property
     def watched(self) -> Array:
-        """Rows of forces, readings and wanted displacements (K + C + D, n)."""
+        """Rows of forces, readings without slow noise and wanted displacements (K + C + D, n)."""
         wanted = [] if self.places is None else [self.places]
-        return np.concatenate([np.eye(len(self.A))[self.forces], self.C, *wanted])
+        moves = np.arange(len(self.A)) < len(self.A) - len(self.fresh)
+        return np.concatenate([np.eye(len(self.A))[self.forces], self.C * moves, *wanted])
 
 
 def rotor_of(problem: DropProblem) -> ForcedRotor:
@@ -323,16 +371,23 @@ def rotor_of(problem: DropProblem) -> ForcedRotor:
     start[: 2 * m] = problem.mean[: 2 * m]
     variance[: 2 * m] = known[: 2 * m]
     variance[2 * m : n] = known[model.layout.velocity_of(slice(0, 2 * m))]
+    form = problem.sensor_form
+    none, last = np.zeros(len(form.noisy)), len(A) + np.arange(len(form.noisy))
+    A = np.pad(A, (0, len(none)))
+    A[last, last] = form.noise_decay
+    C = np.pad(C, ((0, 0), (0, len(none))))
+    C[form.noisy, last] = 1.0
     return ForcedRotor(
         dt=dt,
         A=A,
-        gravity=gravity,
+        gravity=np.append(gravity, none),
         forces=slice(n, n + k),
         C=C,
-        start=start,
-        start_covariance=np.diag(variance),
-        variances=problem.variances,
+        start=np.append(start, none),
+        start_covariance=np.diag(np.append(variance, form.noise_variance)),
+        variances=problem.white_variances,
         weight=np.repeat(model.load_shares, 2),
+        fresh=(1.0 - form.noise_decay**2) * form.noise_variance,
     )
 
 
@@ -392,6 +447,7 @@ def forward_pass(
     k = f.stop - f.start
     at, rate = np.arange(f.start, f.stop), np.arange(f.stop, f.stop + k)
     count, size = len(readings), len(rotor.A)
+    noise = np.arange(size - len(rotor.fresh), size)
     strength = TURNED * turn**1.5 * np.maximum(local, rotor.weight)
     # A rate that is a random walk of density s² moves rate and force together over a sample.
     of_force, of_both, of_rate = (strength**2 * x for x in (dt**3 / 3.0, dt**2 / 2.0, dt))
@@ -409,6 +465,8 @@ def forward_pass(
             P[at, rate] += of_both[i]
             P[rate, at] += of_both[i]
             P[rate, rate] += of_rate[i]
+            if len(noise):
+                P[noise, noise] += rotor.fresh
         live, shut = np.flatnonzero(np.isfinite(readings[i])), np.flatnonzero(closed[i])
         done = []
         for H, z, R, channels in (

@@ -8,6 +8,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.table import parameter
+from rotordrop.evidence.colour import SlowNoise
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
@@ -40,7 +41,12 @@ def fall_time(machine: Machine, gap: float | None = None) -> float:
 
 
 def prior_at_power_off(
-    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, level: Array, speed: tuple[float, float]
+    model: DropModel,
+    unknowns: tuple[Unknown, ...],
+    rows: Array,
+    level: Array,
+    speed: tuple[float, float],
+    noise: SlowNoise,
 ) -> tuple[Array, Array]:
     """Prior mean (n,) and covariance (n, n) of the whole estimate at power-off.
 
@@ -56,10 +62,12 @@ def prior_at_power_off(
         First readings of every channel [m]; NaN where there is none.
     speed : tuple of float
         Rotor speed at power-off and its standard error [rad/s].
+    noise : SlowNoise
+        Slow noise of the sensors, of which one part is as likely as another at power-off.
     """
     layout = model.layout
     s, n_p, n_c = layout.n_dynamic, len(unknowns), rows.shape[0]
-    mean = np.zeros(s + n_p + 4 * n_c)
+    mean = np.zeros(s + n_p + 4 * n_c + len(noise.channel))
     sigma = np.zeros_like(mean)
     mean[:s] = model.at_rest()[:s]
     gap, fall = smallest_gap(model.machine), fall_time(model.machine)
@@ -78,7 +86,8 @@ def prior_at_power_off(
         mean[gain], sigma[gain] = 1.0 / known.mean - 1.0, known.sigma
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
         mean[offset], sigma[offset] = known.mean, known.sigma
-    sigma[s + n_p + 2 * n_c :] = RUNOUT_SIGMA
+    sigma[s + n_p + 2 * n_c : s + n_p + 4 * n_c] = RUNOUT_SIGMA
+    sigma[s + n_p + 4 * n_c :] = np.sqrt(noise.variance)
     sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap
     rings = layout.further_at(L.RING_STATES)
     sigma[rings] = np.resize(RING_SIGMA, rings.stop - rings.start)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
+from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.ends import held_bearings
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
@@ -57,6 +58,8 @@ class RecordedDrop:
     shape (N, C)."""
     noise: Array
     """Standard deviation of the noise [m]; NaN where the record does not say, shape (C,)."""
+    slow_noise: SlowNoise = field(default_factory=SlowNoise)
+    """The part of it that is not white."""
     initial_speed: float
     initial_speed_error: float
     """Rotor speed at power-off and its standard error [rad/s]."""
@@ -84,7 +87,7 @@ class DropProblem:
     sensor_rows: Array
     """Displacement along each sensor's direction from the dynamic state, shape (C, s)."""
     variances: Array
-    """Noise variance of each channel [m²], shape (C,)."""
+    """Noise variance of each channel [m²], slow noise included, shape (C,)."""
     speed_variance: float
     mean: Array
     start: Array
@@ -108,6 +111,13 @@ class DropProblem:
         rows = np.zeros_like(self.sensor_rows)
         rows[np.arange(len(lagging)), lagging[:, 0]] = 1.0
         return rows
+
+    @property
+    def white_variances(self) -> Array:
+        """Variance of the white noise of each channel [m²], shape (C,)."""
+        white = self.variances.copy()
+        np.subtract.at(white, self.sensor_form.noisy, self.sensor_form.noise_variance)
+        return white
 
     @property
     def n_dynamic(self) -> int:
@@ -237,7 +247,7 @@ def build_problem(
     rows = sensor_rows(model)
     level = first_level(drop.time[drop.time >= 0.0], readings, FIRST_READINGS * fall_time(model.machine))
     speed = drop.initial_speed, drop.initial_speed_error
-    mean, covariance = prior_at_power_off(model, unknowns, rows, level, speed)
+    mean, covariance = prior_at_power_off(model, unknowns, rows, level, speed, drop.slow_noise)
     problem = DropProblem(
         model=_prepared(model, drop.initial_speed),
         unknowns=unknowns,
@@ -251,7 +261,7 @@ def build_problem(
         mean=mean,
         start=start_of(mean, model, unknowns),
         covariance=covariance,
-        sensor_form=sensor_form(model, unknowns, rows),
+        sensor_form=sensor_form(model, unknowns, rows, drop.slow_noise, float(drop.time[1] - drop.time[0])),
         first_contact=drop.first_contact,
     )
     if drop.tail_level is not None:
@@ -387,6 +397,10 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     Vertically the rotor rests where gap and sag put it; horizontally it may be held aside by friction.
     """
     start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
+    # Noise slower than the levitated part moves the zero until the tail; it is taken to be as large as the
+    # slowest part of what is seen there, as that of 1/f noise is.
+    form, wander = problem.sensor_form, np.zeros(n_c)
+    wander[form.noisy[::-1]] = form.noise_variance[::-1]
     theta = mean[problem.parameter_slice].copy()
     angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
     axes = np.array([np.cos(angles), np.sin(angles)])
@@ -423,7 +437,7 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
                 row[start + n_p + c] += weight * along
                 row[start + n_p + n_c + c] += weight
                 row[problem.parameter_slice] += weight * growth * slopes[c]
-            variance = (sigma * gap) ** 2 + reach**2
+            variance = (sigma * gap) ** 2 + reach**2 + float(weights**2 @ wander[chosen])
             shown = covariance @ row
             size = variance + float(row @ shown)
             covariance -= np.outer(shown, shown) / size

@@ -1,4 +1,4 @@
-"""What sensors do beyond gain, offset and runout: a reading, its derivative, its lag and further terms."""
+"""What sensors do beyond gain, offset and runout: reading, derivative, lag, slow noise, further terms."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
+from rotordrop.evidence.colour import SlowNoise, decay
 from rotordrop.physics._compile import kernel, lean_kernel
 from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.rotor.layout import StateLayout
@@ -21,12 +22,15 @@ CATCHING_UP_SIGMA = 1e-6
 
 
 class SensorForm(NamedTuple):
-    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, s dynamic.
+    """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, M parts of noise
+    that outlast a sample, s dynamic.
 
     A sensor sees ``(its row + Σ value of the unknown · row of the term) · state``: ``term`` (T, 2) holds
     sensor and unknown, ``term_row`` (T, s) its row. ``lag`` (G, 2) holds for each sensor the state with what
     it has got to and the unknown that is the logarithm of its time constant, between ``shortest`` and
-    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. All are empty for plain sensors.
+    ``longest`` (G,); ``lag_row`` (G, s) is what it sees. The last M of the estimate are slow noise of the
+    sensors ``noisy`` (M,), each with the variance ``noise_variance`` (M,) [m²], of which a sample leaves
+    ``noise_decay`` (M,). All are empty for plain sensors.
     """
 
     term: Integers
@@ -35,6 +39,9 @@ class SensorForm(NamedTuple):
     lag_row: Array
     shortest: Array
     longest: Array
+    noisy: Integers
+    noise_decay: Array
+    noise_variance: Array
 
 
 @lean_kernel
@@ -97,8 +104,9 @@ def measurement_row(
     """Reading of sensor ``c`` predicted at an estimate [m] and its derivative ``row`` (n,).
 
     The reading is ``(1 + gain error) · (sensor row · state) + offset + runout at the rotor angle``. The gains
-    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each. A sensor that lags behind
-    reads its own state, and its terms act on what it lags behind of.
+    begin at ``first``, the offsets, cosines and sines follow, ``n_c`` of each, and the slow noise, which is
+    read beside all that. A sensor that lags behind reads its own state, and its terms act on what it lags
+    behind of.
     """
     row[:] = 0.0
     k = first + c
@@ -117,10 +125,28 @@ def measurement_row(
     row[k + 2 * n_c] = cosine
     row[k + 3 * n_c] = sine
     predicted: float = growth * seen + at[k + n_c] + at[k + 2 * n_c] * cosine + at[k + 3 * n_c] * sine
+    for m in range(form.noisy.shape[0]):
+        if form.noisy[m] == c:
+            row[first + 4 * n_c + m] = 1.0
+            predicted += at[first + 4 * n_c + m]
     return predicted
 
 
-def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) -> SensorForm:
+@kernel
+def noise_step(mean: Array, P: Array, form: SensorForm) -> None:
+    """Advance the slow noise, the last of the estimate, by one sample: mean (n,) and covariance (n, n)."""
+    n, parts = mean.shape[0], form.noisy.shape[0]
+    for m in range(parts):
+        i, a = n - parts + m, form.noise_decay[m]
+        mean[i] *= a
+        P[i, :] *= a
+        P[:, i] *= a
+        P[i, i] += (1.0 - a * a) * form.noise_variance[m]
+
+
+def sensor_form(
+    model: DropModel, unknowns: tuple[Unknown, ...], rows: Array, noise: SlowNoise, dt: float
+) -> SensorForm:
     """What the sensors of a machine do beyond gain, offset and runout, as the filter takes it."""
     names = [sensor.name for sensor in model.machine.sensors]
     terms = [(names.index(u.owner), k) for k, u in enumerate(unknowns) if u.parameter.seen is not None]
@@ -134,6 +160,9 @@ def sensor_form(model: DropModel, unknowns: tuple[Unknown, ...], rows: Array) ->
         lag_row=rows[: len(lagging)],
         shortest=np.array([unknowns[k].bounds[0] for k in lagging]),
         longest=np.array([unknowns[k].bounds[1] for k in lagging]),
+        noisy=noise.channel,
+        noise_decay=decay(noise.frequency, dt),
+        noise_variance=noise.variance,
     )
 
 

@@ -56,6 +56,7 @@ def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
         time=evidence.time[: len(readings)],
         readings=readings,
         noise=evidence.noise(until),
+        slow_noise=evidence.slow_noise,
         initial_speed=evidence.speed.initial,
         initial_speed_error=evidence.speed.initial_error,
         speed=evidence.measured_speed(until),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.touchdown_bearing import AIR_GAP
+from rotordrop.elements.touchdown_bearing import AIR_GAP, MODEL_GAP_ERROR
 from rotordrop.estimate.bearing_drop import (
     LATE,
     AirGap,
@@ -34,7 +34,14 @@ from rotordrop.series import runs_of
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
-from rotordrop.track.input_state import MEAN_ERROR, InputEstimate, corrections_by_record, input_state_estimate
+from rotordrop.track.input_state import (
+    MEAN_ERROR,
+    STRESS_PER_PEAK,
+    InputEstimate,
+    corrections_by_record,
+    input_state_estimate,
+    peaks_shown,
+)
 from rotordrop.track.problem import DropProblem
 from rotordrop.twin.allowances import (
     MODEL_FORCE_SIGMA,
@@ -271,6 +278,24 @@ def is_beyond_factor(peak: float, check: InputEstimate, b: int) -> bool:
     return not 1.0 / FACTOR_APART <= _over_check(peak, check, b) <= FACTOR_APART
 
 
+def check_with_noise(
+    problem: DropProblem, forces: ForceHistory, check: InputEstimate, apart: Sequence[int]
+) -> tuple[InputEstimate, Array]:
+    """The cross-check with the error that noise leaves at bearings where it is far from the twin.
+
+    Comes with what it would show of the peaks of the twin there, NaN elsewhere, shape (B,) [N].
+    """
+    shown, peaks = np.full(len(check.peak), np.nan), forces.magnitude.max(axis=0)
+    shown[list(apart)] = peaks_shown(problem, corrections_by_record(problem), forces.force)[list(apart)]
+    hidden = np.nan_to_num(np.abs(peaks / shown - 1.0))
+    wider = replace(
+        check,
+        peak_error=np.hypot(check.peak_error, hidden),
+        stress_error=np.hypot(check.stress_error, STRESS_PER_PEAK * hidden),
+    )
+    return wider, shown
+
+
 def is_beyond_accuracy(peak: float, check: InputEstimate, b: int) -> bool:
     """Whether a peak [N] lies outside the known accuracy of the cross-check."""
     return abs(_over_check(peak, check, b) - 1.0) > float(check.peak_error[b])
@@ -462,7 +487,8 @@ def race_moved(forces: ForceHistory, b: int, gap: Known, widening: float, doubt:
     place = forces.displacement[:, b]
     radius = np.hypot(*place.T)
     at = int(np.argmax(radius))
-    sigma = float(np.hypot(*(place[at] / radius[at] * forces.displacement_sigma[at, b])))
+    sigma = math.hypot(*(place[at] / radius[at] * forces.displacement_sigma[at, b]))
+    apart = MODEL_GAP_ERROR * float(radius[at])  # gains and offsets stretch it as they stretch the gap
     half, step = NINETY * widening * forces.indentation_sigma[:, b], float(forces.time[1] - forces.time[0])
     begun = []
     for moved, outside in ((0.0, 0.0), (half, step), (-half, 0.0)):
@@ -473,7 +499,7 @@ def race_moved(forces: ForceHistory, b: int, gap: Known, widening: float, doubt:
     lasts = [one[-1] for one in begun if len(one)]
     seen = {
         "count_interval_90": (min(counts), max(counts)),
-        "largest": with_interval(float(radius[at]), sigma, widening, "m"),
+        "largest": with_interval(float(radius[at]), math.hypot(sigma, apart), widening, "m", apart),
     }
     if len(begun[0]) and lasting_from(begun[0], float(forces.time[-1])) is not None:
         early, late = (math.hypot(end - lasts[0], doubt, step) for end in (min(lasts), max(lasts)))

@@ -58,12 +58,16 @@ class PlainFilter:
         impulses, p = np.zeros(problem.model.layout.n_bearings), private_copy(problem.model.parameters)
         P.apply_parameters(theta, problem.targets, p)
         P.propagate(problem.time[i - 1], y, theta, problem.targets, p, self.numbers, F, impulses)
+        form = problem.sensor_form
+        parts = np.arange(n - len(form.noisy), n)
         whole = np.eye(n)
         whole[:s, : s + n_p] = F
+        whole[parts, parts] = form.noise_decay
         noise = np.zeros((n, n))
+        noise[parts, parts] = (1.0 - form.noise_decay**2) * form.noise_variance
         P.add_process_noise(noise, p, self.numbers, impulses, problem.targets.drift, np.inf)
         self.matrices.append(whole)
-        return np.concatenate([y[:s], mean[s:]]), whole @ covariance @ whole.T + noise
+        return np.concatenate([y[:s], whole[s:, s:] @ mean[s:]]), whole @ covariance @ whole.T + noise
 
     def _readings(self, i):
         """Readings of a sample with the linearised measurement; taken at the mean at hand."""
@@ -82,9 +86,11 @@ class PlainFilter:
                     row[:s] = gain * problem.sensor_rows[c]
                     row[first + c], row[first + n_c + c] = seen, 1.0
                     row[[first + 2 * n_c + c, first + 3 * n_c + c]] = turn
-                    return row, gain * seen + offset + runout
+                    own = first + 4 * n_c + np.flatnonzero(problem.sensor_form.noisy == c)
+                    row[own] = 1.0
+                    return row, gain * seen + offset + runout + mean[own].sum()
 
-                yield problem.readings[i, c], at, None, problem.variances[c]
+                yield problem.readings[i, c], at, None, problem.white_variances[c]
         if np.isfinite(problem.speed[i]):
             place = problem.model.layout.rotor_speed
 
@@ -166,6 +172,51 @@ def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
         unit = deviations_of(covariances[i])
         difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
         assert np.abs(difference).max() < 1e-3
+
+
+def with_slow_noise(problem: DropProblem) -> DropProblem:
+    """The problem with two sensors whose noise is not white, one of them with two parts."""
+    variances, whole = np.array([4e-13, 9e-14, 1e-13]), problem.variances.copy()
+    form = problem.sensor_form._replace(
+        noisy=np.array([1, 1, 3]), noise_decay=np.array([0.99, 0.6, 0.9]), noise_variance=variances
+    )
+    np.add.at(whole, form.noisy, variances)
+    covariance = np.pad(problem.covariance, (0, 3))
+    covariance[-3:, -3:] = np.diag(variances)
+    return replace(
+        problem,
+        mean=np.append(problem.mean, np.zeros(3)),
+        start=np.append(problem.start, np.zeros(3)),
+        covariance=covariance,
+        sensor_form=form,
+        variances=whole,
+    )
+
+
+def test_slow_noise_is_that_of_the_plain_filter_and_smoother(flight):
+    problem = with_slow_noise(flight)
+    np.testing.assert_allclose(problem.white_variances, flight.variances, rtol=1e-12)
+    plain, filtered = PlainFilter(problem).run(), forward(problem, SETTINGS)
+    assert filtered.done == len(problem.time)
+    for i in range(0, filtered.done, 5):
+        assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
+        unit = deviations_of(plain.covariances[i])
+        difference = (filtered.covariance(i) - plain.covariances[i]) / np.outer(unit, unit)
+        assert np.abs(difference).max() < 1e-6
+    smoothed = smooth(filtered, kept=range(filtered.done))
+    means, covariances = plain.smoothed()
+    for i in range(0, len(means), 5):
+        assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
+        unit = deviations_of(covariances[i])
+        difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
+        assert np.abs(difference).max() < 1e-3
+    # what a sample leaves of it is not nothing: with white noise in its place the same readings differ
+    assert (
+        in_deviations(
+            smoothed.means[30, :-3] - smooth(forward(flight, SETTINGS)).means[30], covariances[30][:-3, :-3]
+        )
+        > 0.1
+    )
 
 
 def test_a_packed_covariance_comes_back_whole(random):

@@ -251,3 +251,23 @@ def test_missing_readings_are_bridged(pushed):
     assert np.all(np.isfinite(found.force))
     whole = input_state_estimate(problem, corrections)
     np.testing.assert_allclose(found.peak, whole.peak, rtol=0.05)
+
+
+def test_slow_noise_of_the_sensors_is_no_force(flight):
+    """Told of it, the estimate is nearer to the true forces than with white noise of the same size."""
+    problem, corrections, force = recorded_pushes(flight, 1)
+    decay, size = 0.98, 4e-6
+    random = np.random.default_rng(8)
+    slow = np.empty_like(problem.readings)
+    slow[0] = size * random.standard_normal(problem.n_channels)
+    for i in range(1, len(slow)):
+        slow[i] = decay * slow[i - 1] + size * np.sqrt(1.0 - decay**2) * random.standard_normal(4)
+    white = replace(problem, readings=problem.readings + slow, variances=problem.variances + size**2)
+    form = problem.sensor_form._replace(
+        noisy=np.arange(4), noise_decay=np.full(4, decay), noise_variance=np.full(4, size**2)
+    )
+    found = input_state_estimate(replace(white, sensor_form=form), corrections)
+    taken_for_white = input_state_estimate(white, corrections)
+    error, other = (np.sqrt(np.mean((one.force - force) ** 2)) for one in (found, taken_for_white))
+    assert error < 0.8 * other, (error, other)
+    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)

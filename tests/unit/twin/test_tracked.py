@@ -416,7 +416,8 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
     forces = workshop.forces
     magnitude = forces.magnitude.copy()
     magnitude[:, 0] *= 3.0
-    wrong = replace(workshop, forces=replace(forces, magnitude=magnitude))
+    force = forces.force * np.array([3.0, 1.0])[:, None]
+    wrong = replace(workshop, forces=replace(forces, magnitude=magnitude, force=force))
     assert wrong.consistent
     drop, check = cross_checked(wrong, Tracked())
     assert check is not None
