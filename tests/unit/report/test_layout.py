@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,8 @@ def content() -> ReportContent:
     """A failed estimate: ranges in place of numbers."""
     time = np.linspace(0.0, 0.2, 500)
     history = History(label="estimated", time=time, values=1000.0 * np.sin(90.0 * time) ** 2)
-    panel = Panel(title="NDE", axis="bearing force", histories=(history,))
+    also = [replace(history, label=f"a history of the other kind, number {at}") for at in range(4)]
+    panel = Panel(title="NDE", axis="bearing force", histories=(history, *also))
     figures = tuple(KeyFigure(label, ranged(kind), "by the cross-check") for label, kind in 2 * LABELS)
     return ReportContent(
         title="Drop",
@@ -92,6 +94,18 @@ def test_a_page_is_dark_where_that_is_asked_for_its_figures_too(browser: Browser
         browser.colours(scheme)
         browser.until(f"{drawn} === '{figure}'")
         assert browser.evaluate(paper) == page
+
+
+@pytest.mark.parametrize("width", [400, 1100, 1280, 1920])
+def test_the_tools_of_a_figure_cover_neither_its_legend_nor_the_heading(browser: Browser, width: int) -> None:
+    """The legend is as wide as the figure, as that of an orbit is."""
+    browser.size(width, 900)
+    browser.until("document.querySelector('.legend').getBoundingClientRect().right < window.innerWidth")
+    left, top, right, bottom = edges(browser, ".modebar")
+    assert 0.0 <= left < right <= width
+    for selector in (".legend", "#section-1 h2"):
+        beside = edges(browser, selector)
+        assert beside[2] <= left or right <= beside[0] or beside[3] <= top or bottom <= beside[1], selector
 
 
 PAPER = (695, 1005)
