@@ -270,7 +270,20 @@ def test_more_sensor_planes_than_bearings_are_drawn(browser, tmp_path, files):
         press(browser, "early")
         browser.until("document.querySelectorAll('.panel canvas').length === 4")
         assert browser.evaluate(orbits) == "NDE,DE"
+        _fits_a_telephone(browser)
         quiet(browser)
+
+
+def _fits_a_telephone(browser: Browser) -> None:
+    """Four figures of force, stress and motion on 400 px: high enough to read, and none leaves the screen."""
+    browser.size(400, 800)
+    plots = "[...document.querySelectorAll('.panel .u-over')]"
+    browser.until(f"{plots}.every(one => one.clientHeight >= 80)", 20.0)
+    browser.until("document.documentElement.scrollWidth <= innerWidth")
+    heads = "[...document.querySelectorAll('.panel header, .panel header *')]"
+    assert browser.evaluate(f"{heads}.every(one => one.getBoundingClientRect().right <= innerWidth - 8)")
+    apart = "p.previousElementSibling.getBoundingClientRect().bottom <= p.getBoundingClientRect().top"
+    assert browser.evaluate(f"[...document.querySelectorAll('.plot')].every(p => {apart})")
 
 
 def _with_a_third_plane_and_an_estimate(job: Job) -> None:
