@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.estimate.changed import unlike
 from rotordrop.estimate.published import Drop
 from rotordrop.known import Known
 from rotordrop.restart.assumptions import Assumptions
@@ -195,8 +196,11 @@ def restart_card(
         assumptions=assumed,
         statements=(),
     )
-    compared = any(one.estimate is not None for one in earlier)
-    said = [*_said(card, drop, compared), *contradictions(found), *remarks]
+    estimates = [one.estimate for one in earlier if one.estimate is not None]
+    apart = [
+        f"{words}. Nothing is concluded from that drop." for one in estimates if (words := unlike(one, drop))
+    ]
+    said = [*_said(card, drop, len(estimates) > len(apart)), *apart, *contradictions(found), *remarks]
     return replace(card, statements=tuple(said))
 
 

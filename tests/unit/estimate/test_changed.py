@@ -9,7 +9,7 @@ import pytest
 from tests.published import published
 
 from rotordrop.errors import UsageError
-from rotordrop.estimate.changed import WATCHED, changes
+from rotordrop.estimate.changed import WATCHED, changes, unlike
 from rotordrop.estimate.published import Joint, Parameter, Value
 from rotordrop.known import NINETY
 
@@ -267,3 +267,36 @@ def test_the_smallest_change_that_shows_is_found_in_19_of_20_pairs(place, size):
         found.append(hits)
     assert 0.91 * 300 <= found[0] <= 0.98 * 300
     assert found[1] < 0.6 * 300
+
+
+def supported(name, stiffness, mass):
+    """An estimate that tells stiffness [N/m] and mass [kg] of a support to 1.5 and 2 %."""
+    read = np.log([stiffness, mass])
+    sharp, wide = np.array([0.015, 0.02]), np.array([0.5, 0.4])
+    covariance = np.diag(1.0 / (sharp**-2 + wide**-2))
+    paths = ["NDE.support.stiffness", "NDE.support.mass"]
+    return published(
+        record=name,
+        parameters=[
+            Parameter(path=path, scope="machine", prior=None, estimate=Value(value=value))
+            for path, value in zip(paths, (stiffness, mass), strict=True)
+        ],
+        joint=Joint(
+            paths=paths,
+            mean=(covariance @ (read / sharp**2 + np.log([1e8, 40.0]) / wide**2)).tolist(),
+            covariance=covariance[np.tril_indices(2)].tolist(),
+            prior_mean=np.log([1e8, 40.0]).tolist(),
+            prior_standard_deviation=wide.tolist(),
+        ),
+    )
+
+
+def test_drops_of_two_machines_by_one_file_show_no_change():
+    """A stiffness × 1.1 was called × 2.1, as the mass beside it was taken for one that cannot change."""
+    first, other = supported("a", 0.8e8, 56.0), supported("b", 0.88e8, 28.0)
+    with pytest.raises(UsageError, match=r"not of one machine.*NDE\.support\.mass is 56 kg in one and 28 kg"):
+        changes(first, other)
+    assert unlike(first, supported("c", 1.2e8, 57.0)) == ""
+    assert [one.path for one in changes(first, supported("c", 1.2e8, 57.0)).named] == [
+        "NDE.support.stiffness"
+    ]

@@ -233,6 +233,28 @@ def test_earlier_drops_and_a_limit_that_the_next_drop_passes_count():
         assert more == pytest.approx(ASSUMED.another_drop * share * exchange)
 
 
+def test_an_earlier_drop_of_another_machine_is_said_and_concludes_nothing():
+    """The support of the other one has twice the mass; a stiffness "x 2.1" had called for a replacement."""
+
+    def supported(mass):
+        path = "NDE.support.mass"
+        own = Parameter(
+            path=path, scope="machine", prior=None, estimate=value(mass, 0.97 * mass, mass / 0.97)
+        )
+        found = drop(gap=285e-6 if mass > 40.0 else 275e-6)
+        joint = Joint(
+            paths=[path], mean=[math.log(mass)], covariance=[4e-4], prior_mean=[math.log(40.0)],
+            prior_standard_deviation=[0.4],
+        )  # fmt: skip
+        return found.model_copy(update={"parameters": [*found.parameters, own], "joint": joint})
+
+    earlier = inspected(supported(28.0))
+    card = restart_card(supported(56.0), ASSUMED, earlier=[earlier])
+    assert any("not of one machine" in one and "Nothing is concluded" in one for one in card.statements)
+    blind = restart_card(supported(56.0), ASSUMED, earlier=[replace(earlier, estimate=None)])
+    assert chance(card, "worn") == pytest.approx(chance(blind, "worn"))
+
+
 def test_damage_that_an_earlier_estimate_would_have_shown_counts_no_more():
     """Ten drops of which the last but one was still sound: only the last can have done it."""
     first, open_ = inspected(drop()), [replace(earlier_drop(drop()), estimate=None)] * 9

@@ -490,6 +490,7 @@ def test_jacobian_agrees_with_finite_differences(deep):
 
 
 def test_an_estimate_takes_axial_motion_along_and_a_weightless_rotor_is_refused():
+    from rotordrop.evidence.colour import SlowNoise
     from rotordrop.track.prior import AXIAL_SIGMA, prior_at_power_off
     from rotordrop.track.problem import sensor_rows
 
@@ -497,7 +498,7 @@ def test_an_estimate_takes_axial_motion_along_and_a_weightless_rotor_is_refused(
     assert machine.not_estimated == ""
     model = build_drop_model(machine, "quick")
     rows = sensor_rows(model)
-    _mean, covariance = prior_at_power_off(model, (), rows, np.zeros(len(rows)), (SPEED, 0.1))
+    _mean, covariance = prior_at_power_off(model, (), rows, np.zeros(len(rows)), (SPEED, 0.1), SlowNoise())
     at = model.layout.axial
     assert np.sqrt(np.diag(covariance)[at : at + 2]) == pytest.approx(AXIAL_SIGMA)
     weightless = machine.with_values({"gravity": 0.0})
