@@ -176,6 +176,26 @@ def _trace(values: Array) -> list[float | None]:
     return [None if np.isnan(value) else round((value - low) / span, 3) for value in few.tolist()]
 
 
+def _range(values: Array, unit: str) -> dict[str, str]:
+    """The least and the largest reading of a channel, a length as the page shows lengths."""
+    import numpy as np
+
+    from rotordrop.report.quantity import Quantity
+    from rotordrop.units import parse_quantity
+    from rotordrop.web.rows import SYSTEMS
+
+    if not np.isfinite(values).any():
+        return dict.fromkeys(SYSTEMS, "empty")
+    ends = float(np.nanmin(values)), float(np.nanmax(values))
+    try:
+        low, high = (end * parse_quantity(f"1 {unit}", "length") for end in ends)
+    except RotordropError:
+        numbers = " to ".join(f"{end:.3g}" for end in ends).replace("-", "−")
+        return dict.fromkeys(SYSTEMS, f"{numbers} {unit or 'without a unit'}")
+    both = Quantity(value=high, kind="length", interval_90=(low, high))
+    return {system: replace(both, system=system).interval_text for system in SYSTEMS}
+
+
 def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     """What a recording holds, which sensors look for a channel, and what could be guessed."""
     from rotordrop.record.columns import RULE, guess_profile
@@ -184,15 +204,15 @@ def _channels(job: Job, made: Path, told: dict[str, Any]) -> None:
     machine, given = machine_of(job), profile_of(job, told["options"])
     recording = read_recording(_record_file(job), given)
     guess = guess_profile(recording, given, () if machine is None else machine.sensors)
+    units = [given.units.get(one.label) or one.unit or given.unit or "" for one in recording.channels]
     found = [
         {
             "label": channel.label,
-            "unit": given.units.get(channel.label) or channel.unit or given.unit or "",
-            "low": float(channel.values.min()) if len(channel.values) else None,
-            "high": float(channel.values.max()) if len(channel.values) else None,
+            "unit": unit,
+            "range": _range(channel.values, unit),
             "trace": _trace(channel.values),
         }
-        for channel in recording.channels
+        for channel, unit in zip(recording.channels, units, strict=True)
     ]
     sensors = [
         {"name": sensor.name, "plane": sensor.bearing or f"node {sensor.node}", "angle": float(sensor.angle)}

@@ -123,6 +123,8 @@ def test_twelve_numbers_and_a_record_with_names_of_its_own_get_to_an_estimate(br
         press(browser, "send")
         browser.until("document.getElementById('mapping').open", 120)
         assert "NDE_A" in words(browser, "#channelrows")
+        said = words(browser, "#channelrows option:checked")
+        assert re.fullmatch(r"\S*Y1, −?\d+ to \d+ µm", said), said  # short enough for a list of 320 px
         chosen = "[...document.querySelectorAll('#channelrows select')].map(one => one.value).join()"
         assert browser.evaluate(chosen).replace("displacement/", "") == "Y1,X1,Y2,X2"
         browser.evaluate("document.querySelector('#mapping .main').click()")

@@ -67,17 +67,19 @@ def test_what_a_record_does_not_tell_is_asked(served, tmp_path):
 
 
 def test_a_page_asks_for_channels_in_words_of_its_own(served, tmp_path):
-    rows = [f"{i * 5e-5:.5f};" + ";".join(f"{k * i}" for k in range(4)) for i in range(50)]
+    rows = [f"{i * 5e-5:.5f};0;{i};{i};{3 * i - 49};{i / 10}" for i in range(50)]
     path = tmp_path / "drop.csv"
-    path.write_text("\n".join(["Time [s];alpha [um];bravo [um];c [um];d [um]", *rows]) + "\n")
+    path.write_text("\n".join(["Time [s];alpha [um];bravo [um];c [um];d [um];speed [rpm]", *rows]) + "\n")
     number = served.new_job({"record": path})
     served.order(f"/api/jobs/{number}/look")
     told = served.settled(number, "look")["error"]
     assert told.endswith("say which channel is which") and "--map" not in told
     served.order(f"/api/jobs/{number}/channels")
     assert served.settled(number, "channels")["state"] == "done"
-    likely = served.ask("GET", f"/api/jobs/{number}/channels/page").told["likely"]
-    assert likely == {"NDE": "alpha, bravo", "DE": "c, d"}
+    page = served.ask("GET", f"/api/jobs/{number}/channels/page").told
+    assert page["likely"] == {"NDE": "alpha, bravo", "DE": "c, d"}
+    assert page["channels"][-2]["range"] == {"SI": "−49 to 98 µm", "US": "−1.9 to 3.9 mil"}
+    assert page["channels"][-1]["range"]["US"] == "0 to 4.9 rpm"
 
 
 def test_a_shaft_table_that_was_forgotten_is_asked_for_alone(served, files):

@@ -2,6 +2,7 @@
 import * as server from "./server.js";
 import { by, say, state } from "./state.js";
 import { make } from "./tables.js";
+import * as units from "./units.js";
 
 const NAMES = { machine: "machine file", profile: "profile of the recorder", record: "record", tail: "settled tail", beside: "named by another file", "": "leave out" };
 
@@ -94,7 +95,9 @@ export function tomlOf(table) {
   return [...plain.map(line), ...parts.flatMap(([name, part]) => ["", `[${name}]`, ...Object.entries(part).filter(([, value]) => value !== undefined).map(line)]), ""].join("\n");
 }
 
-const spoken = ({ label, unit, low, high }) => `${label} (${low === null ? "empty" : `${`${Number(low.toPrecision(3))} to ${Number(high.toPrecision(3))}`.replaceAll("-", "−")} ${unit || "without a unit"}`})`;
+// A channel as it is chosen: the end of a long name tells more than its beginning, and the range must be seen.
+const LABEL = 22;
+const spoken = ({ label, range }) => `${label.length > LABEL ? `…${label.slice(1 - LABEL)}` : label}, ${range[units.chosen()]}`;
 function drawn(values) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg"), line = document.createElementNS(svg.namespaceURI, "polyline");
   svg.setAttribute("class", "trace");
