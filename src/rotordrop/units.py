@@ -304,6 +304,21 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 
 
+_WORDS = ((1e12, "trillion"), (1e9, "billion"), (1e6, "million"))
+
+
+def format_amount(number: float) -> str:
+    """Write a cost or a factor to three digits as one says it: ``"128"``, ``"1110"``, ``"2.98 million"``.
+
+    Less than a thousandth is "< 0.001": smaller ones differ in nothing that is decided by them.
+    """
+    rounded = float(f"{number:.3g}")
+    if 0.0 < abs(number) < 1e-3:
+        return "< 0.001" if number > 0.0 else "> -0.001"
+    factor, word = next((one for one in _WORDS if abs(rounded) >= one[0]), (1.0, ""))
+    return f"{rounded / factor:.15g} {word}".rstrip()
+
+
 def format_moment(time: float) -> str:
     """Write a time of a record [s] to 0.1 ms, as ``"0.2140 s"``; never as "-0.0000 s"."""
     text = f"{time:.4f}"

@@ -228,7 +228,11 @@ class UsedShare:
             parts.append(f"{self.drops} of {self.allowed_drops} drops ({100 * share:.3g} %)")
         if self.allowed_seconds is not None:
             share = self.seconds / self.allowed_seconds
-            untimed = f", {self.untimed} drops without duration left out" if self.untimed else ""
+            untimed = (
+                f", {self.untimed} {'drop' if self.untimed == 1 else 'drops'} without duration left out"
+                if self.untimed
+                else ""
+            )
             parts.append(f"{self.seconds:.4g} s of {self.allowed_seconds:g} s ({100 * share:.3g} %{untimed})")
         return f"{who}: {'; '.join(parts)}, allowed by {self.source}"
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rotordrop.known import Known
-from rotordrop.units import KINDS, si_unit
+from rotordrop.units import KINDS, format_chance, si_unit
 
 System: TypeAlias = Literal["SI", "US"]
 
@@ -133,6 +133,10 @@ class Quantity:
             return self._range() if self.interval_90 is not None else "–"
         if self.places is not None and 0.0 < abs(self._in_unit(self.value)) < 0.5 * 10.0**-self.places:
             return self._with_unit(f"< {written(10.0**-self.places, self.places)}")
+        if self.kind == "probability" and self.interval_90 is None and math.isfinite(self.value):
+            chance = format_chance(self.value)
+            if chance[0] in "<>":
+                return self._with_unit(chance.removesuffix("%"))
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))

@@ -28,7 +28,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.restart.card import ANSWERS, RestartCard, answer_in
-from rotordrop.units import format_chance, format_quantity
+from rotordrop.units import format_amount, format_chance, format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.restart.foreseen import NextDrop
@@ -51,8 +51,8 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
     """Build the page of a restart card."""
     columns = (
         Column("damage", "label"),
-        Column("chance by one drop", "prior", "probability", 2),
-        Column("risk of running on", "risk", "probability", 2),
+        Column("chance by one drop", lambda one: f"{100.0 * one.prior:.3g} %"),
+        Column("risk of running on", lambda one: f"{100.0 * one.risk:.3g} %"),
         Column("remedy", "remedy"),
         Column("source", "source"),
     )
@@ -110,7 +110,7 @@ def _answers(card: RestartCard) -> Table:
     }
     columns = (
         Column("answer", lambda name: f"{name} ←" if name == card.answer else name),
-        Column(f"expected cost [{card.assumptions.unit}]", lambda name: f"{card.costs[name]:.3g}"),
+        Column(f"expected cost [{card.assumptions.unit}]", lambda name: format_amount(card.costs[name])),
         Column("up to a chance of a damage of", lambda name: bounds.get(name, "–")),
         Column("right if the state was known", lambda name: card.right[name], "probability", 2),
     )
@@ -121,9 +121,9 @@ def _checks(card: RestartCard) -> Table:
     unit = card.assumptions.unit
     columns = (
         Column("check", "label"),
-        Column(f"costs [{unit}]", lambda one: f"{one.cost:.2g}"),
+        Column(f"costs [{unit}]", lambda one: format_amount(one.cost)),
         Column("changes the answer", "settles", "probability", 2),
-        Column(f"saves, its cost taken off [{unit}]", lambda one: f"{one.value:.2g}"),
+        Column(f"saves, its cost taken off [{unit}]", lambda one: format_amount(one.value)),
     )
     made = ", ".join(f"{card.assumptions.checks[name].label} ({how})" for name, how in card.made.items())
     return table(card.checks, columns, f"Checks before a restart{f'; made: {made}' if made else ''}")
@@ -148,7 +148,7 @@ def _evidence(card: RestartCard) -> Table:
         Column("found", "what"),
         Column("where", lambda one: one.bearing or "rotor"),
         Column("speaks of a", lambda one: kinds[one.kind].label),
-        Column("odds times", lambda one: f"{one.ratio:.3g}"),
+        Column("odds times", lambda one: format_amount(one.ratio)),
     )
     note = "" if card.indicators else "No earlier estimate of this machine was given, or it says nothing."
     return table(card.indicators, columns, "What changed since the earlier drop", note)
@@ -166,9 +166,9 @@ def _flips(card: RestartCard) -> Table:
 def _costs(card: RestartCard) -> Table:
     one = card.assumptions
     rows = (
-        ("a day of standstill", f"{one.day_cost:g} {one.unit}"),
-        ("a set of touchdown bearings", f"{one.bearing_set_cost:g} {one.unit}"),
-        ("a damaged machine", f"{one.machine_cost:g} {one.unit}"),
+        ("a day of standstill", one.cost(one.day_cost)),
+        ("a set of touchdown bearings", one.cost(one.bearing_set_cost)),
+        ("a damaged machine", one.cost(one.machine_cost)),
         ("opening and looking", f"{one.inspection_days:g} d"),
         ("exchange or repair after that", f"{one.exchange_days:g} d"),
         ("exchange in one go", f"{one.replace_days:g} d"),

@@ -15,6 +15,7 @@ from pydantic import Field, ValidationError
 
 from rotordrop.document import Document, first_fault, read_toml
 from rotordrop.errors import UsageError
+from rotordrop.units import format_amount
 
 Share = Field(ge=0.0, le=1.0)
 Chance = Field(gt=0.0, lt=1.0)
@@ -103,6 +104,11 @@ class Assumptions(Document):
     checks: dict[str, Check]
     source: str = ASSUMED
     """Whose the costs and chances are."""
+
+    def cost(self, amount: float) -> str:
+        """A cost [unit] in words, "1 day of standstill"."""
+        number = format_amount(amount)
+        return f"{number} {self.unit.replace('days', 'day', 1) if number == '1' else self.unit}"
 
 
 BRINELLED = "brinelled"

@@ -36,7 +36,7 @@ from rotordrop.restart.evidence import (
 )
 from rotordrop.restart.foreseen import Foreseen, LiftNow, SpeedLimit
 from rotordrop.restart.order import EarlierDrop
-from rotordrop.units import format_chance, format_quantity
+from rotordrop.units import format_amount, format_chance, format_quantity
 
 Answer = Literal["restart", "restart with limits", "inspect first", "replace"]
 ANSWERS: tuple[Answer, ...] = ("restart", "restart with limits", "inspect first", "replace")
@@ -487,7 +487,7 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     chance = f"{100.0 * doubt:.2g}%" if 0.005 < doubt < 0.095 else format_chance(doubt)
     said.append(
         f"{card.answer.capitalize()}: something is damaged with {chance}; {ranges}. "
-        f"It costs {card.costs[card.answer]:.2g} {assumed.unit} in "
+        f"It costs {assumed.cost(card.costs[card.answer])} in "
         f"expectation{_beside(card)}. The largest doubt is a {in_words(likeliest, assumed)}. Who knew the "
         f"state of the bearings would answer {known}."
     )
@@ -497,8 +497,8 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     if best is not None:
         hours = 24.0 * best.cost / assumed.day_cost
         said.append(
-            f"The check that pays most: {best.label} ({hours:.2g} h). Its outcome changes the answer in "
-            f"{format_chance(best.settles)} of the cases and saves {best.value:.2g} {assumed.unit} in "
+            f"The check that pays most: {best.label} ({format_amount(hours)} h). Its outcome changes the "
+            f"answer in {format_chance(best.settles)} of the cases and saves {assumed.cost(best.value)} in "
             "expectation."
         )
     else:
@@ -604,5 +604,7 @@ def _times(factor: float) -> str:
 
 
 def _beside(card: RestartCard) -> str:
-    others = ", ".join(f"{name} {cost:.2g}" for name, cost in card.costs.items() if name != card.answer)
+    others = ", ".join(
+        f"{name} {format_amount(cost)}" for name, cost in card.costs.items() if name != card.answer
+    )
     return f" ({others})"

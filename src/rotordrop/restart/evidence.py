@@ -15,7 +15,7 @@ from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
 from rotordrop.restart.order import EarlierDrop
-from rotordrop.units import format_chance
+from rotordrop.units import format_amount, format_chance
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
@@ -140,7 +140,8 @@ def _parameters(since: Drop, drop: Drop) -> Iterator[_Moved]:
         yield _Moved(
             place=place,
             path=path,
-            what=f"{one.path} " + (f"× {one.change:.3g}" if one.factor else f"{1e6 * one.change:+.3g} µm"),
+            what=f"{one.path} "
+            + (f"× {format_amount(one.change)}" if one.factor else f"{1e6 * one.change:+.3g} µm"),
             change=math.log(one.change) if one.factor else one.change,
             error=(high - low) / (2.0 * NINETY),
         )
@@ -153,7 +154,7 @@ def _unbalances(since: Drop, drop: Drop) -> Iterator[_Moved]:
         was, now = before.get(one.node), _logarithm(one.amount_kg_m)
         if was is not None and now is not None:
             change = now[0] - was[0]
-            what = f"unbalance at node {one.node} × {math.exp(change):.3g}"
+            what = f"unbalance at node {one.node} × {format_amount(math.exp(change))}"
             error = math.hypot(was[1], now[1])
             yield _Moved(place="", path="unbalance", what=what, change=change, error=error)
 

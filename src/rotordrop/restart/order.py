@@ -82,9 +82,14 @@ def in_order(
     before = [one for one in logged if one not in later]
     open_ = sum(_day(one.recorded) is None for one in before)
     if before and now is None:
-        remarks.append(f"This drop has no date: all {len(before)} others of the log count as earlier.")
+        others = "the other one" if len(before) == 1 else f"all {len(before)} others"
+        verb = "counts" if len(before) == 1 else "count"
+        remarks.append(f"This drop has no date: {others} of the log {verb} as earlier.")
     elif open_:
-        remarks.append(f"{open_} of {len(before)} drops of the log have no date, and count as earlier.")
+        has, counts = ("has", "counts") if open_ == 1 else ("have", "count")
+        remarks.append(
+            f"Of {len(before)} earlier drops of the log {open_} {has} no date and {counts} as earlier."
+        )
     for estimate in since:
         found = earlier_drop(estimate)
         same = [k for k, one in enumerate(before) if one.sha256 and one.sha256 == found.sha256]

@@ -97,7 +97,7 @@ def test_used_share_counts_drops_and_known_seconds(log):
     used, free = used_shares(log)
     assert (used.drops, used.seconds, used.untimed) == (3, 100.0, 1)
     assert used.sentence() == (
-        "LP-400, bearings 2026: 3 of 12 drops (25 %); 100 s of 400 s (25 %, 1 drops without duration left "
+        "LP-400, bearings 2026: 3 of 12 drops (25 %); 100 s of 400 s (25 %, 1 drop without duration left "
         "out), allowed by contract 17, section 4"
     )
     assert free.sentence() == "other, bearings 2026: 1 drop; no limit given"

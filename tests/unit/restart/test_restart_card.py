@@ -36,6 +36,7 @@ from rotordrop.restart.next_drop import found_machine, next_drops, speed_limit
 from rotordrop.restart.order import EarlierDrop, MadeCheck, earlier_drop, in_order, with_checks
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns, is_of_a_bearing
+from rotordrop.units import format_amount
 
 ASSUMED = assumptions_of({}, "here")
 BY_COST = assumptions_of({"most_doubt": 1.0}, "here")
@@ -353,6 +354,48 @@ def test_page_json_and_terminal_say_the_same(capsys):
     assert "made: turning the rings by hand (good)" in out
 
 
+def test_costs_and_chances_are_written_one_way_in_sentences_and_tables():
+    """ "replace 1.3e+02" stood beside 128, "100.0 %" beside "> 99 %", and "1 days of standstill"."""
+    for scale in (1.0, 40.0, 4e4, 4e8):
+        costs = {"day_cost": scale, "bearing_set_cost": 1.5 * scale, "machine_cost": 62.5 * scale}
+        assumed = assumptions_of({**costs, "unit": "EUR"}, "here")
+        for one, earlier in ((drop(), []), (drop(gap=310e-6), [inspected(drop())])):
+            card = restart_card(one, assumed, earlier=earlier)
+            page = restart_page(card, one)
+            tables = [*page.summary, *(table for section in page.sections for table in section.tables)]
+            cells = [
+                str(getattr(cell, "text", cell)) for table in tables for row in table.rows for cell in row
+            ]
+            written = " ".join(
+                [*card.statements, *cells, *(f.value.text for c in page.cards for f in c.figures)]
+            )
+            assert not re.search(r"\de[+-]\d", written)
+            assert "100.0 %" not in written and "0.0 %" not in re.sub(r"\d0\.0 %", "", written)
+            for answer, row in zip(ANSWERS, page.summary[0].rows, strict=True):
+                assert str(row[1]) in card.statements[int(card.prior_alone)]
+                assert answer in str(row[0])
+    assert ASSUMED.cost(1.0) == "1 day of standstill"
+    assert ASSUMED.cost(1.5) == "1.5 days of standstill"
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (0.0, "0"),
+        (127.6, "128"),
+        (1111.0, "1110"),
+        (9.36e-14, "< 0.001"),
+        (-2e-9, "> -0.001"),
+        (2.98e6, "2.98 million"),
+        (999_999.9, "1 million"),
+        (1.07e13, "10.7 trillion"),
+        (-0.0993, "-0.0993"),
+    ],
+)
+def test_an_amount_is_written_as_one_says_it(number, text):
+    assert format_amount(number) == text
+
+
 def test_probabilities_are_reliable_where_the_world_is_as_assumed():
     """Of the states drawn as the assumptions say, the stated share is damaged."""
     random = np.random.default_rng(8)
@@ -517,14 +560,14 @@ def test_drops_count_by_their_dates():
     assert said == ["Later than this drop and left out: 1 of the log, new (2026-04-01)."]
     earlier, said = in_order(now, [], [logged(""), logged("2026-03-01")])
     assert len(earlier) == 2
-    assert said == ["1 of 2 drops of the log have no date, and count as earlier."]
+    assert said == ["Of 2 earlier drops of the log 1 has no date and counts as earlier."]
     earlier, said = in_order(now, [], [logged("2026-03-01", stress=2e9), logged("2026-02-01", stress=1e9)])
     assert [one.stresses["NDE"].value for one in earlier] == [1e9, 2e9]
     assert not said
     _, said = in_order(drop(), [early, drop()], [logged("2026-03-01")])
     assert said == [
         "Not all earlier estimates have a date: they count in the order they are given.",
-        "This drop has no date: all 1 others of the log count as earlier.",
+        "This drop has no date: the other one of the log counts as earlier.",
     ]
     with pytest.raises(UsageError, match=r"--since b is of 2026-02-01, later than drop.h5 of 2025-06-01"):
         in_order(drop(recorded="2025-06-01"), [late], [])
