@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import plotly.graph_objects as go
 
 from rotordrop.estimate.published import Drop
+from rotordrop.known import Known
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -202,20 +203,24 @@ def _next(card: RestartCard) -> Section:
             for name in names
         ),
         Column(
-            "passes a limit",
-            lambda one: (
-                Quantity.of(one.beyond_limit, "probability", 2) if one.beyond_limit else "no limit given"
-            ),
+            f"passes {card.foreseen.limits_in_words}" if card.foreseen.limits else "passes a limit",
+            lambda one: _with_ends(one.beyond_limit) if one.beyond_limit else "no limit given",
         ),
+        Column("simulated drops", lambda one: str(one.peak_force[names[0]][0].drops)),
     )
     of = "as this estimate found it" if card.foreseen.of_estimate else "by its file alone"
-    count = drops[0].peak_force[names[0]][0].drops
-    note = f"{count} simulated drops a speed, the machine {of}; no damage is simulated."
+    note = f"Simulated, the machine {of}; no damage is simulated."
     return Section(
         "The next drop",
         figures=(Figure(_by_speed(drops, names), "Half of the next drops, and 95 % of them, stay below."),),
         tables=(table(drops, columns, "The next drop by speed", note),),
     )
+
+
+def _with_ends(known: Known) -> str:
+    """A chance and its interval as the sentence above writes them."""
+    low, high = (format_chance(end) for end in known.interval_90 or (known.value,) * 2)
+    return f"{format_chance(known.value)} ({low} to {high})"
 
 
 def _by_speed(drops: Sequence[NextDrop], names: Sequence[str]) -> go.Figure:

@@ -535,7 +535,10 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
     beyond = ""
     if full.beyond_limit is not None:
         low, high = (format_chance(end) for end in full.beyond_limit.interval_90 or (full.beyond,) * 2)
-        beyond = f"; it passes a limit with {format_chance(full.beyond)} (90 %: {low} to {high})"
+        beyond = (
+            f"; it passes the limit, {foreseen.limits_in_words}, with {format_chance(full.beyond)} "
+            f"(90 %: {low} to {high})"
+        )
     count = full.peak_force[next(iter(full.peak_force))][0].drops
     yield (
         f"The next drop from {format_quantity(full.speed, 'speed')}, {of}, by {count} simulated ones"
@@ -551,7 +554,7 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
         ]
         yield f"{name}: {'; '.join(parts)}."
     if foreseen.speed_limit is not None:
-        yield _of_speed_limit(foreseen.speed_limit)
+        yield _of_speed_limit(foreseen.speed_limit, full.beyond_limit)
 
 
 def _of_lift(lift: LiftNow | None) -> Iterator[str]:
@@ -582,17 +585,25 @@ def _shown(known: Known, kind: str) -> str:
     return f"{value} ({least} {f'to {format_quantity(high, kind)}' if math.isfinite(high) else 'or more'})"
 
 
-def _of_speed_limit(limit: SpeedLimit) -> str:
-    allowed = f"a chance of {format_chance(limit.chance)} or less"
+def _of_speed_limit(limit: SpeedLimit, beyond: Known | None) -> str:
+    allowed = format_chance(limit.chance)
     if limit.speed is None or limit.interval_90 is None:
         lowest = format_quantity(limit.tried[0], "speed")
-        return f"No speed limit down to {lowest} brings the next drop to {allowed} of passing a limit."
+        return f"No speed limit down to {lowest} brings the chance to pass the limit down to {allowed}."
     speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
     if not limit.needed:
-        return f"It needs no speed limit: up to {speed} it passes one with {allowed}."
+        ends = None if beyond is None else beyond.interval_90
+        most = 1.0 if ends is None else ends[1]
+        chance = f"{allowed} at most"
+        if most > limit.chance:
+            chance = f"about {allowed} at most, and these drops cannot rule out {format_chance(most)}"
+        return (
+            f"No speed limit was found necessary: by {limit.drops} simulated drops up to {speed} the limit "
+            f"is passed with {chance}."
+        )
     return (
-        f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings it to "
-        f"{allowed}; take the lower end to be sure."
+        f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings that chance "
+        f"to about {allowed}; take the lower end to be sure."
     )
 
 

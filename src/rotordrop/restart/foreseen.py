@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from rotordrop.known import Known
+from rotordrop.severity.numbers import NUMBERS
+from rotordrop.units import format_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,5 +72,16 @@ class Foreseen:
     drops: tuple[NextDrop, ...] = ()
     speed_limit: SpeedLimit | None = None
     lift: LiftNow | None = None
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """Limits that were given [SI], by the field of an estimate document."""
     of_estimate: bool = False
     """Whether the machine is the one that the estimate found, with its intervals; else that of its file."""
+
+    @property
+    def limits_in_words(self) -> str:
+        """The limits by name, value and unit, "peak Hertz stress of 2500 MPa"."""
+        return " or ".join(
+            f"{one.label} of {format_quantity(self.limits[one.field], one.kind, 4)}"
+            for one in NUMBERS
+            if one.field in self.limits
+        )

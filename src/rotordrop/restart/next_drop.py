@@ -137,7 +137,7 @@ def next_drops(
     if limits and len(shares) > 2:
         fewest = min(map(len, ratios))  # each draw at every speed
         limit = speed_limit(np.array(shares) * speed, np.array([one[:fewest] for one in ratios]), chance)
-    return Foreseen(drops=tuple(made), speed_limit=limit, of_estimate=found is not None)
+    return Foreseen(drops=tuple(made), speed_limit=limit, limits=dict(limits), of_estimate=found is not None)
 
 
 def lift_now(

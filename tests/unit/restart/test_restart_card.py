@@ -604,10 +604,11 @@ def test_the_answer_says_the_next_drop_and_the_speed_limit():
         for s, v in ((400.0, 0.9), (280.0, 0.1))
     )
     limit = SpeedLimit(speed=250.0, interval_90=(220.0, 270.0), chance=0.05, tried=(100.0, 400.0), drops=144)
-    foreseen = Foreseen(drops=after, speed_limit=limit, of_estimate=True)
+    foreseen = Foreseen(drops=after, speed_limit=limit, limits={"peak_stress_Pa": 2.5e9}, of_estimate=True)
     card = restart_card(drop(), ASSUMED, foreseen=foreseen)
     said = " ".join(card.statements)
-    assert "as this estimate found the machine, by 24 simulated ones; it passes a limit with 90%" in said
+    assert "as this estimate found the machine, by 24 simulated ones; it passes the limit, " in said
+    assert "peak Hertz stress of 2500 MPa, with 90% (90 %: 90% to 90%)" in said
     assert "NDE: force below 3" in said
     assert re.search(r"\([^()]* or more\) in 95 %", said)
     assert "A speed limit of 39.8 Hz" in said and "take the lower end" in said
@@ -616,6 +617,37 @@ def test_the_answer_says_the_next_drop_and_the_speed_limit():
     exchange = ASSUMED.bearing_set_cost + ASSUMED.exchange_days
     assert full - plain["restart"] == pytest.approx(ASSUMED.another_drop * 0.9 * exchange)
     assert limited - plain["restart with limits"] == pytest.approx(ASSUMED.another_drop * 0.05 * exchange)
+
+
+def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell():
+    """24 at full speed and 12 at each lower one were "24 a speed", and "5 % or less" stood beside 22 %."""
+    few = tuple(
+        NextDrop(
+            speed=speed,
+            peak_force=dict.fromkeys(("NDE", "DE"), (Known(value=3e3, drops=count),) * 2),
+            peak_stress=dict.fromkeys(("NDE", "DE"), (Known(value=2e9, drops=count),) * 2),
+            beyond_limit=Known(value=0.0, interval_90=(0.0, high), drops=count),
+        )
+        for speed, count, high in ((400.0, 24, 0.22), (200.0, 12, 0.3))
+    )
+    limit = SpeedLimit(speed=400.0, interval_90=(300.0, 400.0), chance=0.05, tried=(100.0, 400.0), drops=60)
+    foreseen = Foreseen(drops=few, speed_limit=limit, limits={"peak_stress_Pa": 2.5e9})
+    card = restart_card(drop(), ASSUMED, foreseen=foreseen)
+    (said,) = (text for text in card.statements if "speed limit" in text)
+    assert "about 5% at most, and these drops cannot rule out 22%" in said
+    next_ = next(
+        s
+        for s in restart_page(card, drop()).sections
+        if s.tables and s.tables[0].caption == "The next drop by speed"
+    )
+    (shown,) = next_.tables
+    assert "24" not in shown.note
+    assert [row[-1] for row in shown.rows] == ["24", "12"]
+    assert shown.columns[-2] == "passes peak Hertz stress of 2500 MPa"
+    assert shown.rows[0][-2] == "< 1% (< 1% to 22%)"
+    many = replace(few[0], beyond_limit=Known(value=0.0, interval_90=(0.0, 0.03), drops=24))
+    sure = restart_card(drop(), ASSUMED, foreseen=replace(foreseen, drops=(many, *few[1:])))
+    assert any("passed with 5% at most." in text for text in sure.statements)
 
 
 def test_next_drops_are_of_the_machine_that_the_estimate_found():
