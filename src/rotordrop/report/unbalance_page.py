@@ -119,9 +119,9 @@ def _verdict(
 ) -> tuple[Statement, ...]:
     said = [
         Statement(
-            f"{', '.join(one.plane for one in seen)}: the peak at {shown(nearest.peak.speed, 'speed')} with "
-            f"an amplification factor of {nearest.peak.factor:.1f} is "
-            f"{100.0 * nearest.separation.margin:.1f} % from the nominal speed; API 617 asks for "
+            f"{', '.join(one.plane for one in seen)}: the peak of {nearest.plane}, the nearest of them, at "
+            f"{shown(nearest.peak.speed, 'speed')} with an amplification factor of {nearest.peak.factor:.1f} "
+            f"is {100.0 * nearest.separation.margin:.1f} % from the nominal speed; API 617 asks for "
             f"{nearest.separation.asked}",
             "bad",
         )

@@ -103,14 +103,15 @@ def test_one_mode_seen_in_many_planes_is_one_sentence(capsys):
     assert run(["critical-speeds", "--unbalance", str(example_path("lp400"))]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert said.count("API 617 asks for") == 1
-    planes = said.split("problem: ")[1].split(": the peak at")[0]
+    planes = said.split("problem: ")[1].split(": the peak of ")[0]
     assert set(planes.lower().split(", ")) == {
         "sensors nde",
         "sensors de",
         "touchdown bearing nde",
         "touchdown bearing de",
     }
-    assert "the peak at 550.0 Hz" not in said
+    assert "at 550.0 Hz" not in said
+    assert "the peak of sensors DE, the nearest of them, at 549.9 Hz" in said
 
 
 def test_a_machine_without_unbalance_says_so():
