@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -204,21 +205,22 @@ def _standstill(stop: Known) -> str:
     )
 
 
+def seen_of(line: Line, lines: Sequence[Line]) -> str:
+    """From when to when a line was seen; in whole seconds where any of the lines was seen for long."""
+    longest = max((one.last_seen for one in lines), default=0.0)
+    places = 0 if longest >= _IN_WHOLE_SECONDS else 2
+    return f"{line.first_seen:.{places}f} to {line.last_seen:.{places}f} s"
+
+
 def line_table(analysis: CoastDownAnalysis) -> Table:
     """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
-    longest = max((line.last_seen for line in analysis.lines), default=0.0)
-    places = 0 if longest >= _IN_WHOLE_SECONDS else 2
-
-    def seen(line: Line) -> str:
-        return f"{line.first_seen:.{places}f} to {line.last_seen:.{places}f} s".replace(" ", NO_BREAK)
-
     columns = (
         Column("name", "label"),
         Column("where", where_of),
         Column("amplitude, zero-to-peak", "amplitude", "length", 3),
         Column("× floor", lambda line: f"{line.ratio:.0f}"),
         Column("width", lambda line: f"{line.width:.2f} Hz" if line.width else "below resolution"),
-        Column("seen", seen),
+        Column("seen", lambda line: seen_of(line, analysis.lines).replace(" ", NO_BREAK)),
         Column("confidence", lambda line: line.confidence if line.named else None, "probability"),
     )
     return table(analysis.lines, columns, "Lines found, strongest first", LINES_NOTE)

@@ -285,7 +285,7 @@ def write_waterfall(
 def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str, Any]) -> dict[str, Any]:
     """Write the amplitudes of every waterfall, and tell what the page draws over them."""
     from rotordrop.report.waterfall_figure import DRAWN_ORDERS, highest_shown
-    from rotordrop.report.waterfall_page import where_of
+    from rotordrop.report.waterfall_page import seen_of, where_of
 
     planes = list(found.planes)
     falls = found.planes[planes[0]].waterfalls
@@ -318,7 +318,7 @@ def _falls(found: CoastDownAnalysis, job: Job, made: Path, options: Mapping[str,
                 "confidence": quantity_json(Quantity(value=line.confidence, kind="probability")),
                 "reason": line.reason,
                 "planes": list(line.forward),
-                "seen": f"{line.first_seen:.0f} to {line.last_seen:.0f} s",
+                "seen": seen_of(line, found.lines),
                 "python": course_lines(line.label),
                 "frames": [
                     float(value) if math.isfinite(value) else None

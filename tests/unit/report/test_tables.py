@@ -20,7 +20,7 @@ from rotordrop.report.parameters import ParameterRow, parameter_figure, paramete
 from rotordrop.report.quantity import Quantity, round_steps
 from rotordrop.report.record_quality import record_quality_section
 from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table, thinned
-from rotordrop.report.waterfall_page import law_table
+from rotordrop.report.waterfall_page import law_table, seen_of
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.simulate.result import DropResult
 
@@ -273,3 +273,10 @@ def test_thinned_outliers_keep_both_ends_and_leave_no_gap() -> None:
     assert (kept[0], kept[-1]) == (values.min(), values.max())
     distance = np.min(np.abs(values[:2000, None] - kept[None, :]), axis=1)
     assert distance.max() <= (values.max() - values.min()) / 300
+
+
+def test_a_short_line_is_seen_in_hundredths_of_a_second_and_a_long_one_in_whole_ones() -> None:
+    """The page said "0 to 2 s" where the report said 0.20 to 2.00 s."""
+    short, long = (SimpleNamespace(first_seen=0.2, last_seen=end) for end in (2.0, 40.0))
+    assert seen_of(short, [short]) == "0.20 to 2.00 s"
+    assert seen_of(short, [short, long]) == "0 to 2 s"
