@@ -258,3 +258,13 @@ def test_damage_to_the_head_of_a_labview_file_does_not_take_a_segment_away(tmp_p
     text = labview("No", segments=(range(25), range(25, COUNT))).decode()
     path.write_text(text.replace("***End_of_Header***", "**+End_of_Header***", 1), newline="")
     assert len(read(path).channels[0].values) == COUNT
+
+
+def test_a_result_of_simulate_is_said_to_be_one(tmp_path):
+    """It was refused for its 'coordinate', which has no clock."""
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["format"] = "rotordrop drop 2"
+        file["coordinate"] = np.zeros(4)
+    with pytest.raises(RecordError, match=r"is a result of 'rotordrop simulate -o'.*no recording"):
+        read(path)

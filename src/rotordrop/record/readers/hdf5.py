@@ -18,6 +18,8 @@ from rotordrop.record.sandbox import MOST_SERIES, Content, Item, plain, refuse_b
 if TYPE_CHECKING:
     from rotordrop.record.profile import Profile
 
+_SIMULATED = "rotordrop drop "
+"""Begin of the attribute ``format`` of a simulated drop."""
 _TIME_NAMES = ("time", "t")
 
 _Clocks: TypeAlias = dict[tuple[float, float, float, int], Array]
@@ -35,6 +37,11 @@ def read_hdf5(path: Path, profile: Profile) -> Recording:
     except DamagedFileError as error:
         raise RecordError(str(error)) from error
     content = unpack(path, "hdf5")
+    if str(content.attributes.get("format", "")).startswith(_SIMULATED):
+        raise RecordError(
+            f"{path} is a result of 'rotordrop simulate -o' (histories of the simulation), no recording of "
+            "sensors; name the file of a recorder, or make simulated recordings with 'rotordrop-bench make'"
+        )
     last = {item.name: item.name.rsplit("/", 1)[-1] for item in content.items}
     times = {
         item.name: item
