@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from cases import Compute, checks_of
+from numpy.typing import NDArray
 from rigid_machine import linked, rigid_model
 
 from rotordrop.machine import loads_machine
@@ -74,10 +75,9 @@ damping = "{v["support_damping"]} N s/m" }}
 """
 
 
-def path_of_exudyn(inputs: Inputs) -> dict[str, float]:
-    """Displacement [m] of the rotor at each bearing at the instants of the case."""
-    velocity = np.array(inputs["start"]["velocity"])
-    case = DropCase(
+def coasting_case(inputs: Inputs, velocity: NDArray[np.float64]) -> DropCase:
+    """A drop from the middle of the bearings with velocities there [m/s], shape (B, 2)."""
+    return DropCase(
         speed=inputs["speed"],
         duration=inputs["duration"],
         output_step=inputs["compared_step"],
@@ -85,6 +85,11 @@ def path_of_exudyn(inputs: Inputs) -> dict[str, float]:
         spin="coasting",
         start=PlacedStart(displacement=np.zeros_like(velocity), velocity=velocity),
     )
+
+
+def path_of_exudyn(inputs: Inputs) -> dict[str, float]:
+    """Displacement [m] of the rotor at each bearing at the instants of the case."""
+    case = coasting_case(inputs, np.array(inputs["start"]["velocity"]))
     result = simulate_drop(rigid_rotor(inputs), case)
     assert len(result.contacts) >= inputs["fewest_contacts"]
     return {
@@ -125,15 +130,7 @@ force = "{along} N"
         arrangement="X",
     )
     model.parameters.bearing[:, L.RACE_WEIGHT] = 0.0
-    case = DropCase(
-        speed=inputs["speed"],
-        duration=inputs["duration"],
-        output_step=inputs["compared_step"],
-        tolerance=1e-9,
-        spin="coasting",
-        start=PlacedStart(displacement=np.zeros((1, 2)), velocity=np.array([inputs["velocity"]])),
-    )
-    result = simulate_drop(model, case)
+    result = simulate_drop(model, coasting_case(inputs, np.array([inputs["velocity"]])))
     paths = np.column_stack([result.displacement[:, 0], result.axial_displacement, result.race_speed[:, 0]])
     return {
         f"{name}, {1e3 * time:g} ms": float(value)

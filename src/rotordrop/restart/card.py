@@ -166,6 +166,12 @@ def restart_card(
     carried = tuple((one.record, dict(one.checks)) for one in earlier if one.checks)
     for name, outcome in [pair for of in (made, *(of for _, of in carried)) for pair in of.items()]:
         require_check(name, outcome, assumed)
+    # an estimate of another machine says nothing of this one
+    said = [unlike(one.estimate, drop) if one.estimate is not None else "" for one in earlier]
+    earlier = [
+        replace(one, estimate=None) if words else one for one, words in zip(earlier, said, strict=True)
+    ]
+    apart = [f"{words}. Nothing is concluded from that drop." for words in said if words]
     found = indicators(drop, earlier, assumed)
     suspected = suspicions(drop, found, earlier, assumed, inspected=made.get(INSPECTED) == "good")
     history = _History(suspected, [*(one.checks for one in earlier), made], assumed)
@@ -196,12 +202,9 @@ def restart_card(
         assumptions=assumed,
         statements=(),
     )
-    estimates = [one.estimate for one in earlier if one.estimate is not None]
-    apart = [
-        f"{words}. Nothing is concluded from that drop." for one in estimates if (words := unlike(one, drop))
-    ]
-    said = [*_said(card, drop, len(estimates) > len(apart)), *apart, *contradictions(found), *remarks]
-    return replace(card, statements=tuple(said))
+    compared = any(one.estimate is not None for one in earlier)
+    statements = (*_said(card, drop, compared), *apart, *contradictions(found), *remarks)
+    return replace(card, statements=statements)
 
 
 @dataclass(frozen=True)

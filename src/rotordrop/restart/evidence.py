@@ -10,7 +10,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
-from rotordrop.estimate.changed import changes, unlike
+from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
@@ -82,7 +82,7 @@ def indicators(drop: Drop, earlier: Sequence[EarlierDrop], assumed: Assumptions)
     """What changed since the first of the earlier estimates, as evidence for or against each kind of damage.
 
     Without one nothing is known of a change. A change that the records do not determine says nothing, and
-    neither does an estimate that is not consistent with its record, or of another machine.
+    neither does an estimate that is not consistent with its record.
     """
     if not drop.consistent:
         return ()
@@ -90,7 +90,7 @@ def indicators(drop: Drop, earlier: Sequence[EarlierDrop], assumed: Assumptions)
     moved = {
         k: (*_parameters(one, drop), *_unbalances(one, drop))
         for k, one in estimates.items()
-        if one.consistent and not unlike(one, drop)
+        if one.consistent
     }
     found = []
     for kind, damage, bearing in places(drop, assumed):

@@ -1,5 +1,7 @@
 """Noise of the sensors that is not white, told from white noise and from lines."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,8 @@ def test_what_each_sample_brings_anew_is_white():
         white=np.full(2, 1e-13),
     )
     a = decay(slow.frequency, 1.0 / rate)
+    # a corner of 20 Hz forgets in 1 / (2 π 20 Hz) = 7.958 ms, in 159.15 samples
+    assert a[0] ** 159.155 == pytest.approx(math.exp(-1.0), rel=1e-5)
     apart = np.abs(np.subtract.outer(np.arange(300), np.arange(300)))
     covariance = 1e-13 * np.eye(300) + sum(v * x**apart for v, x in zip(slow.variance, a, strict=True))
     root = np.linalg.cholesky(covariance)

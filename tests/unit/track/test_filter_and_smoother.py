@@ -144,13 +144,28 @@ def in_deviations(difference: np.ndarray, covariance: np.ndarray) -> float:
     return float(np.max(np.abs(difference) / deviations_of(covariance)))
 
 
-def test_the_forward_filter_is_the_plain_one(flight, plain, filtered):
-    assert filtered.done == len(flight.time) == 60
+def follows(filtered, plain) -> None:
+    """Whether means and covariances of a filter are those of the plain one."""
     for i in range(filtered.done):
         assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
         unit = deviations_of(plain.covariances[i])
         difference = (filtered.covariance(i) - plain.covariances[i]) / np.outer(unit, unit)
         assert np.abs(difference).max() < 1e-6
+
+
+def smooths(smoothed, plain) -> None:
+    """Whether those of a smoother are those of the plain one."""
+    means, covariances = plain.smoothed()
+    for i in range(0, len(means), 5):
+        assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
+        unit = deviations_of(covariances[i])
+        difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
+        assert np.abs(difference).max() < 1e-3
+
+
+def test_the_forward_filter_is_the_plain_one(flight, plain, filtered):
+    assert filtered.done == len(flight.time) == 60
+    follows(filtered, plain)
     innovations, sizes = np.array(plain.innovations).T
     used = np.isfinite(filtered.innovations)
     np.testing.assert_allclose(filtered.innovations[used], innovations, rtol=1e-6, atol=1e-12)
@@ -165,13 +180,7 @@ def test_likelihood_and_size_are_those_of_the_innovations(plain, filtered):
 
 
 def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
-    smoothed = smooth(filtered, kept=range(filtered.done))
-    means, covariances = plain.smoothed()
-    for i in range(0, len(means), 5):
-        assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
-        unit = deviations_of(covariances[i])
-        difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
-        assert np.abs(difference).max() < 1e-3
+    smooths(smooth(filtered, kept=range(filtered.done)), plain)
 
 
 def with_slow_noise(problem: DropProblem) -> DropProblem:
@@ -198,25 +207,12 @@ def test_slow_noise_is_that_of_the_plain_filter_and_smoother(flight):
     np.testing.assert_allclose(problem.white_variances, flight.variances, rtol=1e-12)
     plain, filtered = PlainFilter(problem).run(), forward(problem, SETTINGS)
     assert filtered.done == len(problem.time)
-    for i in range(0, filtered.done, 5):
-        assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
-        unit = deviations_of(plain.covariances[i])
-        difference = (filtered.covariance(i) - plain.covariances[i]) / np.outer(unit, unit)
-        assert np.abs(difference).max() < 1e-6
-    smoothed = smooth(filtered, kept=range(filtered.done))
-    means, covariances = plain.smoothed()
-    for i in range(0, len(means), 5):
-        assert in_deviations(smoothed.means[i] - means[i], covariances[i]) < 1e-3
-        unit = deviations_of(covariances[i])
-        difference = (smoothed.covariance(i) - covariances[i]) / np.outer(unit, unit)
-        assert np.abs(difference).max() < 1e-3
+    follows(filtered, plain)
+    smoothed, covariance = smooth(filtered, kept=range(filtered.done)), plain.smoothed()[1][30]
+    smooths(smoothed, plain)
     # what a sample leaves of it is not nothing: with white noise in its place the same readings differ
-    assert (
-        in_deviations(
-            smoothed.means[30, :-3] - smooth(forward(flight, SETTINGS)).means[30], covariances[30][:-3, :-3]
-        )
-        > 0.1
-    )
+    white = smooth(forward(flight, SETTINGS))
+    assert in_deviations(smoothed.means[30, :-3] - white.means[30], covariance[:-3, :-3]) > 0.1
 
 
 def test_a_packed_covariance_comes_back_whole(random):
