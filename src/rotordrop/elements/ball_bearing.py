@@ -50,7 +50,7 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
     },
 }
 
-_SPRUNG = ("spring_rate", "ring_mass", "ring_travel", "fit_friction")
+_SPRUNG = ("spring_rate", "ring_mass", "ring_travel", "fit_friction", "ring_damping")
 _BALL_HEIGHT = 1.16
 """Ball diameter over half the height of the cross-section [1], 2 · 0.58 of spindle bearings."""
 
@@ -160,6 +160,9 @@ class BallBearing(RaceBearing):
     fit_friction: V.NonNegative | None = None
     """With springs: friction coefficient of each outer ring in its housing, on its share of the radial force
     [1]; 0.15, 0 to 0.4, which decides how much of the peak the springs take."""
+    ring_damping: V.NonNegative | None = None
+    """With springs: damping of each outer ring along the axis, over that of a dashpot along every line of
+    contact, of which the race's own damping is made [1]; 1, 0 to 2, which nobody has measured."""
 
     ball_inertia: Annotated[bool, Strict()] = Field(
         default=False, description="a drop hardly gets the race up to speed before its first impacts"
@@ -359,7 +362,9 @@ class BallBearing(RaceBearing):
         }
         why = "nobody knows it: 0.1 to 0.2 of steel in steel, more where it tilts"
         friction = Known(value=0.15, status="default", range=(0.0, 0.4), source=why, unit="1")
-        return values | {"fit_friction": friction}
+        why = "dashpots along the lines of contact, as they damp the race; not measured"
+        damping = Known(value=1.0, status="default", range=(0.0, 2.0), source=why, unit="1")
+        return values | {"fit_friction": friction, "ring_damping": damping}
 
     def _of_clearance(self, entry: CatalogueBearing | None) -> dict[str, Any]:
         """Clearance of a class, and what goes without saying beside one: no preload, no contact angle."""
@@ -580,6 +585,15 @@ STATED: tuple[Parameter, ...] = (
         "dimensionless",
         0.1,
         L.RING + ring.FRICTION,
+        logarithmic=False,
+        lower=0.0,
+    ),
+    stated_only(
+        "bearing.ring_damping",
+        "damping of the outer rings by their balls",
+        "dimensionless",
+        0.6,
+        L.RING + ring.DAMPING,
         logarithmic=False,
         lower=0.0,
     ),

@@ -250,6 +250,7 @@ class BallNumbers(BearingNumbers):
         if balls.sprung:
             numbers[ring.MASS], numbers[ring.RATE] = balls.ring_mass, balls.spring_rate
             numbers[ring.TRAVEL], numbers[ring.FRICTION] = balls.ring_travel, balls.fit_friction
+            numbers[ring.DAMPING] = balls.ring_damping
             numbers[ring.STOP] = STOP_STIFFNESS * row_rigidity(self.constants)
             numbers[ring.BALLS] = self.constants.ball_count
             numbers[ring.ROWS] = self.constants.row_count

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 
 # Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers. GROWN is what
-# heat adds to the radial offset of the balls, and no part of what the springs were set to.
+# heat adds to the radial offset of the balls, and no part of what the springs were set to. DAMPING is that of
+# a ring over that of dashpots along the lines of contact.
 MASS = 0
 RATE = 1
 TRAVEL = 2
@@ -31,7 +32,8 @@ FRICTION = 4
 BALLS = 5
 ROWS = 6
 GROWN = 7
-N_ENTRIES = 8
+DAMPING = 8
+N_ENTRIES = 9
 
 SMOOTHING_SPEED = 1e-2
 """Speed of a ring [m/s] below which the friction of its fit is smoothed: chosen, not measured. A hundredth of
@@ -54,7 +56,7 @@ def row_rigidity(constants: BearingConstants) -> float:
 def preload_force(numbers: Array, entries: Array) -> float:
     """Force [N] of the springs on one ring where the race is centred: what its row says at its offset.
 
-    ``numbers`` (8,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi 2020, eqs.
+    ``numbers`` (9,) as they are listed above, ``entries`` (5,) of the ball set. Source: Neisi 2020, eqs.
     (3)–(6), for an axial displacement.
     """
     radial, axial = entries[RADIAL_OFFSET] - numbers[GROWN], entries[AXIAL_OFFSET]
@@ -87,7 +89,7 @@ def fit_friction(numbers: Array, F: float, v: float) -> tuple[float, float, floa
 
     Parameters
     ----------
-    numbers : ndarray, shape (8,)
+    numbers : ndarray, shape (9,)
         Rings of the bearing; coefficient [1] on the share of each ring of the radial force.
     F : float
         Radial force through all rings [N].

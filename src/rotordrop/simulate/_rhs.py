@@ -589,7 +589,8 @@ def add_rings(
     friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
     rows = numbers[ring.ROWS]
     dy[at] = y[at + 1]
-    damped = row_axial_damping(row[L.ROLLING : L.ROLLING_END], 1.0 / rows, y[at])[0] * y[at + 1]
+    share = numbers[ring.DAMPING] / rows
+    damped = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, y[at])[0] * y[at + 1]
     dy[at + 1] = (pushed / rows - held - friction - damped) / numbers[ring.MASS]
     return float(rows * damped * y[at + 1]), float(rows * friction * y[at + 1])
 

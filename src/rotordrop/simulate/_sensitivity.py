@@ -200,7 +200,8 @@ def _ring_jacobian(
     mass, rows = numbers[ring.MASS], numbers[ring.ROWS]
     along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
     elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
-    damping, by_way = row_axial_damping(row[L.ROLLING : L.ROLLING_END], 1.0 / numbers[ring.ROWS], y[at])
+    share = numbers[ring.DAMPING] / numbers[ring.ROWS]
+    damping, by_way = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, y[at])
     by_drag, _by_spin = race_drag_gradient(
         elastic + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
     )
