@@ -321,7 +321,7 @@ class BallNumbers(BearingNumbers):
         """What springs in place of spacers would leave of the force, at a push of many times a load [N]."""
         if self.balls.sprung or load <= 0.0:
             return
-        springs = self.balls.changed(preload_kind="spring").numbers()
+        springs = self.balls.changed(preload_kind="spring", ball_inertia=False).numbers()
         heavy = _HARD_PUSH * load
         pushes = np.column_stack([np.zeros(_PUSHES), np.linspace(0.0, heavy, _PUSHES)])
         way = -seat_on_springs(springs.constants, springs.rings(), pushes)[:, 1]

@@ -131,6 +131,14 @@ def test_the_key_is_written_and_read_again():
     assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
 
 
+def test_a_check_of_such_a_machine_says_what_springs_would_leave():
+    """As of one whose balls have no inertia; it was a traceback."""
+    (*_, left), (*_, of_slow) = (
+        loads_machine(text).touchdown_bearings[0].bearing.numbers().figures(100.0) for text in (WITH, TEXT)
+    )
+    assert left == of_slow and 0.0 < left.value < 1.0
+
+
 def test_springs_and_overspeed_are_refused(fast):
     both = WITH.replace(PLACE, f'preload_kind = "spring"\n{PLACE}')
     with pytest.raises(MachineFileError, match=r"ball_inertia = true goes with a rigid preload today"):
