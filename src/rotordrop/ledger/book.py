@@ -216,6 +216,9 @@ class UsedShare:
     """Drops whose duration is not known: they count as drops, not as seconds."""
     source: str
     """Who allowed it; by API 617 and ISO 14839-5 it is a matter of agreement."""
+    drops_passed_at: int | None = None
+    seconds_passed_at: int | None = None
+    """Drops of the log with which a limit was passed."""
 
     def sentence(self) -> str:
         """The share in words."""
@@ -225,7 +228,9 @@ class UsedShare:
         parts = []
         if self.allowed_drops is not None:
             share = self.drops / self.allowed_drops
-            parts.append(f"{self.drops} of {self.allowed_drops} drops ({100 * share:.3g} %)")
+            over = str(self.drops - self.allowed_drops)
+            beyond = _beyond(f"{self.allowed_drops} drops", over, self.drops_passed_at)
+            parts.append(f"{self.drops} of {self.allowed_drops} drops ({100 * share:.3g} %){beyond}")
         if self.allowed_seconds is not None:
             share = self.seconds / self.allowed_seconds
             untimed = (
@@ -233,8 +238,15 @@ class UsedShare:
                 if self.untimed
                 else ""
             )
-            parts.append(f"{self.seconds:.4g} s of {self.allowed_seconds:g} s ({100 * share:.3g} %{untimed})")
+            over = f"{self.seconds - self.allowed_seconds:.3g} s"
+            beyond = _beyond(f"{self.allowed_seconds:g} s", over, self.seconds_passed_at)
+            done = f"{self.seconds:.4g} s of {self.allowed_seconds:g} s ({100 * share:.3g} %{untimed})"
+            parts.append(f"{done}{beyond}")
         return f"{who}: {'; '.join(parts)}, allowed by {self.source}"
+
+
+def _beyond(limit: str, over: str, drop: int | None) -> str:
+    return "" if drop is None else f", the limit of {limit} is passed by {over}, with drop {drop}"
 
 
 def add_drop(where: str | Path, drop: LoggedDrop) -> int:
@@ -403,23 +415,29 @@ def allow(
 def used_shares(where: str | Path | Log) -> tuple[UsedShare, ...]:
     """How much every machine and set of bearings has used of what it is allowed."""
     found = read_log(where)
-    logged: dict[tuple[str, str], list[float | None]] = {key: [] for key in found.allowances}
-    for drop in found.drops.values():
-        logged.setdefault((drop.machine, drop.bearing_set), []).append(drop.duration)
+    logged: dict[tuple[str, str], dict[int, float | None]] = {key: {} for key in found.allowances}
+    for number, drop in found.drops.items():
+        logged.setdefault((drop.machine, drop.bearing_set), {})[number] = drop.duration
     shares = []
     for key, lasted in sorted(logged.items()):
         drops, seconds, source = found.allowances.get(key, (None, None, ""))
-        known = [one for one in lasted if one is not None]
+        known = [one for one in lasted.values() if one is not None]
+        total, over = math.fsum(known), None
+        if seconds is not None and total > seconds:
+            times = [one or 0.0 for one in lasted.values()]
+            over = next(n for k, n in enumerate(lasted, start=1) if math.fsum(times[:k]) > seconds)
         shares.append(
             UsedShare(
                 machine=key[0],
                 bearing_set=key[1],
                 drops=len(lasted),
                 allowed_drops=drops,
-                seconds=math.fsum(known),
+                seconds=total,
                 allowed_seconds=seconds,
                 untimed=len(lasted) - len(known),
                 source=source,
+                drops_passed_at=None if drops is None else next(iter([*lasted][drops:]), None),
+                seconds_passed_at=over,
             )
         )
     return tuple(shares)

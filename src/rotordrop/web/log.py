@@ -53,6 +53,7 @@ def log_told(log: str, own: bool) -> dict[str, Any]:
                 "bearings": one.bearing_set,
                 "drops": one.drops,
                 "allowed": one.allowed_drops,
+                "passed": (one.drops_passed_at or one.seconds_passed_at) is not None,
                 "sentence": one.sentence(),
             }
             for one in book.used_shares(whole)

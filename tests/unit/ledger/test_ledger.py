@@ -105,6 +105,19 @@ def test_used_share_counts_drops_and_known_seconds(log):
     assert used_shares(log)[0].sentence().startswith("LP-400, bearings 2026: 3 of 6 drops (50 %), allowed by")
 
 
+def test_a_limit_that_is_passed_is_named_with_its_value_and_the_drop_that_passed_it(log):
+    for day, digest in (("01", "a"), ("03", "c"), ("02", "b")):  # the last of them is logged second
+        add_drop(log, replace(DROP, recorded=f"2026-01-{day}", sha256=64 * digest, duration=40.0))
+    allow(log, "LP-400", "2026", drops=2, seconds=60.0, source="the maker")
+    used = used_shares(log)[0]
+    assert used.sentence() == (
+        "LP-400, bearings 2026: 3 of 2 drops (150 %), the limit of 2 drops is passed by 1, with drop 2; "
+        "120 s of 60 s (200 %), the limit of 60 s is passed by 60 s, with drop 3, allowed by the maker"
+    )
+    allow(log, "LP-400", "2026", drops=3, seconds=120.0, source="the maker")
+    assert "passed" not in used_shares(log)[0].sentence()
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

@@ -149,6 +149,22 @@ def test_the_empty_page_offers_a_simulated_drop_to_try(browser, tmp_path):
         quiet(browser)
 
 
+def test_whoever_cannot_press_a_button_reads_why_and_no_trace_is_cut(browser, tmp_path, files):
+    with serving(tmp_path / "served") as server:
+        look_at(browser, server, [files["record"]])
+        browser.until("document.getElementById('why').innerText.includes('the machine file')")
+        assert browser.evaluate("document.getElementById('estimate').disabled")
+        assert "needs an estimate" in browser.evaluate("document.getElementById('document').textContent")
+        plots = "[...document.querySelectorAll('#panels .plot')]"
+        browser.until(f"{plots}.every((one) => one.scrollHeight <= one.clientHeight)")
+        browser.evaluate("location.hash = '#view=drops'")
+        browser.until("document.getElementById('choosewhy').innerText.includes('boxes')")
+        browser.until("document.querySelector('#droprows input')")
+        browser.evaluate("document.querySelector('#droprows input').click()")
+        browser.until("document.getElementById('choosewhy').innerText.includes('to compare: 2 to 4')")
+        quiet(browser)
+
+
 def test_a_file_that_cannot_be_read_is_shown_as_it_begins(browser, tmp_path):
     """The error, ways out, and the lines of the file that it speaks of."""
     bad = tmp_path / "export.csv"

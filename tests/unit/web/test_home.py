@@ -91,6 +91,9 @@ def test_one_click_logs_a_drop_which_the_log_draws_with_what_is_allowed(browser,
         "f = document.querySelector('#log input'); f.value = '5000'; f.dispatchEvent(new Event('change'))"
     )
     browser.until("location.hash.includes('force=5000')")
+    beyond = "the limit of 5\u202f000 N on the peak bearing force: drop 2 at DE by 3\u202f100 to 4\u202f900 N"
+    assert f"Passed is {beyond} (90 % intervals)." in words(browser, "#log .statements")
+    assert "drop 1 at" not in words(browser, "#log .statements")
     browser.evaluate("document.querySelector('#log tbody a').click()")
     browser.until("document.getElementById('dropname').innerText === 'large'")
     browser.evaluate("history.back()")

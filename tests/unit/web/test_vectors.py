@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,5 +89,28 @@ def test_slow_roll_is_taken_off_as_a_vector_and_one_turn_is_filtered(server, tmp
             "Math.abs(one - (3 + 2 * Math.cos(7 * t[i]) - Math.sin(7 * t[i]))))); })"
         )
         assert browser.evaluate(apart) < 1e-9
+    finally:
+        browser.close()
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
+def test_a_distance_over_the_gap_is_as_sure_as_the_gap_and_every_scale_has_marks(server, tmp_path):
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.open(server.address)
+        browser.until("!document.getElementById('empty').hidden")
+
+        def told(module, call):
+            return json.loads(
+                browser.evaluate(f"import('/static/{module}').then(m => JSON.stringify(m.{call}))")
+            )
+
+        assert told("cursor.js", "overGap(270, [250, 300])") == "0.900 to 1.08"
+        assert told("cursor.js", "overGap(270, [300, 300])") == "0.900"
+        assert told("cursor.js", "overGap(270, null)") == "–"
+        for low, high in ((1.36, 1.68), (0.02, 0.05), (-3.0, 1.6), (-0.7, 0.4)):
+            marks = told("waterfall.js", f"scaleOf({low}, {high})")
+            assert len(marks) >= 2
+            assert all(10**low <= one <= 10**high for one in marks)
     finally:
         browser.close()

@@ -91,11 +91,14 @@ export function orderAt(time, x, y, t, speed) {
   return turned / (speed * (time[last] - time[first]));
 }
 
+// Radius over air gap: as sure as the gap is known.
+export const overGap = (radius, gap) => (gap && Number.isFinite(radius) ? [...new Set([gap[1], gap[0]].map((one) => units.written(radius / one, 3)))].join(" to ") : "–");
+
 function cellsOf({ verb, found }, place, at) {
   const value = (from, name) => (from[name] ? from[name][nearest(from.time, at)] : NaN);
   const role = place.estimated ? "estimated" : "measured", [x, y] = at === null ? [NaN, NaN] : place[role].map((name) => value(found, name));
   const order = at === null ? NaN : orderAt(found.time, ...place[role].map((name) => found[name]), at, speedAt(at));
-  const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), place.gap ? units.written(Math.hypot(x, y) / place.gap[1], 3) : "–",
+  const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), overGap(Math.hypot(x, y), place.gap),
     Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–",
     Number.isFinite(order) ? `${units.fixed(order, 2)}X` : "–"];
   for (const [id, name, kind] of state.estimate ? [["force", "force", "force"], ["stress", "stress", "pressure"]] : []) {
@@ -117,7 +120,7 @@ function readout() {
   });
   const of = (name, kind) => `${name} [${units.unit(kind)}]`;
   const columns = ["", of("x", "length"), of("y", "length"), "radius/gap", "angle", "order", ...(state.estimate ? [of("force", "force"), of("stress", "pressure")] : [])];
-  const meant = { angle: "Angle on the ring, from +x", order: "Turns of the shaft centre per turn of the shaft, over half a turn of the shaft about the cursor; forward positive" };
+  const meant = { "radius/gap": "Distance from the centre over the air gap, at both ends of what is known of the gap", angle: "Angle on the ring, from +x", order: "Turns of the shaft centre per turn of the shaft, over half a turn of the shaft about the cursor; forward positive" };
   by("readhead").replaceChildren(make("tr", { of: columns.map((text, i) => make("th", { scope: "col", text, title: meant[text] || null, class: i ? "number" : null })) }));
   by("readout").replaceChildren(...rows);
   tellBetween();

@@ -123,8 +123,8 @@ function buttons() {
   const there = [...home.chosen].filter((id) => home.jobs.some((job) => job.id === id && job.row));
   by("comparechosen").disabled = there.length < 2 || there.length > MOST_COMPARED;
   by("comparechosen").textContent = there.length ? `Compare ${there.length}` : "Compare";
-  by("comparechosen").title = `Choose 2 to ${MOST_COMPARED} drops`;
   by("archivechosen").disabled = !home.chosen.size;
+  by("choosewhy").textContent = !home.chosen.size ? "choose drops by their boxes" : by("comparechosen").disabled ? `to compare: 2 to ${MOST_COMPARED} that were looked at` : "";
   by("archivechosen").textContent = by("which").value === "archived" ? "Bring back" : "Archive";
 }
 

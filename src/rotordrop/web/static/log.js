@@ -7,7 +7,7 @@ import { by, files, say, showLines } from "./state.js";
 import { make, sentence } from "./tables.js";
 import * as units from "./units.js";
 
-const MARKS = ["●", "□", "△", "◇"], MOST_NAMED = 24;
+const MARKS = ["●", "□", "△", "◇"], MOST_NAMED = 24, MOST_SAID = 5;
 const FIGURES = [["peak_force_N", "force", "Peak bearing force"], ["peak_stress_Pa", "pressure", "Peak Hertz stress"]];
 const view = { log: null, jobs: [], machine: "", bearings: "", limits: {} };
 const keyOf = (one) => JSON.stringify([one.machine, one.bearings]);
@@ -16,13 +16,13 @@ const allowed = () => view.log.used.find((one) => one.machine === view.machine &
 
 // One figure: every drop in its order, a mark and an interval for every bearing, limits as lines.
 function trend(pen, [field, kind, title], left, right, top, bottom) {
-  const tone = colours(), drops = here(), f = units.factor(kind), box = { left: left + 64, right: right - 14, top: top + 26, bottom: bottom - 46 };
+  const beneath = right - left < 560 ? 15 : 0, tone = colours(), drops = here(), f = units.factor(kind), box = { left: left + 64, right: right - 14, top: top + 26 + beneath, bottom: bottom - 46 };
   const bearings = [...new Set(drops.flatMap((drop) => drop.numbers.map((one) => one.bearing)))], limit = view.limits[kind], most = allowed();
   const ends = drops.flatMap((drop) => drop.numbers.filter((one) => one.field === field).map((one) => one.upper / f));
   const high = 1.1 * Math.max(...ends, limit ? limit / f : 0, 0) || 1, slots = Math.max(drops.length, most || 0, 4);
   const px = (slot) => box.left + ((slot + 0.5) / slots) * (box.right - box.left), py = (v) => box.bottom - (v / high) * (box.bottom - box.top);
   pen.text(`${title} [${units.unit(kind)}], 90 % intervals`, box.left, top + 13, tone.ink, { size: 12.5, weight: "600" });
-  bearings.forEach((name, k) => pen.text(`${MARKS[k % 4]} ${name}`, box.right - 60 * (bearings.length - 1 - k), top + 13, placeColour(tone, k), { align: "right", size: 12 }));
+  bearings.forEach((name, k) => pen.text(`${MARKS[k % 4]} ${name}`, box.right - 60 * (bearings.length - 1 - k), top + 13 + beneath, placeColour(tone, k), { align: "right", size: 12 }));
   for (const v of ticks(0, high, 5)) {
     pen.line([[box.left, py(v)], [box.right, py(v)]], tone.line);
     pen.text(String(v), box.left - 6, py(v) + 4, tone.ink, { align: "right" });
@@ -59,7 +59,18 @@ const csv = () => [`drop,date,bearing,quantity,${units.COLUMNS}`, ...here().flat
   [drop.log, drop.recorded || drop.added, one.bearing, one.quantity, ...units.columnsOf(one)].map((cell) => JSON.stringify(cell)).join(","))), ""].join("\n");
 const python = () => `from rotordrop.ledger.book import logged_drops, trends\n\ndrops = logged_drops(${JSON.stringify(view.log.name)}, machine=${JSON.stringify(view.machine)}, bearing_set=${JSON.stringify(view.bearings)})\nrising = trends(${JSON.stringify(view.log.name)}, machine=${JSON.stringify(view.machine)})\n`;
 const quoted = (text) => (/^[\w.-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-const command = () => `rotordrop log show ${quoted(view.log.name)} --machine ${quoted(view.machine)}`;
+const command = () => ['show', `allow --bearings ${quoted(view.bearings)} --drops N --source TEXT`].map((what) => what.replace(/^\w+/, (verb) => `rotordrop log ${verb} ${quoted(view.log.name)} --machine ${quoted(view.machine)}`)).join("\n");
+
+// Which drops pass a limit: surely where the whole interval lies beyond it, else perhaps.
+function passed([field, kind, title]) {
+  const limit = view.limits[kind], f = units.factor(kind), name = `the limit of ${units.shown(limit, kind)} on the ${title.replace(/^P/, "p")}`;
+  const beyond = here().flatMap((drop) => drop.numbers.filter((one) => limit && one.field === field && one.upper > limit).map((one) => ({ ...one, drop: drop.log })));
+  return [true, false].flatMap((sure) => {
+    const some = beyond.filter(({ lower }) => (lower > limit) === sure), last = some.slice(-MOST_SAID);
+    const list = last.map(({ drop, bearing, lower, upper }) => `drop ${drop} at ${bearing} by ${sure ? `${units.written((lower - limit) / f, 3)} to ` : "up to "}${units.shown(upper - limit, kind, 3)}`);
+    return some.length ? [{ text: `${sure ? "Passed" : "Perhaps passed"} is ${name}: ${list.join("; ")}${some.length > last.length ? `; and by ${some.length - last.length} before them` : ""} (90 % intervals).`, level: sure ? "bad" : "warning" }] : [];
+  });
+}
 
 function limitField(kind, text) {
   const input = make("input", { inputmode: "decimal", size: 7, "aria-label": `Limit of ${text} [${units.unit(kind)}]`, value: view.limits[kind] ? Number((view.limits[kind] / units.factor(kind)).toPrecision(6)) : "" });
@@ -76,15 +87,15 @@ function show() {
   const { log } = view, sets = [...new Map([...log.drops, ...log.used].map((one) => [keyOf(one), one])).values()];
   address.note(() => ({ view: "log", machine: view.machine, bearings: view.bearings, force: view.limits.force, pressure: view.limits.pressure }));
   if (!sets.length) {
-    by("log").replaceChildren(make("p", { text: log.problem || "No drop is logged yet. Add puts an estimated drop of the list into the log; the command line does it by: rotordrop log add LOG estimate.json." }));
+    by("log").replaceChildren(make("p", { text: log.problem || "No drop is logged yet. Add puts an estimated drop of the list into the log." }));
     return;
   }
   const choice = make("select", { "aria-label": "Machine and bearings", of: sets.map((one) => make("option", { value: keyOf(one), text: `${one.machine}, bearings ${one.bearings}`, selected: keyOf(one) === keyOf(view) ? "" : null })) });
   choice.addEventListener("change", () => { const [machine, bearings] = JSON.parse(choice.value); address.go({ view: "log", machine, bearings }); });
   const drops = here(), canvas = make("canvas", { class: "trend", role: "img", "aria-label": FIGURES.map(([field, , title]) => `${title}: ${drops.map((drop) => `drop ${drop.log} ${drop.numbers.filter((one) => one.field === field).map((one) => `${one.bearing} ${one[units.chosen()].filter(Boolean).join(", ")}`).join("; ")}`).join(". ")}`).join(". ") });
-  const used = log.used.find((one) => keyOf(one) === keyOf(view)), said = [...(used ? [{ text: `${used.sentence}.`, level: used.allowed && used.drops > used.allowed ? "bad" : "notice" }] : []),
+  const used = log.used.find((one) => keyOf(one) === keyOf(view)), said = [...(used ? [{ text: `${used.sentence}.`, level: used.passed ? "bad" : "notice" }] : []), ...FIGURES.flatMap(passed),
     ...log.trends.filter((text) => text.startsWith(`${view.machine}, bearings ${view.bearings}:`)).map((text) => ({ text, level: "warning" })),
-    ...(used && used.allowed === null ? [{ text: `Nobody has stated how many drops are allowed: rotordrop log allow ${quoted(log.name)} --machine ${quoted(view.machine)} --drops N --source TEXT`, level: "notice" }] : [])];
+    ...(used && used.allowed === null ? [{ text: "Nobody has stated how many drops are allowed; 'As command' of the menu ⋯ shows how it is stated.", level: "notice" }] : [])];
   const rows = drops.map((drop) => {
     const job = view.jobs.find((one) => one.row?.sha256 === drop.sha256 && drop.sha256);
     return make("tr", { of: [make("th", { scope: "row", text: String(drop.log) }), make("td", { text: units.minuteText(drop.recorded) || `logged ${units.minuteText(drop.added)}` }),

@@ -83,9 +83,10 @@ function showStatus() {
   if (state.job.damaged) { say(state.job.damaged, "bad", make("button", { text: "Remove", on: { click: () => askRemoval(state.job) } })); return false; }
   const running = [estimate, waterfall, look, channels].find((one) => one && ["waiting", "running"].includes(one.state));
   by("estimate").disabled = Boolean(running) || !state.job.files.machine || !state.look;
-  by("estimate").title = !state.job.files.machine ? "An estimate needs the machine file" : state.look ? "Estimate force and stress" : "An estimate needs a record that could be looked at";
   by("report").disabled = by("document").disabled = by("tothelog").disabled = !(estimate && estimate.result);
   by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
+  by("why").textContent = whyNot(running, estimate);
+  for (const id of ["document", "tothelog"]) { by(id).textContent = by(id).textContent.replace(UNESTIMATED, "") + (by(id).disabled ? UNESTIMATED : ""); }
   by("tomachine").hidden = Boolean(state.job.files.machine);
   by("simulated").hidden = !simulated();
   by("simulated").title = simulated();
@@ -112,6 +113,15 @@ function showStatus() {
     say(words + (stop ? `${stop.message}; ${stop.remedy}` : told.text), stop ? "bad" : told.level);
   } else { say("Nothing was found yet.", "notice"); }
   return false;
+}
+
+// Why a button of the drop cannot be pressed.
+const UNESTIMATED = " (needs an estimate)";
+function whyNot(running, estimate) {
+  if (running) { return "one computation of a drop at a time"; }
+  if (!state.look) { return "Estimate and Waterfall need a readable record"; }
+  if (!state.job.files.machine) { return "Estimate and Waterfall need the machine file"; }
+  return estimate?.result ? "" : "Report needs an estimate";
 }
 
 // What helps after a record could not be looked at: the missing file, the channels, or to look once more.
@@ -225,7 +235,7 @@ const part = (name) => (name in TABS ? name : "Impacts");
 async function openDrop(told) {
   if (state.job?.id !== told.drop) {
     leaveFall();
-    Object.assign(state, { job: null, look: null, estimate: null, view: null });
+    Object.assign(state, { job: null, look: null, estimate: null, view: null, panels: [] });
     by("main").hidden = true;
     state.job = await server.job(told.drop);
     shown = "";
@@ -420,7 +430,9 @@ const redraw = () => {
   if (!state.job) { redrawLog(); } else if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Centre", "Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
 };
 let waiting = 0;
-window.addEventListener("resize", () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); });
+const resized = () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); };
+window.addEventListener("resize", resized);
+new ResizeObserver(resized).observe(by("panels")); // a line of words above them takes of their height
 
 by("units").value = units.chosen();
 chooseTheme(localStorage.getItem("rotordrop theme") || "");

@@ -154,18 +154,24 @@ function courseOf(line) {
   );
 }
 
+// Round numbers of a logarithmic scale between two powers of ten: decades, or 1, 2 and 5, or at equal distances.
+export function scaleOf(low, high) {
+  const within = (parts) => Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, k) => parts.map((part) => Number((part * 10 ** (Math.floor(low) + k)).toPrecision(1)))).flat()
+    .filter((one) => Math.log10(one) >= low && Math.log10(one) <= high);
+  return [within([1]), within([1, 2, 5])].find((some) => some.length > 2) || ticks(10 ** low, 10 ** high, 4);
+}
+
 function drawCut(pen, box, { x, y, title, label, mark }) {
   const tone = colours(), f = units.factor("length"), known = y.filter((v) => v > 0);
   if (!known.length) { pen.text(title, box.left, box.top - 6, tone.ink, { size: 12, weight: "600" }); return; }
   const high = Math.log10(Math.max(...known) / f) + 0.1, low = Math.max(Math.log10(Math.min(...known) / f), high - 5);
   const px = (v) => box.left + ((v - x[0]) / (x.at(-1) - x[0])) * (box.right - box.left);
   const py = (v) => box.bottom - ((Math.log10(v / f) - low) / (high - low)) * (box.bottom - box.top);
-  for (let power = Math.floor(low); power <= high; power += 1) {
-    for (const v of (high - low < 1.6 ? [1, 2, 5] : [1]).map((part) => part * 10 ** power).filter((one) => Math.log10(one) >= low && Math.log10(one) <= high)) {
-      pen.line([[box.left, py(f * v)], [box.right, py(f * v)]], tone.line);
-      pen.text(String(Number(v.toPrecision(1))), box.left - 5, py(f * v) + 4, tone.ink, { align: "right", size: 10 });
-    }
+  for (const v of scaleOf(low, high)) {
+    pen.line([[box.left, py(f * v)], [box.right, py(f * v)]], tone.line);
+    pen.text(String(v), box.left - 5, py(f * v) + 4, tone.ink, { align: "right", size: 10 });
   }
+  pen.text(`amplitude [${units.unit("length")}]`, 12, (box.top + box.bottom) / 2, tone.ink, { align: "center", size: 11, turned: true });
   for (const v of ticks(x[0], x.at(-1), 6)) { pen.text(String(v).replace("-", "−"), px(v), box.bottom + 13, tone.ink, { align: "center", size: 10 }); }
   pen.line(x.map((v, i) => [px(v), y[i] > 0 ? Math.min(py(y[i]), box.bottom) : NaN]), tone.estimated, 1.2);
   if (Number.isFinite(mark)) { pen.line([[px(mark), box.top], [px(mark), box.bottom]], tone.limit, 1, [3, 3]); }
@@ -173,6 +179,7 @@ function drawCut(pen, box, { x, y, title, label, mark }) {
   pen.text(label, (box.left + box.right) / 2, box.bottom + 28, tone.ink, { align: "center", size: 11 });
 }
 
+const NEEDED = " (needs the shaft speed)";
 const cutFrame = () => (fall.at ? frameOf(fall.at.t) : 0);
 const tracked = () => fall.page.orders_tracked?.[fall.page.planes[fall.plane]];
 const shows = () => (tracked() && by("fallshow").value !== "cuts" ? by("fallshow").value.split(" ") : null);
@@ -184,12 +191,12 @@ function drawCuts(pen) {
     return;
   }
   const [low, high] = span(), first = binOf(low), last = binOf(high), frame = cutFrame(), middle = pen.height / 2;
-  const x = frequencies().slice(first, last + 1), where = { left: 46, right: pen.width - 10 };
+  const x = frequencies().slice(first, last + 1), where = { left: 60, right: pen.width - 10 };
   drawCut(pen, { ...where, top: 20, bottom: middle - 36 }, { x, y: x.map((_, i) => value(frame, first + i)), mark: fall.at ? fall.at.f : NaN,
-    title: `Spectrum at ${units.fixed(fall.page.time[frame], 2)} s [${units.unit("length")}, ${fall.page.amplitude_kind}]`, label: "frequency [Hz]" });
+    title: `Spectrum at ${units.fixed(fall.page.time[frame], 2)} s, ${fall.page.amplitude_kind}`, label: "frequency [Hz]" });
   if (fall.line) {
     drawCut(pen, { ...where, top: middle + 20, bottom: pen.height - 36 }, { x: fall.page.time, y: courseOf(fall.line), mark: fall.at ? fall.at.t : NaN,
-      title: `${fall.line.label} over time [${units.unit("length")}]`, label: "time from power-off [s]" });
+      title: `${fall.line.label} over time`, label: "time from power-off [s]" });
   }
 }
 
@@ -227,7 +234,7 @@ export function drawFall() {
   by("fallmap").setAttribute("aria-label", `Waterfall of ${fall.page.planes[fall.plane]}, ${PARTS[fall.part]}, to ${Math.round(fall.to)} Hz; arrow keys move the cursor`);
   by("fallcut").setAttribute("aria-label", shows() ? `${shows()[0] === "bode" ? "Bode" : "Polar"} plot of ${shows()[1]}X at ${fall.page.planes[fall.plane]}` : "Spectrum at the cursor and the chosen line over time");
   by("slowwords").textContent = shows() && slowRoll() > 0 ? `taken off: ${takenWords(vectors(tracked(), shows()[1], slowRoll())) || "nothing, no speed is near"}` : "";
-  for (const option of by("fallshow").options) { option.disabled = option.value !== "cuts" && !tracked(); }
+  for (const option of by("fallshow").options) { option.disabled = option.value !== "cuts" && !tracked(); option.textContent = option.textContent.replace(NEEDED, "") + (option.disabled ? NEEDED : ""); }
   by("slowlabel").hidden = !shows();
   readFall();
   lineList();
