@@ -135,9 +135,13 @@ _USUAL = {
     "frequency": {"Hz": 1.0, "kHz": 1e3, "rpm": 1.0 / 60.0},
     "speed": {"rad/s": 1.0, "Hz": 2.0 * math.pi, "rpm": math.pi / 30.0},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "velocity": {"mm/s": 1e-3},
+    "pressure": {"GPa": 1e9, "MPa": 1e6},
+    "unbalance": {"g mm": 1e-6},
+    "voltage_sensitivity": {"mV/um": 1e3},
 }
-"""What recorders write [SI units per unit]: the unit library takes half a second to load, which a look can
-spare."""
+"""What recorders and machine files write beside SI units [SI units per unit]: the unit library takes half a
+second to load, which a look can spare."""
 
 _FAMILIAR = tuple(
     "m,mm,um,cm,in,mil,kg,g,t,lb,s,ms,min,Hz,kHz,rpm,rad,deg,N,kN,lbf,Pa,MPa,GPa,bar,psi,N/m,N/mm,N/um,"
@@ -202,7 +206,7 @@ def parse_quantity(text: object, kind: str) -> float:
         raise UsageError(f"{text!r} has no unit; {_spoken(kind)} needs one, for example {wanted.example!r}")
     if kind == "contact_stiffness":
         return _contact_stiffness(number, unit, text)
-    factor = _USUAL.get(kind, {}).get(unit)
+    factor = 1.0 if unit == wanted.unit else _USUAL.get(kind, {}).get(unit)
     if factor is not None:
         return number * factor
     return _convert(number, unit, text, kind, wanted)
@@ -434,6 +438,9 @@ def _wrong_dimension(unit: str, text: object, kind: str, wanted: Kind) -> str:
 
 def _contact_stiffness(number: float, unit: str, text: object) -> float:
     """Convert N/m^n, whose exponent n is itself a parameter of the contact."""
+    plain = re.fullmatch(r"N/m\^(1(?:\.[0-9]{1,20})?)", unit)
+    if plain and float(plain[1]) < 2.0:
+        return number
     quantity = _registry().Quantity(number, _unit(unit, text, "contact_stiffness"))
     dimension = dict(quantity.dimensionality)
     exponent = 1.0 - float(dimension.pop("[length]", 0))

@@ -16,6 +16,7 @@ from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.record.speed import require_speed
+from rotordrop.series import curvature
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -360,12 +361,9 @@ def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:
 
 def first_sudden(record: Record, gravity: float, instant: float, sunk: int) -> float:
     """First time after sinking at which the acceleration cannot be that of a free rotor [s]."""
-    from scipy.signal import savgol_filter
-
-    rate = record.sampling_rate
-    samples = max(round(_CONTACT_FILTER * rate) // 2 * 2 + 1, 5)
-    curvature = savgol_filter(record.motion, samples, 3, deriv=2, delta=1.0 / rate, axis=0)
-    size = np.max(np.hypot(curvature[:, :, 0], curvature[:, :, 1] + gravity), axis=1)
+    samples = max(round(_CONTACT_FILTER * record.sampling_rate) // 2 * 2 + 1, 5)
+    turned = curvature(record.motion, record.sampling_rate, samples)
+    size = np.max(np.hypot(turned[:, :, 0], turned[:, :, 1] + gravity), axis=1)
     levitated = record.time < instant - _UNSURE
     usual = float(np.max(size[levitated])) if levitated.any() else 0.0
     limit = gravity + max(1.5 * gravity, 2.0 * usual)

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.series import SIGMA_OF_MEDIAN
+from rotordrop.series import SIGMA_OF_MEDIAN, median_of_five
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -201,9 +201,7 @@ def _robust(design: Array, values: Array, rounds: int = 12) -> tuple[Array, floa
 
 
 def _without_outliers(readings: Array) -> Array:
-    from scipy.ndimage import median_filter
-
-    middle = median_filter(readings, size=5, mode="nearest")
+    middle = median_of_five(readings)
     rest = readings - middle
     limit = 6.0 * SIGMA_OF_MEDIAN * float(np.median(np.abs(rest))) + 1e-6 * float(np.max(np.abs(readings)))
     return np.where(np.abs(rest) > limit, middle, readings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotordrop.series import noise_by_differences, runs_of
+from rotordrop.series import curvature, median_of_five, noise_by_differences, runs_of
 
 
 def test_runs_are_found_with_starts_and_lengths_at_the_ends_too() -> None:
@@ -32,3 +32,19 @@ def test_missing_samples_are_left_out_of_the_noise() -> None:
     values = np.random.default_rng(4).normal(0.0, 0.4e-6, 20_000)
     values[100:4000:7] = np.nan
     assert noise_by_differences(values, 3) == pytest.approx(0.4e-6, rel=0.05)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 5, 101])
+def test_the_median_of_five_is_that_of_each_value_with_its_neighbours(count: int) -> None:
+    values = np.random.default_rng(count).normal(size=count)
+    padded = np.pad(values, 2, mode="edge")
+    assert median_of_five(values).tolist() == [np.median(padded[i : i + 5]) for i in range(count)]
+
+
+def test_the_curvature_of_a_cubic_is_exact_and_nothing_where_samples_are_missing() -> None:
+    rate = 1000.0
+    time = np.arange(200)[:, None] / rate + np.array([0.2, -0.1])
+    values = time**3
+    assert curvature(values, rate, 11)[5:-5] == pytest.approx(6.0 * time[5:-5], abs=1e-9)
+    assert not curvature(values, rate, 11)[[*range(5), *range(-5, 0)]].any()
+    assert not curvature(values[:8], rate, 11).any()

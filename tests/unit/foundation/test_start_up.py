@@ -79,6 +79,18 @@ def test_what_reads_estimates_loads_neither_compiler_nor_scipy_nor_elements(word
     subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.DEVNULL)
 
 
+def test_a_look_with_a_machine_file_loads_no_unit_library_and_no_signal_library():
+    program = (
+        "import sys\nfrom importlib.resources import files\nfrom rotordrop.cli.app import run\n"
+        "place = files('rotordrop.examples') / 'lp400' / 'drop_060.h5'\n"
+        "machine = files('rotordrop.machine.examples') / 'lp400.toml'\n"
+        "assert run(['look', str(machine), str(place)]) == 0\n"
+        "loaded = {'pint', 'scipy.signal', 'scipy.ndimage', 'scipy.stats'} & set(sys.modules)\n"
+        "assert not loaded, loaded\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.DEVNULL)
+
+
 def test_public_names_are_loaded_on_first_use():
     program = (
         "import sys, rotordrop\n"

@@ -235,3 +235,19 @@ def test_a_moment_is_never_minus_zero(time, text):
 )
 def test_no_chance_is_certain(probability, text):
     assert format_chance(probability) == text
+
+
+@pytest.mark.parametrize(
+    ("kind", "short", "spelled"),
+    [
+        ("pressure", "GPa", "gigapascal"),
+        ("pressure", "MPa", "megapascal"),
+        ("velocity", "mm/s", "millimetre/second"),
+        ("unbalance", "g mm", "gram millimetre"),
+        ("voltage_sensitivity", "mV/um", "millivolt/micrometre"),
+        ("contact_stiffness", "N/m^1.111", "newton/metre^1.111"),
+        ("density", "kg/m^3", "kilogram/metre^3"),
+    ],
+)
+def test_what_is_read_without_the_unit_library_is_what_the_library_reads(kind, short, spelled):
+    assert parse_quantity(f"17.17 {short}", kind) == parse_quantity(f"17.17 {spelled}", kind)

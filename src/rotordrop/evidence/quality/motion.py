@@ -17,6 +17,7 @@ from rotordrop.evidence.paths import SLOWEST_FALL
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY, Known
 from rotordrop.machine.plausibility import USUAL_GAP
+from rotordrop.series import median_of_five
 from rotordrop.units import GRAVITY, format_quantity
 
 if TYPE_CHECKING:
@@ -267,9 +268,7 @@ def check_speed(record: Record, machine: Machine) -> list[Finding]:
     if len(bad):
         return [_speed_finding(record, f"{len(bad)} speed readings are not finite", int(bad[0]), "stop")]
     if len(readings) >= 5:
-        from scipy.ndimage import median_filter
-
-        middle = median_filter(readings, size=5, mode="nearest")
+        middle = median_of_five(readings)
         usual = np.maximum(np.abs(middle), 0.1 * float(np.max(np.abs(middle))))
         off = np.flatnonzero(np.abs(readings - middle) > 0.2 * usual)
         if len(off):
