@@ -373,6 +373,7 @@ def waterfall(
         simulated=simulated,
         against=against.value,
         highest=highest,
+        drawn=not (report is None and data is None),
     )
     if output is not None:
         write_findings(found, output)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +12,11 @@ from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
-from rotordrop.evidence.evidence import Missing, known, read_evidence
-from rotordrop.evidence.paths import Motion, drops_of, with_impacts
+from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.evidence.paths import Drop, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
+from rotordrop.evidence.wall import Wall
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.record.axes import along_sensors
@@ -66,6 +68,8 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap;
     in one that ends before, both are those of a look at it, where it determines them.
     """
+    # before the rotor model: the paths of a minute and the compiler need not be in memory at once
+    walls, falls = _seen(record, machine)
     evidence = read_evidence(build_drop_model(machine), record)
     off, names = evidence.power_off.value, evidence.model.bearing_names
     sensing = known(evidence.sensing)
@@ -78,7 +82,6 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
             f"above the rest of the last {gap.rest.end - gap.rest.start:.3g} s, at the height of sensor zero"
         )
     except IdentificationError as error:
-        walls = {} if isinstance(evidence.motion, Missing) else evidence.motion.walls
         if set(names) <= {name for name, wall in walls.items() if wall.determined}:
             circles = np.array([walls[sensor.bearing].centre for sensor in record.sensors])
             along = np.sum(record.directions * circles, axis=1) - sensing.settled_bend
@@ -100,7 +103,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         air_gap=dict(zip(names, map(float, gaps), strict=True)),
         air_gap_error=None if sigmas is None else dict(zip(names, map(float, sigmas), strict=True)),
         centre=centre,
-        settling=_settlings(evidence.motion, off),
+        settling=_settlings(walls, falls, off),
         sampling_rate=record.sampling_rate,
         start_time=float(record.time[first]) - off,
         profile=None if time is None or speed is None else fit_speed_profile(time, speed, power_off=0.0),
@@ -110,14 +113,20 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     )
 
 
-def _settlings(motion: Motion | Missing, off: float) -> dict[str, Settling]:
-    """Impacts of the fall after power-off [s] by plane, as a look at the record finds them."""
-    falls = () if isinstance(motion, Missing) else drops_of(motion)
-    if isinstance(motion, Missing) or not falls:
+def _seen(record: Record, machine: Machine) -> tuple[dict[str, Wall], tuple[Drop, ...]]:
+    """Clearance circle by plane, and falls with their impacts, as a look at the record finds them."""
+    motion = Evidence(record=record, machine=machine).motion
+    if isinstance(motion, Missing):
+        return {}, ()
+    return motion.walls, tuple(with_impacts(motion, fall) for fall in drops_of(motion))
+
+
+def _settlings(walls: Iterable[str], falls: tuple[Drop, ...], off: float) -> dict[str, Settling]:
+    """Impacts of the fall after power-off [s] by plane."""
+    if not falls:
         return {}
-    fall = with_impacts(motion, min(falls, key=lambda one: abs(one.release - off)))
-    pairs = zip(motion.paths, fall.settlings, strict=True)
-    return {path.name: settling.after(off) for path, settling in pairs}
+    fall = min(falls, key=lambda one: abs(one.release - off))
+    return {name: settling.after(off) for name, settling in zip(walls, fall.settlings, strict=True)}
 
 
 def with_found_air_gaps(machine: Machine, signal: CoastDownSignal) -> Machine:

@@ -76,8 +76,9 @@ def waterfall_page(
     simulated: str = "",
     against: str = "time",
     highest: float | None = None,
+    drawn: bool = True,
 ) -> ReportContent:
-    """Build the report on the frequencies of a coast-down.
+    """Build the report on the frequencies of a coast-down, with its sections where they are wanted.
 
     Waterfalls go upwards with the time or the speed (``against``), as far as anything happens, or up to a
     ``highest`` frequency [Hz].
@@ -120,7 +121,7 @@ def waterfall_page(
         summary=(line_table(analysis),),
         sections=tuple(
             replace(section, tables=()) if section.heading == LINES else section  # it stands in the summary
-            for section in frequency_sections(analysis, against, highest)
+            for section in (frequency_sections(analysis, against, highest) if drawn else ())
         ),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 from dataclasses import replace
 
@@ -10,9 +11,11 @@ import pytest
 
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.evidence.look import look
+from rotordrop.evidence.paths import Motion, motion_of
 from rotordrop.machine import example_machine
 from rotordrop.record.examples import example_record_path
 from rotordrop.record.record import read_record
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.spectrum.indentation import displacement_history, find_settling, settling_words
 from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
 
@@ -114,6 +117,25 @@ def test_impacts_are_those_of_a_look_at_the_record(machine, record):
         assert found.contact_from + off == pytest.approx(plane.settling.contact_from, abs=1e-9)
         begun = plane.settling.contact_from_interval_90
         assert np.add(found.contact_from_interval_90, off) == pytest.approx(begun, abs=1e-9)
+
+
+def test_the_paths_of_the_record_are_gone_before_the_rotor_model_is_built(machine, record, monkeypatch):
+    """Of a minute they fill 100 MB, as much as the compiler that the model brings with it."""
+    order = []
+
+    def follow(*given, **words):
+        order.append("paths")
+        return motion_of(*given, **words)
+
+    def build(described):
+        order.append(sum(isinstance(one, Motion) for one in gc.get_objects()) - before)
+        return build_drop_model(described)
+
+    monkeypatch.setattr("rotordrop.evidence.paths.motion_of", follow)
+    monkeypatch.setattr("rotordrop.estimate.recorded_coast_down.build_drop_model", build)
+    before = sum(isinstance(one, Motion) for one in gc.get_objects())
+    recorded_coast_down(machine, replace(record))
+    assert order == ["paths", 0]
 
 
 def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record):
