@@ -80,6 +80,14 @@ def test_a_bandwidth_that_nobody_stated_is_said_with_what_it_could_hide(
     assert "no time constant of the sensors" not in said(stated, evidence)
 
 
+def test_a_load_along_the_axis_is_said_to_be_unseen_where_none_is_stated(
+    machine: Machine, evidence: Evidence
+) -> None:
+    assert "states no load along the axis" in said(machine, evidence)
+    moving = machine.changed(rotor=machine.rotor.changed(axial=True))
+    assert "no load along the axis" not in said(moving, evidence)
+
+
 def test_noise_that_nothing_tells_is_said(machine: Machine, evidence: Evidence) -> None:
     text = said(machine, evidence.with_facts(levitated=None))
     for sensor in machine.sensors:
