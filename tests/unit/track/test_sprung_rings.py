@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from rotordrop.simulate.drop import simulate_drop
 from rotordrop.track.calibration import BLIND_SCHEDULE, is_inconsistent, track
 from rotordrop.track.forces import force_history
 from rotordrop.track.problem import RecordedDrop, build_problem, sensor_rows
+from rotordrop.track.smoother import fastest_frequency
 from rotordrop.twin.problems import COARSE_BASIS
 
 SPRINGS = 'preload_kind = "spring"\nspring_rate = "1e5 N/m"\nfit_friction = 0.0\npreload = { guess'
@@ -45,3 +48,17 @@ def test_rings_without_friction_in_their_fits_are_followed():
         window = drop.time <= forces.time[-1]
         peak = np.max(drop.bearing_force_magnitude[window, b])
         assert np.max(forces.magnitude[:, b]) == pytest.approx(peak, rel=0.1)
+
+
+def test_a_light_ring_sets_the_steps_of_the_filter():
+    """Four times lighter, twice as fast; a heavy one is slower than the race, and a rigid pair has none."""
+    text = example_path("small").read_text(encoding="utf-8")
+
+    def fastest(*lines: str) -> float:
+        machine = loads_machine(text.replace("preload = { guess", "\n".join((*lines, "preload = { guess"))))
+        return fastest_frequency(SimpleNamespace(model=build_drop_model(machine, COARSE_BASIS)))
+
+    spring = 'preload_kind = "spring"'
+    light = fastest(spring, 'ring_mass = "4 g"')
+    assert fastest(spring, 'ring_mass = "1 g"') == pytest.approx(2.0 * light, rel=1e-6)
+    assert light > fastest() == fastest(spring, 'ring_mass = "4 kg"')
