@@ -344,10 +344,15 @@ def format_second(moment: str) -> str:
 
 
 def format_chance(probability: float) -> str:
-    """Write a probability [1] in per cent, ``"93%"``; nothing is certain: the ends are "> 99%" and "< 1%"."""
+    """Write a probability [1] in per cent, ``"93 %"``; nothing is certain: ends at "> 99 %", "< 1 %"."""
     if probability >= 0.995:
-        return "> 99%"
-    return f"{probability:.0%}" if probability > 0.005 else "< 1%"
+        return "> 99 %"
+    return percent(probability) if probability > 0.005 else "< 1 %"
+
+
+def percent(share: float, places: int = 0) -> str:
+    """Write a share [1] in per cent with so many decimal places, ``"12.5 %"``."""
+    return f"{100.0 * share:.{places}f} %"
 
 
 def _kind(kind: str) -> Kind:

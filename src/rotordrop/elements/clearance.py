@@ -69,7 +69,7 @@ class Clearance(Placed):
         return (
             "has a 'stiffness'",
             ": the housing would pass for something else. Leave it out where the rotor did not touch there; "
-            "'rotordrop simulate' and 'study' know it",
+            "simulations and studies know it",
         )
 
     def completed(self, rotor: Rotor) -> dict[str, Any]:

@@ -22,7 +22,7 @@ Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 AXIAL = "an axial acceleration of the ground"
 _NOT_ESTIMATED = (
     ": the fall before the first contact is taken as one under gravity alone. Leave it out to estimate "
-    "without it; 'rotordrop simulate' and 'study' know it"
+    "without it; simulations and studies know it"
 )
 
 

@@ -27,7 +27,7 @@ from rotordrop.known import NINETY, Known
 from rotordrop.physics import columns as L
 from rotordrop.physics import magnet as law
 from rotordrop.physics.magnet_loop import SampledController, sampled_pid
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 RIGID_FREQUENCY = 40.0
 """Rigid-body frequency [Hz] that the AMBs are taken to give the rotor when their stiffness is left out
@@ -297,7 +297,7 @@ class ActiveMagneticBearing(Placed):
             values["stiffness"] = stiffness
         if "damping" not in self.model_fields_set:
             value = 2.0 * DAMPING_RATIO * math.sqrt(stiffness.value * carried_mass)
-            why = f"{DAMPING_RATIO:.0%} of critical for the {carried_mass:.3g} kg it carries"
+            why = f"{percent(DAMPING_RATIO)} of critical for the {carried_mass:.3g} kg it carries"
             values["damping"] = Known(value=value, status="default", source=why, unit="N s/m")
         return values
 

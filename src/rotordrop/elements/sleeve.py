@@ -34,7 +34,7 @@ class Sleeve(RaceBearing):
     ring_travel: ClassVar[None] = None
     beyond_estimates: ClassVar[tuple[str, str]] = (
         "is a sleeve",
-        "; 'rotordrop simulate', 'coast-down' and 'study' know it",
+        "; simulations and studies know it",
     )
     no_face: ClassVar[str] = "a sleeve has no race that could give way axially"
 

@@ -31,6 +31,7 @@ from rotordrop.known import Known
 from rotordrop.physics import columns as L
 from rotordrop.physics import mount as mount_law
 from rotordrop.physics import support as law
+from rotordrop.units import percent
 
 _DAMPING_RATIO = 0.025
 REFERENCE_MASS = 60.0
@@ -181,7 +182,7 @@ class Support(Description):
 def _from_ratio(ratio: Known | None, mass: Known, stiffness: Known) -> Known:
     critical = 2.0 * math.sqrt(stiffness.value * mass.value)
     if ratio is None:
-        why = f"{_DAMPING_RATIO:.1%} of critical"
+        why = f"{percent(_DAMPING_RATIO, 1)} of critical"
         value = _DAMPING_RATIO * critical
         bounds = (0.1 * value, 10.0 * value)
         return Known(value=value, status="default", range=bounds, source=why, unit="N s/m")

@@ -92,8 +92,8 @@ class Thermal(Description):
 
     beyond_estimates: ClassVar[tuple[str, str]] = (
         "warms",
-        ": a drop determines next to nothing of its heat. Leave out its table 'thermal'; 'rotordrop "
-        "simulate', 'coast-down' and 'study' know it",
+        ": a drop determines next to nothing of its heat. Leave out its table 'thermal'; simulations "
+        "and studies know it",
     )
 
     @property

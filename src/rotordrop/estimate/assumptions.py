@@ -16,7 +16,7 @@ from rotordrop.physics import columns as L
 from rotordrop.rotor.reduction import contact_frequency
 from rotordrop.rotor.unknowns import sensor_prior, smallest_gap
 from rotordrop.track.problem import DropProblem, rough_noise
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 
 def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
@@ -87,9 +87,9 @@ def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
     within = NINETY * sensor_prior(parameter("gain", "sensor"), taken[0].gain, smallest_gap(machine)).sigma
     yield (
         f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
-        f"calibrated, each within ±{within:.1%} (90 %). A larger error that all share would be in forces and "
-        "gaps; a tolerance such as gain = { guess = 1.0, range = [0.8, 1.2] } lets the estimate find it",
-        f"gains within ±{within:.1%}",
+        f"calibrated, each within ±{percent(within, 1)} (90 %). A larger error that all share would be in "
+        "forces and gaps; a range of the gain in that file, such as 0.8 to 1.2, lets the estimate find it",
+        f"gains within ±{percent(within, 1)}",
     )
 
 
@@ -111,8 +111,8 @@ def _lag(problem: DropProblem) -> Iterator[tuple[str, str]]:
     yield (
         "the machine file states no time constant of the sensors: they are taken as fast. A lag of "
         f"{1e6 * lag:.0f} µs (a bandwidth of {1e-3 * cut_off:.2g} kHz) would hide about "
-        f"{SMALL_LOSS:.0%} of a peak of these contacts of {contact:.0f} Hz, and readings need not show it; "
-        "time_constant in the machine file, for all sensors, takes it into account",
+        f"{percent(SMALL_LOSS)} of a peak of these contacts of {contact:.0f} Hz, and readings need not show "
+        "it; a time constant in the machine file, for all sensors, takes it into account",
         f"sensors faster than {1e-3 * cut_off:.2g} kHz",
     )
 

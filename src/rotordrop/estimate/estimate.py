@@ -58,7 +58,7 @@ class Verdict(Enum):
     )
     OPEN_LOOP = (
         "This is the paper's route, an open-loop replay: one drop like the recorded one. The tracked twin "
-        "(--method tracked) follows the record and gives narrower intervals."
+        "follows the record and gives narrower intervals."
     )
 
     @property

@@ -17,7 +17,7 @@ from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.record.speed import require_speed
 from rotordrop.series import curvature
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -352,8 +352,8 @@ def _refuse_without_drop(record: Record, start: Array, gaps: Array) -> None:
     raise NoDropError(
         record.name,
         f"the vertical displacement spans {ranges} in its planes and sinks by "
-        f"{deepest:.0%} of the nominal air gap at most, a dropped rotor by more than {FALLEN_SHARE:.0%} in "
-        "all planes",
+        f"{percent(deepest)} of the nominal air gap at most, a dropped rotor by more than "
+        f"{percent(FALLEN_SHARE)} in all planes",
         "give a recording that holds the drop; if this one does, correct polarity or unit",
         begins_late=False,
     )

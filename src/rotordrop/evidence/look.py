@@ -193,7 +193,9 @@ class Look:
             last, between = drop.permanent_contact, drop.permanent_contact_interval_90
             if last is not None and between is not None:
                 early, late = (1e3 * abs(end - last) for end in between)
-                events.append((last, f"last impact, in contact from here on (−{early:.2g}, +{late:.2g} ms)"))
+                events.append(
+                    (last, f"last impact, mostly in contact from here on (−{early:.2g}, +{late:.2g} ms)")
+                )
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:

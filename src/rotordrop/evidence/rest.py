@@ -16,7 +16,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, UnsettledError
 from rotordrop.known import NINETY
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.evidence.sensing import Sensing
@@ -150,7 +150,7 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
         raise UnsettledError(
             record.name,
             f"does not reach standstill: the shaft still moves by {moves} peak to peak in the last "
-            f"{_QUIET:g} s, more than {MOST_SWING:.0%} of the nominal air gap of "
+            f"{_QUIET:g} s, more than {percent(MOST_SWING)} of the nominal air gap of "
             f"{format_quantity(gap, 'length')}",
         )
     first = len(time) - quiet * block
@@ -234,13 +234,14 @@ def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
     if np.any(height > 0.0) or np.any(sway > largest * mean):
         raise IdentificationError(
             f"{name}: the rotor is not at rest on its bearings: mean height {_microns(height)} µm, swing "
-            f"{_microns(sway)} µm; expected a height near minus the air gap and a swing below {largest:.0%} "
-            "of it. Check polarity and angles of the sensors, or give a later settled tail."
+            f"{_microns(sway)} µm; expected a height near minus the air gap and a swing below "
+            f"{percent(largest)} of it. Check polarity and angles of the sensors, or give a later settled "
+            "tail."
         )
     if turning and np.any(spread > MOST_SPREAD * mean):
         raise IdentificationError(
             f"{name}: in its last {END:g} s the rotor still leaves its races: its distance from their "
-            f"centre scatters by {_microns(spread)} µm; expected less than {MOST_SPREAD:.0%} of it"
+            f"centre scatters by {_microns(spread)} µm; expected less than {percent(MOST_SPREAD)} of it"
         )
     blocks = max(2, int((time[-1] - time[0]) / BLOCK + 0.1))
     means = np.array([part.mean(axis=0) for part in np.array_split(radius, blocks)])

@@ -32,8 +32,8 @@ RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "
 
 _WEIGHTLESS = (
     "has no gravity across its axis",
-    ": the fall before the first contact is taken as one under gravity. 'rotordrop simulate' and 'study' "
-    "know such a machine",
+    ": the fall before the first contact is taken as one under gravity. Simulations and studies know "
+    "such a machine",
 )
 
 

@@ -14,7 +14,7 @@ from rotordrop.report.compared_drop import ComparedDrop, left_out
 from rotordrop.report.content import Column, Figure, ReportContent, Section, Statement, Table, table
 from rotordrop.report.limits import limit_statement
 from rotordrop.report.quantity import Quantity, display_unit, shown
-from rotordrop.report.stress_box import StressBox, stress_box_figure, stress_table
+from rotordrop.report.stress_box import StressBox, stress_box_figure
 from rotordrop.report.style import axis_title, bars, curve, fit_legend, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
@@ -205,7 +205,7 @@ def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ra
         return Section("Severity", figures=tuple(figures), tables=tuple(tables))
     caption = "Distribution of the stress within each drop, outliers left out (Neisi 2020, Fig. 16)."
     figures.append(Figure(stress_box_figure(boxes), caption))
-    return Section("Severity", figures=tuple(figures), tables=(*tables, stress_table(boxes)))
+    return Section("Severity", figures=tuple(figures), tables=tuple(tables))
 
 
 def _ranking_table(caption: str, ranking: Ranking, number: Number) -> Table:

@@ -10,7 +10,7 @@ from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.severity.numbers import Number
-from rotordrop.units import format_minute
+from rotordrop.units import format_minute, percent
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,11 @@ class ComparedDrop:
         """
         found = self.drop.bearings[bearing].numbers.get(number.field)
         if found is None:
-            return Quantity(value=math.nan, kind=number.kind)
+            return Quantity(value=math.nan, kind=number.shown_as)
         return Quantity(
             value=found.value,
-            kind=number.kind,
+            kind=number.shown_as,
+            places=number.places,
             interval_90=found.interval,
             standard_error=found.standard_error,
             status=found.status or "",
@@ -63,7 +64,7 @@ class ComparedDrop:
         ):
             whole = math.fsum(one.value for one in all_of_it)
             if whole > 0.0:
-                parts.append(f"{part.value / whole:.0%} of the {name}")
+                parts.append(f"{percent(part.value / whole)} of the {name}")
         moment = shown(hit.peak_time_s, "time", 3)
         return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"
 

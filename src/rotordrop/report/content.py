@@ -88,6 +88,8 @@ class Column:
     """Kind of quantity; empty for text. What is a quantity or a text already stays as it is."""
     digits: int = 4
     """Significant digits where no interval says how many are meant."""
+    optional: bool = False
+    """Whether the column is left out where it says nothing of any row."""
 
     def cell(self, row: object) -> Cell:
         """What the column shows of a row."""
@@ -136,10 +138,22 @@ class Table:
         return Table(tuple(heads), rows, self.caption, self.note)
 
 
+def verdict_column(status: Callable[[Any], str], label: str = "verdict") -> Column:
+    """What the identification says of a number that is not determined; of one that is, nothing."""
+
+    def said(row: Any) -> str:
+        verdict = status(row)
+        return "" if verdict == "determined" else verdict
+
+    return Column(label, said, optional=True)
+
+
 def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:
     """Make a table of typed rows by its declared columns."""
-    cells = tuple(tuple(column.cell(row) for column in columns) for row in rows)
-    return Table(tuple(column.label for column in columns), cells, caption, note)
+    cells = [[column.cell(row) for column in columns] for row in rows]
+    shown = [k for k, column in enumerate(columns) if not column.optional or any(row[k] for row in cells)]
+    by_row = tuple(tuple(row[k] for k in shown) for row in cells)
+    return Table(tuple(columns[k].label for k in shown), by_row, caption, note)
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,9 @@ def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> 
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
         "stress distribution",
     )
-    return Section("Hertz stress", figures=(history, box), tables=(stress_table(boxes),))
+    # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
+    tables = () if any(one.stress_band for one in bearings) else (stress_table(boxes),)
+    return Section("Hertz stress", figures=(history, box), tables=tables)
 
 
 def stress_boxes(bearings: Sequence[BearingDrop], speed: float) -> tuple[StressBox, ...]:

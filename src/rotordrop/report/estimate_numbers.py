@@ -10,7 +10,7 @@ from rotordrop.elements.parameter import Parameter, Role
 from rotordrop.elements.table import published
 from rotordrop.estimate.bearing_drop import BearingDrop, Origin, Peak
 from rotordrop.known import Known
-from rotordrop.report.content import Card, Column, KeyFigure, Statement, Table, table
+from rotordrop.report.content import Card, Column, KeyFigure, Statement, Table, table, verdict_column
 from rotordrop.report.quantity import Quantity, shown, with_interval
 from rotordrop.severity.numbers import LOADS
 
@@ -86,9 +86,9 @@ def identified_table(bearings: Sequence[BearingDrop], *, taken_over: str = "", c
                 return "not estimated"
             if taken_over and known.status == "taken over":
                 return f"taken over from {Path(taken_over).name}"
-            return "" if known.status == "determined" else known.status
+            return known.status
 
-        return Column(bearing.name, value), Column(f"{bearing.name}: verdict", verdict)
+        return Column(bearing.name, value), verdict_column(verdict, f"{bearing.name}: verdict")
 
     rows = [
         row

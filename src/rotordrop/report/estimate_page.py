@@ -24,6 +24,7 @@ from rotordrop.report.content import (
     Table,
     appendix,
     table,
+    verdict_column,
 )
 from rotordrop.report.drop_sections import drop_sections
 from rotordrop.report.estimate_numbers import headline_card, identified_table, static_limit_statement
@@ -50,8 +51,8 @@ from rotordrop.units import format_second
 
 KINDS = {"N": "force", "Pa": "pressure"}
 PRIOR_NOTE = (
-    "Below a prior or an estimate: its 90 % interval. What the record does not determine enters the "
-    "intervals of force and stress by its prior."
+    "A prior is a range; below an estimate stands its 90 % interval. What the record does not determine "
+    "enters the intervals of force and stress by its prior."
 )
 PARAMETERS = (
     "Estimates with 90 % intervals over their priors, both relative to the prior's centre. Where the blue "
@@ -244,7 +245,12 @@ def _severity(estimate: Estimate) -> Section:
 
     def at(name: str) -> Column:
         values = found[name]
-        return Column(name, lambda o: Quantity.of(values.get(o.field), o.kind, range_only=uncertain))
+        return Column(
+            name,
+            lambda o: replace(
+                Quantity.of(values.get(o.field), o.shown_as, range_only=uncertain), places=o.places
+            ),
+        )
 
     def rating(name: str) -> str:
         ratings = numbers_of(estimate.machine.bearing(name)).ratings()
@@ -271,7 +277,9 @@ def _parameters(estimate: Estimate) -> Section:
             verdict = (
                 f"larger than {shown(one.estimate.lower, kind)}, the most that the {one.row.way_of} moved"
             )
-        row = ParameterRow(spoken(one), Quantity.of(one.prior, kind), found, verdict)
+        # a prior is a range: its middle is nobody's word; where a replay begins is a number of its own
+        spread = one.prior is not None and one.prior.standard_error is not None
+        row = ParameterRow(spoken(one), Quantity.of(one.prior, kind, range_only=spread), found, verdict)
         rows[one.scope].append(row)
     tables = [parameter_table(rows["machine"], caption="Parameters of the machine", note=PRIOR_NOTE)]
     if rows["drop"]:
@@ -282,7 +290,7 @@ def _parameters(estimate: Estimate) -> Section:
             Column("gain error", lambda o: Quantity.of(o.gain_error, "share", range_only=uncertain)),
             Column("offset", lambda o: Quantity.of(o.offset, "length", range_only=uncertain)),
             Column("noise (standard deviation)", "noise", "length", 2),
-            Column("verdict", lambda o: o.gain_error.status),
+            verdict_column(lambda o: o.gain_error.status),
         )
         tables.append(table(estimate.sensors, of_sensor, "Sensors", SENSORS_NOTE))
     if estimate.unbalance:
@@ -290,7 +298,7 @@ def _parameters(estimate: Estimate) -> Section:
             Column("node", "node"),
             Column("amount", lambda o: Quantity.of(o.amount, "unbalance", range_only=uncertain)),
             Column("phase against the mark", lambda o: o.phase or o.reason, "angle"),
-            Column("verdict", lambda o: (o.phase or o.amount).status),
+            verdict_column(lambda o: (o.phase or o.amount).status),
         )
         tables.append(table(estimate.unbalance, columns, "Unbalance", PHASE_NOTE))
     steps = estimate.replay

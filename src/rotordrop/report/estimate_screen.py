@@ -94,7 +94,7 @@ def _loads(estimate: Estimate) -> Table:
         "impacts": lambda b: (
             b.missing.get("impacts") or with_interval(len(b.touched), "count", b.count_interval_90)
         ),
-        "in contact from": lambda b: with_interval(b.contact_from, "time", b.contact_from_interval_90),
+        "mostly in contact from": lambda b: with_interval(b.contact_from, "time", b.contact_from_interval_90),
         **({"largest displacement": lambda b: number(b.largest, "length")} if certain else {}),
         "over the air gap": lambda b: _over_gap(b, certain=certain),
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),

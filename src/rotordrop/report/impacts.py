@@ -15,8 +15,10 @@ from rotordrop.record.impacts import HOP, shortest_flight
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity, places_of, round_steps
 from rotordrop.report.style import MUTED, axis_title, curve, panels, square
+from rotordrop.units import percent
 
 LISTED = 24
+AZIMUTH = "Azimuth counter-clockwise from +x, −90° is the bottom. "
 LATE, EARLY, INTERVAL, RING = "#9cc3e8", "#0b3d73", "#5b6875", "#cbd4dc"
 
 
@@ -29,12 +31,12 @@ def impact_rule(gaps: Sequence[float], *, seen: bool = False) -> str:
     after = f"at least {' to '.join([*times][:: max(len(times) - 1, 1)])} ms" if times else "a time"
     leaves, swing = "", ""
     if seen:
-        leaves = f", in which the rotor leaves the race by {0.5 * HOP:.1%} of the gap or more"
+        leaves = f", in which the rotor leaves the race by {percent(0.5 * HOP, 1)} of the gap or more"
         swing = ", and a swing along the race is none"
     return (
-        f"An impact is a return to the race after {after} of free flight, as long as a hop of {HOP:.0%} of "
-        f"the air gap under gravity lasts{leaves}; the first touch of a fall is one too. Shorter hops belong "
-        f"to the impact before{swing}."
+        f"An impact is a return to the race after {after} of free flight, as long as a hop of "
+        f"{percent(HOP)} of the air gap under gravity lasts{leaves}; the first touch of a fall is one too. "
+        f"Shorter hops belong to the impact before{swing}."
     )
 
 
@@ -56,21 +58,25 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         places = places_of((getattr(impact, field).value for _, impact, _ in strongest), kind)
         return Column(label, lambda row: replace(Quantity.of(getattr(row[1], field), kind), places=places))
 
+    # where an impact hit, and for how long, has no known error in an estimate
+    exact = all(impact.peak_force.interval_90 is None for _, impact, _ in impacts)
+    place = Column("azimuth", lambda row: row[1].azimuth, "angle", 3)
+    lasted = Column("duration", lambda row: row[1].end - row[1].start, "time", 3)
     columns = (
         Column("bearing", lambda row: row[0]),
         Column("time of peak", lambda row: row[1].peak_time, "time"),
-        Column("azimuth", lambda row: row[1].azimuth, "angle", 3),
+        *((place,) if exact else ()),
         number(f"peak {force}", "peak_force", "force"),
         number("impulse", "impulse", "impulse"),
         number("dissipated energy", "dissipated_energy", "energy"),
-        Column("duration", lambda row: row[1].end - row[1].start, "time", 3),
+        *((lasted,) if exact else ()),
         Column("impact", lambda row: "yes" if row[2] else ""),
     )
     return table(
         sorted(strongest, key=lambda item: item[1].peak_time),
         columns,
         f"Contacts ({len(strongest)} of {len(impacts)}), {count} of them impacts",
-        f"Azimuth counter-clockwise from +x, −90° is the bottom. {impact_rule(gaps)}{rest}",
+        f"{AZIMUTH if exact else ''}{impact_rule(gaps)}{rest}",
     )
 
 

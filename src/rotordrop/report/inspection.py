@@ -58,9 +58,9 @@ def inspection_section(estimate: Estimate, card: RestartCard | None = None) -> S
         if bearing.air_gap is not None
     )
     text = (
-        "At the next standstill: a lift check (push the rotor round its touchdown bearings, record it, "
-        f"'rotordrop clearance'). A gap that differs from the one found here ({gaps}) is wear or a sensor "
-        "that has moved; turning each bearing by hand shows whether it still runs."
+        "At the next standstill: a lift check (push the rotor round its touchdown bearings and record it). "
+        f"A gap that differs from the one found here ({gaps}) is wear or a sensor that has moved; "
+        "turning each bearing by hand shows whether it still runs."
     )
     return Section("What to do", (), (*said, Statement(text), Statement(SCOPE)))
 

@@ -11,7 +11,7 @@ from rotordrop.report.compared_drop import ComparedDrop
 from rotordrop.report.content import Level, Statement
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.severity.numbers import NUMBERS, Number
-from rotordrop.units import format_chance, parse_quantity
+from rotordrop.units import format_chance, parse_quantity, percent
 
 SURE = 0.95
 """Probability from which a limit counts as kept, or as passed [1]; chosen, not measured."""
@@ -81,7 +81,7 @@ def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tup
     worst, who = max(beyond)
     if worst > 1.0 - SURE:
         return f"{words}: open, passed by {who} with a probability of {format_chance(worst)}", None
-    return f"{words}: kept by all drops (passed by {who} with {worst:.1%} at most)", True
+    return f"{words}: kept by all drops (passed by {who} with {percent(worst, 1)} at most)", True
 
 
 def _beyond(quantity: Quantity, limit: float, number: Number) -> float | None:

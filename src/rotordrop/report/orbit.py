@@ -59,7 +59,7 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
         reach = 1.08 * MICRO * max([*radii, bearing.air_gap.upper if bearing.air_gap else 0.0])
         square(figure, column, reach)
     figure.update_xaxes(title_text=axis_title("displacement x", "µm"))
-    figure.update_yaxes(title_text=axis_title("displacement y", "µm"))
+    figure.update_yaxes(title_text=axis_title("displacement y", "µm"), col=1)
     return fit_legend(figure)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import plotly.graph_objects as go
 
-from rotordrop.report.content import Column, Table, table
+from rotordrop.report.content import Column, Table, table, verdict_column
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import COLOURS, axis_title, bars, curve, fit_legend, panels, plain, upright
 
@@ -30,7 +30,7 @@ def parameter_table(rows: Sequence[ParameterRow], *, caption: str = "Parameters"
         Column("parameter", "name"),
         Column("prior or start", "prior"),
         Column("estimate (90 % interval)", "estimate"),
-        Column("verdict", lambda row: "" if row.verdict == "determined" else row.verdict),
+        verdict_column(lambda row: row.verdict),
     )
     return table(rows, columns, caption, note)
 

@@ -129,14 +129,15 @@ class Quantity:
     @property
     def text(self) -> str:
         """Number and unit; a speed in Hz and rpm; the range where only that is to be shown."""
+        most = self._in_unit(max(map(abs, (self.value, *self.ends))))
+        if self.places is not None and 0.0 < most < 0.5 * 10.0**-self.places:
+            return self._with_unit(f"< {written(10.0**-self.places, self.places)}")
         if self.range_only:
             return self._range() if self.interval_90 is not None else "–"
-        if self.places is not None and 0.0 < abs(self._in_unit(self.value)) < 0.5 * 10.0**-self.places:
-            return self._with_unit(f"< {written(10.0**-self.places, self.places)}")
         if self.kind == "probability" and self.interval_90 is None and math.isfinite(self.value):
             chance = format_chance(self.value)
             if chance[0] in "<>":
-                return self._with_unit(chance.removesuffix("%"))
+                return self._with_unit(chance.removesuffix(" %"))
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))

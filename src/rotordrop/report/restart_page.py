@@ -29,7 +29,7 @@ from rotordrop.report.quantity import Quantity
 from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
 from rotordrop.restart.card import ANSWERS, RestartCard, answer_in
-from rotordrop.units import format_amount, format_chance, format_quantity
+from rotordrop.units import format_amount, format_chance, format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.restart.foreseen import NextDrop
@@ -45,7 +45,7 @@ SCOPE = (
     "the estimate and the checks show."
 )
 RESTART = "Restart"
-NO_DROPS = "Name the machine file, and a limit with --limit, to see the next drop."
+NO_DROPS = "The next drop is foreseen where the machine file and a limit are given."
 
 
 def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
@@ -173,11 +173,17 @@ def _costs(card: RestartCard) -> Table:
         ("opening and looking", f"{one.inspection_days:g} d"),
         ("exchange or repair after that", f"{one.exchange_days:g} d"),
         ("exchange in one go", f"{one.replace_days:g} d"),
-        ("running with limits", f"{one.limited_days:g} d, and {one.limited_risk:.0%} of the risk is left"),
-        ("risk with sound bearings", f"{one.sound_risk:.2%}"),
-        ("another drop until the next planned inspection", f"{one.another_drop:.0%}"),
-        ("damage allowed in a restart without limits", f"{one.most_doubt:.1%}"),
-        ("chance to pass a limit that a speed limit brings it down to", f"{one.most_beyond:.1%}"),
+        (
+            "running with limits",
+            f"{one.limited_days:g} d, and {percent(one.limited_risk)} of the risk is left",
+        ),
+        ("risk with sound bearings", percent(one.sound_risk, 2)),
+        ("another drop until the next planned inspection", percent(one.another_drop)),
+        ("damage allowed in a restart without limits", percent(one.most_doubt, 1)),
+        (
+            "chance to pass a limit that a speed limit brings it down to",
+            percent(one.most_beyond, 1),
+        ),
     )
     columns = (Column("assumption", lambda row: row[0]), Column("value", lambda row: row[1]))
     return table(rows, columns, "Costs and chances", f"Source: {one.source}.")

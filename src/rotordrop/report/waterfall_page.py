@@ -22,6 +22,7 @@ from rotordrop.report.content import (
     Statement,
     Table,
     table,
+    verdict_column,
 )
 from rotordrop.report.quantity import NO_BREAK, Quantity, shown, with_error, written
 from rotordrop.report.style import TURN
@@ -346,7 +347,7 @@ def law_table(law: SpeedLaw) -> Table:
         Column("quantity", lambda row: row[0]),
         Column("value", value),
         Column("90 % interval", interval),
-        Column("verdict", lambda row: row[1].status),
+        verdict_column(lambda row: row[1].status),
     )
     return table(rows, columns, "Speed law")
 

@@ -482,12 +482,16 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
         if card.right[name] > RARE
     )
     restart, limited = (format_chance(max(bound, 0.0)) for bound in card.bounds)
-    by = "most_doubt, whatever it costs" if card.bounds[0] == assumed.most_doubt else "by the costs"
+    by = (
+        "the doubt that is allowed, whatever it costs"
+        if card.bounds[0] == assumed.most_doubt
+        else "by the costs"
+    )
     ranges = f"up to {restart} it may restart ({by})" if card.bounds[0] > 0.0 else "it may not restart at all"
     if card.bounds[1] > max(card.bounds[0], 0.0):
         ranges += f", up to {limited} with limits (by the costs)"
     doubt = 1.0 - card.sound
-    chance = f"{100.0 * doubt:.2g}%" if 0.005 < doubt < 0.095 else format_chance(doubt)
+    chance = f"{100.0 * doubt:.2g} %" if 0.005 < doubt < 0.095 else format_chance(doubt)
     said.append(
         f"{card.answer.capitalize()}: something is damaged with {chance}; {ranges}. "
         f"It costs {assumed.cost(card.costs[card.answer])} in "
@@ -513,8 +517,8 @@ def _said(card: RestartCard, drop: Drop, compared: bool) -> list[str]:
     if not drop.consistent:
         said.append("The model is not consistent with this record: its parameters are no evidence here.")
     said.append(
-        f"Costs, priors and risks are those of: {assumed.source}. They are no limits; state your own with "
-        "--assumptions."
+        f"Costs, priors and risks are those of: {assumed.source}. They are no limits; state your own before "
+        "you rely on them."
     )
     return said
 

@@ -13,6 +13,13 @@ class Number:
     label: str
     kind: str
     more_is_worse: bool = True
+    places: int | None = None
+    """Decimal places of a number that is shown as a share; what lies below them is "< 0.001 %"."""
+
+    @property
+    def shown_as(self) -> str:
+        """Kind in which a report shows it."""
+        return self.kind if self.places is None else "share"
 
 
 LOADS = (
@@ -24,6 +31,8 @@ LOADS = (
 """Force and stress, which every estimate states, in the order in which they are shown."""
 
 _PURE = "dimensionless"
+_PLACES = 3
+"""Of a share of the rating life in per cent: a hundred thousand drops of 0.001 % would make one life."""
 SEVERITY = (
     Number("severity.static_safety", "static safety factor by the peak stress", _PURE, more_is_worse=False),
     Number("severity.static_safety_of_rating", "static safety factor by C0", _PURE, more_is_worse=False),
@@ -31,9 +40,9 @@ SEVERITY = (
     Number("severity.skid_energy_J", "energy lost in the contact", "energy"),
     Number("severity.position_index", "position index (mean distance over gap)", _PURE),
     Number("severity.velocity_index", "velocity index (velocity over speed times gap)", _PURE),
-    Number("severity.fatigue_by_segments", "share of rating life, segments", _PURE),
-    Number("severity.fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE),
-    Number("severity.fatigue_by_rainflow", "share of rating life, rainflow", _PURE),
+    Number("severity.fatigue_by_segments", "share of rating life, segments", _PURE, places=_PLACES),
+    Number("severity.fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE, places=_PLACES),
+    Number("severity.fatigue_by_rainflow", "share of rating life, rainflow", _PURE, places=_PLACES),
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""
 
@@ -44,6 +53,7 @@ NOTE = (
     "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
     "peak force. Shares of the basic rating life (at one a tenth of new bearings fails): finite segments of "
     "the raceways (after Menck 2023), ISO/TS 16281 at every instant, rainflow of the most loaded ball; the "
-    "first two as if the race turned with the rotor from the first impact on, as upper ends. None is a limit."
+    "first two as if the race turned with the rotor from the first impact on, as upper ends. "
+    "Below 0.001 % it takes more than a hundred thousand such drops for one life. None is a limit."
 )
 """What stands beneath a table of these numbers."""

@@ -59,9 +59,9 @@ SENSOR_NOISE = 4e-7
 without it the search would find arithmetic, with less than a recording has what no recording shows."""
 FORCE_OF_A_RECORD = (
     "Force and stress are not in a record of displacement; the largest indentation above dates the largest "
-    "force only roughly, as race and support give way too. 'rotordrop estimate' finds both for the first "
-    "0.2 s; 'rotordrop coast-down --drag-from' with this record says for the whole coast-down of the machine "
-    "as described when they are largest."
+    "force only roughly, as race and support give way too. An estimate of the drop finds both for the first "
+    "0.2 s; a simulated coast-down of the machine as described, with the drag of this record, says when they "
+    "are largest."
 )
 LINES_OF_A_SIMULATION = 24
 """Lines looked for at most in a simulation (chosen)."""

@@ -178,7 +178,7 @@ def settling_words(
     known = "" if error is None else f" ± {NINETY * error * 1e6:.0f}"
     times = " to ".join(format_moment(one) for one in between)
     return (
-        f"{count}{format_moment(found.contact_from)} ({times}), in contact from there on, at "
+        f"{count}{format_moment(found.contact_from)} ({times}), mostly in contact from there on, at "
         f"{radius * 1e6:.0f}{known} µm from the centre in the end"
     )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rotordrop.spectrum.candidates import Candidate
+from rotordrop.units import percent
 
 LineKind = Literal["order", "steady", "combination", "undecided"]
 
@@ -129,7 +130,7 @@ def name_line(line: LineEvidence, candidates: Sequence[Candidate], *, air_gap: f
         label=f"unnamed ({options}?)",
         named=False,
         confidence=share,
-        reason=f"{_place(line)} fits {options}, but not surely ({share:.0%})",
+        reason=f"{_place(line)} fits {options}, but not surely ({percent(share)})",
         matches=listed,
     )
 

@@ -14,6 +14,7 @@ from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
+from rotordrop.units import percent
 
 NIS_RANGE = (0.6, FITTING_NIS)
 DIRECTIONS = "directions"
@@ -328,7 +329,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
         note=(
             f"a force of {across:.0f} N across and {up:.0f} N upwards stays after power-off: the machine is "
             "not level, or something pulls at the rotor; a gain error that all sensors share would be "
-            f"{share:.1%} at most, for which all intervals are wider"
+            f"{percent(share, 1)} at most, for which all intervals are wider"
         )
         if noted
         else "",

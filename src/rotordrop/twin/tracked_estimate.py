@@ -59,7 +59,7 @@ from rotordrop.twin.value_of_information import DRAWING, value_of_information
 
 QUICK = (
     "Quick estimate: one pass over the record, {}without the search for the size of the process noise. "
-    "For a number that decides, leave --quick out."
+    "A number that decides needs a whole estimate."
 )
 
 
@@ -282,7 +282,7 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
         f"the model does not fit the record {drop.evidence.name} "
         f"({'; '.join(check.said() for check in failed)}), and "
         "nothing can check its force; expected a model that fits, or both directions in two planes. "
-        "Calibrate on drops with all sensors, estimate without --quick, or leave this drop out."
+        "Calibrate on drops with all sensors, make a whole estimate, or leave this drop out."
     )
 
 

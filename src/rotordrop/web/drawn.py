@@ -237,7 +237,7 @@ def _events(estimate: Estimate) -> list[dict[str, Any]]:
             (
                 bearing.contact_from,
                 bearing.contact_from_interval_90,
-                f"last impact at {bearing.name}, in contact from here on",
+                f"last impact at {bearing.name}, mostly in contact from here on",
             ),
             (peak.time, peak.time_interval_90, f"largest force at {bearing.name}"),
         ):

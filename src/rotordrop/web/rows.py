@@ -13,7 +13,7 @@ from rotordrop.report.quantity import Quantity, System, display_unit
 from rotordrop.severity.numbers import LOADS
 
 SYSTEMS: tuple[System, ...] = ("SI", "US")
-SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity")
+SHOWN_KINDS = ("length", "force", "pressure", "speed", "velocity", "stiffness", "mass", "energy", "impulse")
 _LOADS = {load.field: load for load in LOADS}
 
 

@@ -55,7 +55,7 @@ FAULTS = {
     "time": (backwards, r"non-monotonic time at -0\.085 s: sample 501 is at -0\.085 s after.*export again"),
     "no drop": (
         lambda record: record.window(-0.1, -0.01),
-        r"no drop in the record: the vertical displacement spans 2\d\.?\d* µm.*by more than 35%.*give a rec",
+        r"no drop in the record: the vertical displacement spans 2\d\.?\d* µm.*by more than 35 %.*give a rec",
     ),
     "polarity": (factors(-1, 1, 1, 1), r"inverted polarity S_NDE_A: .* leans 8\d° from .*correct the polari"),
     "axes": (

@@ -222,7 +222,7 @@ def test_a_tabulated_response_is_zero_before_the_release():
 def test_no_drop_in_the_record(drop, machine):
     with pytest.raises(
         RecordError,
-        match=r"drop_060: no drop in the record: the vertical displacement spans 26.* sinks by 5% of",
+        match=r"drop_060: no drop in the record: the vertical displacement spans 26.* sinks by 5 % of",
     ):
         power_off(drop.window(-0.25, -0.01), machine)
 

@@ -585,7 +585,7 @@ class TestLength:
     def test_no_drop(self, drop, machine):
         found = only(drop.window(-0.25, -0.01), machine)
         assert found.kind == "no drop in the record"
-        assert "spans 26.5 µm, 20.5 µm in its planes and sinks by 5% of the nominal air gap" in found.message
+        assert "spans 26.5 µm, 20.5 µm in its planes and sinks by 5 % of the nominal air gap" in found.message
 
     @pytest.mark.parametrize("start", [0.002, -0.01])
     def test_missing_pre_trigger(self, start, drop, machine):

@@ -238,7 +238,7 @@ def test_a_clock_that_is_two_per_cent_off(drop, tail, machine):
     )
     found = worst(fast, machine, tail)
     assert (found.kind, found.severity) == ("wrong sampling rate", "warning")
-    assert "of the speed channel, +2.0% or more" in found.message
+    assert "of the speed channel, +2.0 % or more" in found.message
 
 
 def test_six_samples_stuck(drop, machine):
@@ -351,7 +351,7 @@ def test_readings_taken_early_and_late_under_an_even_clock(drop):
     signals = np.column_stack([np.interp(when, drop.time, column) for column in drop.signals.T])
     (found,) = check_continuity(replace(drop, signals=signals))
     assert (found.kind, found.severity) == ("jittered clock", "warning")
-    early = float(re.search(r"\((\d+)% of an interval", found.message)[1])
+    early = float(re.search(r"\((\d+) % of an interval", found.message)[1])
     assert early == pytest.approx(30.0, abs=10.0)
 
 

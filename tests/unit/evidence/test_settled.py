@@ -28,7 +28,7 @@ def test_a_whirling_shaft_without_speed_is_not_at_rest(whole_drop, machine):
     silent = replace(whole_drop.window(0.1, 0.6), speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(
         RecordError,
-        match=r"still moves by \d+ µm peak to peak in the last 0.1 s, more than 50% of the nominal",
+        match=r"still moves by \d+ µm peak to peak in the last 0.1 s, more than 50 % of the nominal",
     ):
         settled_tail(silent, machine)
 

@@ -231,7 +231,7 @@ def test_a_moment_is_never_minus_zero(time, text):
 
 @pytest.mark.parametrize(
     ("probability", "text"),
-    [(1.0, "> 99%"), (0.996, "> 99%"), (0.93, "93%"), (0.006, "1%"), (0.005, "< 1%"), (0.0, "< 1%")],
+    [(1.0, "> 99 %"), (0.996, "> 99 %"), (0.93, "93 %"), (0.006, "1 %"), (0.005, "< 1 %"), (0.0, "< 1 %")],
 )
 def test_no_chance_is_certain(probability, text):
     assert format_chance(probability) == text

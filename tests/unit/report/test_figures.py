@@ -346,7 +346,7 @@ def test_where_single_numbers_do_not_hold_peaks_are_ranges_and_no_distribution_i
         if certain:
             assert peak.startswith(f"peak {force.value:,.0f} N at ".replace(",", "\u202f"))
             assert peak.endswith("90 %: 1\u202f500 to 2\u202f300 N")
-            assert [table.caption for table in stress.tables] == ["Distribution of the maximum Hertz stress"]
+            assert len(stress.figures) == 2  # its box; numbers without an interval stand in no table
         else:
             assert peak == "peak, 90 %: 1\u202f500 to 2\u202f300 N"
             assert not stress.tables and len(stress.figures) == 1

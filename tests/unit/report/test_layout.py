@@ -100,9 +100,11 @@ def test_a_page_is_dark_where_that_is_asked_for_its_figures_too(browser: Browser
 def test_the_tools_of_a_figure_cover_neither_its_legend_nor_the_heading(browser: Browser, width: int) -> None:
     """The legend is as wide as the figure, as that of an orbit is."""
     browser.size(width, 900)
-    browser.until("document.querySelector('.legend').getBoundingClientRect().right < window.innerWidth")
+    chart = "document.querySelector('.chart').getBoundingClientRect()"
+    browser.until(f"document.querySelector('.legend').getBoundingClientRect().right < {chart}.right")
     left, top, right, bottom = edges(browser, ".modebar")
-    assert 0.0 <= left < right <= width
+    assert 0.0 <= left < right <= max(width, 640)  # a figure keeps the width that its words need
+    assert browser.evaluate("document.documentElement.scrollWidth") <= width
     for selector in (".legend", "#section-1 h2"):
         beside = edges(browser, selector)
         assert beside[2] <= left or right <= beside[0] or beside[3] <= top or bottom <= beside[1], selector
@@ -135,6 +137,10 @@ def test_the_first_printed_page_is_the_one_to_send_and_the_rest_an_appendix(
     # a wider page is made smaller, words and all
     assert browser.evaluate("document.documentElement.scrollWidth") <= PAPER[0]
     assert edges(browser, ".front")[3] <= PAPER[1]
+    left, _, right, _ = edges(browser, ".front .wide .chart")
+    assert (
+        right - left > 0.95 * PAPER[0]
+    )  # it was half as wide, and the titles of its panels lay on their axes
     browser.evaluate("window.dispatchEvent(new Event('afterprint'))")
     browser.call("Emulation.setEmulatedMedia", media="")
     assert browser.evaluate("document.querySelectorAll('.part[open]').length") == 1

@@ -28,9 +28,9 @@ def test_without_limits_it_says_so():
 @pytest.mark.parametrize(
     ("limit", "level", "text"),
     [
-        ("2.2 GPa", "good", "kept by all drops (passed by b at NDE with 0.0% at most)"),
-        ("1.95 GPa", "bad", "passed by b at NDE (> 99%)"),
-        ("2 GPa", "warning", "open, passed by b at NDE with a probability of 50%"),
+        ("2.2 GPa", "good", "kept by all drops (passed by b at NDE with 0.0 % at most)"),
+        ("1.95 GPa", "bad", "passed by b at NDE (> 99 %)"),
+        ("2 GPa", "warning", "open, passed by b at NDE with a probability of 50 %"),
     ],
 )
 def test_a_limit_on_the_stress(limit, level, text):
@@ -40,7 +40,7 @@ def test_a_limit_on_the_stress(limit, level, text):
 
 def test_a_safety_factor_is_passed_from_above():
     said = limit_statement(DROPS, read_limits(["static_safety = 3"]))
-    assert "passed by b at NDE (> 99%)" in said.text and "passed by a" not in said.text
+    assert "passed by b at NDE (> 99 %)" in said.text and "passed by a" not in said.text
 
 
 def test_the_number_of_drops_is_counted():

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+import rotordrop
 from rotordrop.known import Known
 from rotordrop.report.quantity import Quantity, with_error, written
+from rotordrop.severity.numbers import SEVERITY
 from rotordrop.web.rows import quantity_json
 
 THIN = "\u202f"
@@ -109,3 +113,27 @@ def test_nothing_is_zero_and_an_interval_without_an_end_goes_on() -> None:
     assert interval(230.0, math.inf) == "230.0 N or more"
     assert interval(-math.inf, 250.0) == "250.0 N or less"
     assert interval(230.0, 250.0) == "230 to 250 N"
+
+
+def test_a_share_of_a_life_that_no_number_of_drops_uses_up_has_no_digits() -> None:
+    life = next(one for one in SEVERITY if one.field.endswith("segments"))
+
+    def shown(value: float, high: float, *, uncertain: bool = False) -> Quantity:
+        known = Known(value=value, interval_90=(0.0, high))
+        return replace(Quantity.of(known, life.shown_as, range_only=uncertain), places=life.places)
+
+    assert (shown(7.9e-11, 8.5e-11).text, shown(7.9e-11, 8.5e-11).interval_text) == ("< 0.001 %", "")
+    assert shown(7.9e-11, 8.5e-11, uncertain=True).text == "< 0.001 %"
+    assert shown(2e-6, 4e-4).interval_text == "0.000 to 0.040 %"  # what may be more is not called less
+    assert shown(1.2e-3, 1.5e-3).text == "0.120 %"
+
+
+def test_per_cent_are_written_with_a_blank_everywhere() -> None:
+    """As numbers and units are, and as tables have them; sentences had "93%"."""
+    source = Path(rotordrop.__file__).parent
+    wrong = [
+        f"{file.name}: {found[0]}"
+        for file in source.rglob("*.py")
+        for found in re.finditer(r":[+.\d]*%\}|\d(?<!a0)%(?![\d\w])|\d\}%", file.read_text("utf-8"))
+    ]
+    assert not wrong

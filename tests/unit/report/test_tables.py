@@ -136,10 +136,17 @@ def row(name: str, prior: float, estimate: float, interval: tuple[float, float] 
 
 def test_parameters_show_prior_estimate_interval_and_verdict() -> None:
     table = parameter_table([row("NDE.support.stiffness", 1e8, 1.4e8, (1.38e8, 1.42e8))])
-    assert texts(table.rows[0]) == ["NDE.support.stiffness", "100.0 N/µm", "140.0 N/µm", ""]
+    assert texts(table.rows[0]) == ["NDE.support.stiffness", "100.0 N/µm", "140.0 N/µm"]
     cell = table.rows[0][2]
     assert isinstance(cell, Quantity)
     assert cell.interval_text == "138.0 to 142.0 N/µm"
+
+
+def test_a_verdict_is_said_where_a_number_is_not_determined_and_has_no_column_where_all_are() -> None:
+    known, open_ = row("K", 1e8, 1.4e8, (1.38e8, 1.42e8)), row("M", 4e7, 4e7, None)
+    assert "verdict" not in parameter_table([known, known]).columns
+    both = parameter_table([known, open_])
+    assert [line[both.columns.index("verdict")] for line in both.rows] == ["", open_.verdict]
 
 
 def test_parameters_are_drawn_relative_to_their_prior() -> None:

@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotordrop.estimate.bearing_drop import Origin
-from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.bearing_drop import Impact, Origin
+from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import CrossCheck, Estimate, Verdict
 from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.known import Known
-from rotordrop.report.content import Table
+from rotordrop.report.content import ReportContent, Table
 from rotordrop.report.drop_sections import drop_sections
-from rotordrop.report.estimate_page import cross_check_statements, estimate_page, spoken
+from rotordrop.report.estimate_page import assumed_card, cross_check_statements, estimate_page, spoken
+from rotordrop.report.impacts import impact_table
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.restart_page import restart_page
 from rotordrop.track.consistency import Check
 
 
@@ -34,7 +36,6 @@ def test_card_document_figure_and_table_agree_on_every_peak(estimate: Estimate) 
     content = estimate_page(estimate)
     document = json.loads(json.dumps(estimate_document(estimate), allow_nan=False))
     loads = next(s for s in content.sections if s.heading == "Bearing force").figures[0].chart
-    statistics = {row[0]: row[1:] for row in table(estimate, "Hertz stress").rows}
     for k, (bearing, card) in enumerate(zip(estimate.bearings, content.cards, strict=True)):
         for figure, field, peak in (
             (card.figures[0], "peak_force_N", bearing.peak_force),
@@ -49,8 +50,6 @@ def test_card_document_figure_and_table_agree_on_every_peak(estimate: Estimate) 
             assert entry["time_interval_90_s"] == [early, late]
             assert early < peak.time < late
             assert re.fullmatch(r"at \d+\.\d+ ms \(\d+\.\d+ to \d+\.\d+ ms\)", figure.note)
-        cell = statistics["maximum"][k]
-        assert isinstance(cell, Quantity) and cell.value == bearing.peak_stress.value
         mark = next(one for one in loads.layout.annotations if one.xref == f"x{2 * k + 2}")
         assert (mark.x, mark.y) == pytest.approx((1e3 * bearing.peak_force.time, bearing.peak_force.value))
 
@@ -110,16 +109,18 @@ def test_the_first_contact_is_the_first_impact(estimate: Estimate) -> None:
 
 
 def test_every_unknown_has_prior_estimate_interval_and_verdict(estimate: Estimate) -> None:
-    rows = {str(row[0]): row for number in (0, 1) for row in table(estimate, "Parameters", number).rows}
+    both = [table(estimate, "Parameters", number) for number in (0, 1)]
+    rows, columns = {str(row[0]): row for one in both for row in one.rows}, both[0].columns
     assert len(rows) == len(estimate.parameters)
     assert not any("." in name or "unbalance 0" in name for name in rows), "a path, or a count from zero"
     prior = rows["NDE: support stiffness"][1]
-    assert isinstance(prior, Quantity) and prior.value == pytest.approx(1e8)
+    assert isinstance(prior, Quantity) and prior.levelled == "90 %: 50 to 200 N/µm"
     for one in estimate.parameters:
         shown = rows[spoken(one)]
         assert isinstance(shown[2], Quantity)
         assert (shown[2].value, shown[2].interval_90) == (one.estimate.value, one.estimate.interval_90)
-        assert shown[3] == ("" if one.estimate.status == "determined" else one.estimate.status)
+        verdict = dict(zip(columns, shown, strict=True)).get("verdict", "")
+        assert verdict == ("" if one.estimate.status == "determined" else one.estimate.status)
         if one.scope == "machine":
             assert estimate.bearing(one.owner).values[one.row.field] == one.estimate
 
@@ -300,3 +301,35 @@ def test_no_more_than_a_few_notes_stand_open_and_all_are_sentences(estimate: Est
     html = render_page(content)
     assert html.index('id="section-1"') < html.index("No tail.") < html.index("more notes and assumptions")
     assert "Note 8." in html
+
+
+def test_the_page_speaks_of_what_its_reader_can_do(estimate: Estimate) -> None:
+    """Options and commands belong to the terminal; "state your own with --assumptions" stood on the page."""
+    card = assumed_card(estimate)
+    said = [*parts_of(estimate_page(estimate)), *parts_of(restart_page(card, published_drop(estimate)))]
+    assert len(said) > 30
+    wrong = [text for text in said if re.search(r"--[a-z]|'rotordrop|TOML|[a-z]_[a-z]| = \{", text)]
+    assert not wrong
+
+
+def parts_of(content: ReportContent) -> list[str]:
+    sections = [*content.sections, *([content.to_do] if content.to_do else [])]
+    said = [one.text for one in (*content.verdict, *(s for part in sections for s in part.statements))]
+    return [*said, *(text for part in sections for text in part.text)]
+
+
+def test_what_is_estimated_has_its_interval_or_is_not_shown(estimate: Estimate) -> None:
+    """Azimuths and durations of contacts, and quartiles, stood beside intervals with none."""
+    sections = {part.heading: part for part in estimate_page(estimate).sections}
+    assert not sections["Hertz stress"].tables
+    contacts = sections["Impacts"].tables[0]
+    assert not {"azimuth", "duration"} & {*contacts.columns}
+    simulated = impact_table(
+        [replace(b, impacts=tuple(without(one) for one in b.impacts)) for b in estimate.bearings],
+        force="bearing force",
+    )
+    assert {"azimuth", "duration"} <= {*simulated.columns}
+
+
+def without(impact: Impact) -> Impact:
+    return replace(impact, peak_force=replace(impact.peak_force, interval_90=None))

@@ -46,8 +46,8 @@ def test_the_card_says_how_often_how_fast_and_with_which_current() -> None:
     (said,) = _of_lift(lift)
     for words in (
         "9 of 12 simulated lifts succeed",
-        "47%",
-        "93%",
+        "47 %",
+        "93 %",
         "14.0 ms to 20.0 ms",
         "1.2 A of 4 A of NDE",
         "more than the 4 A of DE",

@@ -281,7 +281,8 @@ def test_it_runs_without_limits_only_where_the_chance_of_a_damaged_bearing_is_sm
     assert held.costs == free.costs
     assert 1.0 - held.sound > ASSUMED.most_doubt
     assert held.answer != "restart"
-    assert any("up to 1% it may restart (most_doubt, whatever it costs)" in text for text in held.statements)
+    by = "up to 1 % it may restart (the doubt that is allowed, whatever it costs)"
+    assert any(by in text for text in held.statements)
     assert any("it may restart (by the costs)" in text for text in free.statements)
     good = dict.fromkeys(("turning", "borescope", "coast-down", "lift"), "good")
     turned = restart_card(drop(), ASSUMED, earlier=[inspected(drop())], checks=good)
@@ -608,7 +609,7 @@ def test_the_answer_says_the_next_drop_and_the_speed_limit():
     card = restart_card(drop(), ASSUMED, foreseen=foreseen)
     said = " ".join(card.statements)
     assert "as this estimate found the machine, by 24 simulated ones; it passes the limit, " in said
-    assert "peak Hertz stress of 2500 MPa, with 90% (90 %: 90% to 90%)" in said
+    assert "peak Hertz stress of 2500 MPa, with 90 % (90 %: 90 % to 90 %)" in said
     assert "NDE: force below 3" in said
     assert re.search(r"\([^()]* or more\) in 95 %", said)
     assert "A speed limit of 39.8 Hz" in said and "take the lower end" in said
@@ -634,7 +635,7 @@ def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell(
     foreseen = Foreseen(drops=few, speed_limit=limit, limits={"peak_stress_Pa": 2.5e9})
     card = restart_card(drop(), ASSUMED, foreseen=foreseen)
     (said,) = (text for text in card.statements if "speed limit" in text)
-    assert "about 5% at most, and these drops cannot rule out 22%" in said
+    assert "about 5 % at most, and these drops cannot rule out 22 %" in said
     next_ = next(
         s
         for s in restart_page(card, drop()).sections
@@ -644,10 +645,10 @@ def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell(
     assert "24" not in shown.note
     assert [row[-1] for row in shown.rows] == ["24", "12"]
     assert shown.columns[-2] == "passes peak Hertz stress of 2500 MPa"
-    assert shown.rows[0][-2] == "< 1% (< 1% to 22%)"
+    assert shown.rows[0][-2] == "< 1 % (< 1 % to 22 %)"
     many = replace(few[0], beyond_limit=Known(value=0.0, interval_90=(0.0, 0.03), drops=24))
     sure = restart_card(drop(), ASSUMED, foreseen=replace(foreseen, drops=(many, *few[1:])))
-    assert any("passed with 5% at most." in text for text in sure.statements)
+    assert any("passed with 5 % at most." in text for text in sure.statements)
 
 
 def test_next_drops_are_of_the_machine_that_the_estimate_found():

@@ -59,7 +59,7 @@ def test_air_gaps_without_a_tail_say_where_they_begin(machine: Machine, evidence
 
 def test_gains_that_nobody_stated_are_said_with_what_is_taken(machine: Machine, evidence: Evidence) -> None:
     names = ", ".join(sensor.name for sensor in machine.sensors)
-    assert f"states no gain of {names}: taken as calibrated, each within ±1.6% (90 %)" in said(
+    assert f"states no gain of {names}: taken as calibrated, each within ±1.6 % (90 %)" in said(
         machine, evidence
     )
     stated = machine.with_values({f"sensors.{sensor.name}.gain": 1.0 for sensor in machine.sensors})

@@ -165,13 +165,12 @@ def test_every_parameter_and_sensor(
 def test_statistics_and_cross_check(
     estimate: Estimate, page: dict[str, Any], document: dict[str, Any]
 ) -> None:
-    table = section(page, "Hertz stress")["tables"][0]
-    for column, bearing in enumerate(estimate.bearings, start=1):
+    assert not section(page, "Hertz stress")[
+        "tables"
+    ]  # statistics without an interval stand in the document alone
+    for bearing in estimate.bearings:
         told = document["bearings"][bearing.name]["stress_statistics_Pa"]
-        for row in table["rows"]:
-            field = row[0].replace(" ", "_")
-            if field in told:
-                assert row[column]["value"] == told[field] == getattr(bearing.statistics, field)
+        assert told["median"] == bearing.statistics.median
     if estimate.cross_check:
         rows = section(page, "Independent cross-check")["tables"][0]["rows"]
         for row, one, check in zip(rows, document["cross_check"], estimate.cross_check, strict=True):

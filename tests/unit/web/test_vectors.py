@@ -94,7 +94,7 @@ def test_slow_roll_is_taken_off_as_a_vector_and_one_turn_is_filtered(server, tmp
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-def test_a_distance_over_the_gap_is_as_sure_as_the_gap_and_every_scale_has_marks(server, tmp_path):
+def test_gap_ratios_are_ranges_scales_have_marks_and_sentences_the_chosen_units(server, tmp_path):
     browser = Browser(tmp_path / "profile")
     try:
         browser.open(server.address)
@@ -112,5 +112,15 @@ def test_a_distance_over_the_gap_is_as_sure_as_the_gap_and_every_scale_has_marks
             marks = told("waterfall.js", f"scaleOf({low}, {high})")
             assert len(marks) >= 2
             assert all(10**low <= one <= 10**high for one in marks)
+        browser.evaluate(
+            "import('/static/units.js').then(m => { m.learn({length: {SI: [1e-6, 'µm'], "
+            "US: [25.4e-6, 'mil']}, force: {SI: [1, 'N'], US: [4.448, 'lbf']}}); m.choose('US'); })"
+        )
+        said = "gap 273.1 µm (269.5 to 276.7 µm), 88.96 N, 5 N s/m at 60 Hz, 5 N/µm"
+        assert told("units.js", f"inWords({said!r})") == (
+            "gap 10.75 mil (10.61 to 10.89 mil), 20.00 lbf, 5 N s/m at 60 Hz, 5 N/µm"
+        )
+        browser.evaluate("import('/static/units.js').then(m => m.choose('SI'))")
+        assert told("units.js", f"inWords({said!r})") == said
     finally:
         browser.close()

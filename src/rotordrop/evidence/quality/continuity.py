@@ -18,6 +18,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
+from rotordrop.units import percent
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -426,7 +427,7 @@ def _uneven(record: Record, noise: Array) -> list[Finding]:
             kind=Kind.JITTERED_CLOCK,
             message=f"the readings scatter {with_motion / aside:.2g} times as much along the motion of all "
             f"channels as across it: they were taken about {share / record.sampling_rate * 1e6:.2g} µs "
-            f"({share:.0%} of an interval, rms) early or late, though the clock runs evenly",
+            f"({percent(share)} of an interval, rms) early or late, though the clock runs evenly",
             remedy="export the recording with the recorder's own sample clock",
             severity="warning",
         )

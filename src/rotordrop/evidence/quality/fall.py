@@ -27,7 +27,7 @@ from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import planar_of
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.evidence.fall import Fall
@@ -184,7 +184,7 @@ def _implausible_lift(fall: Fall, machine: Machine) -> list[Finding]:
         Finding(
             kind=Kind.WRONG_GAIN,
             message=f"the fall fits only with a remanent lift of {fall.remanent_force[worst, 1]:.3g} N at "
-            f"AMB {machine.ambs[worst].name}, {share[worst]:.0%} of its static lift: the rotor seems to "
+            f"AMB {machine.ambs[worst].name}, {percent(share[worst])} of its static lift: the rotor seems to "
             f"fall too {'fast' if share[worst] < 0 else 'slowly'} there",
             remedy="check sensitivity and gain of the sensors at that end, and the sampling rate",
             severity="warning",
@@ -234,8 +234,8 @@ def _implausible_sideways(fall: Fall, machine: Machine) -> list[Finding]:
         Finding(
             kind=Kind.TURNED,
             message=f"the fall fits only with {fall.remanent_force[worst, 0]:.3g} N sideways at AMB "
-            f"{machine.ambs[worst].name}, {abs(share[worst]):.0%} of its static lift: the rotor seems to "
-            "fall aside there before it touches anything",
+            f"{machine.ambs[worst].name}, {percent(abs(share[worst]))} of its static lift: the rotor seems "
+            "to fall aside there before it touches anything",
             remedy="check the angles of the sensors at that end",
             severity="warning",
         )

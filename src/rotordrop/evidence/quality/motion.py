@@ -458,8 +458,8 @@ def _other_clock(levitated: LevitatedModel, record: Record) -> list[Finding]:
         Finding(
             kind=Kind.WRONG_RATE,
             message=f"before the drop the orbit turns at {levitated.frequency:.5g} Hz or farther from the "
-            f"{speed:.5g} Hz of the speed channel, {off / speed:+.1%} or more: the sampling interval is off, "
-            "or the speed is; the readings do not tell which",
+            f"{speed:.5g} Hz of the speed channel, {100.0 * off / speed:+.1f} % or more: the sampling "
+            "interval is off, or the speed is; the readings do not tell which",
             remedy="correct the sampling interval (time.step) or the speed channel in the profile",
             severity="warning",
         )

@@ -15,7 +15,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.series import SIGMA_OF_MEDIAN, runs_of
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.evidence.levitated import LevitatedModel
@@ -75,7 +75,7 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
         findings.append(
             Finding(
                 kind=Kind.JITTERED_CLOCK,
-                message=f"the sampling interval of {usual * 1e6:.4g} µs scatters by {jitter:.1%}",
+                message=f"the sampling interval of {usual * 1e6:.4g} µs scatters by {percent(jitter, 1)}",
                 remedy="export the recording with the recorder's own sample clock",
                 severity="warning",
                 time=float(record.time[worst]),
@@ -380,8 +380,8 @@ def _coupling(record: Record, drop: float) -> list[Finding]:
     return [
         Finding(
             kind=Kind.AC_COUPLING,
-            message=f"the readings at rest creep back towards zero, to {float(np.mean(share[-1])):.0%} of "
-            "their depth by the end, all alike: a rotor on its bearings cannot rise",
+            message=f"the readings at rest creep back towards zero, to {percent(float(np.mean(share[-1])))} "
+            "of their depth by the end, all alike: a rotor on its bearings cannot rise",
             remedy="record with DC coupling; a high-pass takes away where the rotor lies",
             severity="stop",
         )

@@ -55,7 +55,7 @@
   // are flat, and all but the first stand beside words, so that the front is one page
   function resize(onPaper) {
     drawn.forEach(function (element) {
-      var front = element.closest(".front"), beside = element.closest(".front > :nth-child(n + 3)");
+      var front = element.closest(".front"), beside = element.closest(".front > .beside");
       var width = onPaper ? (beside ? 535 : 985) : null;
       var height = Math.round((onPaper ? (beside ? 0.56 : front ? 0.76 : 0.85) : 1.0) * Number(element.getAttribute("data-height")));
       element.style.height = height + "px";

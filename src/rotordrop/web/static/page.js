@@ -55,10 +55,10 @@ const TABS = {
     const card = state.estimate?.restart;
     if (!card) { return [make("p", { text: "An estimate of this drop is needed to weigh whether the machine may run again." })]; }
     return [make("ul", { class: "statements", of: card.verdict.map(sentence) }), ...card.summary.map(table), ...card.sections.flatMap((part) => [
-      make("h3", { class: "part", text: part.heading }), ...part.text.map((text) => make("p", { text })), ...part.tables.map(table)])];
+      make("h3", { class: "part", text: part.heading }), ...part.text.map((text) => make("p", { text: units.inWords(text) })), ...part.tables.map(table)])];
   },
   All: () => (state.estimate || state.look).sections.filter((part) => part.text.length + part.statements.length + part.tables.length).flatMap((part) => [make("h3", { class: "part", text: part.heading }),
-    ...part.text.map((text) => make("p", { text })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
+    ...part.text.map((text) => make("p", { text: units.inWords(text) })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
   Centre: centrelineTab,
   Compare: compareTab,
   Rotor: rotorTab,

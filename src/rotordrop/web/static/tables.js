@@ -1,5 +1,5 @@
 // Tables and sentences. Every text goes in as text: names from files are never markup.
-import { chosen } from "./units.js";
+import { chosen, inWords } from "./units.js";
 
 export function make(name, { text, of = [], on = {}, ...attributes } = {}) {
   const element = document.createElement(name);
@@ -13,7 +13,7 @@ export function make(name, { text, of = [], on = {}, ...attributes } = {}) {
 export const BADGES = { good: "good", notice: "note", warning: "warning", bad: "problem", stop: "problem", note: "note" };
 
 export const sentence = ({ text, level }) => make("li", {
-  class: level, of: [make("span", { class: "badge", text: BADGES[level] || level }), make("span", { text })]
+  class: level, of: [make("span", { class: "badge", text: BADGES[level] || level }), make("span", { text: inWords(text) })]
 });
 
 // No line breaks between a number and its unit.
@@ -46,12 +46,11 @@ export function cards(list) {
 }
 
 export function impactTable(impacts, columns, here, timeOf, go) {
-  const head = make("tr", { of: ["place", "time", "azimuth", ...columns.map(headOf)].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) });
+  const head = make("tr", { of: ["place", "time", ...columns.map(headOf)].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) });
   const rows = impacts.map((impact, i) => make("tr", {
     class: i === here ? "here" : null, "aria-current": i === here ? "true" : null, on: { click: () => go(i) },
     of: [make("th", { scope: "row", of: [make("button", { class: "link", text: impact.place, "aria-label": `Go to impact ${i + 1} at ${impact.place}`, on: { click: (event) => { event.stopPropagation(); go(i); } } })] }),
       make("td", { class: "number", text: timeOf(impact.time) }),
-      make("td", { class: "number", text: `${((impact.azimuth * 180) / Math.PI).toFixed(0).replace("-", "−")}°` }),
       ...impact.numbers.map((cell) => make("td", { class: "number", of: number(cell) }))]
   }));
   return make("table", { class: "impacts", of: [make("thead", { of: [head] }), make("tbody", { of: rows })] });
