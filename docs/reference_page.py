@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -23,45 +24,44 @@ PROFILE = """\
 Every key of a [profile](../recorders.md), from the model that reads it. None is needed.
 """
 
-TITLES = {
-    "SpeedDescription": "[speed]",
-    "Rotor": "[rotor]",
-    "Material": "[rotor.materials.NAME]",
-    "SectionByLength": "[[rotor.sections]] by length",
-    "SectionByNodes": "[[rotor.sections]] by nodes",
-    "Disc": "[[rotor.discs]]",
-    "BalanceGrade": "[balance_grade]",
-    "Unbalance": "[[unbalances]]",
-    "TouchdownBearing": "[[touchdown_bearings]]",
-    "BallBearing": "[touchdown_bearings.bearing]",
-    "Race": "[touchdown_bearings.race]",
-    "Contact": "[touchdown_bearings.contact]",
-    "Friction": "[touchdown_bearings.friction]",
-    "Support": "[touchdown_bearings.support]",
-    "ActiveMagneticBearing": "[[ambs]]",
-    "Sensor": "[[sensors]]",
-    "CalibrationOrigin": "[calibration]",
-    "CalibrationDrop": "[[calibration.drops]]",
-}
-"""Where in the file each part stands, in the order of the page."""
-
 
 def machine_page() -> str:
     """Every key of a machine file."""
     schema = machine_schema()
     parts = schema["$defs"]
-    kinds = {name: part for name, part in parts.items() if name not in TITLES}
-    lines = [MACHINE, "## At the top", "", *_table(schema, kinds)]
-    for name, title in TITLES.items():
-        lines += [
-            "",
-            f"## `{title}`",
-            "",
-            str(parts[name].get("description", "")),
-            "",
-            *_table(parts[name], kinds),
-        ]
+    lines = [MACHINE, "## At the top", "", *_table(schema, parts)]
+    # a part that may stand at two places is described where it stands first
+    headings: dict[str, str] = {}
+    for name, heading in _headings(schema, parts, ""):
+        headings.setdefault(name, heading)
+    for name, heading in headings.items():
+        about = str(parts[name].get("description", ""))
+        lines += ["", f"## {heading}", "", about, "", *_table(parts[name], parts)]
     return "\n".join([*lines, ""])
+
+
+def _headings(part: Mapping[str, Any], parts: Mapping[str, Any], path: str) -> Iterator[tuple[str, str]]:
+    """Every part below another and where in the file it stands, in the order of its keys."""
+    for key, entry in part["properties"].items():
+        tables = _tables(entry, f"{path}.{key}" if path else key)
+        held = [(name, table) for name, table in tables if "properties" in parts[name]]
+        for name, table in held:
+            words = re.sub(r"(?<!^)(?=[A-Z])", " ", name).lower()
+            yield name, f"`{table}`" if len(held) == 1 else f"`{table}`, {words}"
+            yield from _headings(parts[name], parts, table.strip("[]"))
+
+
+def _tables(entry: Mapping[str, Any], place: str, brackets: str = "[{}]") -> Iterator[tuple[str, str]]:
+    """Parts that a key may hold, each with the header of its table."""
+    if "$ref" in entry:
+        yield entry["$ref"].split("/")[-1], brackets.format(place)
+    if "items" in entry:
+        yield from _tables(entry["items"], place, "[[{}]]")
+    if isinstance(entry.get("additionalProperties"), Mapping):
+        yield from _tables(entry["additionalProperties"], f"{place}.NAME")
+    for choices in ("anyOf", "oneOf", "allOf"):
+        for one in entry.get(choices, ()):
+            yield from _tables(one, place, brackets)
 
 
 def profile_page() -> str:
@@ -106,6 +106,7 @@ def _example(entry: Mapping[str, Any], kinds: Mapping[str, Any]) -> str:
 def _of_type(entry: Mapping[str, Any]) -> str:
     types = [entry.get("type"), *(one.get("type") for one in entry.get("anyOf", ()))]
     names = {"string": "text", "integer": "whole number", "number": "number", "boolean": "`true`, `false`"}
+    names["array"] = "list"
     return next((names[one] for one in types if isinstance(one, str) and one in names), "table")
 
 

@@ -27,7 +27,7 @@ travel of slip: by harmonic balance 0.2643 r / (1 + 0.2455 r)."""
 SLIP_TRAVEL = (25e-6, 5e-6, 100e-6)
 """Travel at which a ribbon slips [m] and its range, where no slip force is given: chosen, not measured."""
 
-_OF_SUPPORT: Mapping[str, tuple[str, ...]] = {
+ELEMENTS: Mapping[str, tuple[str, ...]] = {
     "spring": ("stiffness", "damping", "damping_ratio", "cubic"),
     "ribbon": ("stiffness",),
     "maxwell": ("stiffness",),
@@ -171,7 +171,7 @@ def mounted(raw: dict[str, Any]) -> dict[str, Any]:
     support = dict(given) if isinstance(given, Mapping) else {}
     for k, element in enumerate(elements):
         kind, rest = _element(element, ("mount", k))
-        for key in [key for key in _OF_SUPPORT[kind] if key in rest]:
+        for key in [key for key in ELEMENTS[kind] if key in rest]:
             if key in support or not isinstance(given, Mapping):
                 raise Misfit(
                     f"the support has a {key!r} already, and so does this {kind}; state their sum once",
@@ -191,12 +191,16 @@ def mounted(raw: dict[str, Any]) -> dict[str, Any]:
 def _element(element: Any, place: tuple[str | int, ...]) -> tuple[str, dict[str, Any]]:
     """Kind of an element, and the rest of it."""
     kind = element.get("kind") if isinstance(element, Mapping) else None
-    if not isinstance(kind, str) or kind not in _OF_SUPPORT:
+    if not isinstance(kind, str) or kind not in ELEMENTS:
         shown = repr(element if kind is None else kind)
-        raise Misfit(f"{shown} is no element of a mount; its kind is one of {', '.join(_OF_SUPPORT)}", place)
+        raise Misfit(f"{shown} is no element of a mount; its kind is one of {', '.join(ELEMENTS)}", place)
     rest = {key: value for key, value in element.items() if key != "kind"}
     if kind == "maxwell" and not (set(rest) <= {"stiffness", "branches"} and rest.get("branches")):
-        raise Misfit('write branches = [{ stiffness = "4e6 N/m", time = "30 ms" }, ...]', place)
+        raise Misfit(
+            "a maxwell element of a mount has branches, and may state the 'stiffness' of the spring; "
+            'write branches = [{ stiffness = "4e6 N/m", time = "30 ms" }, ...]',
+            place,
+        )
     return kind, rest
 
 

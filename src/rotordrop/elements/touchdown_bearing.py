@@ -31,13 +31,13 @@ _MOUNTING = frozenset(
     ("arrangement", "first_ball_angle", "second_row_offset", "preload_class", "clearance_class")
 )
 
-_WITHOUT_BALLS: Mapping[str, type[RaceBearing]] = {"sleeve": Sleeve}
+WITHOUT_BALLS: Mapping[str, type[RaceBearing]] = {"sleeve": Sleeve}
 """Kinds of touchdown bearings whose table 'bearing' describes no ball bearing."""
 
 
 def _of_its_kind(raw: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
     """Read a table 'bearing' as the kind of touchdown bearing says."""
-    kind = _WITHOUT_BALLS.get(info.data.get("kind", ""))
+    kind = WITHOUT_BALLS.get(info.data.get("kind", ""))
     if kind is None:
         return handler(raw)
     return raw if isinstance(raw, kind) else kind.model_validate(raw)
@@ -111,7 +111,7 @@ class TouchdownBearing(Placed):
                 'kind = "planetary" is reserved for bearings of several rollers, which are not yet supported'
             )
             raise Misfit(f'{told}; there are "ball bearing" and "sleeve"', ("kind",))
-        return mounted({"bearing": {}} | raw if raw.get("kind") in _WITHOUT_BALLS else raw)
+        return mounted({"bearing": {}} | raw if raw.get("kind") in WITHOUT_BALLS else raw)
 
     def check(self) -> None:
         """Refuse a clearance that leaves no rotor and a bore outside the balls."""

@@ -8,6 +8,8 @@ from typing import Any
 
 from rotordrop.elements.catalog.boundary import CLASSES
 from rotordrop.elements.description import Description
+from rotordrop.elements.mount import ELEMENTS
+from rotordrop.elements.touchdown_bearing import WITHOUT_BALLS
 from rotordrop.elements.values import KIND_MARK, STATUSES
 from rotordrop.json_schema import DIALECT, TEXT
 from rotordrop.known import Known
@@ -20,6 +22,8 @@ def machine_schema() -> dict[str, Any]:
     schema = _described(Machine)
     _add_shaft_table(schema["$defs"]["Rotor"])
     _add_shorthand(schema["$defs"])
+    _add_bearing_kinds(schema["$defs"])
+    _add_mount_elements(schema["$defs"])
     return _finished(schema, "rotordrop machine file")
 
 
@@ -163,6 +167,60 @@ def _add_shaft_table(rotor: dict[str, Any]) -> None:
         "description": "Position of every node, for sections given by nodes",
         "anyOf": [{"type": "array", "items": {KIND_MARK: "length"}}, table],
     }
+
+
+def _add_bearing_kinds(parts: dict[str, Any]) -> None:
+    """Let the kind of a touchdown bearing say what its table 'bearing' holds; without balls it may lack."""
+    bearing = parts["TouchdownBearing"]
+    choices = bearing["properties"]["bearing"]
+    balls = {"$ref": choices.pop("$ref")}
+    choices["anyOf"] = [balls]
+    bearing["required"].remove("bearing")
+    others = {"required": ["kind"], "properties": {"kind": {"enum": list(WITHOUT_BALLS)}}}
+    bearing["allOf"] = [{"if": others, "else": {"required": ["bearing"], "properties": {"bearing": balls}}}]
+    for name, kind in WITHOUT_BALLS.items():
+        parts[kind.__name__] = kind.model_json_schema()
+        _describe(parts[kind.__name__], kind)
+        inside = {"$ref": f"#/$defs/{kind.__name__}"}
+        choices["anyOf"].append(inside)
+        named = {"required": ["kind"], "properties": {"kind": {"const": name}}}
+        bearing["allOf"].append({"if": named, "then": {"properties": {"bearing": inside}}})
+
+
+PLAIN_SPRING = "Plain spring and damper of the support, such as the elastic part of a ribbon"
+
+
+def _add_mount_elements(parts: dict[str, Any]) -> None:
+    """Let a mount be a list of elements in parallel, as files write it."""
+    held, support = parts["Mount"]["properties"], parts["Support"]["properties"]
+    elements = []
+    for kind, of_support in ELEMENTS.items():
+        part: dict[str, Any] = {"properties": {}}
+        if kind == "maxwell":
+            part = {"properties": {"branches": held[kind] | {"minItems": 1}}, "required": ["branches"]}
+        elif kind in held:
+            part = parts[kind.capitalize()]
+        about = part.get("description", held.get(kind, {"description": PLAIN_SPRING})["description"])
+        name = f"{kind.capitalize()}Element"
+        elements.append({"$ref": f"#/$defs/{name}"})
+        parts[name] = {
+            "type": "object",
+            "description": f"An element of a mount, in parallel to the others. {about}",
+            "properties": {
+                "kind": {"enum": [kind], "description": "What it is"},
+                **{key: dict(entry) for key, entry in part["properties"].items()},
+                **{
+                    key: support[key]
+                    | {"description": f"{PLAIN_SPRING}; stands for {key!r} of the table 'support'"}
+                    for key in of_support
+                },
+            },
+            "required": ["kind", *part.get("required", [])],
+            "additionalProperties": False,
+        }
+    mount = parts["TouchdownBearing"]["properties"]["mount"]
+    table = {"$ref": mount.pop("$ref")}
+    mount["anyOf"] = [{"type": "array", "items": {"oneOf": elements}}, table]
 
 
 def _add_shorthand(parts: dict[str, Any]) -> None:
