@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from rotordrop.track.force_estimate import ForceEstimate as ForceEstimate
     from rotordrop.track.force_estimate import estimate_force as estimate_force
     from rotordrop.twin.calibrated import calibrate_machine as calibrate_machine
+    from rotordrop.twin.stream import StreamStep as StreamStep
+    from rotordrop.twin.stream import track_stream as track_stream
     from rotordrop.units import format_quantity as format_quantity
     from rotordrop.units import parse_quantity as parse_quantity
 
@@ -82,7 +84,9 @@ _PUBLIC = {
     "run_study": "rotordrop.study.run",
     "save_machine": "rotordrop.machine.saving",
     "simulate_drop": "rotordrop.simulate.drop",
+    "StreamStep": "rotordrop.twin.stream",
     "sweep": "rotordrop.study.run",
+    "track_stream": "rotordrop.twin.stream",
 }
 
 __all__ = ["__version__", *_PUBLIC]

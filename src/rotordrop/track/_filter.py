@@ -64,10 +64,14 @@ def take_off(P: Array, before: Array, count: int) -> None:
     """
     n = P.shape[0]
     for i in range(n):
-        for c in range(count):
-            weight = before[c, i]
+        for c in range(0, count - 1, 2):
+            one, two = before[c, i], before[c + 1, i]
             for j in range(n):
-                P[i, j] -= weight * before[c, j]
+                P[i, j] = (P[i, j] - one * before[c, j]) - two * before[c + 1, j]
+        if count % 2 == 1:
+            weight = before[count - 1, i]
+            for j in range(n):
+                P[i, j] -= weight * before[count - 1, j]
 
 
 @lean_kernel
@@ -290,9 +294,9 @@ def backward_pass(
         Linear functions of the estimate whose smoothed covariance is wanted at every sample.
     kept : ndarray, shape (K,)
         Samples, rising, whose Λ is wanted.
-    smoothed : ndarray, shape (N, n)
+    smoothed : ndarray, shape (N, n) or (0, n)
         Filled with the smoothed estimate.
-    blocks : ndarray, shape (N, G, G)
+    blocks : ndarray, shape (N, G, G) or (0, ...)
         Filled with the smoothed covariance of the watched functions.
     filtered, information : ndarray, shape (K, n, n)
         Filled with P and Λ of the kept samples: the smoothed covariance is ``P − P Λ P``.
@@ -311,10 +315,11 @@ def backward_pass(
     seen = np.empty(n, dtype=np.int64)
     left = kept.shape[0] - 1
     for i in range(n_t - 1, first - 1, -1):
-        unpack(covariances[i], P)
-        smoothed[i] = means[i] - np.dot(P, lam)
-        spread = np.dot(watched, P)
-        blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)
+        if smoothed.shape[0] > 0:
+            unpack(covariances[i], P)
+            smoothed[i] = means[i] - np.dot(P, lam)
+            spread = np.dot(watched, P)
+            blocks[i] = np.dot(spread, watched.T) - np.dot(np.dot(spread, Lam), spread.T)
         if left >= 0 and kept[left] == i:
             filtered[left] = P
             information[left] = Lam
@@ -337,8 +342,8 @@ def backward_pass(
                     seen[count] = a
                     count += 1
             for a in range(n):
-                for e in range(count):
-                    Lam[a, seen[e]] -= lk[a] * row[seen[e]]
+                for b in range(n):  # every entry: faster than those alone that are not zero
+                    Lam[a, b] -= lk[a] * row[b]
             for e in range(count):
                 a = seen[e]
                 for b in range(n):

@@ -254,11 +254,17 @@ def sparse_product(entries: Array, columns: Integers, starts: Integers, V: Array
     for i in range(starts.shape[0] - 1):
         for j in range(c):
             out[i, j] = 0.0
-        for e in range(starts[i], starts[i + 1]):
-            value = entries[e]
-            k = columns[e]
+        e, end = starts[i], starts[i + 1]
+        # Four entries in one go, summed in their order: ``out`` is fetched and stored a quarter as often.
+        while e + 3 < end:
+            a, b, g, h = entries[e], entries[e + 1], entries[e + 2], entries[e + 3]
+            k, m, n, o = columns[e], columns[e + 1], columns[e + 2], columns[e + 3]
             for j in range(c):
-                out[i, j] += value * V[k, j]
+                out[i, j] = (((out[i, j] + a * V[k, j]) + b * V[m, j]) + g * V[n, j]) + h * V[o, j]
+            e += 4
+        while e < end:
+            add_row(entries[e], V[columns[e]], out[i])
+            e += 1
 
 
 @lean_kernel
@@ -388,6 +394,9 @@ def propagate(
     touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
     middle = y.copy()
+    # What acts on the rotor alone does so evenly; in a contact position and gap must see the same, or the gap
+    # looks too well known.
+    once = not np.any(targets.acts[:, :-1])
     step = (1.0 + p.spin[L.CLOCK_ERROR]) * settings.dt / settings.substeps
     h = step * settings.frozen
     F[:, :] = 0.0
@@ -405,8 +414,7 @@ def propagate(
                 middle = y.copy()
         drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
         gather_entries(J, entries, places, starts)
-        # at every stretch: position and gap must see the same contact, or the gap looks too well known
-        if columns > s:
+        if columns > s and (stretch == 0 or not once):
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
         for c in range(p.contact_at.shape[0]):

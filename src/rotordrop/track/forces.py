@@ -126,7 +126,8 @@ class ForceHistory:
     displacement_sigma: Array
     """Rotor at the bearing nodes and standard deviation [m], shape (N, B, 2)."""
     friction_sigma: Array
-    """Relative standard deviation of the dynamic friction coefficient [1], shape (B,)."""
+    """Relative standard deviation of the dynamic friction coefficient [1], shape (B,); zero where it is not
+    estimated."""
 
 
 def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
@@ -241,10 +242,12 @@ def _indentation_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
 
 
 def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
-    variances = np.diag(smoothed.covariance(parameter_sample(smoothed)))
     bearings = range(problem.model.layout.n_bearings)
-    places = [problem.entries_that_set("bearing", b, L.FRICTION_DYNAMIC)[0] for b in bearings]
-    return np.sqrt(np.maximum(variances[places], 0.0))
+    places = [problem.entries_that_set("bearing", b, L.FRICTION_DYNAMIC) for b in bearings]
+    if not any(places):
+        return np.zeros(len(places))
+    variances = np.diag(smoothed.covariance(parameter_sample(smoothed)))
+    return np.sqrt(np.maximum(variances[[entries[0] for entries in places]], 0.0))
 
 
 def displacements_of(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:

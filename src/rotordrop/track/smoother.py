@@ -182,7 +182,10 @@ class Storage:
 
 @dataclass(frozen=True, kw_only=True)
 class _Course:
-    """What every stretch of a pass starts from: the problem, where it begins, where it is linearised."""
+    """What every stretch of a pass starts from: the problem, where it begins, where it is linearised.
+
+    ``resumed`` is 1 where the first sample is the last one of the pass before, else 0.
+    """
 
     problem: DropProblem
     settings: P.FilterSettings
@@ -190,6 +193,7 @@ class _Course:
     reference: Array
     length: int
     smoothing: bool
+    resumed: int
 
     def stretch(self, first: int, count: int, storage: Storage) -> Stretch:
         """Room for the samples of a stretch."""
@@ -216,7 +220,7 @@ class _Course:
         chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
         stretch = self.stretch(first, chosen.stop - first, storage)
         done = F.forward_pass(
-            min(first, 1),
+            min(first + self.resumed, 1),
             means[first].copy() if first else self.mean,
             covariance,
             problem.time[chosen],
@@ -249,9 +253,9 @@ class Forward:
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
     unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read; ``last`` is the
-    covariance (n, n) of the last sample reached, in single precision. What the smoother needs besides is
-    filtered again from ``starts``, the covariances at the beginning of every stretch: kept for all samples it
-    would be hundreds of megabytes.
+    covariance (n, n) of the last sample reached, in single precision, and ``reached`` the same as it is. What
+    the smoother needs besides is filtered again from ``starts``, the covariances at the beginning of every
+    stretch: kept for all samples it would be hundreds of megabytes.
     """
 
     done: int
@@ -261,6 +265,7 @@ class Forward:
     innovation_variances: Array
     parameter_sample: int
     last: Array
+    reached: Array
     course: _Course
     starts: tuple[Array, ...]
 
@@ -316,6 +321,7 @@ def forward(
     samples: int | None = None,
     smoothing: bool = True,
     storage: Storage | None = None,
+    after: Forward | None = None,
 ) -> Forward:
     """Run the filter over the first samples of a problem.
 
@@ -331,8 +337,13 @@ def forward(
         Keep what the smoother needs.
     storage : Storage, optional
         Where to keep it: what an earlier pass left there is overwritten.
+    after : Forward, optional
+        A pass to go on from with its settings, in place of a start estimate: its last sample is the first of
+        the problem.
     """
     count = len(problem.time) if samples is None else min(samples, len(problem.time))
+    if after is not None:
+        mean, covariance = after.means[after.done - 1], after.reached
     mean = problem.mean if mean is None else mean
     P = np.array(problem.covariance if covariance is None else covariance)
     n, updates = len(mean), problem.n_channels + 1
@@ -341,13 +352,18 @@ def forward(
         problem=problem,
         settings=settings.for_sampling(
             dt, fastest_frequency(problem), problem.first_contact, problem.impulse_in_fall
-        ),
+        )
+        if after is None
+        else after.course.settings,
         mean=np.ascontiguousarray(mean),
         reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
         length=_stretch_length(problem) if smoothing else count,
         smoothing=smoothing,
+        resumed=0 if after is None else 1,
     )
     filled = np.empty((count, n)), np.empty((count, updates)), np.empty((count, updates))
+    if after is not None:  # its readings have been taken already
+        filled[0][0], filled[1][0], filled[2][0] = mean, np.nan, np.nan
     storage, starts = storage or Storage(), []
     for first in range(0, max(count - 1, 1), course.length):
         starts.append(P.copy())
@@ -362,6 +378,7 @@ def forward(
         innovation_variances=filled[2],
         parameter_sample=problem.parameter_sample,
         last=_unpacked(stretch, max(done - 1, 0), n) if smoothing else P,
+        reached=P,
         course=course,
         starts=tuple(starts),
     )
@@ -421,13 +438,15 @@ def smooth(
     watched: Array | None = None,
     kept: Sequence[int] | None = None,
     storage: Storage | None = None,
+    part: tuple[int, int] | None = None,
+    carried: bool = False,
 ) -> Smoothed:
     """Run the backward pass.
 
     Parameters
     ----------
     score, information : ndarray, shapes (n,), (n, n), optional
-        What later drops say about the last sample.
+        What later drops, or later samples, say about the last sample.
     watched : ndarray, shape (G, n), optional
         Linear functions of the estimate whose covariance is wanted at every sample.
     kept : sequence of int, optional
@@ -435,8 +454,13 @@ def smooth(
         and the last.
     storage : Storage, optional
         That of the forward pass, whose last stretch is at hand there.
+    part : tuple of int, optional
+        Samples from the first to before the second are smoothed; all by default. Others are left empty.
+    carried : bool
+        Carry back what later readings say, and leave all samples empty.
     """
-    done, n = filtered.done, filtered.means.shape[1]
+    n, course = filtered.means.shape[1], filtered.course
+    begin, done = part or (course.resumed, filtered.done)
     wanted = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
     chosen = np.unique(np.asarray(wanted, dtype=np.int64))
     rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
@@ -445,10 +469,13 @@ def smooth(
     spread, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
     lam = np.zeros(n) if score is None else score.copy()
     Lam = np.zeros((n, n)) if information is None else information.copy()
-    for stretch in _from_the_last(filtered, storage or Storage()):
+    last = min(max(done - 2, 0) // course.length, len(filtered.starts) - 1)
+    for stretch in _from_the_last(filtered, storage or Storage(), last):
         first = stretch.first
-        samples = slice(first, min(first + filtered.course.length + 1, done))
-        held, own = slice(0, samples.stop - first), min(first, 1)
+        samples = slice(first, min(first + course.length + 1, done))
+        held, own = slice(0, samples.stop - first), max(begin - first, min(first, 1))
+        if own >= samples.stop - first:
+            break
         inside = slice(*np.searchsorted(chosen, (first + own, samples.stop)))
         F.backward_pass(
             own,
@@ -459,10 +486,10 @@ def smooth(
             stretch.gains[held],
             filtered.innovations[samples],
             filtered.innovation_variances[samples],
-            filtered.course.problem.sensor_form.noise_decay,
+            course.problem.sensor_form.noise_decay,
             rows,
             chosen[inside] - first,
-            means[samples],
+            means[:0] if carried else means[samples],
             blocks[samples],
             spread[inside],
             stored[inside],
@@ -481,11 +508,13 @@ def smooth(
     )
 
 
-def _from_the_last(filtered: Forward, storage: Storage) -> Iterator[Stretch]:
-    """The stretches of a pass, backwards; while one is used, the one before it is filtered again."""
+def _from_the_last(filtered: Forward, storage: Storage, number: int) -> Iterator[Stretch]:
+    """The stretches of a pass from one backwards; while one is used, the one before it is filtered again."""
+    if number == 0:  # a thread would take as long to begin as a short pass
+        yield filtered.stretch(0, storage)
+        return
     here, there = storage, Storage()
     with ThreadPoolExecutor(max_workers=1) as ahead:
-        number = len(filtered.starts) - 1
         coming = ahead.submit(filtered.stretch, number, here)
         while number > 0:
             stretch, number = coming.result(), number - 1

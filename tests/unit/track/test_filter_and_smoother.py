@@ -563,3 +563,36 @@ def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch
     impulse = SETTINGS.impulse
     assert asked == [(impulse, True), (impulse, False), (8.0 * impulse, False)]
     assert smoothed.filtered.impulse == 8.0 * impulse
+
+
+def test_a_pass_that_goes_on_gives_the_bits_of_one_in_one_go(impacts: DropProblem) -> None:
+    whole = forward(impacts, SETTINGS)
+    cut, count = 200, len(impacts.time)
+
+    def part(samples: slice) -> DropProblem:
+        return replace(
+            impacts,
+            time=impacts.time[samples],
+            readings=impacts.readings[samples],
+            speed=impacts.speed[samples],
+        )
+
+    first = forward(part(slice(0, cut + 1)), SETTINGS)
+    then = forward(part(slice(cut, count)), SETTINGS, after=first)
+    np.testing.assert_array_equal(first.means, whole.means[: cut + 1])
+    np.testing.assert_array_equal(then.means, whole.means[cut:])
+    np.testing.assert_array_equal(then.innovations[1:], whole.innovations[cut + 1 :])
+    assert then.negative_log_likelihood + first.negative_log_likelihood == pytest.approx(
+        whole.negative_log_likelihood
+    )
+    # backwards in four parts, of the last of which nothing but what it says of the others is wanted
+    smoothed = smooth(whole, watched=impacts.watched, kept=())
+    middle = count - cut - 50
+    late = smooth(then, kept=(), part=(middle, count - cut), carried=True)
+    score, information = late.score_0, late.information_0
+    for filtered, begin, end in ((then, 1, middle), (first, 100, cut + 1), (first, 0, 100)):
+        back = smooth(filtered, score, information, watched=impacts.watched, kept=(), part=(begin, end))
+        score, information = back.score_0, back.information_0
+        there = slice(begin + (cut if filtered is then else 0), end + (cut if filtered is then else 0))
+        np.testing.assert_array_equal(back.means[begin:end], smoothed.means[there])
+        np.testing.assert_array_equal(back.watched[begin:end], smoothed.watched[there])
