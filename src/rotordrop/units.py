@@ -318,9 +318,9 @@ def format_amount(number: float) -> str:
     """
     rounded = float(f"{number:.3g}")
     if 0.0 < abs(number) < 1e-3:
-        return "< 0.001" if number > 0.0 else "> -0.001"
+        return "< 0.001" if number > 0.0 else "> −0.001"
     factor, word = next((one for one in _WORDS if abs(rounded) >= one[0]), (1.0, ""))
-    return f"{rounded / factor:.15g} {word}".rstrip()
+    return f"{rounded / factor:.15g} {word}".rstrip().replace("-", "−")
 
 
 def format_moment(time: float) -> str:

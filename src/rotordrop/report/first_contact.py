@@ -50,6 +50,10 @@ def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOW
 
 def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column: int) -> None:
     start, end = MILLI * contact.start, MILLI * contact.end
+    # of an estimate lift-off has no known error, and the depth has that of the air gap
+    exact, gap = bearing.peak_force.interval_90 is None, bearing.values.get("air_gap_m")
+    beyond = (0.0,) if exact or gap is None else (gap.value - gap.high, gap.value - gap.low)
+    depths = [max(MICRO * (contact.indentation + one), 0.0) for one in beyond]
     figure.add_vrect(x0=start, x1=end, fillcolor=CONTACT_FILL, line_width=0, row=1, col=column)
     for value in (start, end):
         upright(figure, value, MUTED, "dot", row=1, col=column)
@@ -57,7 +61,7 @@ def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column
         x=end,
         y=1.0,
         yref="y domain" if column == 1 else f"y{column} domain",
-        text=f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms",
+        text=f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂",
         showarrow=False,
         xanchor="left",
         yanchor="top",
@@ -71,7 +75,7 @@ def _mark(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column
     figure.add_annotation(
         x=MILLI * contact.deepest_time,
         y=MICRO * depth,
-        text=f"indentation {MICRO * contact.indentation:.1f} µm",
+        text=f"indentation {' to '.join(f'{one:.1f}' for one in depths)} µm",
         showarrow=True,
         arrowhead=2,
         arrowcolor=LIMIT,

@@ -287,7 +287,7 @@ def unbroken(text: str) -> str:
 
 
 def with_error(value: float, error: float | None, unit: str) -> str:
-    """Write a number with its standard error, both to two digits of the error; without one to three places.
+    """Write a number with its standard error, both to two digits of the error; without one to three digits.
 
     Examples
     --------
@@ -296,7 +296,7 @@ def with_error(value: float, error: float | None, unit: str) -> str:
     '28.761 ± 0.011 Hz'
     """
     if error is None or not math.isfinite(error) or error <= 0.0:
-        return f"{written(value, 3)} {unit}"
+        return f"about {written(value, max(0, 2 - _magnitude(value)))} {unit}"
     places = min(12, max(0, 1 - _magnitude(error)))
     return f"{written(value, places)} ± {written(error, places)} {unit}"
 

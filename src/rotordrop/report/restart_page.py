@@ -67,7 +67,7 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
         summary=(_answers(card), _checks(card)),
         facts=(("assumptions", card.assumptions.source), ("estimate", drop.verdict)),
         sections=(
-            Section("What may be damaged", tables=(_suspected(card), _evidence(card))),
+            Section("What may be damaged", tables=(_suspected(card), *_evidence(card))),
             Section("On what the answer hangs", tables=(_flips(card), _costs(card), kinds)),
             _next(card),
         ),
@@ -76,7 +76,7 @@ def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
 
 def restart_section(card: RestartCard) -> Section:
     """The card as a part of the report on its drop: answer, costs, checks, what may be damaged."""
-    tables = (_answers(card), _checks(card), _suspected(card), _evidence(card))
+    tables = (_answers(card), _checks(card), _suspected(card), *_evidence(card))
     return Section(RESTART, statements=_said(card), tables=tables)
 
 
@@ -143,7 +143,9 @@ def _suspected(card: RestartCard) -> Table:
     )
 
 
-def _evidence(card: RestartCard) -> Table:
+def _evidence(card: RestartCard) -> tuple[Table, ...]:
+    if not card.indicators:
+        return ()
     kinds = card.assumptions.damages
     columns = (
         Column("found", "what"),
@@ -151,8 +153,7 @@ def _evidence(card: RestartCard) -> Table:
         Column("speaks of a", lambda one: kinds[one.kind].label),
         Column("odds times", lambda one: format_amount(one.ratio)),
     )
-    note = "" if card.indicators else "No earlier estimate of this machine was given, or it says nothing."
-    return table(card.indicators, columns, "What changed since the earlier drop", note)
+    return (table(card.indicators, columns, "What changed since the earlier drop"),)
 
 
 def _flips(card: RestartCard) -> Table:

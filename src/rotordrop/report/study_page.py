@@ -27,7 +27,18 @@ from rotordrop.report.content import (
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
 from rotordrop.report.spread import ends, percent, study_numbers_of
-from rotordrop.report.style import OVER, SERIES, axis_title, bars, curve, fit_legend, panels, plain, upright
+from rotordrop.report.style import (
+    MUTED,
+    OVER,
+    SERIES,
+    axis_title,
+    bars,
+    curve,
+    fit_legend,
+    panels,
+    plain,
+    upright,
+)
 from rotordrop.simulate.clearances import share_column, stopped
 from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import LIFT, Quantity
@@ -57,6 +68,8 @@ QUANTILES = (
     "Quantiles over the drops with 90 % intervals from order statistics: how well the number of drops "
     'determines them. "Or more" and "or less" mean that more drops are needed.'
 )
+DRAWN_DROPS = 1000
+"""Drops of a scatter, at even steps of all; chosen, not measured."""
 SHARES_OF_VARIANCE = (
     "Alone: the part of the variance over the drops that would go if this value were known. With all others: "
     'the part that would be left if everything else were known; it takes the design "sensitivity". What no '
@@ -307,7 +320,7 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
     asked += seen.items()
     figures = []
     for quantity, limit in asked:
-        what = "Quantiles of" if limit is None else "Probability among"
+        what = "Every drop, and quantiles of" if limit is None else "Probability among"
         caption = f"{what} drops with neighbouring values; bars: 90 % intervals."
         figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
     if results.study.looped:
@@ -346,6 +359,18 @@ def _map_figure(
     for column, bearing in enumerate(bearings, start=1):
         shown = _quantity(results, bearing, quantity)
         size, size_unit = display_unit(shown.kind) if limit is None else (1.0, "")
+        if limit is None:
+            some = slice(None, None, -(-len(results) // DRAWN_DROPS))
+            curve(
+                figure,
+                results.column(name)[some] / factor,
+                results.column(f"{bearing}.{quantity}")[some] / size,
+                "a drop",
+                column=column,
+                mode="markers",
+                marker={"color": MUTED, "size": 4, "opacity": 0.45},
+                legend=column == 1,
+            )
         for k, share in enumerate(SHARES if limit is None else SHARES[:1]):
             cells = results.map(f"{bearing}.{quantity}", name, share=share, above=limit)
             known: list[Known] = [cell["known"] for cell in cells]

@@ -217,6 +217,14 @@ def test_the_first_contact_is_marked_with_its_times_and_depth() -> None:
     texts = [note.text for note in drawn.layout.annotations]
     assert "t₁ 7.75, t₂ 8.70, T 0.95 ms" in texts
     assert "indentation 20.0 µm" in texts
+    known = Known(value=3333.1, interval_90=(3180.0, 3490.0), unit="N")
+    gap = Known(value=275e-6, interval_90=(270e-6, 279e-6), unit="m")
+    of_estimate = drop("DE", first_contact=contact, values={"air_gap_m": gap})
+    peak = replace(of_estimate.peak_force, known=known)
+    said = first_contact_figure([replace(of_estimate, peak_force=peak)]).layout.annotations
+    texts = [note.text for note in said]
+    assert "indentation 16.0 to 25.0 µm" in texts  # as sure as the air gap
+    assert not any("T 0.95" in text for text in texts), "nobody knows the error of a lift-off"
     lines = [shape for shape in drawn.layout.shapes if shape.xref == "x2" and shape.x0 == shape.x1]
     assert [round(shape.x0, 6) for shape in lines] == [7.75, 8.7]
     assert trace(drawn, "simulated").x[-1] == pytest.approx(40.0)

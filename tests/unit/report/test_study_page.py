@@ -153,3 +153,11 @@ def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page
 )
 def test_a_varied_value_is_named_in_words(name: str, words: str) -> None:
     assert spoken_value(example_machine("lp400"), name) == words
+
+
+def test_against_a_value_every_drop_is_a_point(results: StudyResults) -> None:
+    """Quantiles alone hid that a cell holds four drops."""
+    drawn = study_page(results, [FRICTION]).sections[2].figures[0].chart.data
+    points = [one for one in drawn if one.name == "a drop"]
+    assert [len(one.x) for one in points] == [DROPS, DROPS]
+    assert points[0].y == pytest.approx(results.column("NDE.peak_force"))

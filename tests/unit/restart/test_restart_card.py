@@ -386,11 +386,11 @@ def test_costs_and_chances_are_written_one_way_in_sentences_and_tables():
         (127.6, "128"),
         (1111.0, "1110"),
         (9.36e-14, "< 0.001"),
-        (-2e-9, "> -0.001"),
+        (-2e-9, "> −0.001"),
         (2.98e6, "2.98 million"),
         (999_999.9, "1 million"),
         (1.07e13, "10.7 trillion"),
-        (-0.0993, "-0.0993"),
+        (-0.0993, "−0.0993"),
     ],
 )
 def test_an_amount_is_written_as_one_says_it(number, text):
