@@ -30,6 +30,12 @@ _FLANK, _DELAY = (0.2, 0.6), 0.26e-3
 than the touch that line leaves the fall, by the windows of the velocities [s] (set with DropBench in
 view)."""
 
+_SUDDEN, _SUDDEN_WITHIN = 0.9, 1e-3
+"""What a deceleration that sets in at once leaves over of the motion up to so long after the touch [s], over
+what one that grows leaves, below which a contact is hard however long its deceleration seems to grow [1]: a
+light rotor rings on its race (soft contacts of 500 kg to 6 t leave 0.94 and more, ringing ones 0.74 and less).
+"""
+
 _RELEASE = 1e-3
 """Time after the release from which the deceleration counts as that of the fall [s] (chosen)."""
 
@@ -110,12 +116,14 @@ def first_touch(
     if near is None:
         return None
     released = max(near - int(math.sqrt(2.0 * _NEAREST * size / GRAVITY) * rate), 0)
-    flank = _flank(way, rate, (released, near))
+    soft, flank = None, _flank(way, rate, (released, near))
     if flank is not None and flank[1] > _SOFT * rate:
         begins, lasts = flank
         share = float(np.interp(begins, np.arange(len(way)), way)) / size
         if _FIRST_SOFT < share < _SURELY[1]:
-            return Touch(sample=begins, error=_FLANK_ERROR * lasts / rate, by_kink=True)
+            soft = Touch(sample=begins, error=_FLANK_ERROR * lasts / rate, by_kink=True)
+            if not _sets_in_at_once(place, begins, rate):
+                return soft
     far = _first_beyond(way, begin, _FARTHEST * size) or len(way) - 1
     last = min(far, near + int(_LATEST * rate))
     last = near + int(np.argmax(way[near : last + 1]))
@@ -126,12 +134,12 @@ def first_touch(
     limit = max(5.0 * noise, _RINGING * ringing, _LEAST * GRAVITY * unit)
     strong = np.flatnonzero((samples >= near) & (inward > limit))
     if not len(strong):
-        return None
+        return soft
     best = strong[0] + int(np.argmax(inward[strong[0] : strong[0] + int(_AFTER * rate) + 1]))
-    kink = _dated(place, int(samples[best]), rate)
+    kink = _dated(place, int(samples[best]), rate)[0]
     share = float(np.interp(kink, np.arange(len(way)), way)) / size
     if not _SURELY[0] < share < _SURELY[1]:
-        return None
+        return soft
     return Touch(sample=kink, error=math.hypot(_KINK_ERROR, 0.3 / rate), by_kink=True)
 
 
@@ -202,19 +210,40 @@ def _departures(
     return samples, -np.sum(moved * out, axis=1) / np.maximum(np.hypot(*out.T), 1e-12), unit
 
 
-def _dated(place: Array, near: int, rate: float) -> float:
-    """The kink [samples] that fits best: cubic before, and a parabola more after it."""
+def _sets_in_at_once(place: Array, begins: float, rate: float) -> bool:
+    """Whether a jump of the deceleration explains the motion better than its growth from a touch on."""
+    at_once, grown = (
+        _dated(place, round(begins), rate, after=_SUDDEN_WITHIN, searched=(-0.8e-3, 0.6e-3), power=power)[1]
+        for power in (2, 3)
+    )
+    return at_once < _SUDDEN * grown
+
+
+def _dated(
+    place: Array,
+    near: int,
+    rate: float,
+    *,
+    after: float = _AFTER,
+    searched: tuple[float, float] = _SEARCHED,
+    power: int = 2,
+) -> tuple[float, float]:
+    """The kink [samples] that fits best, a cubic before and a power of the time more after it; what is left.
+
+    A parabola is a deceleration that jumps, a cubic one that grows; what is left is a sum of squares [m²].
+    """
     index = np.arange(
         max(near - round(_BEFORE * rate), 0),
-        min(near + max(round(_AFTER * rate), 4), len(place) - 1) + 1,
+        min(near + max(round(after * rate), 4), len(place) - 1) + 1,
     )
     time = (index - near) / rate * 1e3
     cubic = np.linalg.qr(np.vander(time, 4))[0]
     readings = place[index] - place[near]
     rest = readings - cubic @ (cubic.T @ readings)
-    tried = np.arange(_SEARCHED[0] * 1e3, _SEARCHED[1] * 1e3, 0.02)
-    pushed = np.maximum(time - tried[:, None], 0.0) ** 2
+    tried = np.arange(searched[0] * 1e3, searched[1] * 1e3, 0.02)
+    pushed = np.maximum(time - tried[:, None], 0.0) ** power
     pushed -= (pushed @ cubic) @ cubic.T
     size = np.sum(pushed**2, axis=1)
     explained = np.sum((pushed @ rest) ** 2, axis=1) / np.maximum(size, 1e-12)
-    return near + float(tried[int(np.argmax(explained))]) * 1e-3 * rate
+    best = int(np.argmax(explained))
+    return near + float(tried[best]) * 1e-3 * rate, float(np.sum(rest**2) - explained[best])

@@ -18,6 +18,7 @@ from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
 from rotordrop.evidence.quality import Kind
 from rotordrop.evidence.quality.motion import check_slow_fall
+from rotordrop.evidence.touch import first_touch
 from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine
 from rotordrop.record.examples import example_record_path
@@ -634,3 +635,20 @@ def test_the_terminal_says_what_was_read_and_guessed(capsys):
     assert re.search(r"Read: .*_A, .*_B; .* at 20000 Hz, -0\.25 to ", said)
     assert "their sensors taken as perpendicular" in said
     assert "lost samples; without a machine file none looks at wiring, polarity, gains and gaps" in said
+
+
+@pytest.mark.parametrize(
+    "first, dip, second, lasts", [(60, 0.4, 80, 0.3), (80, 0.4, 120, 0.4), (60, 0.2, 80, 0.5)]
+)
+def test_a_hard_contact_that_rings_is_dated_by_its_first_thrust(first, dip, second, lasts):
+    """Two thrusts [m/s², ms] of a light rotor looked like one soft contact, dated 0.3 ms early."""
+    rate, touches = 20e3, 7e-3
+    time = np.arange(-20_000, 30_000) * 1e-6
+    since = 1e3 * (time - touches)
+    thrust = np.where((since > 0.0) & (since < lasts), first, 0.0)
+    thrust += np.where((since > lasts + dip) & (since < 2.0 * lasts + dip), second, 0.0)
+    height = -np.cumsum(np.cumsum(np.where(time < 0.0, 0.0, 9.81) - thrust)) * 1e-12
+    place = np.column_stack([np.zeros_like(height), height])[::50]
+    place += np.random.default_rng(1).normal(0.0, 0.3e-6, place.shape)
+    found = first_touch(place, np.zeros(2), rate, 300, 0.5 * 9.81 * touches**2 * 1.02, 0.3e-6)
+    assert found.when(time[::50]) == pytest.approx(touches, abs=0.1e-3)
