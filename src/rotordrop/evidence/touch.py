@@ -33,8 +33,8 @@ view)."""
 _SUDDEN, _SUDDEN_WITHIN = 0.9, 1e-3
 """What a deceleration that sets in at once leaves over of the motion up to so long after the touch [s], over
 what one that grows leaves, below which a contact is hard however long its deceleration seems to grow [1]: a
-light rotor rings on its race (soft contacts of 500 kg to 6 t leave 0.94 and more, ringing ones 0.74 and less).
-"""
+light rotor rings on its race (soft contacts of 500 kg and 1.6 t leave 0.94 and more, those of 5 kg that ring
+0.74 and less)."""
 
 _RELEASE = 1e-3
 """Time after the release from which the deceleration counts as that of the fall [s] (chosen)."""
