@@ -32,6 +32,7 @@ from rotordrop.evidence.paths import (
     with_impacts,
 )
 from rotordrop.evidence.quality import Finding, Kind, gate, not_seen, stops
+from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.motion import check_fall, check_given_gap, check_slow_fall
@@ -66,9 +67,6 @@ if TYPE_CHECKING:
 
 RELEASE_ERROR = 2e-3
 """Half width to which a look knows the release [s]."""
-
-BEFORE_RELEASE = 4e-3
-"""Distance from the release [s], known to `RELEASE_ERROR`, up to which the rotor surely floats."""
 
 INDEX_WINDOW = 0.2
 """Time from the release on over which the indices are taken [s], or to the end where that comes first."""
@@ -279,8 +277,12 @@ def look(
         guessed = (ends.words(read), *guessed)
         fell = read.of_channels(ends.columns(read, held=False))
         gaps = tuple(one for one, stays in zip(gaps, ends.held, strict=True) if not stays)
+    stated = arrangement is None or arrangement.angles_known
     try:
-        motion = motion_of(fell, gaps=gaps, angles_known=arrangement is None or arrangement.angles_known)
+        motion = motion_of(fell, gaps=gaps, angles_known=stated)
+        if evidence is None and stated:
+            turning = _speed_at(read, float(motion.time[int(np.argmin(motion.floats))]))
+            findings = ranked([*findings, *check_alone(fell, motion, turning)])
         drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
         if not drops:
             raise NothingFallsError(
@@ -303,7 +305,7 @@ def look(
         record=read,
         motion=motion,
         findings=findings,
-        not_seen=not_seen(evidence, passed=passed),
+        not_seen=not_seen(evidence, passed=passed, stated=stated),
         drops=drops,
         whirls=whirls_of(motion, drops[0]),
         planes=tuple(_plane_looks(motion, drops[0], turning)),

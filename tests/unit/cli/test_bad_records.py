@@ -57,10 +57,10 @@ FAULTS = {
         lambda record: record.window(-0.1, -0.01),
         r"no drop in the record: the vertical displacement spans 2\d\.?\d* µm.*by more than 35 %.*give a rec",
     ),
-    "polarity": (factors(-1, 1, 1, 1), r"inverted polarity S_NDE_A: .* leans 8\d° from .*correct the polari"),
+    "polarity": (factors(-1, 1, 1, 1), r"inverted polarity S_NDE_A: .* leans 8\d° from .*correct polari"),
     "axes": (
         lambda record: replace(record, signals=record.signals[:, [1, 0, 2, 3]]),
-        r"swapped axes S_NDE_A, S_NDE_B: .*orbit at node 5 runs against the spin.*correct the",
+        r"swapped axes S_NDE_A, S_NDE_B: .*orbit at NDE runs against the spin.*correct pol",
     ),
     "unit": (
         factors(1e3, 1e3, 1e3, 1e3),

@@ -453,7 +453,7 @@ class TestArrangement:
             found = only(reordered(edited, record, [1, 0, 2, 3]), machine)
             assert (found.kind, found.channel) == ("swapped axes", "S_NDE_A, S_NDE_B")
             assert (
-                "orbit at node 5 runs against the spin; it fits with S_NDE_A and S_NDE_B exchanged"
+                "orbit at NDE runs against the spin; it fits with S_NDE_A and S_NDE_B exchanged"
                 in found.message
             )
 

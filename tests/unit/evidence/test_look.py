@@ -634,7 +634,10 @@ def test_the_terminal_says_what_was_read_and_guessed(capsys):
     said = " ".join(capsys.readouterr().out.split())
     assert re.search(r"Read: .*_A, .*_B; .* at 20000 Hz, -0\.25 to ", said)
     assert "their sensors taken as perpendicular" in said
-    assert "lost samples; without a machine file none looks at wiring, polarity, gains and gaps" in said
+    assert (
+        "lost samples; without a machine file none looks at wiring, polarity, exchanged ends, gains and gaps"
+        in said
+    )
 
 
 @pytest.mark.parametrize(
@@ -652,3 +655,30 @@ def test_a_hard_contact_that_rings_is_dated_by_its_first_thrust(first, dip, seco
     place += np.random.default_rng(1).normal(0.0, 0.3e-6, place.shape)
     found = first_touch(place, np.zeros(2), rate, 300, 0.5 * 9.81 * touches**2 * 1.02, 0.3e-6)
     assert found.when(time[::50]) == pytest.approx(touches, abs=0.1e-3)
+
+
+@pytest.mark.parametrize(
+    "near, far, kinds",
+    [
+        ("NDE: NDE_X 0 deg, NDE_Y 90 deg", "DE: DE_X 0 deg, DE_Y 90 deg", []),
+        ("NDE: NDE_Y 0 deg, NDE_X 90 deg", "DE: DE_X 0 deg, DE_Y 90 deg", ["swapped axes"]),
+        ("NDE: NDE_X -45 deg, NDE_Y 45 deg", "DE: DE_X 0 deg, DE_Y 90 deg", ["leaning fall"]),
+        ("NDE: NDE_X 180 deg, NDE_Y 90 deg", "DE: DE_X 0 deg, DE_Y 90 deg", ["inverted polarity"]),
+        ("NDE: NDE_X 180 deg, NDE_Y 90 deg", "DE: DE_X 180 deg, DE_Y 90 deg", ["swapped axes"]),
+        ("NDE: DE_X 0 deg, DE_Y 90 deg", "DE: NDE_X 0 deg, NDE_Y 90 deg", []),
+        ("NDE: NDE_Y, NDE_X", "DE: DE_X, DE_Y", []),
+    ],
+)
+def test_stated_angles_are_held_against_the_fall_and_the_spin(near, far, kinds, tmp_path):
+    """Which way a plane reads shows without a machine; at which end it stands does not."""
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
+    seen = look(file, mapping=[near, far])
+    found = [
+        one for one in seen.findings if one.kind in ("swapped axes", "inverted polarity", "leaning fall")
+    ]
+    assert [one.kind for one in found] == kinds
+    for one in found:
+        assert "against the spin" in one.message or re.search(r"leans \d\d° from straight down", one.message)
+    assert "exchanged ends" in seen.not_seen
+    assert not seen.drops or ("wiring" in seen.not_seen) == ("deg" not in near)

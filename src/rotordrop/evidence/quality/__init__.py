@@ -369,15 +369,20 @@ SEEN_BY: Mapping[str, str] = {
 NO_CHECK_SEES = "No check sees: "
 
 
-def not_seen(evidence: Evidence | None, *, fell: bool = True, passed: Gate | None = None) -> str:
+def not_seen(
+    evidence: Evidence | None, *, fell: bool = True, passed: Gate | None = None, stated: bool = False
+) -> str:
     """What no check can see of this record, in a sentence; without evidence no machine is known.
+
+    Where the angles of the sensors are stated, the fall shows how they are wired, but not at which end.
 
     A gate that it did not pass whole says which checks were not asked.
     """
     said = f"{NO_CHECK_SEES}{', '.join(UNSEEN_ANYWHERE)}"
     if evidence is None or not fell:
         lacking = "a machine file" if evidence is None else "a fall"
-        return f"{said}; without {lacking} none looks at wiring, polarity, gains and gaps"
+        wiring = "exchanged ends" if stated and fell else "wiring, polarity, exchanged ends"
+        return f"{said}; without {lacking} none looks at {wiring}, gains and gaps"
     if passed is not None and (unasked := SEEN_BY.keys() - passed.asked):
         passes = ", ".join(words for name, words in SEEN_BY.items() if name in unasked)
         ended = ", ".join(dict.fromkeys(one.kind for one in passed.findings if one.severity == "stop"))

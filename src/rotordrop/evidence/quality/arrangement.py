@@ -7,6 +7,7 @@ levitated shape, see `rotordrop.evidence.quality.fall`.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from itertools import combinations
@@ -17,8 +18,10 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.record.axes import Plane, along_sensors
+from rotordrop.units import GRAVITY
 
 if TYPE_CHECKING:
+    from rotordrop.evidence.paths import Motion
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
@@ -29,6 +32,12 @@ MOST_TILT = 30.0
 
 CLEAR_ORBIT = 3.0
 """Forward over backward part of the orbit above which its sense is clear [1] (chosen)."""
+
+BEFORE_RELEASE = 4e-3
+"""Distance from a release of which a look knows to 2 ms [s], up to which the rotor surely floats."""
+
+_FEWEST_TURNS = 4
+"""Turns that show the sense of an orbit [1] (chosen)."""
 
 _AFTER_FALL = 0.06
 """Time over which the change by a fall is averaged [s] (chosen)."""
@@ -121,7 +130,7 @@ def check_planes(
                 "all of them",
                 remedy="either the shaft turns clockwise seen from the DE (x then points the other way), or "
                 "the sensors "
-                "are exchanged in every plane: correct the angles in the machine file or the channel map",
+                "are exchanged in every plane: correct their angles or the map of the channels",
                 severity="stop",
                 channel=", ".join(name for plane in planes for name in plane.names),
             )
@@ -132,6 +141,29 @@ def check_planes(
             continue
         findings.append(_plane_finding(plane, verdict, sunk, levitated_1x, fell_straight))
     return findings
+
+
+def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Finding]:
+    """Check sensors whose angles were stated, without a machine: the fall, and 1X before it where it shows.
+
+    The speed [rad/s] counts as counter-clockwise.
+    """
+    gone = np.flatnonzero(motion.floats[:-1] & ~motion.floats[1:])
+    if not len(gone):
+        return []
+    sunk_at, took = int(gone[0]) + 1, math.sqrt(2.0 * max(path.gap for path in motion.paths) / GRAVITY)
+    begins = sunk_at - round((took + BEFORE_RELEASE) * record.sampling_rate)
+    if begins < 2:
+        return []
+    level = np.mean(record.signals[:begins], axis=0)
+    tone = np.zeros(len(level), dtype=np.complex128)
+    turns = math.floor((record.time[begins] - record.time[0]) * (speed or 0.0) / (2.0 * math.pi))
+    if speed and turns >= _FEWEST_TURNS:
+        first = int(np.searchsorted(record.time, record.time[begins] - turns * 2.0 * math.pi / speed))
+        waves = np.exp(-1j * speed * record.time[first:begins])
+        tone = 2.0 * np.mean((record.signals[first:begins] - level) * waves[:, None], axis=0) * record.gains
+    found = check_planes(record.planes, fall_of(record, level, sunk_at), tone)
+    return [one for one in found if tone.any() or one.kind != Kind.SENSE_OF_ORBIT]
 
 
 def _verdict(plane: Plane, sunk: Array, tone: Tone) -> str:
@@ -180,7 +212,7 @@ def _plane_finding(
     if verdict == "undecided":
         return Finding(
             kind=Kind.SENSE_OF_ORBIT,
-            message=f"the levitated orbit at node {plane.node} is too small or flat to show its sense: "
+            message=f"the levitated orbit at {plane.bearing} is too small or flat to show its sense: "
             "whether "
             f"{' and '.join(plane.names)} are exchanged cannot be decided",
             remedy="make sure by moving the shaft by hand",
@@ -198,7 +230,7 @@ def _plane_finding(
     tilt = _tilt(plane, sunk, _changes(len(plane.columns))[0])
     seen = f"the fall changes {own} and so leans {tilt:.0f}° from straight down"
     if verdict == "backward":
-        seen = f"the fall changes {own}, but the levitated orbit at node {plane.node} runs against the spin"
+        seen = f"the fall changes {own}, but the levitated orbit at {plane.bearing} runs against the spin"
     if not fitting:
         return _leaning(f"{seen}; no exchange or inversion explains it", names)
     if fell_straight and _sense(plane, tone, _changes(len(plane.columns))[0]) >= 0:
@@ -209,7 +241,7 @@ def _plane_finding(
     return Finding(
         kind=Kind.SWAPPED_AXES if swapped else Kind.INVERTED,
         message=f"{seen}; it fits with {causes}",
-        remedy="correct the polarity or the angles in the machine file, or the channel map in the profile",
+        remedy="correct polarity or angles of the sensors, or the map of the channels",
         severity="stop",
         channel=_named_channels(plane, simplest) or names,
     )
