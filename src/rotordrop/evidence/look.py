@@ -18,6 +18,7 @@ from rotordrop.evidence.evidence import Evidence, Missing, sought
 from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
 from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.paths import (
+    TOO_SLOW,
     Drop,
     Gap,
     Impact,
@@ -37,7 +38,7 @@ from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import ranked
 from rotordrop.evidence.quality.motion import check_fall, check_given_gap, check_slow_fall
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
-from rotordrop.evidence.rest import standstill_of
+from rotordrop.evidence.rest import STANDSTILL, standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
 from rotordrop.files import DIGEST
@@ -60,7 +61,7 @@ from rotordrop.record.impacts import Settling, slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record, sha256_of
-from rotordrop.units import in_si
+from rotordrop.units import format_quantity, in_si
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -145,7 +146,7 @@ class Look:
     planes: tuple[PlaneLook, ...]
     """Of the first drop."""
     standstill: float | None
-    """When the shaft came to rest [s]."""
+    """From when on the speed readings stay below `STANDSTILL` [s]."""
     speed: float | None
     """Shaft speed at the release [rad/s]."""
     synchronous: tuple[Synchronous, ...]
@@ -207,7 +208,9 @@ class Look:
             for whirl in self.whirls
         ]
         if self.standstill is not None:
-            events.append((self.standstill, "standstill"))
+            events.append(
+                (self.standstill, f"slower than {format_quantity(STANDSTILL, 'speed')} from here on")
+            )
         return tuple(sorted(events))
 
     def as_json(self) -> dict[str, Any]:
@@ -583,8 +586,10 @@ _DOCUMENT: dict[str, Part] = {
     "drops": _rows(
         lambda seen: seen.drops,
         release_s=_read_off(NUMBER, "release"),
+        release_interval_90_s=(PAIR, lambda one: [one.release - RELEASE_ERROR, one.release + RELEASE_ERROR]),
         end_s=_read_off(NUMBER, "end"),
         permanent_contact_s=_read_off(MAYBE, "permanent_contact"),
+        permanent_contact_interval_90_s=_read_off(MAYBE_PAIR, "permanent_contact_interval_90"),
         lifted=_read_off(FLAG, "lifted"),
     ),
     "planes": _rows(
@@ -613,10 +618,15 @@ _DOCUMENT: dict[str, Part] = {
         lambda seen: seen.impacts,
         plane=_read_off(TEXT, "plane"),
         time_s=_read_off(NUMBER, "time"),
+        time_interval_90_s=_read_off(PAIR, "time_interval_90"),
         azimuth_rad=_read_off(NUMBER, "azimuth"),
+        azimuth_interval_90_rad=_read_off(PAIR, "azimuth_interval_90"),
         depth_m=_read_off(NUMBER, "depth"),
+        depth_interval_90_m=_read_off(PAIR, "depth_interval_90"),
         approach_m_per_s=_read_off(NUMBER, "approach"),
+        approach_bounds_m_per_s=(PAIR, lambda hit: [hit.approach, hit.approach + TOO_SLOW]),
         rebound_m_per_s=_read_off(NUMBER, "rebound"),
+        rebound_bounds_m_per_s=(PAIR, lambda hit: [hit.rebound, hit.rebound + TOO_SLOW]),
     ),
     "contacts": _rows(
         lambda seen: seen.contacts,
@@ -649,7 +659,9 @@ _DOCUMENT: dict[str, Part] = {
         start_s=_read_off(NUMBER, "start"),
         end_s=_read_off(NUMBER, "end"),
         turns=_read_off(NUMBER, "turns"),
+        turns_interval_90=_read_off(PAIR, "turns_interval_90"),
         frequency_Hz=_read_off(NUMBER, "frequency"),
+        frequency_interval_90_Hz=_read_off(PAIR, "frequency_interval_90"),
         sense=_read_off({"enum": ["forward", "backward"]}, "sense"),
     ),
     "synchronous": _rows(

@@ -12,10 +12,11 @@ from rotordrop.arrays import Array
 from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
 from rotordrop.evidence.touch import crossing
-from rotordrop.evidence.wall import Wall, find_wall
+from rotordrop.evidence.wall import CENTRED, Wall, find_wall
+from rotordrop.known import NINETY
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import whirl_spells
-from rotordrop.record.impacts import Settling, find_impacts
+from rotordrop.record.impacts import BEGUN, Settling, find_impacts
 from rotordrop.record.record import Record
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import GRAVITY
@@ -272,6 +273,10 @@ _FOLLOWED = 2e-4
 """Time between the angles by which a whirl is followed [s] (chosen)."""
 
 
+TOO_SLOW = 5e-3
+"""By how much velocities of impacts by straight lines over 1 ms are too small at most [m/s]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Impact:
     """The rotor thrown back by its touchdown bearing."""
@@ -286,8 +291,12 @@ class Impact:
     """How far beyond the air gap the rotor went, negative for short of it [m]."""
     approach: float
     rebound: float
-    """Largest radial velocity before and after, by straight lines over 1 ms and so up to 5 mm/s
-    too small [m/s], both positive."""
+    """Largest radial velocity before and after, by straight lines over 1 ms and so up to `TOO_SLOW` too small
+    [m/s], both positive."""
+    time_interval_90: tuple[float, float]
+    azimuth_interval_90: tuple[float, float]
+    depth_interval_90: tuple[float, float]
+    """Intervals that hold the three with 90 % probability [s], [rad], [m]: the latter by centre and gap."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,6 +312,23 @@ class Whirl:
     """Turns, positive for forward whirl (with the spin), negative for backward."""
     frequency: float
     """Mean frequency [Hz]."""
+    angle_error: float
+    """Standard error of the direction at either end by that of the centre [rad]."""
+
+    @property
+    def frequency_interval_90(self) -> tuple[float, float]:
+        """Interval that holds the mean frequency with 90 % probability [Hz]; it is that without the run-in,
+        half a turn at either end.
+        """
+        half = NINETY * math.sqrt(2.0) * self.angle_error / math.tau
+        half *= self.frequency / (abs(self.turns) - 1.0)
+        return self.frequency - half, self.frequency + half
+
+    @property
+    def turns_interval_90(self) -> tuple[float, float]:
+        """Interval that holds the turns with 90 % probability [1]."""
+        low, high = (self.turns * one / self.frequency for one in self.frequency_interval_90)
+        return min(low, high), max(low, high)
 
     @property
     def sense(self) -> str:
@@ -312,8 +338,20 @@ class Whirl:
     @property
     def words(self) -> str:
         """The spell in words."""
-        turns = abs(self.turns)
-        return f"{self.sense} whirl at {self.plane}, {self.frequency:.3g} Hz, {turns:.1f} turns"
+
+        def known(value: float, interval: tuple[float, float]) -> str:
+            half = 0.5 * (interval[1] - interval[0])
+            places = max(-math.floor(math.log10(half)), 0) if half > 0.0 else 2
+            return f"{abs(value):.{places}f} ± {half:.{places}f}"
+
+        turns, frequency = (
+            known(value, interval)
+            for value, interval in (
+                (self.turns, self.turns_interval_90),
+                (self.frequency, self.frequency_interval_90),
+            )
+        )
+        return f"{self.sense} whirl at {self.plane}, {frequency} Hz, {turns} turns"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -397,27 +435,33 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
     for path in motion.paths:
         place = path.bearing_position[inside]
         hits = find_impacts(place, motion.rate, path.gap, path.noise)
-        touched = time[hits.touched]
-        touch = path.wall.touch
+        touched, begun = time[hits.touched], np.full(len(hits.touched), BEGUN)
+        touch, centre = path.wall.touch, NINETY * float(path.wall.centre_error.max())
         if (
             len(touched)
             and touch is not None
             and abs(touch.sample - first - hits.touched[0]) < 3e-3 * motion.rate
         ):
-            touched[0] = touch.when(motion.time)
-        impacts += [
-            Impact(
-                plane=path.name,
-                time=float(begins),
-                azimuth=float(np.arctan2(*place[at][::-1])),
-                depth=float(np.hypot(*place[at]) - path.gap),
-                approach=float(approach),
-                rebound=float(rebound),
+            touched[0], begun[0] = touch.when(motion.time), touch.error
+        for begins, error, at, approach, rebound in zip(
+            touched, begun, hits.deepest, hits.approach, hits.rebound, strict=True
+        ):
+            away = float(np.hypot(*place[at]))
+            half, azimuth, depth = NINETY * float(error), float(np.arctan2(*place[at][::-1])), away - path.gap
+            aside, doubt = centre / away, path.wall.distance_error
+            impacts.append(
+                Impact(
+                    plane=path.name,
+                    time=float(begins),
+                    azimuth=azimuth,
+                    depth=depth,
+                    approach=float(approach),
+                    rebound=float(rebound),
+                    time_interval_90=(float(begins) - half, float(begins) + half),
+                    azimuth_interval_90=(azimuth - aside, azimuth + aside),
+                    depth_interval_90=(depth - doubt, depth + doubt),
+                )
             )
-            for begins, at, approach, rebound in zip(
-                touched, hits.deepest, hits.approach, hits.rebound, strict=True
-            )
-        ]
         settlings.append(Settling.of(touched, time[hits.surely], time[hits.perhaps], drop.end))
     return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), settlings=tuple(settlings))
 
@@ -434,8 +478,17 @@ def whirls_along(path: Path, motion: Motion, reach: float, span: tuple[float, fl
     inside = np.flatnonzero((motion.time >= span[0]) & (motion.time <= span[1]))
     chosen = inside[:: max(int(_FOLLOWED * motion.rate), 1)]
     spells = whirl_spells(motion.time[chosen], path.position[chosen], reach)
+    centre = float(path.wall.centre_error.max()) / reach
+    error = centre if math.isfinite(centre) else CENTRED
     return [
-        Whirl(plane=path.name, start=s.start, end=s.end, turns=s.turns, frequency=abs(s.frequency))
+        Whirl(
+            plane=path.name,
+            start=s.start,
+            end=s.end,
+            turns=s.turns,
+            frequency=abs(s.frequency),
+            angle_error=error,
+        )
         for s in spells
     ]
 

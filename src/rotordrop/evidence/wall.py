@@ -23,7 +23,7 @@ from rotordrop.record.impacts import Impacts, find_impacts
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY
 
-_CENTRED = 0.08
+CENTRED = 0.08
 """Standard deviation of where a rotor floats from the centre, per axis, over the gap [1] (chosen)."""
 
 _UNLIKE = 0.2
@@ -181,7 +181,7 @@ def find_wall(
             _robust(impacts),
             np.sqrt(np.log1p(strays**2)),  # of the likelihood: errors that are expected larger cost
             _robust(rest / (_ROUND * size)) / math.sqrt(max(len(lying) / _INDEPENDENT, 1.0)),
-            (centre - floated) / (_CENTRED * size),
+            (centre - floated) / (CENTRED * size),
             [
                 (sought[3] - math.log(_USUAL_BETA[0])) / _USUAL_BETA[1],
                 sought[4] / _SAG_DOUBT,

@@ -10,7 +10,9 @@ from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.look import RELEASE_ERROR
+from rotordrop.evidence.paths import TOO_SLOW
 from rotordrop.evidence.quality import Kind
+from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -32,7 +34,7 @@ from rotordrop.report.style import axis_title, curve, panels
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.look import HeldContact, Level, Look, PlaneLook, Synchronous
+    from rotordrop.evidence.look import HeldContact, Impact, Level, Look, PlaneLook, Synchronous
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
@@ -268,7 +270,8 @@ def _verdict(seen: Look) -> list[Statement]:
         if plane.excess > 0 and plane.gap_interval_90 is None
     ]
     if seen.standstill is not None:
-        said.append(f"The shaft came to rest {seen.standstill - drop.release:.3g} s after the release.")
+        slow = shown(STANDSTILL, "speed")
+        said.append(f"Its speed readings stay below {slow} from {format_moment(seen.standstill)} on.")
     if not seen.whirls:
         said.append("It did not whirl: nowhere does it run round its race by two turns or more.")
     elif forward := [whirl for whirl in seen.whirls if whirl.turns > 0]:
@@ -363,11 +366,20 @@ def _figures(seen: Look) -> tuple[Section, ...]:
     return sections
 
 
+def _touch_of(impact: Impact) -> str:
+    return f"{format_moment(impact.time)} ± {1e3 * (impact.time_interval_90[1] - impact.time):.2g} ms"
+
+
+def _azimuth_of(impact: Impact) -> str:
+    half = impact.azimuth_interval_90[1] - impact.azimuth
+    return f"{degrees(impact.azimuth):.0f}° ± {degrees(half):.0f}°"
+
+
 def _impacts(seen: Look) -> Table:
     columns = (
         Column("plane", "plane"),
-        Column("touches at (record time)", lambda impact: format_moment(impact.time)),
-        Column("azimuth", lambda impact: f"{degrees(impact.azimuth):.0f}°"),
+        Column("touches at (record time, 90 %)", _touch_of),
+        Column("azimuth (90 %)", _azimuth_of),
         Column("beyond the air gap", "depth", "length"),
         Column("radial velocity before", "approach", "velocity"),
         Column("and after", "rebound", "velocity"),
@@ -378,7 +390,8 @@ def _impacts(seen: Look) -> Table:
         f"{path.name} ± {shown(path.wall.distance_error, 'length', 2)}" for path in seen.motion.paths
     )
     rule += (
-        f" Distances beyond the air gap are known to {known} (90 %), velocities are up to 5 mm/s too small."
+        f" Distances beyond the air gap are known to {known} (90 %), velocities are up to "
+        f"{1e3 * TOO_SLOW:g} mm/s too small."
     )
     return table(
         seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{rule} {note}".strip()
