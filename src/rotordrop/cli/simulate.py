@@ -171,6 +171,7 @@ def simulate(
 
         said = simulate_page(result, described)
     deliver(simulation_numbers(result, described), json, said, report=report, data=data, film=film)
+    result.check_finished()
 
 
 def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:

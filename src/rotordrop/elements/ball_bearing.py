@@ -472,9 +472,14 @@ class BallBearing(RaceBearing):
             return rows * self.width.value, "width of all rows"
         return rows * 1.6 * self.ball_diameter.value, "1.6 ball diameters per row"
 
+    @property
+    def rim_radius(self) -> float:
+        """0.3 ball diameters inside the pitch circle [m], where shoulders usually end (chosen)."""
+        return 0.5 * (self.pitch_diameter.value - 0.6 * self.ball_diameter.value)
+
     def race_of_size(self, race: Race, width: Known, bore: float) -> Race:
         """Give the race the mass of a ring from the bore to below the balls."""
-        radius = 0.5 * (self.pitch_diameter.value - 0.6 * self.ball_diameter.value)
+        radius = self.rim_radius
         why = "steel ring from the bore to 0.6 ball diameters inside the pitch circle"
         return race.sized(width, bore, radius, why)
 

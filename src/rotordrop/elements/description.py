@@ -218,7 +218,10 @@ def place_on_nodes(items: tuple[P, ...], nodes: tuple[float, ...], key: str) -> 
         if item.position is not None:
             item.__dict__["node"] = _node_at(item.position, nodes, (key, index, "position"))
         elif not 1 <= item.node <= len(nodes):
-            told = f"node {item.node} is outside the rotor, whose nodes are 1 to {len(nodes)}"
+            told = (
+                f"node {item.node} is outside the rotor, whose nodes are 1 to {len(nodes)}; give one of "
+                "them, or the 'position' from node 1 in its place"
+            )
             raise Misfit(told, (key, index, "node"))
     return items
 

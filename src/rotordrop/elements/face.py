@@ -28,6 +28,13 @@ SIDES: Mapping[str, float] = {"both": 0.0, "+z": 1.0, "-z": -1.0}
 """Side of a face as the kernels know it; +z points to higher nodes."""
 
 
+UNPRESSED = (
+    "no load along the axis presses the rotor to it, so it bears nothing; describe the thrust as [[loads]] "
+    'with direction = "axial" (towards higher nodes) or "-axial", the weight of a vertical rotor too'
+)
+"""What a face without any load along the axis means, and the way out."""
+
+
 class Face(Description):
     """The faces of an inner race and the shoulders of the rotor before them, F = K δⁿ (1 + 1.5 λ δ̇)."""
 

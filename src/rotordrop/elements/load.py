@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -23,6 +24,12 @@ AXIAL = "an axial acceleration of the ground"
 _NOT_ESTIMATED = (
     ": the fall before the first contact is taken as one under gravity alone. Leave it out to estimate "
     "without it; simulations and studies know it"
+)
+
+
+DIRECTIONS = (
+    'write "axial" (along the axis, towards higher nodes), "-axial" (towards lower ones), or across it an '
+    'angle from +x towards y, such as "-90 deg"'
 )
 
 
@@ -54,18 +61,18 @@ class Load(Placed):
     @classmethod
     def rewritten(cls, raw: dict[str, Any]) -> dict[str, Any]:
         """Read a direction along the axis."""
-        if raw.get("direction") in ("axial", "-axial"):
+        said = raw.get("direction")
+        if said in ("axial", "-axial"):
             raw["along"] = raw.pop("direction")
+        elif isinstance(said, str) and not re.search(r"\d", said):
+            raise Misfit(f"{said!r} is no direction; {DIRECTIONS}", ("direction",))
         return raw
 
     def check(self) -> None:
         """Refuse a load without direction or force or with two, and a course that does not go on."""
         super().check()
         if (self.direction is None) == (self.along is None):
-            raise Misfit(
-                'a load needs a \'direction\': an angle from +x towards y, such as "-90 deg", or "axial" '
-                'towards higher nodes, or "-axial"'
-            )
+            raise Misfit(f"a load needs a 'direction'; {DIRECTIONS}")
         if (self.force is None) == (not self.over_time):
             raise Misfit("a load needs either 'force' or 'over_time', and only one of them")
         if self.over_time and "speed_exponent" in self.model_fields_set:

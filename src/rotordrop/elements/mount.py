@@ -94,7 +94,21 @@ class Mount(Description):
     @property
     def further_states(self) -> tuple[int, ...]:
         """The stretch, x and y, of each spring that slips or relaxes."""
-        return (L.POSITION, L.POSITION) * (len(self.maxwell) + (self.ribbon is not None))
+        return (L.POSITION,) * len(self.stretches)
+
+    @property
+    def stretches(self) -> tuple[str, ...]:
+        """What each of its further states is the stretch of [m], such as "ribbon x" or "branch 1 y"."""
+        springs = ["ribbon"] * (self.ribbon is not None)
+        springs += [f"branch {k + 1}" for k in range(len(self.maxwell))]
+        return tuple(f"{spring} {axis}" for spring in springs for axis in "xy")
+
+    @property
+    def stiffnesses(self) -> dict[str, float]:
+        """Stiffness [N/m] of each of its elements."""
+        found = {f"branch {k + 1}": one.stiffness.value for k, one in enumerate(self.maxwell)}
+        found |= {} if self.ribbon is None else {"ribbon": self.ribbon.friction_stiffness.value}
+        return found | ({} if self.stop is None else {"stop": self.stop.stiffness.value})
 
     def check(self) -> None:
         """Refuse branches that do not descend, or too many."""
@@ -102,7 +116,7 @@ class Mount(Description):
         if len(times) > law.MOST_BRANCHES:
             raise Misfit(
                 f"the mount has {len(times)} branches; {law.MOST_BRANCHES} cover two decades of "
-                "frequency and are the most",
+                "frequency and are the most: join the two whose times are closest",
                 ("maxwell",),
             )
         for k, (one, other) in enumerate(pairwise(times)):

@@ -58,6 +58,11 @@ class RaceBearing(Description):
     def race_of_size(self, race: Race, width: Known, bore: float) -> Race:
         """Give a race its width, and mass and inertia that were left out, around a bore radius [m]."""
 
+    @property
+    def rim_radius(self) -> float:
+        """Radius at which the inner ring ends [m]; that of what has none is anywhere."""
+        return math.inf
+
     def oddities(self, bore_radius: float) -> Iterator[Oddity]:
         """What looks odd in the description, which can be used all the same."""
         yield from ()

@@ -153,7 +153,8 @@ class Physical:
             )
         if self.above is not None and not number > self.above:
             limit = "positive" if self.above == 0 else f"greater than {self.text(self.above)}"
-            raise UsageError(f"{name} is not allowed here; {spoken(self.kind)} must be {limit}")
+            example = f", such as {KINDS[self.kind].example!r}" if self.above == 0 else ""
+            raise UsageError(f"{name} is not allowed here; {spoken(self.kind)} must be {limit}{example}")
         if self.least is not None and number < self.least:
             limit = "negative" if self.least == 0 else f"below {self.text(self.least)}"
             raise UsageError(f"{name} is not allowed here; it must not be {limit}")

@@ -183,9 +183,14 @@ def _one_error(
         )
     if place and place[-1] in ("conformity_inner", "conformity_outer") and not positions.has(place):
         place = (*place[:-1], "conformity")
+    if isinstance(cause, UnknownKey):
+        message = _of_above(place) or message
     # The key rather than the value is to blame where it is not known, or not there.
     at_key = isinstance(cause, UnknownKey) or (cause is None and entry["type"] == "missing")
-    line, column = (positions.key(place) if at_key else positions.value(place)) or (1, 1)
+    # branches of a mount that is a list stand one level deeper there
+    listed = tuple(key for part in place for key in (part, "branches")[: 1 + (part == "maxwell")])
+    written = listed if positions.value(listed) != positions.value(place) else place
+    line, column = (positions.key(written) if at_key else positions.value(written)) or (1, 1)
     told = f"{_dotted(place)}: {message}" if place else message
     return MachineFileError(told, file=file, line=line, column=column)
 
@@ -211,6 +216,22 @@ def _message(entry: Any, place: tuple[str | int, ...]) -> str:
     shown = "a table" if isinstance(found, dict) else many
     expected = _EXPECTED.get(entry["type"]) or entry["msg"].replace("Input should be", "expected")
     return f"{shown} does not fit; {expected}"
+
+
+def _of_above(place: tuple[str | int, ...]) -> str:
+    """Say where a key belongs that a table above its own knows, which has the last header before it."""
+    above: list[tuple[str, type[Description]]] = [("the top of the file", Machine)]
+    for key in (key for key in place[:-1] if isinstance(key, str)):
+        field = above[-1][1].model_fields.get(key)
+        described = None if field is None else _description_in(field.annotation)
+        above += [] if described is None else [(repr(key), described)]
+    for (owner, described), (below, _) in zip(above[-2::-1], above[:0:-1], strict=True):
+        if place[-1] in described.model_fields:
+            return (
+                f"{place[-1]!r} is no key of {above[-1][0]}; it belongs to {owner}: write it above the "
+                f"header of the table {below}"
+            )
+    return ""
 
 
 def _kind_at(place: tuple[str | int, ...]) -> str | None:
@@ -313,6 +334,10 @@ class TomlPositions:
             elements = [child for child in node.children if child.is_named and child.type != "comment"]
             for index, element in enumerate(elements):
                 self._value(element, (*path, index))
+                pairs = (child for child in element.children if child.type == "pair")
+                for key, _, value in (pair.children[:3] for pair in pairs):
+                    if key.text == b"kind":  # a list of kinds is held by kind
+                        self._value(element, (*path, value.text[1:-1].decode("utf-8")))
 
     def _place(self, node: Any) -> Place:
         row, byte = node.start_point

@@ -215,11 +215,18 @@ class Machine(Description):
             )
         for index, load in loads:
             if not any(face.stops(load.sense) for face in faces):
-                towards = "higher" if load.sense > 0.0 else "lower"
+                towards, side = ("higher", "+z") if load.sense > 0.0 else ("lower", "-z")
+                wrong = [one.name for one in self.touchdown_bearings if one.face is not None]
+                way_out = (
+                    f'the face of {" and ".join(wrong)} stops motion the other way: give it side = "{side}" '
+                    'or "both"'
+                    if wrong
+                    else 'give a touchdown bearing a face there, such as face = { gap = "0.25 mm", '
+                    'inner_radius = "35 mm", outer_radius = "39 mm" }'
+                )
                 raise Misfit(
-                    f"nothing stops the rotor that this load pushes towards {towards} nodes; give a "
-                    'touchdown bearing a face there, such as face = { gap = "0.25 mm", inner_radius = '
-                    '"35 mm", outer_radius = "39 mm" }, or leave the load out',
+                    f"nothing stops the rotor that this load pushes towards {towards} nodes; {way_out}, "
+                    "or leave the load out",
                     ("loads", index, "direction"),
                 )
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from rotordrop.elements.description import Description
+from rotordrop.elements.mount import SLIP_TRAVEL
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.elements.values import LEFT_OUT
 from rotordrop.known import Known
@@ -23,8 +24,8 @@ USUAL_GAP = (30e-6, 1.5e-3)
 """Air gaps of touchdown bearings [m], from small spindles to the largest machines."""
 
 RADIUS_DISTANCE = 2e-3
-"""Difference of the rotor's radius at a bearing and the shaft's outer radius there [m] that needs a word
-(chosen)."""
+"""Difference of the rotor's radius at a bearing and the shaft's outer radius there [m], and of a face and its
+ring, that needs a word (chosen)."""
 
 LEAST_SMOOTHING_SPEED = 5e-3
 """Smoothing speed of the friction [m/s] below which a drop takes many times as many steps."""
@@ -94,8 +95,25 @@ def _of_the_bearing(machine: Machine, bearing: TouchdownBearing) -> Iterator[Dou
         f"{1e6 * least:g} to {1e6 * most:g} µs of Neisi 2020"
     )
     yield from _beyond("bearing damping", name, time, least, most, text)
+    yield from _of_the_face(bearing)
     for kind, value, limit, text in bearing.bearing.oddities(bearing.bore_radius.value):
         yield _doubt(kind, name, value, limit, text)
+
+
+def _of_the_face(bearing: TouchdownBearing) -> Iterator[Doubt]:
+    """Radii of a face against those of the inner ring that has it."""
+    face, bore, rim = bearing.face, bearing.bore_radius.value, bearing.bearing.rim_radius
+    if face is None:
+        return
+    inner, outer = face.inner_radius.value, face.outer_radius.value
+    text = (
+        f"rotor and face touch between radii of {_length(inner)} and {_length(outer)}, and the inner ring "
+        f"reaches from {_length(bore)} (its bore) to about {_length(rim)}; give 'inner_radius' and "
+        "'outer_radius' of what touches there, radii and not diameters"
+    )
+    least, most = bore - bearing.air_gap.value - RADIUS_DISTANCE, rim + RADIUS_DISTANCE
+    beyond = inner if inner < least else outer
+    yield from _beyond("face radii", bearing.name, beyond, least, most, text)
 
 
 def unusual_values(machine: Machine) -> Iterator[Doubt]:
@@ -192,12 +210,17 @@ def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator
         yield from _of_the_race(bearing, mass)
     look = f"the rotor weighs {mass:.3g} kg"
     weight = mass * GRAVITY / len(machine.touchdown_bearings)
-    sag = weight / support.stiffness.value
-    text = (
-        f"its support of {format_quantity(support.stiffness.value, 'stiffness')} gives way by "
-        f"{_length(sag)} under its share of the weight, in an air gap of {_length(gap)}; check the unit"
-    )
-    yield from _beyond("support stiffness", name, sag, 1e-5 * gap, 2.0 * gap, text)
+    springs = {"support": ("its support", support.stiffness.value, 2.0 * gap)}
+    for what, stiffness in bearing.mount.stiffnesses.items():
+        springs[what] = (f"the {what} of its mount", stiffness, math.inf)
+    for what, (called, stiffness, most) in springs.items():
+        sag = weight / stiffness
+        text = (
+            f"{called}, {format_quantity(stiffness, 'stiffness')}, gives way by {_length(sag)} under its "
+            f"share of the weight, in an air gap of {_length(gap)}; check the unit"
+        )
+        yield from _beyond(f"{what} stiffness", name, sag, 1e-5 * gap, most, text)
+    yield from _of_the_ribbon(bearing)
     look += "; a tiny mass also makes a drop slow to compute"
     yield from _outside("support mass", name, support.mass.value, 1e-4 * mass, 1e3 * mass, "mass", look)
     damping = support.damping.value / (2.0 * math.sqrt(support.stiffness.value * support.mass.value))
@@ -209,6 +232,22 @@ def _against_the_weight(machine: Machine, bearing: TouchdownBearing) -> Iterator
         f"of the weight, in an air gap of {_length(gap)}; check the unit N/m^n and the exponent"
     )
     yield from _beyond("contact stiffness", name, pressed, 1e-6 * gap, 0.5 * gap, text)
+
+
+def _of_the_ribbon(bearing: TouchdownBearing) -> Iterator[Doubt]:
+    """The travel at which a ribbon slips, over the air gap."""
+    ribbon, gap = bearing.mount.ribbon, bearing.air_gap.value
+    if ribbon is None:
+        return
+    stiffness, force = ribbon.friction_stiffness.value, ribbon.slip_force.value
+    usual, low, high = (_length(one) for one in SLIP_TRAVEL)
+    text = (
+        f"its ribbon of {format_quantity(stiffness, 'stiffness')} slips at "
+        f"{format_quantity(force, 'force')}, after a travel of {_length(force / stiffness)}; {usual} ({low} "
+        f"to {high}) are usual, and a tiny one makes a drop slow or impossible to compute: check the units "
+        "of 'friction_stiffness' and 'slip_force'"
+    )
+    yield from _beyond("slip of the ribbon", bearing.name, force / stiffness, 1e-3 * gap, math.inf, text)
 
 
 def _of_the_race(bearing: TouchdownBearing, mass: float) -> Iterator[Doubt]:

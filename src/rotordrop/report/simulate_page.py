@@ -18,6 +18,7 @@ from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.magnets import MagnetHistory
 from rotordrop.simulate.result import DropResult
+from rotordrop.simulate.ribbons import ribbon_uses
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -31,6 +32,15 @@ CLEARANCES = (
     Column("at", "time", "time", 3),
     Column("contacts", lambda use: "no force acts" if use.count is None else str(use.count)),
     Column("largest force", "peak_force", "force"),
+)
+
+RIBBONS = (
+    Column("ribbon of the mount", "name"),
+    Column("slip force", "slip_force", "force"),
+    Column("largest force", "peak_force", "force"),
+    Column("at", "peak_time", "time", 3),
+    Column("slipped for", "slipped", "time", 3),
+    Column("energy taken", "dissipated", "energy", 3),
 )
 
 
@@ -55,6 +65,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     bearings = simulated_bearings(result)
     uses = () if machine is None else clearance_uses(machine, result)
     landed = () if machine is None else landings(machine, result)
+    ribbons = () if machine is None else ribbon_uses(machine, result)
     rotor = (History(label="rotor", time=result.time, values=result.speed),)
     races = tuple(
         History(label=f"{name} race", time=result.time, values=result.race_speed[:, index])
@@ -71,6 +82,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
             orbit,
             *appendix(rest),
             *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
+            *((Section("Ribbons", tables=(table(ribbons, RIBBONS),)),) if ribbons else ()),
             *((_landing(result, landed),) if landed else ()),
             *((_magnets(result, result.magnets),) if result.magnets is not None else ()),
             *heat_sections(result.heat, result.bearing_names),

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop._version import __version__
+from rotordrop.elements.face import UNPRESSED
 from rotordrop.elements.race_bearing import THROWN, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.machine.plausibility import doubts_of_speed
-from rotordrop.report.content import SIMULATED_MACHINE, Card, ReportContent, Statement, fact
+from rotordrop.report.content import SIMULATED_MACHINE, Card, Level, ReportContent, Statement, fact
 from rotordrop.report.estimate_numbers import headline_card, static_limit_statement
 from rotordrop.report.quantity import shown
 from rotordrop.simulate.clearances import ClearanceUse, clearance_uses
 from rotordrop.simulate.landing import landings
-from rotordrop.simulate.result import DropResult
+from rotordrop.simulate.result import DropResult, stop_of
+from rotordrop.simulate.ribbons import RibbonUse, ribbon_uses
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -61,10 +64,12 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
     if bearing.first_contact is not None and bearing.air_gap is not None:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
         figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
-    landed = result.contacts_at(f"{bearing.name}.face")
-    if landed is not None and len(landed):
-        force, moment = landed.peak
-        figures.append(fact("Peak axial force", force, "force", note=f"at {shown(moment, 'time', 3)}"))
+    places = ((f"{bearing.name}.face", "Peak axial force"), (stop_of(bearing.name), "Peak force on the stop"))
+    for place, label in places:
+        there = result.contacts_at(place)
+        if there is not None and len(there):
+            force, moment = there.peak
+            figures.append(fact(label, force, "force", note=f"at {shown(moment, 'time', 3)}"))
     lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
     figures.append(
         fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
@@ -80,6 +85,8 @@ def _verdict(
     uses: tuple[ClearanceUse, ...],
 ) -> tuple[Statement, ...]:
     said = [Statement(result.outcome, "good" if result.finished else "bad")]
+    if machine is not None:
+        said += [*map(_used, uses), *map(_ribbon, ribbon_uses(machine, result))]
     if result.initial_speed < 0.0:
         said.append(Statement(BACKWARDS))
     if machine is not None:
@@ -94,34 +101,49 @@ def _verdict(
     known = () if machine is None else machine.touchdown_bearings
     unrated = [one.name for one in known if numbers_of(one).rolling_elements() is None]
     said += [static_limit_statement(bearing) for bearing in bearings if bearing.name not in unrated]
-    said += [_used(use) for use in uses]
     if machine is not None and machine.defaults_in_use:
         count = len(machine.defaults_in_use)
         text = (
             f"{count} values of the machine are defaults; the report and 'rotordrop check --all' list them."
         )
         said.append(Statement(text))
-    return tuple(said)
+    # of a drop that broke off nothing is good
+    good: Level = "good" if result.finished else "notice"
+    return tuple(replace(one, level=good) if one.level == "good" else one for one in said)
 
 
 def _used(use: ClearanceUse) -> Statement:
     """What a drop used of a clearance or of the way up to a stop, and the force there."""
-    travel, gap = shown(use.travel, "length", 3), shown(use.gap, "length", 3)
-    share = f"{travel} of {gap} ({100.0 * use.share:.3g} %)"
-    text = f"{use.name}: the mount moves {share}" if use.stop else f"{use.name}: the rotor travels {share}"
+    gap, touches = shown(use.gap, "length", 3), use.share >= 1.0 if use.contacts is None else bool(use.count)
+    share = f"{shown(use.travel, 'length', 3)} of {gap} ({100.0 * use.share:.3g} %)"
+    if not touches:
+        if use.contacts is None:
+            return Statement(f"{use.name}: the rotor travels {share}.", "good")
+        never = "never reaches its stop" if use.stop else "never touches the housing"
+        moves = "the mount moves" if use.stop else "the rotor travels"
+        return Statement(f"{use.name}: {moves} {share} and {never}.", "good")
     if use.contacts is None:
-        touches = use.share >= 1.0
-        text += ", so it touches there; no force acts in a clearance without stiffness." if touches else "."
-    else:
-        touches = len(use.contacts) > 0
-        what = "reaches its stop" if use.stop else "touches the housing"
-        if touches:
-            times = "once" if use.count == 1 else f"{use.count} times"
-            first, force = shown(use.contacts.start[0], "time", 3), shown(use.peak_force, "force", 3)
-            text += f" and {what} {times}, first at {first}, with {force} at most."
-        else:
-            text += f" and never {what}."
-    return Statement(text, ("warning" if use.stop else "bad") if touches else "good")
+        text = "so it touches there; no force acts in a clearance without stiffness."
+        return Statement(f"{use.name}: the rotor travels {share}, {text}", "bad")
+    times = "once" if use.count == 1 else f"{use.count} times"
+    first, force = shown(use.contacts.start[0], "time", 3), shown(use.peak_force, "force", 4)
+    hit = f"{times}, first at {first}, with {force} at most"
+    if not use.stop:
+        return Statement(f"{use.name}: the rotor travels {share} and touches the housing {hit}.", "bad")
+    pressed = shown(max(use.travel - use.gap, 0.0), "length", 3)
+    text = f"{use.name}: the mount reached its stop at {gap} {hit}; it pressed it by {pressed}."
+    return Statement(text, "warning")
+
+
+def _ribbon(use: RibbonUse) -> Statement:
+    """What a ribbon bore, whether it slipped and what that took."""
+    most, limit = shown(use.peak_force, "force", 3), shown(use.slip_force, "force", 3)
+    text = f"{use.name}: the ribbon of the mount bore at most {most} of its slip force of {limit}"
+    if use.slipped == 0.0:
+        return Statement(f"{text} ({100.0 * use.share:.3g} %) and never slipped.")
+    slipped, first = shown(use.slipped, "time", 3), shown(use.first_slip, "time", 3)
+    taken = shown(use.dissipated, "energy", 3)
+    return Statement(f"{text} and slipped for {slipped} in all, first at {first}, which took {taken}.")
 
 
 def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:
@@ -157,6 +179,9 @@ def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
     for one in landings(machine, result):
         travel, gap = shown(one.travel, "length", 3), shown(one.gap, "length", 3)
         force, moment = one.contacts.peak
+        if not any(load.along for load in machine.loads):
+            yield Statement(f"{one.name}: the rotor never lands on the face: {UNPRESSED}.")
+            continue
         if not len(one.contacts):
             text = f"{one.name}: the rotor travels {travel} of {gap} along its axis"
             yield Statement(f"{text} and never lands on the face.", "good")

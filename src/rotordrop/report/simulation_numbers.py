@@ -12,6 +12,7 @@ from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.magnets import MagnetHistory
 from rotordrop.simulate.result import DropResult
+from rotordrop.simulate.ribbons import ribbon_uses
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -63,6 +64,14 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
             entry |= {"contacts": len(use.contacts), "peak_force_N": use.peak_force}
             entry |= {"first_contact_s": float(use.contacts.start[0])} if len(use.contacts) else {}
         numbers.setdefault("stops" if use.stop else "clearances", {})[use.name] = entry
+    for ribbon in () if machine is None else ribbon_uses(machine, result):
+        numbers.setdefault("ribbons", {})[ribbon.name] = {
+            "slip_force_N": ribbon.slip_force,
+            "peak_force_N": {"value": ribbon.peak_force, "time_s": ribbon.peak_time},
+            "slipped_s": ribbon.slipped,
+            "first_slip_s": ribbon.first_slip if math.isfinite(ribbon.first_slip) else None,
+            "dissipated_J": ribbon.dissipated,
+        }
     if machine is not None and machine.axial:
         latest = int(np.argmax(np.abs(result.axial_displacement)))
         numbers["axial"] = {

@@ -8,6 +8,7 @@ from itertools import accumulate
 import numpy as np
 
 from rotordrop.arrays import Array, Integers
+from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 
@@ -190,9 +191,9 @@ class StateLayout:
             np.int64, order="C"
         )
 
-    def names(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
+    def names(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:
         """Name of every state, in order."""
-        axes = ("x", "y")
+        axes, bearing_names = ("x", "y"), [bearing.name for bearing in bearings]
         coordinates = [f"mode {k + 1} {axis}" for axis in axes for k in range(self.n_modes)]
         coordinates += [
             f"{part} {name} {axis}" for part in ("race", "support") for name in bearing_names for axis in axes
@@ -201,19 +202,27 @@ class StateLayout:
             *coordinates,
             *(f"{name} velocity" for name in coordinates),
             *(f"race {name} spin" for name in bearing_names),
-            *self._names_of_further(bearing_names),
+            *self._names_of_further(bearings),
             *((ROTOR_AXIAL, f"{ROTOR_AXIAL} velocity") if self.moves_axially else ()),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
             *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )
 
-    def _names_of_further(self, bearing_names: tuple[str, ...]) -> tuple[str, ...]:
+    def _names_of_further(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:
         names = [f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)]
-        for place, called in ((L.RING_STATES, ring_state), (L.FACE_STATES, axial_state)):
-            for name, first in zip(bearing_names, self.bearing_at()[:, place], strict=True):
-                if first >= 0:
-                    at = first - self.race_spin.stop
-                    names[at : at + 2] = called(name), f"{called(name)} velocity"
+        for bearing, first in zip(bearings, self.bearing_at(), strict=True):
+            foundation = [f"foundation {bearing.name} {axis}" for axis in "xy"]
+            known = {
+                L.RING_STATES: [ring_state(bearing.name)],
+                L.FACE_STATES: [axial_state(bearing.name)],
+                L.BEARING_OWN: foundation,
+            }
+            named = {at: [*called, *(f"{one} velocity" for one in called)] for at, called in known.items()}
+            named[L.MOUNT_STATES] = [mount_state(bearing.name, one) for one in bearing.mount.stretches]
+            for place, called in named.items():
+                if first[place] >= 0:
+                    at = first[place] - self.race_spin.stop
+                    names[at : at + len(called)] = called
         return tuple(names)
 
     def bore(self, states: Array) -> Array:
@@ -233,6 +242,11 @@ class StateLayout:
     def zeros(self) -> Array:
         """State with everything at zero."""
         return np.zeros(self.size)
+
+
+def mount_state(bearing: str, stretch: str) -> str:
+    """Name of the state that holds a stretch of the mount of a bearing, such as "ribbon x"."""
+    return f"mount {bearing} {stretch}"
 
 
 def ring_state(bearing: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from rotordrop.arrays import Array
-from rotordrop.elements.face import Face
+from rotordrop.elements.face import UNPRESSED, Face
 from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.elements.thermal import heat_figures, runaway
@@ -137,8 +137,8 @@ class MachineWarning(Doubt):
     """One thing to know before trusting a result of this machine.
 
     Its kind is "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load
-    direction", "shoulder of the race", "thermal runaway", "control loop", "lift", "guess", or one of the
-    doubts.
+    direction", "shoulder of the race", "thermal runaway", "face", "control loop", "lift", "guess", or one of
+    the doubts.
     """
 
     doubtful: bool = False
@@ -179,7 +179,11 @@ def _loop(summary: MachineSummary) -> Iterator[MachineWarning]:
 
 
 def _landing(machine: Machine, bearing: TouchdownBearing) -> Iterator[MachineWarning]:
-    if bearing.face is None or (push := _push(machine, bearing.face)) == 0.0:
+    if bearing.face is None:
+        return
+    if not any(load.along for load in machine.loads):
+        yield _warning("face", bearing.name, 0.0, 0.0, f"it has a face, and {UNPRESSED}")
+    if (push := _push(machine, bearing.face)) == 0.0:
         return
     excess = numbers_of(bearing).landing_excess(bearing.face.law, float(bearing.face.gap), push)
     if excess is not None:

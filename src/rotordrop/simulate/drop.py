@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
+from rotordrop.machine.plausibility import doubts
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import magnitude, sine_cosine
@@ -210,7 +211,7 @@ def _result(
         else None,
         further_names=further,
         bearing_names=model.bearing_names,
-        state_names=layout.names(model.bearing_names),
+        state_names=layout.names(model.machine.touchdown_bearings),
         shapes=model.basis.shapes,
         machine_name=model.machine.name,
         initial_speed=case.speed,
@@ -218,7 +219,7 @@ def _result(
         reduction=model.basis.description,
         steps=int(counters[0]),
         rejected_steps=int(counters[1]),
-        outcome=_sentence(outcome, case, counters, len(contacts), n_b),
+        outcome=_sentence(model.machine, outcome, case, counters, len(contacts)),
         finished=outcome == _loop.FINISHED,
         certificate=_energy_certificate(model, parts, times, states, force),
     )
@@ -238,24 +239,22 @@ def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
     )
 
 
-def _sentence(outcome: int, case: DropCase, counters: Array, contacts: int, n_bearings: int) -> str:
+def _sentence(machine: Machine, outcome: int, case: DropCase, counters: Array, contacts: int) -> str:
     reached = f"{counters[4]:.6g} s"
     if outcome == _loop.FINISHED:
         return f"The drop was simulated to {reached} in {int(counters[0])} steps with {contacts} contacts."
-    if outcome == _loop.STEP_TOO_SMALL:
-        return (
-            f"The simulation stopped at {reached}: the step fell below 1e-14 s. "
-            "Check for a friction law with a tiny smoothing speed or an extreme stiffness."
-        )
-    if outcome == _loop.TOO_MANY_STEPS:
-        return (
-            f"The simulation stopped at {reached}: {case.most_steps} steps were not enough. "
-            "Raise most_steps, loosen the tolerance or use a smaller reduction."
-        )
-    return (
-        f"The simulation stopped at {reached}: a value became infinite. "
-        "Check the start and the machine's parameters."
-    )
+    why, way_out = {
+        _loop.STEP_TOO_SMALL: (
+            "the step fell below 1e-14 s",
+            "Check for a friction law with a tiny smoothing speed or an extreme stiffness",
+        ),
+        _loop.TOO_MANY_STEPS: (
+            f"{case.most_steps} steps were not enough",
+            "Raise most_steps, loosen the tolerance or use a smaller reduction",
+        ),
+    }.get(outcome, ("a value became infinite", "Check the start and the machine's parameters"))
+    odd = "".join(f" {doubt.message}." for doubt in doubts(machine))
+    return f"The simulation stopped at {reached}: {why}. {way_out}.{odd}"
 
 
 def _energy_certificate(

@@ -156,6 +156,11 @@ class DropResult:
             f"there is no touchdown bearing {bearing!r}; there are {', '.join(self.bearing_names)}"
         )
 
+    def check_finished(self) -> None:
+        """Refuse a drop whose computation broke off."""
+        if not self.finished:
+            raise SimulationError(self.outcome)
+
     @property
     def lift(self) -> Lift | None:
         """What became of the last lift by magnets in the loop; None without any."""

@@ -18,6 +18,7 @@ from rotordrop.elements.face import Face
 from rotordrop.errors import MachineFileError, RecordError
 from rotordrop.evidence.evidence import insisted
 from rotordrop.machine import example_path, loads_machine
+from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing_response import bearing_response
@@ -436,7 +437,7 @@ def test_a_rotor_without_thrust_never_lands():
     machine = faced()
     drop = simulate_drop(machine, DropCase(speed=SPEED, duration=2e-3, reduction="quick"))
     (said,) = [s for s in simulate_summary(drop, machine).verdict if "never lands" in s.text]
-    assert said.level == "good"
+    assert said.level == "notice" and "no load along the axis" in said.text
     assert simulation_numbers(drop, machine)["axial"]["faces"]["DE"]["peak_force_N"]["value"] == 0.0
 
 
@@ -531,3 +532,39 @@ def test_an_estimate_takes_axial_motion_along_and_a_weightless_rotor_is_refused(
 def test_what_cannot_be_is_refused(text, message):
     with pytest.raises(MachineFileError, match=message):
         loads_machine(text)
+
+
+def test_a_face_that_nothing_presses_and_one_outside_its_ring_are_said():
+    machine = faced(face=FACE.replace("22 mm", "35 mm").replace("26 mm", "39 mm"))
+    found = {one.kind: one for one in machine_warnings(machine, summarise_machine(machine))}
+    assert found["face radii"].doubtful and found["face radii"].value == pytest.approx(39e-3)
+    assert "between radii of 35.0 mm and 39.0 mm" in found["face radii"].message
+    assert "from 20.0 mm (its bore) to about 23.6 mm" in found["face radii"].message
+    assert "no load along the axis" in found["face"].message and not found["face"].doubtful
+    (bore,) = [
+        one.value
+        for one in doubts(faced(face=FACE.replace("22 mm", "12 mm").replace("26 mm", "14 mm")))
+        if one.kind == "face radii"
+    ]
+    assert bore == pytest.approx(12e-3)
+    fitting = faced(push(), face=FACE.replace("26 mm", "23 mm"))
+    kinds = {one.kind for one in machine_warnings(fitting, summarise_machine(fitting))}
+    assert not kinds & {"face", "face radii"}
+
+
+@pytest.mark.parametrize(
+    ("direction", "face", "message"),
+    [
+        ("DE", FACE, r"'DE' is no direction; write \"axial\" \(along the axis, towards higher nodes\)"),
+        (
+            "axial",
+            f'{FACE}, side = "-z"',
+            r"the face of DE stops motion the other way: give it side = \"\+z\"",
+        ),
+        ("-axial", f'{FACE}, side = "+z"', r"towards lower nodes; the face of DE .* side = \"-z\""),
+        ("axial", "", r"towards higher nodes; give a touchdown bearing a face there"),
+    ],
+)
+def test_what_is_wrong_with_an_axial_load_is_said_with_the_way_out(direction, face, message):
+    with pytest.raises(MachineFileError, match=message):
+        faced(push(direction=direction), face=face)

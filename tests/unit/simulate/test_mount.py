@@ -8,15 +8,22 @@ import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jacobian
 
+from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine, loads_machine
-from rotordrop.machine.saving import machine_text
+from rotordrop.machine.plausibility import doubts
+from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.physics import columns as L
+from rotordrop.report.simulate_page import simulate_page
+from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
+from rotordrop.simulate.losses import losses
+from rotordrop.simulate.ribbons import ribbon_uses
 from rotordrop.twin.tracked_parameters import never_used_up
 
 STOP = '{ kind = "stop", gap = "8 um", stiffness = "5e8 N/m" }'
@@ -127,7 +134,22 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
     ("element", "message"),
     [
         ('{ kind = "stop" }', r"gap"),
-        ('{ kind = "stop", gap = "0 um" }', r"must be positive"),
+        ('{ kind = "stop", gap = "0 um" }', r"^142:33: .*a length must be positive, such as '280 um'"),
+        (
+            '\n{ kind = "stop", gap = "0.1 mm" },\n{ kind = "ribbon", slip_force = "0 N" }',
+            r"^144:33: .*'515 N'",
+        ),
+        (
+            '\n{ kind = "maxwell", branches = [\n{ stiffness = "4e6 N/m", time = "30 ms" },\n'
+            '{ stiffness = "4e6 N/m", time = "40 ms" }] }',
+            r"^145:33: .*descend",
+        ),
+        (
+            '{ kind = "maxwell", branches = ['
+            + ", ".join(f'{{ stiffness = "4e6 N/m", time = "{time} ms" }}' for time in (8, 4, 2, 1))
+            + "] }",
+            r"4 branches; 3 .* are the most: join the two whose times are closest",
+        ),
         (
             '{ kind = "stop", gap = "20 um" }, { kind = "stop", gap = "30 um" }',
             r"two elements 'stop'; keep one",
@@ -157,3 +179,77 @@ def test_a_slip_force_needs_a_stiffness():
         MachineFileError, match=r"'slip_force' but no stiffness; give its 'friction_stiffness'"
     ):
         mounted('{ kind = "ribbon", slip_force = "1.5 kN" }', text=TEXT[:start] + "\n".join(lines))
+
+
+def test_a_mount_below_a_table_of_its_bearing_is_sent_above_it():
+    at = TEXT.index("[touchdown_bearings.support]", TEXT.index(HEAD)) + len("[touchdown_bearings.support]\n")
+    with pytest.raises(
+        MachineFileError,
+        match=r"'mount' is no key of 'support'; it belongs to 'touchdown_bearings': write it above the "
+        r"header of the table 'support'",
+    ):
+        loads_machine(f"{TEXT[:at]}mount = [{STOP}]\n{TEXT[at:]}")
+
+
+def test_states_of_a_mount_have_names():
+    machine = mounted(RIBBON, O_RING)
+    values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
+    machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+    names = build_drop_model(machine, "quick").layout.names(machine.touchdown_bearings)
+    assert not [name for name in names if name.startswith("further state")]
+    for name in ("mount DE ribbon x", "mount DE branch 2 y", "foundation DE y velocity"):
+        assert names.count(name) == 1
+
+
+def test_a_ribbon_says_what_it_bore_and_its_slip_takes_the_energy_that_damping_leaves():
+    slack = RIBBON.replace("1.5 kN", "150 N")
+    machine = mounted(slack)
+    drop = simulate_drop(machine, DropCase(speed=SPEED, duration=0.03, output_step=2e-6, reduction="quick"))
+    (use,) = ribbon_uses(machine, drop)
+    model = build_drop_model(machine, "quick")
+    support, v = machine.bearing("DE").support, drop.state[:, model.layout.velocity_of(model.layout.support)]
+    damped = support.damping_horizontal.value * v[:, 2] ** 2 + support.damping.value * v[:, 3] ** 2
+    by_damper = float(np.trapezoid(damped, drop.time))
+    assert use.dissipated > 0.1 * by_damper
+    assert use.dissipated + by_damper == pytest.approx(losses(model, drop).support[1], rel=5e-3)
+    assert 0.95 < use.share < 1.001 and 0.0 < use.slipped < 0.03 and use.first_slip > 0.0
+    numbers = simulation_numbers(drop, machine)["ribbons"]["DE"]
+    assert numbers["dissipated_J"] == use.dissipated and numbers["slip_force_N"] == pytest.approx(150.0)
+    said = [one.text for one in simulate_summary(drop, machine).verdict[:3]]
+    assert any("DE: the ribbon of the mount bore at most" in text and "slipped for" in text for text in said)
+    (section,) = [one for one in simulate_page(drop, machine).sections if one.heading == "Ribbons"]
+    assert len(section.tables[0].rows) == 1
+
+
+def test_a_ribbon_that_holds_is_said_to_hold():
+    machine = mounted(RIBBON.replace("1.5 kN", "15 kN"))
+    drop = simulate_drop(machine, DropCase(speed=SPEED, duration=0.02, reduction="quick"))
+    (use,) = ribbon_uses(machine, drop)
+    assert use.slipped == 0.0 and np.isnan(use.first_slip)
+    assert simulation_numbers(drop, machine)["ribbons"]["DE"]["first_slip_s"] is None
+    assert any(
+        f"({100.0 * use.share:.3g} %) and never slipped" in one.text
+        for one in simulate_summary(drop, machine).verdict
+    )
+
+
+MISTYPED = RIBBON.replace("6e7", "2e12").replace("1.5 kN", "300 N")
+
+
+def test_a_mistyped_ribbon_is_doubted_and_named_where_a_drop_breaks_off(tmp_path, capsys):
+    machine = mounted(MISTYPED, STOP)
+    kinds = {doubt.kind: doubt for doubt in doubts(machine)}
+    assert kinds["slip of the ribbon"].value == pytest.approx(1.5e-10)
+    assert "the ribbon of its mount, 2000 GN/m, gives way" in kinds["ribbon stiffness"].message
+    assert "check the unit" in kinds["slip of the ribbon"].message
+    assert not doubts(mounted(RIBBON, O_RING, STOP))
+    file = tmp_path / "machine.toml"
+    save_machine(machine, file)
+    assert run(["check", str(file)]) == 0
+    assert "values look wrong: ribbon stiffness (DE), slip of the ribbon (DE)" in capsys.readouterr().out
+    out = ["--report", str(tmp_path / "drop.html"), "--duration", "100 ms"]
+    assert run(["simulate", str(file), "--speed", "300 Hz", *out]) == 5
+    told = capsys.readouterr()
+    assert "good:" not in told.out and "a value became infinite" in told.err
+    assert "its ribbon of 2000 GN/m slips at 300 N" in told.err
+    assert (tmp_path / "drop.html").exists()

@@ -104,18 +104,26 @@ def test_a_stop_is_logged_and_told_with_its_force():
         machine = loads_machine(TEXT.replace(HEAD, f"{HEAD}\n{mount}"))
         drop = simulate_drop(machine, CASE)
         (use,) = clearance_uses(machine, drop)
-        (said,) = [one for one in simulate_summary(drop, machine).verdict if "the mount moves" in one.text]
-        return drop, use, said, simulation_numbers(drop, machine)["stops"]["DE"]
+        (said,) = [
+            one for one in simulate_summary(drop, machine).verdict if one.text.startswith("DE: the mount")
+        ]
+        return machine, drop, use, said, simulation_numbers(drop, machine)["stops"]["DE"]
 
-    drop, use, said, entry = stopped(8)
+    machine, drop, use, said, entry = stopped(8)
     moved = np.hypot(*drop.support_displacement[:, 1].T)
     assert use.travel == moved.max() > use.gap
     assert use.peak_force == pytest.approx(5e8 * (use.travel - use.gap), rel=0.15)
     assert drop.time[np.argmax(moved > use.gap)] == pytest.approx(use.contacts.start[0], abs=2e-5)
-    assert said.level == "warning" and "reaches its stop" in said.text
+    pressed = f"{1e6 * (use.travel - use.gap):.3g} µm"
+    assert said.level == "warning" and "reached its stop at 8.00 µm" in said.text
+    assert f"it pressed it by {pressed}." in said.text and "%" not in said.text
+    content = simulate_summary(drop, machine)
+    assert content.verdict[1].text == said.text
+    figures = {figure.label: figure for figure in content.cards[1].figures}
+    assert figures["Peak force on the stop"].value.value == use.peak_force
     assert entry["contacts"] == len(use.contacts) and entry["travel_over_gap"] == use.share
     assert len(drop.contacts) == len(drop.contacts.of_bearing(0)) + len(drop.contacts.of_bearing(1))
-    _, use, said, entry = stopped(500)
+    *_, use, said, entry = stopped(500)
     assert said.level == "good" and "never reaches its stop" in said.text
     assert entry["contacts"] == 0 and entry["peak_force_N"] == 0.0
 
