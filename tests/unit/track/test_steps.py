@@ -83,6 +83,7 @@ def test_a_filter_that_lost_the_drop_is_judged_by_what_it_followed() -> None:
         innovation_variances=variances,
         parameter_sample=0,
         last=nothing,
+        reached=nothing,
         course=nothing,  # type: ignore[arg-type]
         starts=(),
     )
