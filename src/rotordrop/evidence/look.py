@@ -57,7 +57,7 @@ from rotordrop.json_schema import (
 )
 from rotordrop.known import NINETY
 from rotordrop.record.arrangement import Arrangement
-from rotordrop.record.impacts import Settling, slope
+from rotordrop.record.impacts import AFTER_LAST, Settling, slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record, sha256_of
@@ -192,9 +192,7 @@ class Look:
             last, between = drop.permanent_contact, drop.permanent_contact_interval_90
             if last is not None and between is not None:
                 early, late = (1e3 * abs(end - last) for end in between)
-                events.append(
-                    (last, f"last impact, mostly in contact from here on (−{early:.2g}, +{late:.2g} ms)")
-                )
+                events.append((last, f"last impact, {AFTER_LAST} (−{early:.2g}, +{late:.2g} ms)"))
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:

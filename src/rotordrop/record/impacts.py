@@ -49,6 +49,12 @@ _STRETCH = 256
 LASTING = 0.05
 """Contact without an impact for this long lasts [s] (chosen)."""
 
+CONTACT_FROM = "mostly in contact from"
+"""What the begin of the last impact is called: shorter hops than those that end in an impact may follow."""
+
+AFTER_LAST = f"{CONTACT_FROM} then on"
+"""The same behind a sentence on the last impact."""
+
 
 def shortest_flight(gap: float) -> float:
     """Shortest flight that ends in an impact [s]: as long as a hop of `HOP` of the gap under gravity."""

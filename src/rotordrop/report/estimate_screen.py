@@ -12,6 +12,7 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.known import Known
+from rotordrop.record.impacts import CONTACT_FROM
 from rotordrop.report.content import SIMULATED_RECORD, Column, ReportContent, Statement, Table, table
 from rotordrop.report.estimate_numbers import static_limit_statement
 from rotordrop.report.estimate_page import estimate_verdict, names_in
@@ -94,7 +95,7 @@ def _loads(estimate: Estimate) -> Table:
         "impacts": lambda b: (
             b.missing.get("impacts") or with_interval(len(b.touched), "count", b.count_interval_90)
         ),
-        "mostly in contact from": lambda b: with_interval(b.contact_from, "time", b.contact_from_interval_90),
+        CONTACT_FROM: lambda b: with_interval(b.contact_from, "time", b.contact_from_interval_90),
         **({"largest displacement": lambda b: number(b.largest, "length")} if certain else {}),
         "over the air gap": lambda b: _over_gap(b, certain=certain),
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),

@@ -13,6 +13,7 @@ from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.evidence.paths import TOO_SLOW
 from rotordrop.evidence.quality import Kind
 from rotordrop.evidence.rest import STANDSTILL
+from rotordrop.record.impacts import AFTER_LAST
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -247,7 +248,7 @@ def _verdict(seen: Look) -> list[Statement]:
     if contact is not None and between is not None:
         ends = (
             f", the last at {format_moment(contact)} (90 %: {' to '.join(map(format_moment, between))}); "
-            "from then on it was mostly in contact, with hops too short for an impact at most."
+            f"{AFTER_LAST}, with hops too short for an impact at most."
         )
     low, high = drop.count_interval_90
     release = f"{format_moment(drop.release)} of the record (± {1e3 * RELEASE_ERROR:g} ms)"

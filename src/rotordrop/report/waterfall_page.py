@@ -12,6 +12,7 @@ import numpy as np
 from rotordrop._version import __version__
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.known import Known
+from rotordrop.record.impacts import CONTACT_FROM
 from rotordrop.report.content import (
     Card,
     Column,
@@ -108,7 +109,13 @@ def waterfall_page(
                     "",
                 ),
                 ("Impacts", len(settled.touched), "count", settled.count_interval_90, BY_DISPLACEMENT),
-                ("In contact from", last, "duration", settled.contact_from_interval_90, FROM_POWER_OFF),
+                (
+                    CONTACT_FROM.capitalize(),
+                    last,
+                    "duration",
+                    settled.contact_from_interval_90,
+                    FROM_POWER_OFF,
+                ),
             )
         )
         cards.append(Card(f"{name} plane", figures))

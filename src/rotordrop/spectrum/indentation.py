@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.known import NINETY
-from rotordrop.record.impacts import Settling, find_impacts
+from rotordrop.record.impacts import AFTER_LAST, Settling, find_impacts
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 from rotordrop.units import format_moment
@@ -178,7 +178,7 @@ def settling_words(
     known = "" if error is None else f" ± {NINETY * error * 1e6:.0f}"
     times = " to ".join(format_moment(one) for one in between)
     return (
-        f"{count}{format_moment(found.contact_from)} ({times}), mostly in contact from there on, at "
+        f"{count}{format_moment(found.contact_from)} ({times}), {AFTER_LAST}, at "
         f"{radius * 1e6:.0f}{known} µm from the centre in the end"
     )
 

@@ -16,6 +16,7 @@ from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.files import write_json
 from rotordrop.known import NINETY
+from rotordrop.record.impacts import AFTER_LAST
 from rotordrop.report.content import Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.quantity import Quantity
@@ -237,7 +238,7 @@ def _events(estimate: Estimate) -> list[dict[str, Any]]:
             (
                 bearing.contact_from,
                 bearing.contact_from_interval_90,
-                f"last impact at {bearing.name}, mostly in contact from here on",
+                f"last impact at {bearing.name}, {AFTER_LAST}",
             ),
             (peak.time, peak.time_interval_90, f"largest force at {bearing.name}"),
         ):

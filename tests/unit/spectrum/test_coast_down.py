@@ -47,6 +47,11 @@ def test_every_order_to_three_is_followed_halves_included(analysis: CoastDownAna
         assert np.median(read) == pytest.approx(amplitude, rel=0.02), order
 
 
+def test_the_card_claims_no_lasting_contact_beside_shorter_hops(analysis: CoastDownAnalysis) -> None:
+    labels = [one.label for one in waterfall_page(analysis, title="hops", drawn=False).cards[0].figures]
+    assert "Mostly in contact from" in labels and "In contact from" not in labels
+
+
 def test_the_speeds_a_record_covers_are_said_first(analysis: CoastDownAnalysis) -> None:
     """Of a record that ends turning it was said that the first 0.2 s held the maximum, and no more."""
     first = waterfall_page(analysis, title="ends").verdict[0]

@@ -115,7 +115,7 @@ def test_impacts_are_flights_that_end_and_contact_lasts_from_the_last():
     assert found.contact_from_interval_90 is not None
     early, late = found.contact_from_interval_90
     assert early < after_flights(landings)[-1] - 0.1 < late
-    assert f"({early:.4f} s to {late:.4f} s), mostly in contact from there on" in told
+    assert f"({early:.4f} s to {late:.4f} s), mostly in contact from then on" in told
 
 
 def test_an_impact_late_in_a_long_signal_counts():
