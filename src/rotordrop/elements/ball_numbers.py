@@ -327,7 +327,13 @@ class BallNumbers(BearingNumbers):
         way = -seat_on_springs(springs.constants, springs.rings(), pushes)[:, 1]
         left = float(np.interp(static_deflection(self.constants, heavy)[0], way, pushes[:, 1])) / heavy
         note = f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind"
-        yield _figure("force_on_springs", "force left on preload springs", "dimensionless", left, note=note)
+        yield _figure(
+            "force_on_springs",
+            "force with preload springs in place of spacers",
+            "dimensionless",
+            left,
+            note=note,
+        )
 
     def excesses(self, omega: float, load: float) -> Iterator[Excess]:
         """Speed beyond what the maker allows, centrifugal force of the balls, stress by preload."""

@@ -521,7 +521,7 @@ def mentions(part: Description) -> tuple[Mention, ...]:
 
 
 def _walk(part: Description, path: str) -> Iterator[Mention]:
-    for name in type(part).model_fields:
+    for name in type(part).model_fields if getattr(part, "described", True) else ():  # of nothing, nothing
         value = getattr(part, name)
         here = f"{path}.{name}" if path else name
         if isinstance(value, Known):
@@ -536,7 +536,7 @@ def _walk(part: Description, path: str) -> Iterator[Mention]:
             for index, item in enumerate(value):
                 label = getattr(item, "name", "")
                 shown = {"touchdown_bearings": str(label), "unbalances": f"unbalance.{index}"}
-                yield from _walk(item, shown.get(name, f"{here}.{label if label else index + 1}"))
+                yield from _walk(item, shown.get(name, f"{here}.{label or index}"))
         elif isinstance(value, dict):
             for key, item in value.items():
                 yield from _walk(item, f"{here}.{key}")

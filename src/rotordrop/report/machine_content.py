@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
@@ -13,6 +13,7 @@ from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
     from rotordrop.elements.race_bearing import BearingFigure
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE
     from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary, MachineWarning
@@ -48,7 +49,11 @@ def machine_content(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
-        verdict=(_verdict(warnings), *_remarks(machine, warnings, brief)),
+        verdict=(
+            _verdict(warnings),
+            *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
+            *_remarks(machine, warnings, brief),
+        ),
         cards=(
             *(_card(machine, rest) for rest in summary.bearings),
             *(_magnet_card(one, summary.loop) for one in summary.magnets),
@@ -77,6 +82,16 @@ def _named(warnings: Iterable[MachineWarning]) -> list[str]:
     for warning in warnings:
         places.setdefault(warning.kind, []).append(warning.bearing)
     return [f"{kind} ({', '.join(dict.fromkeys(found))})" for kind, found in places.items()]
+
+
+def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]:
+    """What a bearing has beyond balls and a plain support, and what of it counts with the support."""
+    springs = ["preload springs"] * (bearing.bearing.ring_travel is not None)
+    mount = [f"a mount ({', '.join(bearing.mount.stiffnesses)})"] * bearing.mount.present
+    parts = [*springs, *mount, *(["a face"] * (bearing.face is not None))]
+    if parts:
+        held = f"; its support counts with {' and '.join(rest.beside_support)}" if rest.beside_support else ""
+        yield Statement(f"{bearing.name} has {', '.join(parts)}{held}.")
 
 
 def _remarks(machine: Machine, warnings: tuple[MachineWarning, ...], brief: bool) -> list[Statement]:

@@ -12,7 +12,7 @@ from rotordrop.report.content import Column, Figure, ReportContent, Section, app
 from rotordrop.report.drop_sections import drop_sections, speed_figure
 from rotordrop.report.heat_section import heat_sections
 from rotordrop.report.machine_sections import machine_sections, weight_shares
-from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.simulate_summary import landing_count, simulate_summary
 from rotordrop.report.time_panels import Panel, time_panels
 from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
@@ -47,8 +47,9 @@ RIBBONS = (
 LANDINGS = (
     Column("bearing", "name"),
     Column("axial gap", "gap", "length"),
-    Column("largest travel", "travel", "length"),
-    Column("landings", lambda one: str(len(one.contacts))),
+    Column("travel of the rotor", "rotor_travel", "length"),
+    Column("against the race", "travel", "length"),
+    Column("landings", lambda one: str(landing_count(one))),
     Column("largest axial force", lambda one: one.contacts.peak[0], "force"),
     Column("at", lambda one: one.contacts.peak[1], "time", 3),
     Column("contact angle", "contact_angle", "angle"),
@@ -135,4 +136,10 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
         rows.append([Panel(title=one.name, axis="axial force", histories=(simulated,))])
     caption = "Axial force of the rotor on the face of the race, positive towards higher nodes."
     figure = Figure(time_panels(rows, 1.0, "N"), caption, "axial force")
-    return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS),))
+    note = (
+        "Travel of the rotor is from the middle between its axial magnets and counts for impellers; against "
+        "the race it is longer than the gap by what shoulder and face give way. Contacts without a flight "
+        "between them are one landing, as for radial impacts. The edge of the contact is how far up its "
+        "groove the contact of a ball reaches; the groove ends at the shoulder."
+    )
+    return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS, note=note),))

@@ -13,11 +13,12 @@ from rotordrop.elements.face import UNPRESSED
 from rotordrop.elements.race_bearing import THROWN, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.machine.plausibility import doubts_of_speed
+from rotordrop.record.impacts import after_flights
 from rotordrop.report.content import SIMULATED_MACHINE, Card, Level, ReportContent, Statement, fact
 from rotordrop.report.estimate_numbers import headline_card, static_limit_statement
 from rotordrop.report.quantity import shown
 from rotordrop.simulate.clearances import ClearanceUse, clearance_uses
-from rotordrop.simulate.landing import landings
+from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.result import DropResult, stop_of
 from rotordrop.simulate.ribbons import RibbonUse, ribbon_uses
 
@@ -174,6 +175,11 @@ def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
                 yield Statement(f"{bearing.name}: {excess.text}.", "warning")
 
 
+def landing_count(one: Landing) -> int:
+    """Number of landings on a face: contacts that no flight parts are one, by the rule of radial impacts."""
+    return int(np.sum(after_flights(one.contacts.start, one.contacts.end, one.gap)))
+
+
 def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
     """How far the rotor moved along its axis, with what force it landed, whether balls climbed too far."""
     for one in landings(machine, result):
@@ -186,10 +192,12 @@ def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
             text = f"{one.name}: the rotor travels {travel} of {gap} along its axis"
             yield Statement(f"{text} and never lands on the face.", "good")
             continue
-        times = "once" if len(one.contacts) == 1 else f"{len(one.contacts)} times"
+        count, moved = landing_count(one), shown(one.rotor_travel, "length", 3)
+        times = "once" if count == 1 else f"{count} times"
         first = shown(one.contacts.start[0], "time", 3)
         yield Statement(
-            f"{one.name}: the rotor lands on the face of the race {times} (gap {gap}), first at {first}, "
+            f"{one.name}: the rotor moves {moved} along its axis (gap {gap}) and lands on the face of the "
+            f"race {times}, first at {first}, "
             f"with {shown(force, 'force', 4)} along its axis at most, at {shown(moment, 'time', 3)}; contact "
             f"angle up to {shown(one.contact_angle, 'angle', 3)}."
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.estimate.bearing_drop import published_bearing, simulated_bearings
+from rotordrop.report.simulate_summary import landing_count
 from rotordrop.simulate.clearances import clearance_uses
 from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.magnets import MagnetHistory
@@ -118,6 +119,7 @@ def _landed(one: Landing) -> dict[str, Any]:
         "largest_travel_m": one.travel,
         "time_s": one.travel_time,
         "contacts": len(one.contacts),
+        "landings": landing_count(one),
         "peak_force_N": {"value": force, "time_s": moment if len(one.contacts) else None},
         "contact_angle_rad": one.contact_angle,
         "contact_edge_rad": {"value": one.edge_angle, "time_s": one.edge_time},

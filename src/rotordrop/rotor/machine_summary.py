@@ -42,7 +42,9 @@ class BearingSummary:
     tangent_stiffness: float
     """Radial stiffness of the bearing at that deflection [N/m]."""
     support_frequency: float
-    """Natural frequency of the support by itself, vertical [Hz]."""
+    """Natural frequency of the support by itself, vertical [Hz], with what its mount holds beside it."""
+    beside_support: tuple[str, ...]
+    """What of its mount counts with the support, in small motion about the load."""
     equivalent_stiffness: float
     """Bearing and support in series [N/m]."""
 
@@ -107,7 +109,8 @@ def _bearing(machine: Machine, bearing: TouchdownBearing, load: float) -> Bearin
         contact_pressure=float(rotor_on_race(machine, bearing).maximum_pressure(abs(load))),
         deflection=numbers.deflection(abs(load))[0],
         tangent_stiffness=parts.tangent,
-        support_frequency=math.sqrt(float(support.stiffness) / float(support.mass)) / (2.0 * math.pi),
+        support_frequency=math.sqrt(parts.support / float(support.mass)) / (2.0 * math.pi),
+        beside_support=parts.beside,
         equivalent_stiffness=parts.equivalent(),
     )
 
@@ -196,9 +199,11 @@ def _resonance(rest: BearingSummary, summary: MachineSummary) -> Iterator[Machin
         if abs(own - frequency) > FREQUENCY_DISTANCE * frequency:
             continue
         support, rotor = format_quantity(own, "frequency"), format_quantity(frequency, "frequency")
+        beside = f" with {' and '.join(rest.beside_support)}" if rest.beside_support else ""
         text = (
-            f"the support by itself resonates at {support}, near the rotor's mode at {rotor} on massless "
-            "supports; the mass of the support splits that mode, and maps with massless supports mislead"
+            f"the support by itself{beside} resonates at {support}, near the rotor's mode at {rotor} on "
+            "massless supports; the mass of the support splits that mode, and maps with massless supports "
+            "mislead"
         )
         yield _warning("support resonance", rest.name, own, frequency, text)
 

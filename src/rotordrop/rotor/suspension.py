@@ -56,6 +56,8 @@ class EquivalentStiffness:
     contact: float
     """Slope of the contact law between rotor and race at that load [N/m]; infinite without a race, where the
     bearing is the contact."""
+    beside: tuple[str, ...] = ()
+    """What of the mount is in that stiffness."""
     branches: tuple[Relaxing, ...] = ()
     """Branches of the mount that relax: nothing at rest, stiffer the faster the rotor moves."""
 
@@ -96,13 +98,15 @@ def stiffness_of(bearing: TouchdownBearing, load: float) -> EquivalentStiffness:
     numbers, mount = numbers_of(bearing), bearing.mount
     contact = contact_tangent(bearing.contact.law, load)
     contact, tangent, simple = numbers.in_series(contact, load)
+    held, stuck = _held_by(bearing, load)[1], mount.stiffnesses.get("ribbon", 0.0)
     return EquivalentStiffness(
         bearing=bearing.name,
         node=bearing.node,
         load=load,
         tangent=tangent,
         simple=simple,
-        support=float(bearing.support.stiffness) + _held_by(bearing, load)[1],
+        support=float(bearing.support.stiffness) + held,
+        beside=("a ribbon that sticks",) * (stuck > 0.0) + ("a stop pressed shut",) * (held > stuck),
         contact=contact,
         branches=tuple(Relaxing(stiffness=float(b.stiffness), time=float(b.time)) for b in mount.maxwell),
     )

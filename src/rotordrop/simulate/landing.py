@@ -19,6 +19,8 @@ class Landing:
     """Name of the bearing."""
     gap: float
     """Axial clearance of each side [m]."""
+    rotor_travel: float
+    """Largest axial displacement of the rotor from the middle [m]."""
     travel: float
     travel_time: float
     """Largest axial displacement of the rotor against the race [m], of either sense, and when [s]."""
@@ -56,6 +58,7 @@ def landings(machine: Machine, result: DropResult) -> tuple[Landing, ...]:
             Landing(
                 name=bearing.name,
                 gap=float(bearing.face.gap),
+                rotor_travel=float(np.max(np.abs(result.axial_displacement))),
                 travel=float(way[furthest]),
                 travel_time=float(result.time[furthest]),
                 contacts=contacts,

@@ -18,6 +18,7 @@ from rotordrop.physics import columns as L
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.report.simulate_summary import simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate.case import DropCase
@@ -253,3 +254,25 @@ def test_a_mistyped_ribbon_is_doubted_and_named_where_a_drop_breaks_off(tmp_path
     assert "good:" not in told.out and "a value became infinite" in told.err
     assert "its ribbon of 2000 GN/m slips at 300 N" in told.err
     assert (tmp_path / "drop.html").exists()
+
+
+def test_check_says_what_a_bearing_has_and_counts_a_ribbon_with_its_support(tmp_path, capsys):
+    machine = mounted(RIBBON, STOP.replace("8 um", "80 um"))
+    summary = summarise_machine(machine)
+    support, rest = machine.bearing("DE").support, summary.bearings[1]
+    stiffness = support.stiffness.value + 6e7
+    assert rest.support_frequency == pytest.approx(np.sqrt(stiffness / support.mass.value) / (2.0 * np.pi))
+    in_series = 1.0 / (1.0 / stiffness + 1.0 / rest.tangent_stiffness)
+    assert rest.equivalent_stiffness == pytest.approx(in_series)
+    warned = {one.bearing: one for one in machine_warnings(machine, summary) if "resonance" in one.kind}
+    assert "the support by itself with a ribbon that sticks resonates at 628 Hz" in warned["DE"].message
+    file = tmp_path / "machine.toml"
+    push = '\n[[loads]]\nnode = 3\ndirection = "0 deg"\nforce = "5 N"\n'
+    file.write_text(machine_text(machine) + push, encoding="utf-8")
+    assert run(["check", str(file), "--all"]) == 0
+    told = capsys.readouterr().out
+    assert "DE has a mount (ribbon, stop); its support counts with a ribbon that sticks." in told
+    assert "NDE has" not in told and "landing sleeve" not in told
+    assert "loads 1, speed exponent" in told and "loads 2" not in told
+    pressed = summarise_machine(mounted('{ kind = "stop", gap = "0.3 um" }')).bearings[1]
+    assert pressed.beside_support == ("a stop pressed shut",)
