@@ -138,8 +138,8 @@ def _thrust(problem: DropProblem) -> Iterator[tuple[str, str]]:
         yield (
             "the machine file states no load along the axis, and no sensor across it shows one. It presses "
             "on all balls of a bearing: on a simulated rotor of 6 t with 0.8 of the weight on that bearing "
-            "the stress was 16 % higher than found without it, its force as found; a load with direction = "
-            '"axial" and the face it lands on take it into account',
+            "the stress was 16 % higher than found without it, its force as found; an axial load "
+            "in the machine file and the face it lands on take it into account",
             "no axial load",
         )
 

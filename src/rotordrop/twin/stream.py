@@ -107,7 +107,7 @@ def track_stream(
     delay: float | str = "25 ms",
     noise_factor: float = 1.0,
 ) -> Iterator[StreamStep]:
-    """Force and motion of a drop while its readings arrive, at most 25 ms behind them.
+    """Force and motion of a drop while its readings arrive, from readings at most 25 ms younger.
 
     The lag is a free fall through the widest air gap: what a contact says of the flight before it has then
     been read. The parameters of the machine are held; unbalance, remanent lift, drag of the air, gains,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import example_path, loads_machine
+from rotordrop.physics.ring import row_rigidity
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.drop import simulate_drop
@@ -51,7 +52,7 @@ def test_rings_without_friction_in_their_fits_are_followed():
 
 
 def test_a_light_ring_sets_the_steps_of_the_filter():
-    """Four times lighter, twice as fast; a heavy one is slower than the race, and a rigid pair has none."""
+    """Its frequency on balls at eight times their load; a heavy one is slower than the race."""
     text = example_path("small").read_text(encoding="utf-8")
 
     def fastest(*lines: str) -> float:
@@ -62,3 +63,5 @@ def test_a_light_ring_sets_the_steps_of_the_filter():
     light = fastest(spring, 'ring_mass = "4 g"')
     assert fastest(spring, 'ring_mass = "1 g"') == pytest.approx(2.0 * light, rel=1e-6)
     assert light > fastest() == fastest(spring, 'ring_mass = "4 kg"')
+    stiffness = row_rigidity(loads_machine(text).touchdown_bearings[0].bearing.numbers().constants)
+    assert light == pytest.approx((2.0 * stiffness / 4e-3) ** 0.5, rel=1e-6)

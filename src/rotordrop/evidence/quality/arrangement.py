@@ -17,6 +17,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.synchronous import FEWEST_TURNS
 from rotordrop.record.axes import Plane, along_sensors
 from rotordrop.units import GRAVITY
 
@@ -35,9 +36,6 @@ CLEAR_ORBIT = 3.0
 
 BEFORE_RELEASE = 4e-3
 """Distance from a release of which a look knows to 2 ms [s], up to which the rotor surely floats."""
-
-_FEWEST_TURNS = 4
-"""Turns that show the sense of an orbit [1] (chosen)."""
 
 _AFTER_FALL = 0.06
 """Time over which the change by a fall is averaged [s] (chosen)."""
@@ -158,7 +156,7 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
     level = np.mean(record.signals[:begins], axis=0)
     tone = np.zeros(len(level), dtype=np.complex128)
     turns = math.floor((record.time[begins] - record.time[0]) * (speed or 0.0) / (2.0 * math.pi))
-    if speed and turns >= _FEWEST_TURNS:
+    if speed and turns >= FEWEST_TURNS:
         first = int(np.searchsorted(record.time, record.time[begins] - turns * 2.0 * math.pi / speed))
         waves = np.exp(-1j * speed * record.time[first:begins])
         tone = 2.0 * np.mean((record.signals[first:begins] - level) * waves[:, None], axis=0) * record.gains
