@@ -83,7 +83,7 @@ def log_posterior(
     """Logarithm of prior times likelihood, up to a constant."""
     apart = values - problem.mean[places]
     prior = apart @ np.linalg.solve(problem.covariance[np.ix_(places, places)], apart)
-    result = forward(fixed_at(problem, places, values), settings, samples=samples, smoothing=False)
+    result = forward(fixed_at(problem, places, values), settings, samples=samples, keep="nothing")
     if result.done < samples:
         return -math.inf
     return -0.5 * float(prior) - result.negative_log_likelihood

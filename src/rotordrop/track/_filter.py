@@ -25,6 +25,8 @@ from rotordrop.track._propagation import (
     add_process_noise,
     apply_parameters,
     propagate,
+    take_noise_of,
+    unknown_impulses,
 )
 from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row, noise_step
 
@@ -109,6 +111,7 @@ def forward_pass(
     transitions: Compact,
     rows: Array,
     gains: Array,
+    kicks: Array,
     innovations: Array,
     innovation_variances: Array,
 ) -> int:
@@ -137,6 +140,8 @@ def forward_pass(
         Filled with the sensitivity from the sample before.
     rows, gains : ndarray, shape (N, C + 1, n) or (0, ...)
         Filled with measurement rows and gains, in the order used.
+    kicks : ndarray, shape (N, B) or (0, ...)
+        Filled with the standard deviations of the unknown impulses from the sample before [N s].
     innovations, innovation_variances : ndarray, shape (N, C + 1)
         Filled; NaN where a reading was left out.
 
@@ -153,6 +158,7 @@ def forward_pass(
     y = np.zeros(p.rotor_at[L.N_STATES])
     F = np.zeros((s, s + n_p))
     impulses = np.zeros(p.bearing.shape[0])
+    sigmas = np.zeros(p.bearing.shape[0])
     row = np.empty(n)
     gain = np.empty(n)
     told = np.empty((n_c + 1, n))
@@ -194,13 +200,14 @@ def forward_pass(
             P[:s, :s] = np.dot(np.ascontiguousarray(head[:, : s + n_p]), F.T)
             P[s:, :s] = head[:, s:].T
             noise_step(mean, P, form)
-            drift = targets.late_drift if times[i] > settings.learning_end else targets.drift
             largest = settings.fall_impulse if times[i] < settings.fall_end else np.inf
-            add_process_noise(P, p, settings, impulses, drift, largest)
+            unknown_impulses(settings, impulses, largest, sigmas)
+            add_process_noise(P, p, settings, sigmas, drift_at(times[i], targets, settings))
             # Rounding leaves what has moved lopsided by a little, and sample by sample the error would grow.
             symmetrise(P, s)
             if keep:
                 transitions[i] = F
+                kicks[i] = sigmas
         elif keep:
             transitions[i] = 0.0
         count = 0
@@ -248,6 +255,12 @@ def forward_pass(
         if not is_covariance(P) or not is_plausible(mean, p):
             return i
     return len(times)
+
+
+@kernel
+def drift_at(t: float, targets: ParameterTargets, settings: FilterSettings) -> Array:
+    """Drift of the parameters at a time [s], shape (P,)."""
+    return targets.late_drift if t > settings.learning_end else targets.drift
 
 
 @kernel
@@ -371,3 +384,87 @@ def backward_pass(
                 Lam[j, :] *= noise_decay[m]
                 Lam[:, j] *= noise_decay[m]
         symmetrise(Lam, n)
+
+
+@kernel
+def smooth_means(
+    first: int,
+    mean_0: Array,
+    P: Array,
+    times: Array,
+    targets: ParameterTargets,
+    p: KernelParameters,
+    settings: FilterSettings,
+    form: SensorForm,
+    reference: Array,
+    means: Array,
+    transitions: Compact,
+    rows: Array,
+    gains: Array,
+    kicks: Array,
+    innovations: Array,
+    innovation_variances: Array,
+    smoothed: Array,
+    score: Array,
+) -> None:
+    """Smoothed estimate alone; arrays as filled by `forward_pass` and, as `reference`, handed to it.
+
+    λ is carried back as by `backward_pass`; from the first sample, whose covariance is known, the estimate
+    goes forward again, with the unknown impulses and drifts that λ says: no covariance of a later sample is
+    asked for, nor Λ.
+
+    Parameters
+    ----------
+    first : int
+        First sample done: 0, or 1 where sample 0 is the last one of what was filtered before.
+    mean_0, P : ndarray, shapes (n,), (n, n)
+        Estimate before the first reading, or the filtered one of sample 0.
+    smoothed : ndarray, shape (N, n)
+        Filled from the first sample done on.
+    score : ndarray, shape (n,)
+        λ that later samples put on the last one; overwritten as by `backward_pass`.
+    """
+    n_t, n = means.shape
+    s, columns = transitions.shape[1], transitions.shape[2]
+    noisy = form.noise_decay.shape[0]
+    scores = np.empty((n_t, n))
+    for i in range(n_t - 1, first - 1, -1):
+        for c in range(rows.shape[1] - 1, -1, -1):
+            if math.isfinite(innovation_variances[i, c]):
+                seen = innovations[i, c] / innovation_variances[i, c] + np.dot(gains[i, c], score)
+                for a in range(n):
+                    score[a] -= rows[i, c, a] * seen
+        scores[i] = score
+        if i > 0:
+            old = scores[i]
+            score[:s] = 0.0
+            for a in range(s):
+                for j in range(columns):
+                    score[j] += transitions[i, a, j] * old[a]
+            for m in range(noisy):
+                score[n - noisy + m] *= form.noise_decay[m]
+    away = -np.dot(P, score)  # of the smoothed estimate from the filtered one
+    moved = np.empty(n)
+    for i in range(first, n_t):
+        if i == 0:
+            smoothed[0] = mean_0 + away
+        else:
+            at = reference[i - 1] if i - 1 < reference.shape[0] else means[i - 1]
+            apply_parameters(at[s:columns].copy(), targets, p)
+            moved[:] = away
+            for a in range(s):
+                moved[a] = 0.0
+                for j in range(columns):
+                    moved[a] += transitions[i, a, j] * away[j]
+            for m in range(noisy):
+                e, decay = n - noisy + m, form.noise_decay[m]
+                kept = decay * away[e]
+                moved[e] = kept - (1.0 - decay * decay) * form.noise_variance[m] * scores[i, e]
+            take_noise_of(scores[i], p, settings, kicks[i], drift_at(times[i], targets, settings), moved)
+            smoothed[i] = means[i] + moved
+            for c in range(rows.shape[1]):
+                if math.isfinite(innovation_variances[i, c]):
+                    for a in range(n):
+                        smoothed[i, a] -= gains[i, c, a] * innovations[i, c]
+        for a in range(n):
+            away[a] = smoothed[i, a] - means[i, a]

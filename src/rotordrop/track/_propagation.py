@@ -436,36 +436,86 @@ def propagate(
                 F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
 
 
+@lean_kernel
+def unknown_impulses(settings: FilterSettings, impulses: Array, largest: float, sigmas: Array) -> None:
+    """Fill ``sigmas`` (B,) with the standard deviation of the unknown impulse at each bearing [N s].
+
+    ``impulses`` (B,) are those of the contacts, ``largest`` is what none exceeds.
+    """
+    for b in range(sigmas.shape[0]):
+        sigmas[b] = min(settings.impulse + settings.share * impulses[b], largest)
+
+
+@lean_kernel
+def unit_impulse(b: int, axis: int, p: KernelParameters, g: Array, place: Integers) -> None:
+    """Velocities ``g`` (m + 1,) that a unit impulse between rotor and race gives, and where they stand.
+
+    It is equal and opposite; modes have unit mass.
+    """
+    m, n_q = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES]
+    for k in range(m):
+        g[k] = -p.bearing_shape[b, k]
+        place[k] = n_q + p.rotor_at[L.MODES_X + axis] + k
+    g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
+    place[m] = n_q + p.bearing_at[b, L.RACE] + axis
+
+
+@lean_kernel
+def spin_sigma(b: int, sigma: float, p: KernelParameters, settings: FilterSettings) -> float:
+    """Standard deviation of the spin of a race [rad/s]: friction passes on a tenth of an unknown impulse."""
+    row = p.bearing[b]
+    passed: float = settings.spin_noise + sigma * row[L.BORE_RADIUS] / row[L.RACE_INERTIA] * 0.1
+    return passed
+
+
 @kernel
 def add_process_noise(
-    P: Array, p: KernelParameters, settings: FilterSettings, impulses: Array, drift: Array, largest: float
+    P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
 ) -> None:
     """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``.
 
-    ``largest`` is the largest standard deviation of an unknown impulse [N s].
+    ``sigmas`` (B,) are the standard deviations of the unknown impulses [N s].
     """
-    m, n_q, i_w = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
-    # Process noise enters where the model errs: as an impulse between rotor and race, equal and opposite.
-    # White noise on every state would let the filter explain a record by motions that nothing can cause.
-    # ``g`` is the velocity that a unit impulse gives; modes have unit mass.
+    m, i_w = p.eigenvalue.shape[0], p.rotor_at[L.ROTOR_SPEED]
+    # Process noise enters where the model errs: as an impulse between rotor and race. White noise on every
+    # state would let the filter explain a record by motions that nothing can cause.
     g = np.empty(m + 1)
     place = np.empty(m + 1, dtype=np.int64)
     for b in range(p.bearing.shape[0]):
-        sigma = min(settings.impulse + settings.share * impulses[b], largest)
+        sigma = sigmas[b]
         for axis in range(2):
-            for k in range(m):
-                g[k] = -p.bearing_shape[b, k]
-                place[k] = n_q + p.rotor_at[L.MODES_X + axis] + k
-            g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
-            place[m] = n_q + p.bearing_at[b, L.RACE] + axis
+            unit_impulse(b, axis, p, g, place)
             for i in range(m + 1):
                 for j in range(m + 1):
                     P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
-        # Of an unknown impulse friction passes on about a tenth to the spin of the race.
-        spin = settings.spin_noise + sigma * p.bearing[b, L.BORE_RADIUS] / p.bearing[b, L.RACE_INERTIA] * 0.1
+        spin = spin_sigma(b, sigma, p, settings)
         P[p.bearing_at[b, L.RACE_SPIN], p.bearing_at[b, L.RACE_SPIN]] += spin * spin
     P[i_w, i_w] += settings.speed_noise * settings.speed_noise
     s = p.rotor_at[L.N_DYNAMIC]
     # a random walk: its variance grows with time
     for k in range(drift.shape[0]):
         P[s + k, s + k] += drift[k] * drift[k] * settings.dt
+
+
+@kernel
+def take_noise_of(
+    score: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array, out: Array
+) -> None:
+    """Take off ``out`` (n,) the product of what `add_process_noise` adds with ``score`` (n,)."""
+    m, i_w = p.eigenvalue.shape[0], p.rotor_at[L.ROTOR_SPEED]
+    g = np.empty(m + 1)
+    place = np.empty(m + 1, dtype=np.int64)
+    for b in range(p.bearing.shape[0]):
+        for axis in range(2):
+            unit_impulse(b, axis, p, g, place)
+            along = 0.0
+            for i in range(m + 1):
+                along += g[i] * score[place[i]]
+            for i in range(m + 1):
+                out[place[i]] -= sigmas[b] * sigmas[b] * g[i] * along
+        at, spin = p.bearing_at[b, L.RACE_SPIN], spin_sigma(b, sigmas[b], p, settings)
+        out[at] -= spin * spin * score[at]
+    out[i_w] -= settings.speed_noise * settings.speed_noise * score[i_w]
+    s = p.rotor_at[L.N_DYNAMIC]
+    for k in range(drift.shape[0]):
+        out[s + k] -= drift[k] * drift[k] * settings.dt * score[s + k]

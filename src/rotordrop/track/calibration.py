@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from rotordrop.track.smoother import (
     forward,
     pass_settings,
     smooth,
+    smooth_means,
 )
 from rotordrop.units import GRAVITY
 
@@ -95,6 +97,8 @@ MOST_REPEATS, SMALL_CHANGE = 6, 5.0
 A fall does not end them: on a rotor of 6 t it fell by 48 in one pass of the whole drop and rose by 194 in the
 next three, and the peak moved by 9 %.
 """
+MEMORY = 128_000_000
+"""Memory [B] for what the passes of a fit keep of their samples, of all drops together."""
 THREADS = 2
 """Passes over the same drops that run side by side [1]."""
 
@@ -105,24 +109,32 @@ class TrackedDrops:
 
     problems: tuple[DropProblem, ...]
     """The drops, in the order of the chain."""
-    smoothed: tuple[Smoothed, ...]
-    """Their smoothed estimates."""
-    nis: tuple[float, ...]
-    """Mean normalised innovation squared of each drop [1]."""
-    diverged: tuple[bool, ...] = field(default=())
-    """Drops in which the filter had to give up."""
-    noise_factors: tuple[float, ...] = field(default=())
+    filtered: tuple[Forward, ...]
+    """Their last passes."""
+    trajectories: tuple[Array, ...]
+    """Smoothed means of each drop, shape (M, n)."""
+    noise_factors: tuple[float, ...]
     """Process noise of the last pass over the usual one, as each drop needed it to be followed [1]."""
+
+    @property
+    def nis(self) -> tuple[float, ...]:
+        """Mean normalised innovation squared of each drop [1]."""
+        return tuple(one.nis for one in self.filtered)
+
+    @property
+    def diverged(self) -> tuple[bool, ...]:
+        """Drops in which the filter had to give up."""
+        return tuple(one.done < len(one.means) for one in self.filtered)
 
     @property
     def negative_log_likelihood(self) -> float:
         """Negative logarithm of the marginal likelihood of all drops, up to a constant [1]."""
-        return sum(one.filtered.negative_log_likelihood for one in self.smoothed)
+        return sum(one.negative_log_likelihood for one in self.filtered)
 
-    @property
-    def trajectories(self) -> list[Array]:
-        """Smoothed means of each drop, shape (M, n)."""
-        return [one.means for one in self.smoothed]
+    @cached_property
+    def smoothed(self) -> tuple[Smoothed, ...]:
+        """Smoothed estimates with their covariances: most fits of a search are never asked for them."""
+        return tuple(smoothed_chain(self.problems, self.filtered))
 
 
 def window_end(stage: Stage, first_contact: float, fall: float) -> float:
@@ -157,37 +169,30 @@ def track(
     progress : callable, optional
         Called with a sentence and the fraction done.
     """
-    trajectories: list[Array | None] = list(references) if references is not None else [None] * len(problems)
     # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
     from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
     contact, fall = max(one.first_contact for one in problems), problems[0].fall_time
     ends = [window_end(stage, contact, fall) for stage in schedule]
     total = sum(end * stage.passes for end, stage in zip(ends, schedule, strict=True))
     done = 0.0
-    smoothed: list[Smoothed] = []
-    storages = [Storage() for _ in problems]
+    storages = [Storage(MEMORY // len(problems)) for _ in problems]
+    at: Sequence[Array | None] = references or [None] * len(problems)
+    trajectories: Sequence[Array] = ()
     for end, stage in zip(ends, schedule, strict=True):
         settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * end:.0f} ms", done / total)
-            smoothed = one_pass(
-                [_eased(*one, stage) for one in zip(problems, trajectories, strict=True)],
-                settings,
-                trajectories,
-                end,
-                from_guesses=from_guesses,
-                storages=storages,
-            )
+            eased = [_eased(*one, stage) for one in zip(problems, at, strict=True)]
+            filtered = filtered_chain(eased, settings, at, end, from_guesses=from_guesses, storages=storages)
+            at = trajectories = mean_chain(problems, filtered, storages)
             from_guesses = False
-            trajectories = [s.means for s in smoothed]
             done += end
     return TrackedDrops(
         problems=tuple(problems),
-        smoothed=tuple(smoothed),
-        nis=tuple(s.filtered.nis for s in smoothed),
-        diverged=tuple(s.filtered.done < len(s.filtered.means) for s in smoothed),
-        noise_factors=tuple(noise_factor * s.filtered.impulse / settings.impulse for s in smoothed),
+        filtered=tuple(filtered),
+        trajectories=tuple(trajectories),
+        noise_factors=tuple(noise_factor * one.impulse / settings.impulse for one in filtered),
     )
 
 
@@ -201,6 +206,8 @@ def converged(
     progress: Progress | None = None,
 ) -> TrackedDrops:
     """A fit after as many passes over a window as still change the likelihood, or as are allowed.
+
+    Where the likelihood falls, the next pass begins half way: steps that overshoot would swing for ever.
 
     Parameters
     ----------
@@ -225,11 +232,19 @@ def converged(
         return track(problems, once, references=references, noise_factor=noise_factor, progress=told)
 
     fit = passed(0, references)
+    at: Sequence[Array] = fit.trajectories
     for number in range(1, passes):
-        before, fit = fit.negative_log_likelihood, passed(number, fit.trajectories)
-        if abs(fit.negative_log_likelihood - before) < SMALL_CHANGE:
+        before, fit = fit.negative_log_likelihood, passed(number, at)
+        rise = before - fit.negative_log_likelihood
+        if abs(rise) < SMALL_CHANGE:
             break
+        at = fit.trajectories if rise > 0.0 else _half_way(at, fit.trajectories)
     return fit
+
+
+def _half_way(ones: Sequence[Array], others: Sequence[Array]) -> list[Array]:
+    """Middles of trajectories, each as far as the other one reaches."""
+    return [0.5 * (one[: len(other)] + other) for one, other in zip(ones, others, strict=True)]
 
 
 def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
@@ -261,7 +276,7 @@ def is_inconsistent(tracked: TrackedDrops) -> bool:
     return any(tracked.diverged) or max(tracked.noise_factors) > 1.0 or max(tracked.nis) > FITTING_NIS
 
 
-def one_pass(
+def filtered_chain(
     problems: Sequence[DropProblem],
     settings: PassSettings,
     references: Sequence[Array | None],
@@ -269,13 +284,12 @@ def one_pass(
     *,
     from_guesses: bool = False,
     storages: Sequence[Storage] = (),
-) -> list[Smoothed]:
-    """One forward pass through the chain of drops and one backward pass through it.
+) -> list[Forward]:
+    """One forward pass through the chain of drops.
 
     ``storages``, one for each drop if given, is memory that passes before have used.
     """
     storages = storages or [Storage() for _ in problems]
-    shared = problems[0].machine_indices
     filtered: list[Forward] = []
     mean = problems[0].start if from_guesses else problems[0].mean
     covariance = problems[0].covariance
@@ -290,17 +304,34 @@ def one_pass(
                 "are too far from it. Check air gap, bearing nodes, sensor angles and support guesses."
             )
         filtered.append(result)
+    return filtered
+
+
+def smoothed_chain(problems: Sequence[DropProblem], filtered: Sequence[Forward]) -> list[Smoothed]:
+    """The backward pass through the chain of drops."""
     smoothed: list[Smoothed] = []
     score, information = None, None
-    for d in range(len(problems) - 1, -1, -1):
-        back = smooth(filtered[d], score, information, watched=problems[d].watched, storage=storages[d])
-        smoothed.append(back)
-        if d > 0:
-            n = len(problems[d].mean)
-            score, information = np.zeros(n), np.zeros((n, n))
-            score[shared] = back.score_0[shared]
-            information[np.ix_(shared, shared)] = back.information_0[np.ix_(shared, shared)]
+    for problem, one in zip(reversed(problems), reversed(filtered), strict=True):
+        smoothed.append(smooth(one, score, information, watched=problem.watched))
+        shared, n = problem.machine_indices, len(problem.mean)
+        score, information = np.zeros(n), np.zeros((n, n))
+        score[shared] = smoothed[-1].score_0[shared]
+        information[np.ix_(shared, shared)] = smoothed[-1].information_0[np.ix_(shared, shared)]
     return smoothed[::-1]
+
+
+def mean_chain(
+    problems: Sequence[DropProblem], filtered: Sequence[Forward], storages: Sequence[Storage]
+) -> list[Array]:
+    """The smoothed means of `smoothed_chain` alone."""
+    trajectories: list[Array] = []
+    score = None
+    for problem, one, storage in zip(reversed(problems), reversed(filtered), reversed(storages), strict=True):
+        means, before = smooth_means(one, score, storage=storage)
+        trajectories.append(means)
+        score = np.zeros_like(before)
+        score[problem.machine_indices] = before[problem.machine_indices]
+    return trajectories[::-1]
 
 
 def _followed(
@@ -320,13 +351,14 @@ def _followed(
         covariance=covariance,
         reference=reference,
         samples=samples,
+        keep="means",
         storage=storage,
     )
     for factor in LOOSER if reference is not None else LOOSER[1:]:
         if result.done == samples:
             break
         looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
-        again = forward(problem, looser, mean=mean, covariance=covariance, samples=samples)
+        again = forward(problem, looser, mean=mean, covariance=covariance, samples=samples, keep="means")
         result = max(result, again, key=lambda one: one.done)
     return result
 

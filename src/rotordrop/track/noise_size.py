@@ -78,7 +78,7 @@ def forward_passes(
                 covariance=covariance,
                 reference=reference,
                 samples=len(reference),
-                smoothing=False,
+                keep="nothing",
             )
         )
     return passes

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ Compact = NDArray[np.float32]
 
 Number = TypeVar("Number", np.float32, np.float64)
 
+Keep = Literal["all", "means", "nothing"]
+
 REFERENCE_STEP = 50e-6
 """Time for which the numbers of `PassSettings` hold [s]."""
 STEP = 0.007
@@ -32,12 +34,8 @@ SPIN = 0.07
 """Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
 LEARNING = 7.0
 """Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
-STRETCH = 32_000_000
-"""Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again.
-
-The smoother takes it twice. Of a whole drop all but an eighth is filtered again, of a first fit of the coarse
-basis less than half of the last windows.
-"""
+MEMORY = 64_000_000
+"""Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again."""
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 FROZEN = 2
@@ -136,7 +134,8 @@ def pass_settings(problem: DropProblem, *, force: float, share: float, substeps:
 class Stretch:
     """What the smoother needs of some samples of a pass beside its means; K samples, n estimated.
 
-    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed.
+    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed, where
+    they are.
     """
 
     first: int
@@ -144,17 +143,33 @@ class Stretch:
     transitions: Compact
     rows: Array
     gains: Array
+    kicks: Array
+
+    @property
+    def has_covariances(self) -> bool:
+        """Whether it is enough for smoothed covariances."""
+        return bool(self.covariances.shape[1] > 0)
 
 
 class Storage:
-    """Memory for one stretch of a pass: what a pass writes to it is overwritten by the next.
+    """Memory for stretches of a pass: what a pass writes to it is overwritten by the next.
 
     Memory asked of the system anew is as slow to fill for the first time as the filter.
+
+    Parameters
+    ----------
+    memory : int
+        How much is taken [B]; that of two stretches in any case.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, memory: int = MEMORY) -> None:
+        self._memory = memory
         self._blocks: dict[str, NDArray[Any]] = {}
-        self._held: tuple[Array, Stretch] | None = None
+        self._held: dict[int, tuple[Array, Stretch]] = {}
+
+    def slots(self, size: int) -> int:
+        """Places for stretches of a size [B]: stretches that follow one another have different ones."""
+        return max(2, self._memory // size)
 
     def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
         """An array of any content; those of the same name share their memory."""
@@ -169,15 +184,21 @@ class Storage:
         """Memory taken [B]."""
         return sum(block.nbytes for block in self._blocks.values())
 
-    def hold(self, means: Array, stretch: Stretch) -> None:
-        """Remember which pass, told by its means, and which stretch of it the memory holds."""
-        self._held = means, stretch
+    def hold(self, slot: int, means: Array, stretch: Stretch) -> None:
+        """Remember which pass, told by its means, and which stretch of it a slot of the memory holds."""
+        kind = stretch.has_covariances
+        self._held = {
+            place: one
+            for place, one in self._held.items()
+            if one[0] is means and one[1].has_covariances == kind
+        } | {slot: (means, stretch)}
 
     def held(self, means: Array, first: int) -> Stretch | None:
         """The stretch of a pass that begins at a sample, if nothing was written over it."""
-        if self._held is None or self._held[0] is not means or self._held[1].first != first:
-            return None
-        return self._held[1]
+        for known, stretch in self._held.values():
+            if known is means and stretch.first == first:
+                return stretch
+        return None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,33 +213,39 @@ class _Course:
     mean: Array
     reference: Array
     length: int
-    smoothing: bool
     resumed: int
 
-    def stretch(self, first: int, count: int, storage: Storage) -> Stretch:
-        """Room for the samples of a stretch."""
+    def stretch(self, number: int, count: int, keep: Keep, storage: Storage) -> tuple[int, Stretch]:
+        """Room for the samples of a stretch, and its place in the memory."""
         n, s, updates = len(self.mean), self.problem.n_dynamic, self.problem.n_channels + 1
-        kept = count if self.smoothing else 0
-        columns = s + len(self.problem.unknowns)
-        packed = n * (n + 1) // 2 if self.smoothing else 0
-        return Stretch(
-            first=first,
-            covariances=storage.array("covariances", (count, packed), np.float32),
-            transitions=storage.array("transitions", (kept, s, columns), np.float32),
-            rows=storage.array("rows", (kept, updates, n), np.float64),
-            gains=storage.array("gains", (kept, updates, n), np.float64),
+        columns, bearings = s + len(self.problem.unknowns), len(self.problem.model.bearing_names)
+        kept = 0 if keep == "nothing" else self.length + 1
+        packed = n * (n + 1) // 2 if keep == "all" else 0
+        slots = storage.slots(kept * (4 * (packed + s * columns) + 8 * (2 * updates * n + bearings)) or 1)
+        slots = min(slots, len(self.problem.time) // self.length + 1)
+        slot = number % slots
+        # One block for all places: the system gets a large one back at once.
+        return slot, Stretch(
+            first=number * self.length,
+            covariances=storage.array("covariances", (slots, self.length + 1, packed), np.float32)[
+                slot, :count
+            ],
+            transitions=storage.array("transitions", (slots, kept, s, columns), np.float32)[slot, :count],
+            rows=storage.array("rows", (slots, kept, updates, n), np.float64)[slot, :count],
+            gains=storage.array("gains", (slots, kept, updates, n), np.float64)[slot, :count],
+            kicks=storage.array("kicks", (slots, kept, bearings), np.float64)[slot, :count],
         )
 
     def followed(
-        self, first: int, covariance: Array, filled: tuple[Array, Array, Array], storage: Storage
+        self, number: int, covariance: Array, filled: tuple[Array, Array, Array], keep: Keep, storage: Storage
     ) -> tuple[int, Stretch]:
         """Filter a stretch; gives the sample reached, and ``covariance`` becomes that of the last one.
 
         ``filled`` are means, innovations and their variances of the whole pass.
         """
-        problem, means = self.problem, filled[0]
+        problem, means, first = self.problem, filled[0], number * self.length
         chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
-        stretch = self.stretch(first, chosen.stop - first, storage)
+        slot, stretch = self.stretch(number, chosen.stop - first, keep, storage)
         done = F.forward_pass(
             min(first + self.resumed, 1),
             means[first].copy() if first else self.mean,
@@ -239,10 +266,11 @@ class _Course:
             stretch.transitions,
             stretch.rows,
             stretch.gains,
+            stretch.kicks,
             filled[1][chosen],
             filled[2][chosen],
         )
-        storage.hold(means, stretch)
+        storage.hold(slot, means, stretch)
         return first + int(done), stretch
 
 
@@ -269,19 +297,18 @@ class Forward:
     course: _Course
     starts: tuple[Array, ...]
 
-    def stretch(self, number: int, storage: Storage) -> Stretch:
+    def stretch(self, number: int, storage: Storage, keep: Keep = "all") -> Stretch:
         """What the smoother needs of a stretch: as it is held, or filtered again with the same bits."""
-        first = number * self.course.length
-        held = storage.held(self.means, first)
-        if held is not None:
+        held = storage.held(self.means, number * self.course.length)
+        if held is not None and (keep == "means" or held.has_covariances):
             return held
         filled = (self.means, self.innovations, self.innovation_variances)
-        return self.course.followed(first, self.starts[number].copy(), filled, storage)[1]
+        return self.course.followed(number, self.starts[number].copy(), filled, keep, storage)[1]
 
     def covariance(self, sample: int) -> Array:
         """Filtered covariance at a sample, shape (n, n); single precision."""
         number = min(sample // self.course.length, len(self.starts) - 1)
-        stretch = self.stretch(number, Storage())
+        stretch = self.stretch(number, Storage(0))
         return _unpacked(stretch, sample, self.means.shape[1])
 
     @property
@@ -319,7 +346,7 @@ def forward(
     covariance: Array | None = None,
     reference: Array | None = None,
     samples: int | None = None,
-    smoothing: bool = True,
+    keep: Keep = "all",
     storage: Storage | None = None,
     after: Forward | None = None,
 ) -> Forward:
@@ -333,8 +360,8 @@ def forward(
         Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
     samples : int, optional
         Number of samples; all by default.
-    smoothing : bool
-        Keep what the smoother needs.
+    keep : {"all", "means", "nothing"}
+        Keep what the smoother needs, what smoothed means alone need, or nothing.
     storage : Storage, optional
         Where to keep it: what an earlier pass left there is overwritten.
     after : Forward, optional
@@ -357,18 +384,17 @@ def forward(
         else after.course.settings,
         mean=np.ascontiguousarray(mean),
         reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
-        length=_stretch_length(problem) if smoothing else count,
-        smoothing=smoothing,
+        length=count if keep == "nothing" else _stretch_length(problem),
         resumed=0 if after is None else 1,
     )
     filled = np.empty((count, n)), np.empty((count, updates)), np.empty((count, updates))
     if after is not None:  # its readings have been taken already
         filled[0][0], filled[1][0], filled[2][0] = mean, np.nan, np.nan
     storage, starts = storage or Storage(), []
-    for first in range(0, max(count - 1, 1), course.length):
+    for number in range(max(math.ceil((count - 1) / course.length), 1)):
         starts.append(P.copy())
-        done, stretch = course.followed(first, P, filled, storage)
-        if done <= min(first + course.length, count - 1):
+        done, stretch = course.followed(number, P, filled, keep, storage)
+        if done <= min((number + 1) * course.length, count - 1):
             break
     return Forward(
         done=done,
@@ -377,7 +403,7 @@ def forward(
         innovations=filled[1],
         innovation_variances=filled[2],
         parameter_sample=problem.parameter_sample,
-        last=_unpacked(stretch, max(done - 1, 0), n) if smoothing else P,
+        last=_unpacked(stretch, max(done - 1, 0), n) if keep == "all" else P,
         reached=P,
         course=course,
         starts=tuple(starts),
@@ -385,10 +411,12 @@ def forward(
 
 
 def _stretch_length(problem: DropProblem) -> int:
-    """Samples of which what the smoother needs fits into `STRETCH`."""
-    n, s, updates = len(problem.mean), problem.n_dynamic, problem.n_channels + 1
-    packed, transition = n * (n + 1) // 2, s * (s + len(problem.unknowns))
-    return max(2, STRETCH // (4 * (packed + transition) + 8 * 2 * updates * n))
+    """Samples of a stretch: a free fall through the air gap, for rounding grows from impact to impact.
+
+    Smoothed means go forward from the first sample of a stretch.
+    """
+    dt = float(problem.time[1] - problem.time[0])
+    return max(2, math.ceil(problem.fall_time / dt))
 
 
 def _unpacked(stretch: Stretch, sample: int, n: int) -> Array:
@@ -469,8 +497,8 @@ def smooth(
     spread, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
     lam = np.zeros(n) if score is None else score.copy()
     Lam = np.zeros((n, n)) if information is None else information.copy()
-    last = min(max(done - 2, 0) // course.length, len(filtered.starts) - 1)
-    for stretch in _from_the_last(filtered, storage or Storage(), last):
+    last = _stretch_before(filtered, done)
+    for stretch in _from_the_last(filtered, storage or Storage(0), last, "all"):
         first = stretch.first
         samples = slice(first, min(first + course.length + 1, done))
         held, own = slice(0, samples.stop - first), max(begin - first, min(first, 1))
@@ -508,17 +536,57 @@ def smooth(
     )
 
 
-def _from_the_last(filtered: Forward, storage: Storage, number: int) -> Iterator[Stretch]:
+def smooth_means(
+    filtered: Forward, score: Array | None = None, *, storage: Storage | None = None
+) -> tuple[Array, Array]:
+    """Smoothed means (N, n) alone, and λ before the first measurement: half of what `smooth` takes, or less.
+
+    ``score`` (n,) is what later drops say about the last sample, ``storage`` that of the forward pass.
+    """
+    n, course = filtered.means.shape[1], filtered.course
+    means = np.empty((filtered.done, n))
+    lam = np.zeros(n) if score is None else score.copy()
+    parameters, last = private_copy(course.problem.model.parameters), _stretch_before(filtered, filtered.done)
+    for stretch in _from_the_last(filtered, storage or Storage(0), last, "means"):
+        samples = slice(stretch.first, min(stretch.first + course.length + 1, filtered.done))
+        held, own = slice(0, samples.stop - stretch.first), min(stretch.first + course.resumed, 1)
+        F.smooth_means(
+            own,
+            course.mean,
+            filtered.starts[stretch.first // course.length],
+            course.problem.time[samples],
+            course.problem.targets,
+            parameters,
+            course.settings,
+            course.problem.sensor_form,
+            course.reference[samples],
+            filtered.means[samples],
+            stretch.transitions[held],
+            stretch.rows[held],
+            stretch.gains[held],
+            stretch.kicks[held],
+            filtered.innovations[samples],
+            filtered.innovation_variances[samples],
+            means[samples],
+            lam,
+        )
+    return means, lam
+
+
+def _stretch_before(filtered: Forward, stop: int) -> int:
+    """Number of the stretch that has the last sample before one."""
+    return min(max(stop - 2, 0) // filtered.course.length, len(filtered.starts) - 1)
+
+
+def _from_the_last(filtered: Forward, storage: Storage, number: int, keep: Keep) -> Iterator[Stretch]:
     """The stretches of a pass from one backwards; while one is used, the one before it is filtered again."""
     if number == 0:  # a thread would take as long to begin as a short pass
-        yield filtered.stretch(0, storage)
+        yield filtered.stretch(0, storage, keep)
         return
-    here, there = storage, Storage()
     with ThreadPoolExecutor(max_workers=1) as ahead:
-        coming = ahead.submit(filtered.stretch, number, here)
+        coming = ahead.submit(filtered.stretch, number, storage, keep)
         while number > 0:
             stretch, number = coming.result(), number - 1
-            here, there = there, here
-            coming = ahead.submit(filtered.stretch, number, here)
+            coming = ahead.submit(filtered.stretch, number, storage, keep)
             yield stretch
         yield coming.result()

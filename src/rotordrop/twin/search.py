@@ -231,8 +231,7 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         search.begins(WHOLE, (WHOLE,) if quick else (WHOLE, WEIGHED))
         fit = track(drops.fine(machine), schedule, progress=search.progress)
         if quick:
-            usual = tuple(one.filtered for one in fit.smoothed)
-            return search.not_lost(Candidate(machine=machine, fit=fit, usual=usual))
+            return search.not_lost(Candidate(machine=machine, fit=fit, usual=fit.filtered))
         first = Candidate(machine=machine, fit=fit)
         noise = likeliest_noise(fit, CALIBRATED_SCHEDULE[-1])
         found: Candidate | None = search.at_rest(first, fit.trajectories, noise)
@@ -590,7 +589,7 @@ class Search:
 
 
 def _checkpoint_of(fit: TrackedDrops) -> Checkpoint:
-    return Checkpoint(problems=fit.problems, trajectories=tuple(fit.trajectories), score=score_of(fit))
+    return Checkpoint(problems=fit.problems, trajectories=fit.trajectories, score=score_of(fit))
 
 
 def fits(found: Candidate) -> bool:
@@ -663,8 +662,8 @@ def _other_start(problem: DropProblem, number: int) -> DropProblem:
 
 def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
     """The drops, if the filter followed all of them to the end: a part of a drop says nothing of its peak."""
-    for item, problem, smoothed in zip(evidence, tracked.problems, tracked.smoothed, strict=True):
-        done, samples = smoothed.filtered.done, len(smoothed.filtered.means)
+    for item, problem, filtered in zip(evidence, tracked.problems, tracked.filtered, strict=True):
+        done, samples = filtered.done, len(filtered.means)
         if done < samples:
             raise IdentificationError(
                 f"the filter lost the drop {item.name} at {1e3 * problem.time[done]:.1f} ms of "

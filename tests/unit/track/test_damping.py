@@ -45,17 +45,23 @@ def test_damping_holds_the_parameters_to_the_pass_before(impacts: DropProblem) -
 def test_passes_go_on_while_the_likelihood_changes(
     monkeypatch: pytest.MonkeyPatch, scores: list[float], passes: int
 ) -> None:
-    """Each begins where the one before has ended, with the same noise."""
+    """Each begins where the one before ended, half way where the likelihood fell, with the same noise."""
     seen: list[Any] = []
 
     def one_pass(_problems: Any, _stages: Any, *, references: Any, noise_factor: float, progress: Any) -> Any:
-        seen.append((references, noise_factor))
+        seen.append((references[0][0, 0], noise_factor))
         progress("fitting", 0.0)
-        return SimpleNamespace(negative_log_likelihood=scores[len(seen) - 1], trajectories=len(seen))
+        ended = [np.full((3, 1), float(len(seen)))]
+        return SimpleNamespace(negative_log_likelihood=scores[len(seen) - 1], trajectories=ended)
 
     monkeypatch.setattr(calibration, "track", one_pass)
     stage = Stage(until=0.2, force=0.07, share=0.01, passes=2)
     shares: list[float] = []
-    converged([], stage, 0, noise_factor=0.5, progress=lambda _, share: shares.append(share))  # type: ignore[arg-type]
-    assert seen == [(k, 0.5) for k in range(passes)]
+    converged([], stage, [np.zeros((4, 1))], noise_factor=0.5, progress=lambda _, share: shares.append(share))
+    place, begins = 0.0, []
+    for k in range(passes):
+        begins.append((place, 0.5))
+        fell = k > 0 and scores[k] > scores[k - 1]
+        place = 0.5 * (place + k + 1.0) if fell else k + 1.0
+    assert seen == begins
     assert shares == [k / MOST_REPEATS for k in range(passes)]

@@ -11,7 +11,7 @@ import pytest
 from rotordrop.track import _propagation as P
 from rotordrop.track import smoother
 from rotordrop.track._covariance import is_covariance, pack, unpack
-from rotordrop.track.calibration import one_pass
+from rotordrop.track.calibration import filtered_chain, mean_chain, smoothed_chain
 from rotordrop.track.problem import WATCHED, DropProblem, private_copy
 from rotordrop.track.smoother import (
     PassSettings,
@@ -20,6 +20,7 @@ from rotordrop.track.smoother import (
     fastest_frequency,
     forward,
     smooth,
+    smooth_means,
 )
 
 SETTINGS = PassSettings(impulse=1e-3, share=0.01)
@@ -65,7 +66,9 @@ class PlainFilter:
         whole[parts, parts] = form.noise_decay
         noise = np.zeros((n, n))
         noise[parts, parts] = (1.0 - form.noise_decay**2) * form.noise_variance
-        P.add_process_noise(noise, p, self.numbers, impulses, problem.targets.drift, np.inf)
+        sigmas = np.empty_like(impulses)
+        P.unknown_impulses(self.numbers, impulses, np.inf, sigmas)
+        P.add_process_noise(noise, p, self.numbers, sigmas, problem.targets.drift)
         self.matrices.append(whole)
         return np.concatenate([y[:s], whole[s:, s:] @ mean[s:]]), whole @ covariance @ whole.T + noise
 
@@ -277,15 +280,15 @@ def test_a_pass_that_loses_the_drop_is_smoothed_to_where_it_got(flight, length, 
 
 
 def test_memory_for_the_smoother_does_not_grow_with_the_drop(flight, monkeypatch):
-    monkeypatch.setattr(smoother, "STRETCH", 600_000)
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: 5)
     used = {}
     for samples in (20, 60):
-        storage = Storage()
+        storage = Storage(900_000)
         parts = forward(flight, SETTINGS, samples=samples, storage=storage)
         smooth(parts, storage=storage)
         used[samples] = storage.size
         assert len(parts.starts) > 1
-    assert used[20] == used[60] <= 1.2 * 600_000, "a stretch begins with a sample of the one before"
+    assert used[20] == used[60] <= 900_000
 
 
 def test_a_pass_in_the_memory_of_another_is_the_same(flight, filtered):
@@ -476,7 +479,10 @@ def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
     shifted[first.model.layout.modal_x.start] += 2e-5
     second = replace(first, mean=shifted, readings=first.readings + 1.5e-6 * np.cos(np.arange(60.0))[:, None])
     references = [np.array(forward(p, NOISELESS).means) for p in (first, second)]
-    chained = one_pass([first, second], NOISELESS, references, 0.003)
+    drops = [first, second]
+    filtered = filtered_chain(drops, NOISELESS, references, 0.003)
+    chained = smoothed_chain(drops, filtered)
+    alone = [means[0] for means in mean_chain(drops, filtered, [Storage(), Storage()])]
 
     n = len(first.mean)
     places = [np.arange(n), np.zeros(n, dtype=int)]
@@ -504,30 +510,31 @@ def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
     spread = np.linalg.inv(information) * np.outer(unit, unit)
     for d, smoothed in enumerate(chained):
         deviations = np.sqrt(np.diag(spread)[places[d]])
-        assert np.max(np.abs(smoothed.means[0] - joint[places[d]]) / deviations) < 2e-3
+        for means in (smoothed.means[0], alone[d]):
+            assert np.max(np.abs(means - joint[places[d]]) / deviations) < 2e-3
         found = np.sqrt(np.diag(smoothed.covariance(0)))
         open_ = np.diag(first.covariance) > 0.0
         assert np.count_nonzero(~open_) == 1  # the rotor angle
         np.testing.assert_allclose(found[open_], deviations[open_], rtol=2e-3)
-    alone = one_pass([first], NOISELESS, references[:1], 0.003)[0]
+    lone = smoothed_chain([first], filtered_chain([first], NOISELESS, references[:1], 0.003))[0]
     gap = first.n_dynamic + len(first.unknowns) + first.n_channels  # an offset, which both drops see
-    assert chained[0].covariance(0)[gap, gap] < alone.covariance(0)[gap, gap]
+    assert chained[0].covariance(0)[gap, gap] < lone.covariance(0)[gap, gap]
     assert chained[0].means[-1][shared] == pytest.approx(chained[1].means[0][shared], rel=1e-4, abs=1e-12)
 
 
 def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
     """A second drop knows the offsets from the first, but nothing of its remanent force or its start."""
     first = quiet(flight)
-    chained = one_pass([first, first], NOISELESS, [None, None], 0.003)
+    chained = filtered_chain([first, first], NOISELESS, [None, None], 0.003)
     paths = [unknown.path for unknown in first.unknowns]
     lift = first.n_dynamic + paths.index("NDE.remanent_force.y")
     offset = first.n_dynamic + len(first.unknowns) + first.n_channels
-    start, prior = (np.diag(c) for c in (chained[1].filtered.covariance(0), first.covariance))
-    alone = np.diag(chained[0].filtered.covariance(0))
+    start, prior = (np.diag(c) for c in (chained[1].covariance(0), first.covariance))
+    alone = np.diag(chained[0].covariance(0))
     assert lift not in first.machine_indices
     assert offset in first.machine_indices
     assert start[lift] == pytest.approx(prior[lift], rel=1e-6)
-    assert chained[0].filtered.last[lift, lift] < 0.9 * prior[lift]
+    assert chained[0].last[lift, lift] < 0.9 * prior[lift]
     assert start[offset] < 0.98 * alone[offset]
 
 
@@ -536,7 +543,7 @@ def test_a_machine_too_far_from_the_record_is_refused(flight):
 
     broken = replace(flight, mean=np.full_like(flight.mean, np.inf))
     with pytest.raises(IdentificationError, match=r"lost the drop after 0 of 60 samples.*Check air gap"):
-        one_pass([broken], SETTINGS, [None], 0.003)
+        filtered_chain([broken], SETTINGS, [None], 0.003)
 
 
 def test_a_race_that_leaves_its_place_ends_the_pass(flight):
@@ -553,16 +560,38 @@ def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch
     """First without the reference, then with larger unknown impulses; the size that followed is kept."""
     asked = []
 
-    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None, storage=None):
-        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples)
+    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None, keep, storage=None):
+        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples, keep=keep)
         asked.append((settings.impulse, reference is not None))
         return result if settings.impulse > 2.0 * SETTINGS.impulse else replace(result, done=3)
 
     monkeypatch.setattr("rotordrop.track.calibration.forward", giving_up)
-    smoothed = one_pass([flight], SETTINGS, [np.tile(flight.mean, (20, 1))], 0.002)[0]
+    found = filtered_chain([flight], SETTINGS, [np.tile(flight.mean, (20, 1))], 0.002)[0]
     impulse = SETTINGS.impulse
     assert asked == [(impulse, True), (impulse, False), (8.0 * impulse, False)]
-    assert smoothed.filtered.impulse == 8.0 * impulse
+    assert found.impulse == 8.0 * impulse
+
+
+@pytest.mark.parametrize("length", [7, 60, 142])
+def test_means_alone_are_those_of_the_whole_smoother(
+    impacts: DropProblem, length: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In stretches held and filtered again, with and without a trajectory to linearise at."""
+    score = np.full(len(impacts.mean), 0.3) / np.sqrt(np.diag(impacts.covariance) + 1e-30)
+    score[np.diag(impacts.covariance) == 0.0] = 0.0
+    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    reference = None
+    for _ in range(2):
+        storage = Storage()
+        kept = forward(impacts, SETTINGS, reference=reference, keep="means", storage=storage)
+        whole = smooth(forward(impacts, SETTINGS, reference=reference), score)
+        deviation = np.sqrt(np.diag(whole.covariance(kept.parameter_sample)))
+        for memory in (storage, None):
+            means, before = smooth_means(kept, score, storage=memory)
+            away = np.abs(means - whole.means)[:, deviation > 0.0] / deviation[deviation > 0.0]
+            assert away.max() < 2e-3
+            assert before == pytest.approx(whole.score_0, rel=1e-6, abs=1e-6 * np.abs(whole.score_0).max())
+        reference = whole.means
 
 
 def test_a_pass_that_goes_on_gives_the_bits_of_one_in_one_go(impacts: DropProblem) -> None:

@@ -493,15 +493,18 @@ def moved_fit(score: float, way: float, *, further: int = 0, sigma: float = 1.0,
     smoothed = SimpleNamespace(
         means=np.array([[5.0, *([99.0] * further), 1.0, 2.0 + way]]),
         covariance=lambda _: np.diag([9.0, *([0.01] * len(paths))]),
-        filtered=SimpleNamespace(parameter_sample=0, negative_log_likelihood=score),
+        filtered=SimpleNamespace(
+            parameter_sample=0, negative_log_likelihood=score, done=1, means=range(1), nis=1.0
+        ),
     )
-    return TrackedDrops(
+    fit = TrackedDrops(
         problems=(problem,),  # type: ignore[arg-type]
-        smoothed=(smoothed,),  # type: ignore[arg-type]
-        nis=(1.0,),
-        diverged=(False,),
+        filtered=(smoothed.filtered,),
+        trajectories=(smoothed.means,),
         noise_factors=(1.0,),
     )
+    vars(fit)["smoothed"] = (smoothed,)
+    return fit
 
 
 @pytest.mark.parametrize(

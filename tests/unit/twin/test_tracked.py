@@ -10,6 +10,7 @@ import re
 import weakref
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import jsonschema
@@ -405,8 +406,14 @@ def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: Sy
 def test_a_fit_inconsistent_with_the_record_is_noticed(
     nis: float, factor: float, diverged: bool, inconsistent: bool
 ) -> None:
+    drops = [
+        SimpleNamespace(nis=one, done=3 - lost, means=range(3)) for one, lost in ((0.9, 0), (nis, diverged))
+    ]
     fit = TrackedDrops(
-        problems=(), smoothed=(), nis=(0.9, nis), diverged=(False, diverged), noise_factors=(1.0, factor)
+        problems=(),
+        filtered=tuple(drops),  # type: ignore[arg-type]
+        trajectories=(),
+        noise_factors=(1.0, factor),
     )
     assert is_inconsistent(fit) == inconsistent
 
