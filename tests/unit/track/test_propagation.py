@@ -237,10 +237,11 @@ def test_impulses_are_the_time_integral_of_the_contact_force(flight):
 def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
     layout, p = flight.model.layout, flight.model.parameters
     n = len(flight.mean)
-    covariance, impulses = np.zeros((n, n)), np.array([0.5, 0.0])
+    covariance, impulses, sigmas = np.zeros((n, n)), np.array([0.5, 0.0]), np.empty(2)
     numbers = PassSettings(impulse=2e-3, share=0.1, spin_noise=0.2, speed_noise=0.03).for_sampling(DT)
     drift = np.arange(len(flight.unknowns), dtype=float)
-    P.add_process_noise(covariance, p, numbers, impulses, drift, np.inf)
+    P.unknown_impulses(numbers, impulses, np.inf, sigmas)
+    P.add_process_noise(covariance, p, numbers, sigmas, drift)
     expected = np.zeros((n, n))
     for b, sigma in enumerate((2e-3 + 0.1 * 0.5, 2e-3)):
         for axis, part in enumerate((layout.modal_x, layout.modal_y)):
@@ -254,6 +255,9 @@ def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
     here = np.arange(flight.parameter_slice.start, flight.parameter_slice.stop)
     expected[here, here] = drift**2 * DT
     np.testing.assert_allclose(covariance, expected, rtol=1e-12, atol=1e-30)
+    score, taken = np.arange(1.0, n + 1.0), np.zeros(n)
+    P.take_noise_of(score, p, numbers, sigmas, drift, taken)
+    np.testing.assert_allclose(taken, -expected @ score, rtol=1e-12, atol=1e-30)
 
 
 def single(flight: DropProblem, unknown):
