@@ -11,7 +11,6 @@ import sqlite3
 import subprocess
 import sys
 import tempfile
-import time
 from contextlib import closing
 from dataclasses import fields, replace
 from pathlib import Path
@@ -561,9 +560,7 @@ def test_a_reader_is_not_kept_waiting_by_a_writer(log):
     add_drop(log, DROP)
     with sqlite3.connect(log, isolation_level=None) as writer:
         writer.execute("BEGIN IMMEDIATE")
-        began = time.monotonic()
-        assert len(logged_drops(log)) == 1
-        assert time.monotonic() - began < 5.0
+        assert len(logged_drops(log)) == 1  # a reader that waited would be told that the log is locked
         writer.execute("ROLLBACK")
 
 

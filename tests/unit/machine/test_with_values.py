@@ -1,7 +1,6 @@
 """Other values by path: what changes, what follows, what is refused."""
 
 import math
-import time
 
 import pytest
 from tests.scaled_machines import TWELVE_NUMBERS
@@ -59,7 +58,7 @@ def test_the_value_at_the_path_changes_and_nothing_else_of_what_was_given(machin
     other = machine.with_values({path: new})
     assert float(look_up(other, path)) == new
     assert look_up(other, path).status == "given"
-    assert other.rotor == machine.rotor
+    assert other.rotor is machine.rotor  # read again with every value, it would take longer than a simulation
     for kept in set(CONTRACT) - {path}:
         before, after = look_up(machine, kept), look_up(other, kept)
         if before is not None and before.status == "given":
@@ -140,15 +139,6 @@ def test_the_machine_itself_does_not_change(machine):
 def test_refusals_name_path_and_value(machine, path, value, told):
     with pytest.raises(UsageError, match=told):
         machine.with_values({path: value})
-
-
-def test_it_is_fast_enough_to_disappear_behind_a_simulation(machine):
-    values = {"NDE.support.stiffness": 1.1e8, "NDE.support.damping": 3e3, "NDE.support.mass": 30.0}
-    machine.with_values(values)
-    start = time.perf_counter()
-    for _ in range(50):
-        machine.with_values(values)
-    assert (time.perf_counter() - start) / 50 < 2e-3
 
 
 @pytest.mark.parametrize(

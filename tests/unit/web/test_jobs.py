@@ -313,19 +313,17 @@ def test_no_finished_job_is_lost_whenever_server_or_child_is_killed(tmp_path, fi
     assert state_of(job, "look")["state"] in ("done", "failed")
 
 
-def test_the_first_page_comes_within_a_second_and_loads_no_compiler():
+def test_the_first_page_loads_no_compiler():
     program = (
-        "import sys, tempfile, time; from pathlib import Path; from rotordrop.web.workspace import Workspace;"
+        "import sys, tempfile; from pathlib import Path; from rotordrop.web.workspace import Workspace;"
         "from rotordrop.web.app import make_app; make_app(Workspace(Path(tempfile.mkdtemp())), port=1);"
         "print([name for name in ('numba', 'numpy', 'scipy', 'plotly', 'h5py') if name in sys.modules])"
     )
     env = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    begun = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, env=env, check=True
     )
     assert done.stdout.strip() == "[]"
-    assert time.perf_counter() - begun < 3.0  # a busy computer; alone it is 0.5 s
 
 
 def test_the_folder_of_the_page_is_the_users_own(served):

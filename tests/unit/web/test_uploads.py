@@ -283,12 +283,10 @@ def test_a_head_that_never_ends_is_closed(served, monkeypatch, said, after_anoth
         if after_another:
             slow.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n\r\n".encode())
             assert b"200 OK" in slow.recv(100)
-        begun = time.monotonic()
         for letter in said:  # a piece now and then must not give it more time
             slow.sendall(bytes([letter]))
-        while slow.recv(65536):
+        while slow.recv(65536):  # one that stays open ends in the time-out of the socket
             pass
-        assert time.monotonic() - begun < 9.0
     assert served.ask("GET", "/api/jobs").status == 200
 
 
