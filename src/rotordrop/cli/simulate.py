@@ -328,7 +328,7 @@ def coast_down(
         raise
     assert result is not None
     certificate = None
-    if certify:
+    if certify and result.finished:
         with progress_bar("at a tighter tolerance") as progress:
             certificate = certify_coast_down(model, case, result, progress=progress)
     numbers: dict[str, Any] = result.as_json()
@@ -340,6 +340,7 @@ def coast_down(
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
     deliver(numbers, json, coast_down_page(result, described, certificate=certificate))
+    result.check_finished()
 
 
 def _frequencies(machine: Machine, path: Path) -> Any:

@@ -108,9 +108,11 @@ def coast_down_page(
 def _verdict(
     result: CoastDownResult, analysis: CoastDownAnalysis | None, certificate: CoastDownCertificate | None
 ) -> tuple[Statement, ...]:
-    said = [Statement(result.outcome, "good" if result.finished else "warning")]
+    said = [Statement(result.outcome, "good" if result.finished else "bad")]
     later = [maximum for maximum in result.maxima() if not maximum.in_first_window]
-    said += [Statement(maximum.sentence(), "warning") for maximum in later] or [Statement(HELD, "good")]
+    said += [Statement(maximum.sentence(), "warning") for maximum in later]
+    if result.finished and not later:
+        said.append(Statement(HELD, "good"))
     if result.heat is not None:
         said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
     missing, scale = shown(result.energy_residual, "energy", 3), shown(abs(result.energy_scale), "energy", 3)

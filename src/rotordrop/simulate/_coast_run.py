@@ -46,7 +46,8 @@ HEAT_STEP = 0.01
 SETTLED_STEP = 0.92
 CHECKED = 2e-3
 """Part of every settled window [s] that is also done with the Runge–Kutta pair."""
-RUNNING, ENDED, BROKEN = 0.0, 1.0, 2.0
+RUNNING, ENDED = 0.0, 1.0
+"""Phases of a run; one that was given up has less the outcome of the loop."""
 # Entries of `Run.status`.
 PHASE, WINDOW, SAMPLE, STOPPED_AT, LAST_SAMPLE, PARTS, ENERGY_AT_START, WORST_BALANCE = range(8)
 
@@ -333,9 +334,9 @@ def _after(setup: Setup, run: Run, outcome: int, sample: int) -> None:
                 status[PHASE] = ENDED
                 return
     elif outcome != _loop.FINISHED:
-        status[PHASE] = BROKEN
-    if sample >= status[LAST_SAMPLE]:
-        status[PHASE] = max(status[PHASE], ENDED)
+        status[PHASE] = -outcome
+    if status[PHASE] == RUNNING and sample >= status[LAST_SAMPLE]:
+        status[PHASE] = ENDED
 
 
 def _ended_contacts(run: Run, log: Array, already_open: int, p: KernelParameters) -> tuple[Array, Array]:

@@ -16,7 +16,6 @@ from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate import _loop
 from rotordrop.simulate._coast_run import (
-    BROKEN,
     ENDED,
     ENERGY_AT_START,
     MOST_STEPS_PER_WINDOW,
@@ -46,6 +45,7 @@ from rotordrop.simulate.checkpoint import (
 from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_file import Frame, ended_run, write_coast_down, write_part
 from rotordrop.simulate.coast_down_result import QUANTITIES, CoastDownResult, WindowStatistics
+from rotordrop.simulate.drop import given_up
 
 Progress = Callable[[str, float], None]
 
@@ -159,7 +159,7 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
         output_step=case.output_step,
         end_time=end,
         standstill_time=None if math.isnan(stopped) else stopped,
-        finished=run.status[PHASE] == ENDED and (case.duration is not None or not math.isnan(stopped)),
+        finished=bool(run.status[PHASE] == ENDED) and (case.duration is not None or not math.isnan(stopped)),
         outcome="",
         windows=WindowStatistics(
             start=rows[:, 0],
@@ -193,11 +193,9 @@ def _result(setup: Setup, run: Run, output: Path | None) -> CoastDownResult:
 
 def _sentence(setup: Setup, run: Run, result: CoastDownResult) -> str:
     reached = f"{result.end_time:.4g} s"
-    if run.status[PHASE] == BROKEN:
-        return (
-            f"The simulation stopped at {reached}: the step fell below 1e-14 s, a value became infinite or "
-            f"{MOST_STEPS_PER_WINDOW} steps were not enough for one second. Check the machine's parameters."
-        )
+    if run.status[PHASE] < RUNNING:
+        few = f"{MOST_STEPS_PER_WINDOW} steps were not enough for one second", "Loosen the tolerance or use"
+        return given_up(setup.model.machine, -int(run.status[PHASE]), result.end_time, *few)
     counted = f"{result.steps} steps, {int(np.sum(result.contacts))} contacts"
     if result.standstill_time is not None:
         rest = result.end_time - result.standstill_time

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.errors import SimulationError
 from rotordrop.simulate.coast_down_case import FIRST_WINDOW
 from rotordrop.simulate.heat import Heat
 from rotordrop.units import format_quantity
@@ -119,6 +120,7 @@ class CoastDownResult:
     standstill_time: float | None
     """When the rotor stopped [s]."""
     finished: bool
+    """Whether it came to the end that was asked for."""
     outcome: str
     windows: WindowStatistics
     """Statistics second by second."""
@@ -143,6 +145,11 @@ class CoastDownResult:
     """Where the samples are."""
     heat: Heat | None = None
     """How the bearings warmed; None of a machine whose bearings stay cold."""
+
+    def check_finished(self) -> None:
+        """Refuse a coast-down that ended before the rotor stood still, or before the time asked for."""
+        if not self.finished:
+            raise SimulationError(self.outcome)
 
     def maxima(self) -> tuple[Maximum, ...]:
         """When the largest indentation, force and stress of every bearing came: does 0.2 s hold them?"""

@@ -240,21 +240,24 @@ def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
 
 
 def _sentence(machine: Machine, outcome: int, case: DropCase, counters: Array, contacts: int) -> str:
-    reached = f"{counters[4]:.6g} s"
+    reached = float(counters[4])
     if outcome == _loop.FINISHED:
-        return f"The drop was simulated to {reached} in {int(counters[0])} steps with {contacts} contacts."
+        return f"The drop was simulated to {reached:.6g} s in {int(counters[0])} steps with {contacts} contacts."
+    few = f"{case.most_steps} steps were not enough", "Raise most_steps, loosen the tolerance or use"
+    return given_up(machine, outcome, reached, *few)
+
+
+def given_up(machine: Machine, outcome: int, reached: float, too_few: str, remedy: str) -> str:
+    """Why the loop gave up at the time it ``reached`` [s], and the way out; of steps as the caller says."""
     why, way_out = {
         _loop.STEP_TOO_SMALL: (
             "the step fell below 1e-14 s",
             "Check for a friction law with a tiny smoothing speed or an extreme stiffness",
         ),
-        _loop.TOO_MANY_STEPS: (
-            f"{case.most_steps} steps were not enough",
-            "Raise most_steps, loosen the tolerance or use a smaller reduction",
-        ),
+        _loop.TOO_MANY_STEPS: (too_few, f"{remedy} a smaller reduction"),
     }.get(outcome, ("a value became infinite", "Check the start and the machine's parameters"))
     odd = "".join(f" {doubt.message}." for doubt in doubts(machine))
-    return f"The simulation stopped at {reached}: {why}. {way_out}.{odd}"
+    return f"The simulation stopped at {reached:.6g} s: {why}. {way_out}.{odd}"
 
 
 def _energy_certificate(

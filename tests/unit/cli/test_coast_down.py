@@ -14,15 +14,17 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.errors import RecordError
+from rotordrop.errors import RecordError, SimulationError
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
 from rotordrop.estimate.simulated_coast_down import simulated_coast_down
 from rotordrop.files import new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import read_record
+from rotordrop.report.coast_down_page import HELD
 from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate import _coast_run, coast_down
 from rotordrop.simulate.case import CentredStart
 from rotordrop.simulate.checkpoint import work_folder
 from rotordrop.simulate.coast_down import simulate_coast_down
@@ -108,6 +110,25 @@ def test_every_number_of_a_coast_down_is_that_of_its_samples(coast):
     assert sum(windows["dissipated"]) == pytest.approx(found["dissipated_J"], rel=1e-6)
     assert sum(found["contact_energy_J"].values()) < found["dissipated_J"]
     assert abs(found["energy_residual_J"]) < 1e-3 * found["energy_scale_J"]
+
+
+def test_a_coast_down_that_gives_up_is_written_and_ends_as_a_drop_that_does(
+    machine, tmp_path, monkeypatch, capsys
+):
+    """Its exit code was 0, its JSON could not be written, and "the first 0.2 s held the largest" was good."""
+    monkeypatch.setattr(_coast_run, "MOST_STEPS_PER_WINDOW", 300)
+    monkeypatch.setattr(coast_down, "MOST_STEPS_PER_WINDOW", 300)
+    file = tmp_path / "c.json"
+    arguments = ["coast-down", machine, "--speed", "60 Hz", "--certify", "--json", str(file)]
+    assert run(arguments) == SimulationError.exit_code
+    shown = capsys.readouterr()
+    found = json.loads(file.read_text())
+    assert found["outcome"] in shown.err
+    assert re.search(
+        r"stopped at 0\.0\d+ s: 300 steps were not enough for one second\. Loosen the", found["outcome"]
+    )
+    assert (found["finished"], found["standstill_time_s"], found.get("certificate")) == (False, None, None)
+    assert HELD not in shown.out
 
 
 def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
