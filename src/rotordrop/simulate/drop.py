@@ -242,7 +242,8 @@ def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
 def _sentence(machine: Machine, outcome: int, case: DropCase, counters: Array, contacts: int) -> str:
     reached = float(counters[4])
     if outcome == _loop.FINISHED:
-        return f"The drop was simulated to {reached:.6g} s in {int(counters[0])} steps with {contacts} contacts."
+        taken = f"in {int(counters[0])} steps with {contacts} contacts"
+        return f"The drop was simulated to {reached:.6g} s {taken}."
     few = f"{case.most_steps} steps were not enough", "Raise most_steps, loosen the tolerance or use"
     return given_up(machine, outcome, reached, *few)
 
