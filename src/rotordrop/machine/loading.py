@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from rotordrop.document import NestedTomlError, parse_toml
 from rotordrop.elements.ball_bearing import BallBearing
 from rotordrop.elements.description import LARGEST_FILE, Description, Misfit, UnknownKey
+from rotordrop.elements.mount import ELEMENTS
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
@@ -187,11 +188,9 @@ def _one_error(
         message = _of_above(place) or message
     # The key rather than the value is to blame where it is not known, or not there.
     at_key = isinstance(cause, UnknownKey) or (cause is None and entry["type"] == "missing")
-    # branches of a mount that is a list stand one level deeper there
-    listed = tuple(key for part in place for key in (part, "branches")[: 1 + (part == "maxwell")])
-    written = listed if positions.value(listed) != positions.value(place) else place
+    written = positions.written(place)
     line, column = (positions.key(written) if at_key else positions.value(written)) or (1, 1)
-    told = f"{_dotted(place)}: {message}" if place else message
+    told = f"{_dotted(written)}: {message}" if place else message
     return MachineFileError(told, file=file, line=line, column=column)
 
 
@@ -275,6 +274,7 @@ class TomlPositions:
         self._keys: dict[Keys, Place] = {}
         self._values: dict[Keys, Place] = {}
         self._counts: dict[Keys, int] = {}
+        self._listed: dict[Keys, Keys] = {}
         content = text.encode("utf-8")
         self._lines = content.split(b"\n")
         for child in Parser(Language(tree_sitter_toml.language())).parse(content).root_node.children:
@@ -299,6 +299,11 @@ class TomlPositions:
     def has(self, path: Keys) -> bool:
         """Tell whether a key stands in the file."""
         return path in self._keys
+
+    def written(self, place: Keys) -> Keys:
+        """Place as the file has it, where the elements of a mount are a list."""
+        found = ((depth, self._listed.get(place[:depth])) for depth in range(len(place), 0, -1))
+        return next(((*at, *place[depth:]) for depth, at in found if at is not None), place)
 
     def _nearest(self, path: Keys, places: dict[Keys, Place]) -> Place | None:
         for length in range(len(path), 0, -1):
@@ -336,8 +341,12 @@ class TomlPositions:
                 self._value(element, (*path, index))
                 pairs = (child for child in element.children if child.type == "pair")
                 for key, _, value in (pair.children[:3] for pair in pairs):
-                    if key.text == b"kind":  # a list of kinds is held by kind
-                        self._value(element, (*path, value.text[1:-1].decode("utf-8")))
+                    if key.text == b"kind":  # as `rotordrop.elements.mount.mounted` sorts them
+                        kind, at = value.text[1:-1].decode("utf-8"), (*path, index)
+                        self._listed[*path, kind] = (*at, "branches") if kind == "maxwell" else at
+                        for said in ELEMENTS.get(kind, ()):
+                            if self.has((*at, said)):
+                                self._listed[*path[:-1], "support", said] = (*at, said)
 
     def _place(self, node: Any) -> Place:
         row, byte = node.start_point

@@ -135,7 +135,10 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
     ("element", "message"),
     [
         ('{ kind = "stop" }', r"gap"),
-        ('{ kind = "stop", gap = "0 um" }', r"^142:33: .*a length must be positive, such as '280 um'"),
+        (
+            '{ kind = "stop", gap = "0 um" }',
+            r"^142:33: touchdown_bearings\[2\]\.mount\[1\]\.gap: .*a length must be positive",
+        ),
         (
             '\n{ kind = "stop", gap = "0.1 mm" },\n{ kind = "ribbon", slip_force = "0 N" }',
             r"^144:33: .*'515 N'",
@@ -143,7 +146,7 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
         (
             '\n{ kind = "maxwell", branches = [\n{ stiffness = "4e6 N/m", time = "30 ms" },\n'
             '{ stiffness = "4e6 N/m", time = "40 ms" }] }',
-            r"^145:33: .*descend",
+            r"^145:33: touchdown_bearings\[2\]\.mount\[1\]\.branches\[2\]\.time: .*descend",
         ),
         (
             '{ kind = "maxwell", branches = ['
@@ -173,13 +176,17 @@ def test_mounts_that_cannot_be_are_refused(element, message):
         mounted(element)
 
 
-def test_a_slip_force_needs_a_stiffness():
+def test_a_slip_force_needs_a_stiffness_and_a_bad_one_is_found_where_it_was_written():
     start = TEXT.index(HEAD)
     lines = [line for line in TEXT[start:].splitlines() if not line.startswith('stiffness = { guess = "8e7')]
     with pytest.raises(
         MachineFileError, match=r"'slip_force' but no stiffness; give its 'friction_stiffness'"
     ):
         mounted('{ kind = "ribbon", slip_force = "1.5 kN" }', text=TEXT[:start] + "\n".join(lines))
+    with pytest.raises(
+        MachineFileError, match=r"^142:41: touchdown_bearings\[2\]\.mount\[1\]\.stiffness: -10"
+    ):
+        mounted('{ kind = "spring", stiffness = "-10 MN/m" }', text=TEXT[:start] + "\n".join(lines))
 
 
 def test_a_mount_below_a_table_of_its_bearing_is_sent_above_it():
