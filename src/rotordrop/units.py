@@ -35,6 +35,17 @@ def _metric(unit: str, *prefixes: str) -> tuple[tuple[float, str], ...]:
 GRAVITY = 9.81
 """Acceleration of free fall [m/s²], where no machine file says another."""
 
+
+def fall_time(way: float, gravity: float = GRAVITY) -> float:
+    """Time [s] of a fall from rest along a way [m] under an acceleration [m/s²]."""
+    return math.sqrt(2.0 * way / gravity)
+
+
+def fall_speed(way: float, gravity: float = GRAVITY) -> float:
+    """Speed [m/s] after a fall from rest along a way [m] under an acceleration [m/s²]."""
+    return math.sqrt(2.0 * way * gravity)
+
+
 KINDS: dict[str, Kind] = {
     "length": Kind(unit="m", example="280 um", scales=_metric("m", "", "m", "µ")),
     "mass": Kind(unit="kg", example="105 kg", scales=((1.0, "kg"), (1e-3, "g"))),

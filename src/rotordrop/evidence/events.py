@@ -17,7 +17,7 @@ from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.record.speed import require_speed
 from rotordrop.series import curvature
-from rotordrop.units import format_quantity, percent
+from rotordrop.units import fall_time, format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -222,7 +222,7 @@ def _sooner(record: Record, machine: Machine, levitated: LevitatedModel, coarse:
         return coarse
     sunk = int(np.argmax(gone))
     # the unbalance throws a widely circling plane further than it falls, but not before it was let go
-    fallen = float(near.time[sunk]) - float(np.sqrt(2.0 * np.max(way[sunk]) / gravity))
+    fallen = float(near.time[sunk]) - fall_time(np.max(way[sunk]), gravity)
     instant = max(fallen, levitated.end)
     contact = first_sudden(near, gravity, instant, max(sunk, first_sample(way > NEAREST_CONTACT * gaps)))
     return replace(coarse, instant=instant, sunk=float(near.time[sunk]), contact=contact)
@@ -237,7 +237,7 @@ def _coarse_drop(record: Record, gravity: float, gaps: Array, first: int) -> Coa
         _refuse_without_drop(record, start, gaps)
     sunk = sinking(low)
     fastest = float(np.max(start - height[sunk]))
-    instant = record.time[sunk] - float(np.sqrt(2 * fastest / gravity))
+    instant = record.time[sunk] - fall_time(fastest, gravity)
     if instant < record.time[0] or record.time[sunk] - record.time[0] < first / record.sampling_rate:
         raise NoDropError(
             record.name,
@@ -401,7 +401,7 @@ def begins_with_fall(record: Record, machine: Machine) -> bool:
     if not sunk.all(axis=1).any():
         return False
     fallen = float(record.time[sinking(sunk)] - record.time[0])
-    needed = float(np.sqrt(2.0 * FALLEN_SHARE * float(np.max(gaps)) / float(machine.gravity)))
+    needed = fall_time(FALLEN_SHARE * float(np.max(gaps)), float(machine.gravity))
     return fallen < needed + EARLIEST
 
 

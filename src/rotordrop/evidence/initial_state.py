@@ -32,6 +32,7 @@ from rotordrop.record.record import Record
 from rotordrop.record.speed import RotorAngle
 from rotordrop.rotor.parameters import DropModel, pushes
 from rotordrop.rotor.unknowns import smallest_gap
+from rotordrop.units import fall_speed
 
 MAGNET_FORCES = slice(L.REMANENT_X, L.REMANENT_Y + 1)
 
@@ -623,7 +624,7 @@ def _by_end_of_fall(
         state[found.unbalance] = x[rests.stop :]
         return np.concatenate([back @ state, x[gain], x[3 * count : rests.stop]])
 
-    falling = math.sqrt(2.0 * smallest_gap(model.machine) * float(model.machine.gravity))
+    falling = fall_speed(smallest_gap(model.machine), float(model.machine.gravity))
     rates = np.hypot(error, ROUGH_RATE * falling)
     unbalance = np.repeat(_unbalance_sigma(model.machine, found.nodes, model.fe.total_mass), 2)
     known = [sensing.gain_sigma, [REMANENT_TIME[1]], _rest_sigma(model, sensing), unbalance]

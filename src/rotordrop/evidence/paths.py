@@ -19,7 +19,7 @@ from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.record.impacts import BEGUN, Settling, find_impacts
 from rotordrop.record.record import Record
 from rotordrop.series import noise_by_differences, runs_of
-from rotordrop.units import GRAVITY
+from rotordrop.units import GRAVITY, fall_time
 
 SLOWEST_FALL = 0.2
 """Share of gravity with which the fastest end of a dropped rotor falls at least [1]."""
@@ -237,7 +237,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
                 f"its magnets hold; a dropped rotor goes {1e6 * _LEAST_FALL:.0f} µm at least and stays there",
                 "give a recording in which the rotor is let go; if this is one, correct unit or channels",
             )
-    back = int(np.sqrt(2.0 * float(np.max(reach)) / GRAVITY) * rate) + int(3e-3 * rate)
+    back = int(fall_time(float(np.max(reach))) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk, tuple(float(one[0]) for one in found)
 
 
@@ -262,7 +262,7 @@ def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
         size = max(0.5 * path.gap, 2.0 * float(np.hypot(*path.levitated)) if path.gap else 0.0)
         away = np.hypot(*(path.position - path.levitated).T)
         near &= away < min(size, 0.7 * path.gap)
-    flight = 2.0 * np.sqrt(8.0 * max(path.gap for path in paths) / GRAVITY)
+    flight = 4.0 * fall_time(max(path.gap for path in paths))
     for start, length in zip(*runs_of(near), strict=True):
         if start > 0 and length < flight * rate:
             near[start : start + length] = False
@@ -422,7 +422,7 @@ def _release(motion: Motion, start: int, stop: int) -> float | None:
         if not sunk.any():
             return None
         fallen = float(motion.time[start - 1 + int(np.argmax(sunk))])
-        begun.append(fallen - float(np.sqrt(2.0 * FALLEN_SHARE * path.gap / GRAVITY)))
+        begun.append(fallen - fall_time(FALLEN_SHARE * path.gap))
     return max(min(begun), float(motion.time[0]))
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.record.impacts import slope
-from rotordrop.units import GRAVITY
+from rotordrop.units import GRAVITY, fall_time
 
 _NEAREST, _FARTHEST = 0.75, 1.08
 """The race is touched between these shares of the way from floating to rest [1] (chosen)."""
@@ -115,7 +115,7 @@ def first_touch(
     near = _first_beyond(way, begin, _NEAREST * size)
     if near is None:
         return None
-    released = max(near - int(math.sqrt(2.0 * _NEAREST * size / GRAVITY) * rate), 0)
+    released = max(near - int(fall_time(_NEAREST * size) * rate), 0)
     soft, flank = None, _flank(way, rate, (released, near))
     if flank is not None and flank[1] > _SOFT * rate:
         begins, lasts = flank

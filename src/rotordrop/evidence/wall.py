@@ -21,7 +21,7 @@ from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
 from rotordrop.record.impacts import Impacts, find_impacts
 from rotordrop.series import noise_by_differences
-from rotordrop.units import GRAVITY
+from rotordrop.units import GRAVITY, fall_speed
 
 CENTRED = 0.08
 """Standard deviation of where a rotor floats from the centre, per axis, over the gap [1] (chosen)."""
@@ -164,7 +164,7 @@ def find_wall(
     if touch is not None and touch.by_kink:
         touched = touch.at(place), touch.at(apart)
         # a touch that is dated so well is placed by the speed of the fall as well
-        astray = math.hypot(_ROUND * size, touch.error * math.sqrt(2.0 * GRAVITY * size))
+        astray = math.hypot(_ROUND * size, touch.error * fall_speed(size))
 
     def residual(sought: Array, hits: Impacts, lying: NDArray[np.int64]) -> Array:
         centre, gap, beta, lever = sought[:2], sought[2], math.exp(sought[3]), sought[5]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.known import NINETY
-from rotordrop.units import GRAVITY
+from rotordrop.units import GRAVITY, fall_time
 
 SMOOTHING = 1e-3
 """Window of velocities [s]."""
@@ -58,7 +58,7 @@ AFTER_LAST = f"{CONTACT_FROM} then on"
 
 def shortest_flight(gap: float) -> float:
     """Shortest flight that ends in an impact [s]: as long as a hop of `HOP` of the gap under gravity."""
-    return math.sqrt(8.0 * HOP * gap / GRAVITY)
+    return 2.0 * fall_time(HOP * gap)
 
 
 def after_flights(begun: Array, ended: Array, gap: float) -> NDArray[np.bool_]:

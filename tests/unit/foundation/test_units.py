@@ -9,7 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotordrop.errors import UsageError
-from rotordrop.units import KINDS, format_chance, format_moment, format_quantity, parse_quantity, si_unit
+from rotordrop.units import (
+    GRAVITY,
+    KINDS,
+    fall_speed,
+    fall_time,
+    format_chance,
+    format_moment,
+    format_quantity,
+    parse_quantity,
+    si_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -251,3 +261,10 @@ def test_no_chance_is_certain(probability, text):
 )
 def test_what_is_read_without_the_unit_library_is_what_the_library_reads(kind, short, spelled):
     assert parse_quantity(f"17.17 {short}", kind) == parse_quantity(f"17.17 {spelled}", kind)
+
+
+@pytest.mark.parametrize("gravity", [GRAVITY, 1.62])
+def test_a_fall_takes_as_long_and_ends_as_fast_as_gravity_makes_it(gravity):
+    took, speed = fall_time(2e-4, gravity), fall_speed(2e-4, gravity)
+    assert 0.5 * gravity * took**2 == pytest.approx(2e-4, rel=1e-14)
+    assert speed == pytest.approx(gravity * took, rel=1e-14)

@@ -19,7 +19,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.evidence.synchronous import FEWEST_TURNS
 from rotordrop.record.axes import Plane, along_sensors
-from rotordrop.units import GRAVITY
+from rotordrop.units import fall_time
 
 if TYPE_CHECKING:
     from rotordrop.evidence.paths import Motion
@@ -149,7 +149,7 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
     gone = np.flatnonzero(motion.floats[:-1] & ~motion.floats[1:])
     if not len(gone):
         return []
-    sunk_at, took = int(gone[0]) + 1, math.sqrt(2.0 * max(path.gap for path in motion.paths) / GRAVITY)
+    sunk_at, took = int(gone[0]) + 1, fall_time(max(path.gap for path in motion.paths))
     begins = sunk_at - round((took + BEFORE_RELEASE) * record.sampling_rate)
     if begins < 2:
         return []

@@ -24,6 +24,7 @@ from rotordrop.evidence.quality.finding import Finding, Kind
 from rotordrop.known import NINETY
 from rotordrop.record.axes import planar_of
 from rotordrop.series import runs_of
+from rotordrop.units import fall_time
 
 if TYPE_CHECKING:
     from rotordrop.evidence.free_rotor import FreeRotor
@@ -127,7 +128,7 @@ def weighed(
     count = len(record.sensors)
     seen: list[tuple[Array, Array]] = []
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    fall = _Fall(gravity=float(machine.gravity), time=float(np.sqrt(2.0 * gap / float(machine.gravity))))
+    fall = _Fall(gravity=float(machine.gravity), time=fall_time(gap, float(machine.gravity)))
     for window in _flights(record, levitated, drop, fall):
         found = _weighed_in(record, rotor, levitated, window, fall)
         if found is None:
