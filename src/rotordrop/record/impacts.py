@@ -61,12 +61,15 @@ def shortest_flight(gap: float) -> float:
     return 2.0 * fall_time(HOP * gap)
 
 
-def after_flights(begun: Array, ended: Array, gap: float) -> NDArray[np.bool_]:
+def after_flights(
+    begun: Array, ended: Array, gap: float, gravity: float | Array = GRAVITY
+) -> NDArray[np.bool_]:
     """Which of the contacts of a bearing end a flight, where contacts are known; the first one does.
 
-    Their times in the order of their beginning [s], shape (K,), and the air gap [m].
+    Their times in the order of their beginning [s], shape (K,), and the air gap [m]; what brings the rotor
+    back, of gravity or of another force [m/s²], of each flight where it changes, shape (K - 1,).
     """
-    flown = begun[1:] - ended[:-1]
+    flown = np.sqrt(gravity / GRAVITY) * (begun[1:] - ended[:-1])  # under gravity, for a hop as high
     return np.append(True, flown >= shortest_flight(gap))[: len(begun)]
 
 

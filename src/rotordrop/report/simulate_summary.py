@@ -177,7 +177,7 @@ def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
 
 def landing_count(one: Landing) -> int:
     """Number of landings on a face: contacts that no flight parts are one, by the rule of radial impacts."""
-    return int(np.sum(after_flights(one.contacts.start, one.contacts.end, one.gap)))
+    return int(np.sum(after_flights(one.contacts.start, one.contacts.end, one.gap, one.acceleration[1:])))
 
 
 def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:

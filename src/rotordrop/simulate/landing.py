@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import Climb, numbers_of
 from rotordrop.machine import Machine
+from rotordrop.physics import columns as L
+from rotordrop.physics.load import load_now
 from rotordrop.simulate.result import ContactLog, DropResult
 
 
@@ -26,6 +29,8 @@ class Landing:
     """Largest axial displacement of the rotor against the race [m], of either sense, and when [s]."""
     contacts: ContactLog
     """Every contact there."""
+    acceleration: Array
+    """What the thrust accelerates the free rotor by at the begin of each [m/s²], shape (K,)."""
     climb: Climb
     """How far the balls climbed."""
     edge_time: float
@@ -62,8 +67,20 @@ def landings(machine: Machine, result: DropResult) -> tuple[Landing, ...]:
                 travel=float(way[furthest]),
                 travel_time=float(result.time[furthest]),
                 contacts=contacts,
+                acceleration=np.abs(_thrust(machine, result, contacts.start)) / machine.rotor.mass,
                 climb=climb,
                 edge_time=float(result.time[climb.highest]),
             )
         )
     return tuple(found)
+
+
+def _thrust(machine: Machine, result: DropResult, time: Array) -> Array:
+    """Loads along the axis together [N], towards higher nodes, shape (K,)."""
+    speed, found = np.interp(time, result.time, result.speed), np.zeros(len(time))
+    for load in machine.loads:
+        if load.along is not None:
+            row, points = load.course(float(machine.speed.nominal))
+            row[L.LOAD_END] = len(points)
+            found += [load_now(row, points, t, omega)[0] for t, omega in zip(time, speed, strict=True)]
+    return found

@@ -29,9 +29,10 @@ from rotordrop.physics.ball_set import (
     two_row_force,
 )
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
+from rotordrop.record.impacts import HOP
 from rotordrop.report.machine_content import machine_json
 from rotordrop.report.simulate_page import simulate_page
-from rotordrop.report.simulate_summary import simulate_summary
+from rotordrop.report.simulate_summary import landing_count, simulate_summary
 from rotordrop.report.simulation_numbers import simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model
@@ -572,3 +573,19 @@ def test_a_face_that_nothing_presses_and_one_outside_its_ring_are_said():
 def test_what_is_wrong_with_an_axial_load_is_said_with_the_way_out(direction, face, message):
     with pytest.raises(MachineFileError, match=message):
         faced(push(direction=direction), face=face)
+
+
+def test_landings_are_those_after_hops_of_a_share_of_the_gap_whatever_the_thrust():
+    """By gravity in place of the thrust, 6 kN on a rotor of 131 N landed once: no hop lasts over 1.8 ms."""
+    force = 6000.0
+    grown = push(force).replace(
+        f'force = "{force} N"',
+        f'over_time = [{{ time = "0 ms", force = "0 N" }}, {{ time = "1 us", force = "{force} N" }}]',
+    )
+    for machine in (faced(push(force)), faced(grown)):
+        drop = simulate_drop(machine, CASE)
+        (one,) = landings(machine, drop)
+        away = one.gap - np.abs(drop.axial_displacement - drop.race_axial_displacement("DE"))
+        flights = zip(one.contacts.end[:-1], one.contacts.start[1:], strict=True)
+        heights = [np.max(away[(drop.time > a) & (drop.time < b)], initial=0.0) for a, b in flights]
+        assert landing_count(one) == 1 + np.sum(np.array(heights) > HOP * one.gap) > 5
