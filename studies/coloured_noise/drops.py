@@ -8,25 +8,14 @@ power falls as one over the frequency beside the white one, on every sensor. Pri
 
 from __future__ import annotations
 
-import math
 import sys
-import time
 from pathlib import Path
-from typing import Any
 
-from rotordrop import estimate_drop
-from rotordrop.document import read_json
-from rotordrop.errors import RotordropError
-from rotordrop.files import make_folder, write_json
-from rotordrop.machine import load_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.record.record import read_record
-from rotordrop_bench import score_estimate
-from rotordrop_bench.event import hidden_machine
-from rotordrop_bench.files import write_synthetic
-from rotordrop_bench.recording import synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
-from rotordrop_bench.sensor_chain import SensorChain
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "further"))
+from hidden_drops import cell, estimate, scored, truth_of, write_drop
 
 FIRST_MACHINE, FIRST_DROP = 96100, 96110
 DROPS = (
@@ -47,63 +36,34 @@ SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m")
 def make(folder: Path, number: int) -> Path:
     """Machine file, recording, tail and truth of one drop; where they are."""
     place = folder / f"f{number}"
-    if (place / "truth" / "record.json").is_file():
-        return place
-    rotor, size, speed = DROPS[number]
-    machine = bench_rotor(rotor)
-    make_folder(place)
-    (place / "hidden.toml").write_text(f'sensors.flicker = "{size}"\n')
-    hidden = hidden_machine(machine, FIRST_MACHINE + number, str(place / "hidden.toml"))
-    largest = max(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
-    chain = SensorChain(sampling_rate=20e3, full_scale=max(600e-6, 2.0 * largest))
-    (place / "machine.toml").write_text(machine_text(machine))
-    made = synthesize_drop(
-        hidden, 2.0 * math.pi * speed, FIRST_DROP + number, sensor_chain=chain, name="record"
-    )
-    write_synthetic(made, place, name="record", histories=False)
+    if not truth_of(place).is_file():
+        rotor, size, speed = DROPS[number]
+        machine, seeds = bench_rotor(rotor), (FIRST_MACHINE + number, FIRST_DROP + number)
+        owned = {"machine": machine_text(machine)}
+        write_drop(place, machine, speed, seeds, f'sensors.flicker = "{size}"', owned)
     return place
 
 
-def estimate(place: Path) -> dict[str, Any]:
-    """One estimate, or why there is none; kept beside the recording."""
+def row(number: int, place: Path) -> str:
+    """One line of the table; the estimate is kept beside the recording."""
+    rotor, size, _ = DROPS[number]
     file = place / "estimate.json"
     if not file.is_file():
-        began = time.process_time()
-        machine = load_machine(place / "machine.toml")
-        record, tail = (read_record(place / f"{one}.csv", machine) for one in ("record", "record_tail"))
-        try:
-            found: dict[str, Any] = estimate_drop(machine, record, tail, name="record").to_dict()
-        except RotordropError as error:
-            found = {"failed": f"{type(error).__name__}: {error}"}
-        write_json(file, found | {"took_s": time.process_time() - began}, sealed=True)
-    return dict(read_json(file, "studies/coloured_noise/drops.py"))
-
-
-def row(number: int, place: Path) -> str:
-    """One line of the table."""
-    rotor, size, _ = DROPS[number]
-    found = estimate(place)
-    took = found.pop("took_s")
-    if "failed" in found:
-        return f"| {number} | {rotor} | {size} | {found['failed']} |"
-    score = score_estimate(found, place / "truth" / "record.json", drop="record")
+        estimate(place, "machine.toml", file)
+    score = scored(file)
+    if "failed" in score:
+        return f"| {number} | {rotor} | {size} | {score['failed']} |"
     of_bearings = score["bearings"].values()
-    cells = []
-    for field in SHOWN:
-        own = [bearing[field] for bearing in of_bearings if field in bearing]
-        cells.append(
-            ", ".join(
-                f"{100 * one['relative_error']:+.1f} ± {100 * one['half_width']:.1f}"
-                f"{'' if one['covered'] else ' !'}"
-                for one in own
-            )
-        )
+    cells = [
+        ", ".join(cell(bearing[field]) for bearing in of_bearings if field in bearing) for field in SHOWN
+    ]
     numbers = [
         one for bearing in of_bearings for one in bearing.values() if one.get("half_width") is not None
     ]
     held = f"{sum(one['covered'] for one in numbers)} of {len(numbers)}"
     verdict = "yes" if score["consistent"] else "no"
-    return f"| {number} | {rotor} | {size} | {verdict} | {' | '.join(cells)} | {held} | {took:.0f} |"
+    cells += [held, f"{score['took_s']:.0f}"]
+    return f"| {number} | {rotor} | {size} | {verdict} | {' | '.join(cells)} |"
 
 
 def main() -> None:

@@ -12,25 +12,19 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rotordrop import estimate_drop
-from rotordrop.document import read_json
-from rotordrop.errors import RotordropError
-from rotordrop.files import make_folder, write_json
-from rotordrop.machine import Machine, load_machine, loads_machine
+from rotordrop.machine import Machine, loads_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.record.record import read_record
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop_bench import score_estimate
-from rotordrop_bench.event import hidden_machine
-from rotordrop_bench.files import write_synthetic
-from rotordrop_bench.recording import synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
-from rotordrop_bench.sensor_chain import SensorChain
+
+sys.path.insert(0, str(Path(__file__).parent))
+from hidden_drops import cell, estimate, scored, truth_of, write_drop
 
 FIRST_SEED = 410_000
 DROPS = 10
@@ -154,61 +148,27 @@ def described(machine: Machine, lines: str) -> Machine:
     return loads_machine(f"{text}\n[[{behind}" if behind else text)
 
 
+def place_of(folder: Path, name: str, drop: int) -> Path:
+    """Where the files of one drop are."""
+    return folder / name.replace(" ", "_") / f"{drop:02d}"
+
+
 def make(folder: Path, name: str, drop: int) -> Path:
     """Machine files, recording, tail and truth of one drop; where they are."""
-    place = folder / name.replace(" ", "_") / f"{drop:02d}"
-    case, number = CASES[name], list(CASES).index(name)
-    if (place / "truth" / "record.json").is_file():
-        return place
-    machine = bench_rotor(case.rotor)
-    sizes = measures(machine)
-    hidden_lines = case.hidden.format(**sizes)
-    make_folder(place)
-    (place / "hidden.toml").write_text(hidden_lines + "\n")
-    hidden = hidden_machine(machine, FIRST_SEED + number, str(place / "hidden.toml"))
-    largest = max(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
-    chain = SensorChain(sampling_rate=20e3, full_scale=max(600e-6, 2.0 * largest))
-    for way, lines in (("a", case.known), ("b", case.guessed), ("c", "")):
-        owned = described(machine, lines.format(**sizes))
-        (place / f"{way}.toml").write_text(machine_text(owned))
-    seed = FIRST_SEED + 100 * (number + 1) + drop
-    made = synthesize_drop(hidden, 2.0 * math.pi * case.speed, seed, sensor_chain=chain, name="record")
-    write_synthetic(made, place, name="record", histories=False)
+    place, case, number = place_of(folder, name, drop), CASES[name], list(CASES).index(name)
+    if not truth_of(place).is_file():
+        machine = bench_rotor(case.rotor)
+        sizes = measures(machine)
+        lines = {"a": case.known, "b": case.guessed, "c": ""}
+        owned = {way: machine_text(described(machine, one.format(**sizes))) for way, one in lines.items()}
+        seeds = FIRST_SEED + number, FIRST_SEED + 100 * (number + 1) + drop
+        write_drop(place, machine, case.speed, seeds, case.hidden.format(**sizes), owned)
     return place
 
 
-def estimate(place: Path, way: str) -> None:
-    """One estimate, or why there is none."""
-    began = time.process_time()
-    machine = load_machine(place / f"{way}.toml")
-    record, tail = (read_record(place / f"{one}.csv", machine) for one in ("record", "record_tail"))
-    try:
-        found: dict[str, Any] = estimate_drop(machine, record, tail, name="record").to_dict()
-    except RotordropError as error:
-        found = {"failed": f"{type(error).__name__}: {error}"}
-    write_json(place / f"{way}.json", found | {"took_s": time.process_time() - began}, sealed=True)
-
-
-def scored(place: Path, way: str) -> dict[str, Any] | None:
-    """Verdict, names and peaks of one estimate."""
-    file = place / f"{way}.json"
-    if not file.is_file():
-        return None
-    found = dict(read_json(file, "studies/further/drops.py"))
-    if "failed" in found:
-        return {"failed": found["failed"]}
-    took = found.pop("took_s")
-    score = score_estimate(found, place / "truth" / "record.json", drop="record")
-    peaks = [own[field] for own in score["bearings"].values() for field in SHOWN if field in own]
-    load = [p["estimate"] for p in found["parameters"] if p["path"].startswith("loads.")]
-    kept = {key: score[key] for key in ("consistent", "named")}
-    return kept | {"peaks": peaks, "took": took, "load": load}
-
-
-def cell(peak: dict[str, Any]) -> str:
-    """Error ± half width; ! where the interval does not hold the truth."""
-    outside = "" if peak["covered"] else " !"
-    return f"{100 * peak['relative_error']:+.1f} ± {100 * peak['half_width']:.1f}{outside}"
+def peaks_of(score: dict[str, Any]) -> list[dict[str, Any]]:
+    """Peaks of one estimate."""
+    return [own[field] for own in score["bearings"].values() for field in SHOWN if field in own]
 
 
 def table(folder: Path, drops: int) -> str:
@@ -222,18 +182,19 @@ def table(folder: Path, drops: int) -> str:
     sums: dict[str, list[dict[str, Any]]] = {way: [] for way in WAYS}
     for name, case in CASES.items():
         for drop in range(drops):
-            place = folder / name.replace(" ", "_") / f"{drop:02d}"
             for way, words in WAYS.items():
-                one = scored(place, way)
-                if one is None:
+                file = place_of(folder, name, drop) / f"{way}.json"
+                if not file.is_file():
                     continue
+                one = scored(file)
                 head = f"| {name}, {case.rotor} | {drop} | {words} |"
                 if "failed" in one:
                     rows.append(f"{head} none | | {one['failed']} |")
                     continue
-                sums[way].append(one)
+                peaks = peaks_of(one)
+                sums[way].append(one | {"peaks": peaks})
                 flag, named = "yes" if one["consistent"] else "no", ", ".join(one["named"]) or "–"
-                rows.append(f"{head} {flag} | {named} | {'; '.join(map(cell, one['peaks']))} |")
+                rows.append(f"{head} {flag} | {named} | {'; '.join(map(cell, peaks))} |")
     rows.append("")
     for way, words in WAYS.items():
         if not sums[way]:
@@ -274,9 +235,12 @@ def main() -> None:
                 if time.monotonic() - began > asked.limit:
                     return
                 place = make(asked.folder, name, drop)
-                if not (place / f"{way}.json").is_file():
-                    estimate(place, way)
-                    print(name, drop, way, scored(place, way), flush=True)
+                file = place / f"{way}.json"
+                if not file.is_file():
+                    estimate(place, f"{way}.toml", file)
+                    one = scored(file)
+                    said = one.get("failed") or "; ".join(map(cell, peaks_of(one)))
+                    print(name, drop, way, said, flush=True)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ it writes ``results/table.md`` over the estimates there are.
 
 from __future__ import annotations
 
-import math
 import sys
 from pathlib import Path
 
@@ -17,12 +16,12 @@ from rotordrop.files import make_folder, write_json
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import sha256_of
 from rotordrop_bench import score_estimate
-from rotordrop_bench.event import hidden_machine
 from rotordrop_bench.files import write_record
-from rotordrop_bench.recording import synthesize_drop
 from rotordrop_bench.rotors import bench_rotor
-from rotordrop_bench.sensor_chain import SensorChain
 from rotordrop_bench.violations import Violations
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "further"))
+from hidden_drops import cell, hidden_drop
 
 CASES = {
     "60kg": ("60 kg", 120.0, 1500, "NDE"),
@@ -38,10 +37,7 @@ def make(folder: Path, name: str) -> None:
     rotor, speed, seed, on = CASES[name]
     machine = bench_rotor(rotor)
     broken = Violations.model_validate({"magnets": {"stays_on": [on]}})
-    hidden = hidden_machine(machine, seed, broken)
-    largest = max(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
-    chain = SensorChain(sampling_rate=20e3, full_scale=max(600e-6, 2.0 * largest))
-    made = synthesize_drop(hidden, 2.0 * math.pi * speed, 9500 + seed, sensor_chain=chain, name=rotor)
+    made = hidden_drop(machine, speed, (seed, 9500 + seed), broken, rotor)
     place = folder / name
     make_folder(place)
     save_machine(machine, place / "machine.toml")
@@ -58,10 +54,7 @@ def row(folder: Path, name: str) -> str:
     for end, own in scored["bearings"].items():
         if end == on:
             continue
-        for quantity in SHOWN:
-            one = own[quantity]
-            outside = "" if one.get("covered", True) else " !"
-            cells.append(f"{100 * one['relative_error']:+.1f} ± {100 * one['half_width']:.1f} %{outside}")
+        cells += [cell(own[quantity], " %") for quantity in SHOWN]
     return f"| {' | '.join(cells)} |"
 
 
