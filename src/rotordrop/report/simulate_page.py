@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.estimate.bearing_drop import History, simulated_bearings
+from rotordrop.record.impacts import HOP
 from rotordrop.report.content import Column, Figure, ReportContent, Section, appendix, table
 from rotordrop.report.drop_sections import drop_sections, speed_figure
 from rotordrop.report.heat_section import heat_sections
@@ -19,6 +20,7 @@ from rotordrop.simulate.landing import Landing, landings
 from rotordrop.simulate.magnets import MagnetHistory
 from rotordrop.simulate.result import DropResult
 from rotordrop.simulate.ribbons import ribbon_uses
+from rotordrop.units import percent
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -138,8 +140,8 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
     figure = Figure(time_panels(rows, 1.0, "N"), caption, "axial force")
     note = (
         "Travel of the rotor is from the middle between its axial magnets and counts for impellers; against "
-        "the race it is longer than the gap by what shoulder and face give way. Contacts without a flight "
-        "between them are one landing, as for radial impacts. The edge of the contact is how far up its "
+        "the race it is longer than the gap by what shoulder and face give way. Contacts without a hop of "
+        f"{percent(HOP)} of the gap between them are one landing. The edge of the contact is how far up its "
         "groove the contact of a ball reaches; the groove ends at the shoulder."
     )
     return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS, note=note),))

@@ -374,6 +374,7 @@ def test_log_page_and_document_say_how_it_landed(machine, drop):
     assert one.rotor_travel == np.max(drop.axial_displacement) != one.travel
     (section,) = [part for part in simulate_page(drop, machine).sections if part.heading == "Axial landing"]
     assert len(section.tables[0].rows) == 1
+    assert "without a hop of 5 % of the gap between them" in (section.tables[0].note or "")
     drawn = np.asarray(section.figures[0].chart.data[0].y)
     assert np.max(drawn) == pytest.approx(np.max(drop.face_force), rel=1e-6)
     row = dict(
