@@ -25,7 +25,7 @@ from rotordrop.track._propagation import (
     add_process_noise,
     apply_parameters,
     propagate,
-    take_noise_of,
+    subtract_process_noise,
     unknown_impulses,
 )
 from rotordrop.track.sensor_form import SensorForm, lag_step, measurement_row, noise_step
@@ -111,7 +111,7 @@ def forward_pass(
     transitions: Compact,
     rows: Array,
     gains: Array,
-    kicks: Array,
+    impulse_sigmas: Array,
     innovations: Array,
     innovation_variances: Array,
 ) -> int:
@@ -140,7 +140,7 @@ def forward_pass(
         Filled with the sensitivity from the sample before.
     rows, gains : ndarray, shape (N, C + 1, n) or (0, ...)
         Filled with measurement rows and gains, in the order used.
-    kicks : ndarray, shape (N, B) or (0, ...)
+    impulse_sigmas : ndarray, shape (N, B) or (0, ...)
         Filled with the standard deviations of the unknown impulses from the sample before [N s].
     innovations, innovation_variances : ndarray, shape (N, C + 1)
         Filled; NaN where a reading was left out.
@@ -207,7 +207,7 @@ def forward_pass(
             symmetrise(P, s)
             if keep:
                 transitions[i] = F
-                kicks[i] = sigmas
+                impulse_sigmas[i] = sigmas
         elif keep:
             transitions[i] = 0.0
         count = 0
@@ -273,6 +273,27 @@ def is_plausible(mean: Array, p: KernelParameters) -> bool:
             i = p.bearing_at[b, body]
             good = good and abs(mean[i]) < limit and abs(mean[i + 1]) < limit
     return good
+
+
+@kernel
+def score_before_reading(score: Array, row: Array, gain: Array, innovation: float, variance: float) -> None:
+    """λ (n,) after a reading, of a row (n,) and a gain (n,), becomes that before it."""
+    told = np.dot(gain, score) + innovation / variance
+    for a in range(score.shape[0]):
+        score[a] -= row[a] * told
+
+
+@kernel
+def score_before_step(score: Array, F: Array | Compact, noise_decay: Array) -> None:
+    """λ (n,) after a step with the transition ``F`` (s, s + P) becomes that before it."""
+    s, columns = F.shape
+    old = score[:s].copy()
+    score[:s] = 0.0
+    for a in range(s):
+        for j in range(columns):
+            score[j] += F[a, j] * old[a]
+    for m in range(noise_decay.shape[0]):
+        score[score.shape[0] - noise_decay.shape[0] + m] *= noise_decay[m]
 
 
 @kernel
@@ -346,7 +367,6 @@ def backward_pass(
             # (I - K h)ᵀ Λ (I - K h) + hᵀ h / S
             lk = np.dot(Lam, gain)
             klk = np.dot(gain, lk)
-            score = np.dot(gain, lam)
             weight = klk + 1.0 / S
             count = 0
             # A reading sees one plane and its own sensor errors: most of its row is zero.
@@ -361,16 +381,13 @@ def backward_pass(
                 a = seen[e]
                 for b in range(n):
                     Lam[a, b] += row[a] * (weight * row[b] - lk[b])
-            for a in range(n):
-                lam[a] -= row[a] * (score + innovations[i, c] / S)
+            score_before_reading(lam, row, gain, innovations[i, c], S)
         if i > 0:
             F = transitions[i].astype(np.float64)
             top = np.ascontiguousarray(Lam[:s])
             tail = np.dot(F.T, top)
             body = np.dot(np.ascontiguousarray(tail[:, :s]), F)
-            old = lam.copy()
-            lam[:columns] = np.dot(F.T, old[:s])
-            lam[s:columns] += old[s:columns]
+            score_before_step(lam, F, noise_decay)
             lower = Lam[s:, s:].copy()
             cross = tail[:, s:].copy()
             Lam[:, :] = 0.0
@@ -380,7 +397,6 @@ def backward_pass(
             Lam[s:, :columns] += cross.T
             for m in range(noise_decay.shape[0]):
                 j = n - noise_decay.shape[0] + m
-                lam[j] *= noise_decay[m]
                 Lam[j, :] *= noise_decay[m]
                 Lam[:, j] *= noise_decay[m]
         symmetrise(Lam, n)
@@ -401,7 +417,7 @@ def smooth_means(
     transitions: Compact,
     rows: Array,
     gains: Array,
-    kicks: Array,
+    impulse_sigmas: Array,
     innovations: Array,
     innovation_variances: Array,
     smoothed: Array,
@@ -431,18 +447,11 @@ def smooth_means(
     for i in range(n_t - 1, first - 1, -1):
         for c in range(rows.shape[1] - 1, -1, -1):
             if math.isfinite(innovation_variances[i, c]):
-                seen = innovations[i, c] / innovation_variances[i, c] + np.dot(gains[i, c], score)
-                for a in range(n):
-                    score[a] -= rows[i, c, a] * seen
+                S = innovation_variances[i, c]
+                score_before_reading(score, rows[i, c], gains[i, c], innovations[i, c], S)
         scores[i] = score
         if i > 0:
-            old = scores[i]
-            score[:s] = 0.0
-            for a in range(s):
-                for j in range(columns):
-                    score[j] += transitions[i, a, j] * old[a]
-            for m in range(noisy):
-                score[n - noisy + m] *= form.noise_decay[m]
+            score_before_step(score, transitions[i], form.noise_decay)
     away = -np.dot(P, score)  # of the smoothed estimate from the filtered one
     moved = np.empty(n)
     for i in range(first, n_t):
@@ -460,7 +469,9 @@ def smooth_means(
                 e, decay = n - noisy + m, form.noise_decay[m]
                 kept = decay * away[e]
                 moved[e] = kept - (1.0 - decay * decay) * form.noise_variance[m] * scores[i, e]
-            take_noise_of(scores[i], p, settings, kicks[i], drift_at(times[i], targets, settings), moved)
+            subtract_process_noise(
+                scores[i], p, settings, impulse_sigmas[i], drift_at(times[i], targets, settings), moved
+            )
             smoothed[i] = means[i] + moved
             for c in range(rows.shape[1]):
                 if math.isfinite(innovation_variances[i, c]):

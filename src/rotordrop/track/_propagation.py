@@ -498,7 +498,7 @@ def add_process_noise(
 
 
 @kernel
-def take_noise_of(
+def subtract_process_noise(
     score: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array, out: Array
 ) -> None:
     """Take off ``out`` (n,) the product of what `add_process_noise` adds with ``score`` (n,)."""

@@ -97,8 +97,8 @@ MOST_REPEATS, SMALL_CHANGE = 6, 5.0
 A fall does not end them: on a rotor of 6 t it fell by 48 in one pass of the whole drop and rose by 194 in the
 next three, and the peak moved by 9 %.
 """
-MEMORY = 128_000_000
-"""Memory [B] for what the passes of a fit keep of their samples, of all drops together."""
+FIT_MEMORY = 128_000_000
+"""Memory [B] for what the passes of a fit keep of their samples, shared by its drops."""
 THREADS = 2
 """Passes over the same drops that run side by side [1]."""
 
@@ -153,6 +153,7 @@ def track(
     references: Sequence[Array] | None = None,
     noise_factor: float = 1.0,
     progress: Progress | None = None,
+    storages: Sequence[Storage] = (),
 ) -> TrackedDrops:
     """Fit the drop model to recorded drops of one machine.
 
@@ -168,6 +169,8 @@ def track(
         Factor on the unknown impulses of every stage [1].
     progress : callable, optional
         Called with a sentence and the fraction done.
+    storages : sequence of Storage, optional
+        Memory of each drop that passes before have used.
     """
     # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
     from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
@@ -175,9 +178,8 @@ def track(
     ends = [window_end(stage, contact, fall) for stage in schedule]
     total = sum(end * stage.passes for end, stage in zip(ends, schedule, strict=True))
     done = 0.0
-    storages = [Storage(MEMORY // len(problems)) for _ in problems]
+    storages = storages or fit_storages(problems)
     at: Sequence[Array | None] = references or [None] * len(problems)
-    trajectories: Sequence[Array] = ()
     for end, stage in zip(ends, schedule, strict=True):
         settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
@@ -185,13 +187,13 @@ def track(
                 progress(f"fitting the first {1e3 * end:.0f} ms", done / total)
             eased = [_eased(*one, stage) for one in zip(problems, at, strict=True)]
             filtered = filtered_chain(eased, settings, at, end, from_guesses=from_guesses, storages=storages)
-            at = trajectories = mean_chain(problems, filtered, storages)
+            at = smoothed_means_of_chain(problems, filtered, storages)
             from_guesses = False
             done += end
     return TrackedDrops(
         problems=tuple(problems),
         filtered=tuple(filtered),
-        trajectories=tuple(trajectories),
+        trajectories=tuple(one for one in at if one is not None),
         noise_factors=tuple(noise_factor * one.impulse / settings.impulse for one in filtered),
     )
 
@@ -207,7 +209,7 @@ def converged(
 ) -> TrackedDrops:
     """A fit after as many passes over a window as still change the likelihood, or as are allowed.
 
-    Where the likelihood falls, the next pass begins half way: steps that overshoot would swing for ever.
+    Where the likelihood falls, the next pass begins half way, unless one of the two has lost a drop.
 
     Parameters
     ----------
@@ -222,14 +224,21 @@ def converged(
     noise_factor, progress
         As for `track`.
     """
-    once = (replace(stage, passes=1),)
+    once, storages = (replace(stage, passes=1),), fit_storages(problems)
 
     def passed(number: int, references: Sequence[Array]) -> TrackedDrops:
         def told(words: str, share: float) -> None:
             if progress is not None:
                 progress(words, (number + share) / passes)
 
-        return track(problems, once, references=references, noise_factor=noise_factor, progress=told)
+        return track(
+            problems,
+            once,
+            references=references,
+            noise_factor=noise_factor,
+            progress=told,
+            storages=storages,
+        )
 
     fit = passed(0, references)
     at: Sequence[Array] = fit.trajectories
@@ -238,13 +247,16 @@ def converged(
         rise = before - fit.negative_log_likelihood
         if abs(rise) < SMALL_CHANGE:
             break
-        at = fit.trajectories if rise > 0.0 else _half_way(at, fit.trajectories)
+        # Full steps may jump to and fro across the best fit.
+        known, at = at, fit.trajectories
+        if rise < 0.0 and all(len(one) == len(other) for one, other in zip(known, at, strict=True)):
+            at = [0.5 * (one + other) for one, other in zip(known, at, strict=True)]
     return fit
 
 
-def _half_way(ones: Sequence[Array], others: Sequence[Array]) -> list[Array]:
-    """Middles of trajectories, each as far as the other one reaches."""
-    return [0.5 * (one[: len(other)] + other) for one, other in zip(ones, others, strict=True)]
+def fit_storages(problems: Sequence[DropProblem]) -> list[Storage]:
+    """Memory for the passes of a fit, one for each drop."""
+    return [Storage(FIT_MEMORY // max(len(problems), 1)) for _ in problems]
 
 
 def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
@@ -320,7 +332,7 @@ def smoothed_chain(problems: Sequence[DropProblem], filtered: Sequence[Forward])
     return smoothed[::-1]
 
 
-def mean_chain(
+def smoothed_means_of_chain(
     problems: Sequence[DropProblem], filtered: Sequence[Forward], storages: Sequence[Storage]
 ) -> list[Array]:
     """The smoothed means of `smoothed_chain` alone."""
@@ -358,7 +370,15 @@ def _followed(
         if result.done == samples:
             break
         looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
-        again = forward(problem, looser, mean=mean, covariance=covariance, samples=samples, keep="means")
+        again = forward(
+            problem,
+            looser,
+            mean=mean,
+            covariance=covariance,
+            samples=samples,
+            keep="means",
+            storage=storage,
+        )
         result = max(result, again, key=lambda one: one.done)
     return result
 

@@ -13,7 +13,7 @@ from rotordrop.elements.magnet import FORCES, REMANENCE
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
+from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.units import percent
 
 NIS_RANGE = (0.6, FITTING_NIS)
@@ -305,7 +305,7 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
     flies with another gravity, every reading is followed, and every force and gap has the error. One that
     stays and acts sideways is none of that: the machine is not level, or something pulls at the rotor.
     """
-    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice].tolist()
+    theta = smoothed.means[smoothed.filtered.parameter_sample][problem.parameter_slice].tolist()
     values = dict(zip((unknown.parameter for unknown in problem.unknowns), theta, strict=True))
     longest = next(
         (u.value_of(values[u.parameter]) for u in problem.unknowns if u.parameter is REMANENCE), 0.0
@@ -344,7 +344,7 @@ def _fades(longest: float) -> str:
 
 def _departures(problem: DropProblem, smoothed: Smoothed, scope: str) -> list[Departure]:
     """Unknowns of a scope."""
-    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
+    theta = smoothed.means[smoothed.filtered.parameter_sample][problem.parameter_slice]
     return [
         Departure(
             sigmas=abs(float(t) - u.mean) / u.sigma,

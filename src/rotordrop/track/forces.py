@@ -23,7 +23,7 @@ from rotordrop.simulate._rhs import (
 from rotordrop.track import _propagation as P
 from rotordrop.track._filter import LARGEST_DEFLECTION
 from rotordrop.track.problem import WATCHED, DropProblem, private_copy
-from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.smoother import Smoothed
 
 FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
 N_VALUES = 4
@@ -246,7 +246,7 @@ def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
     places = [problem.entries_that_set("bearing", b, L.FRICTION_DYNAMIC) for b in bearings]
     if not any(places):
         return np.zeros(len(places))
-    variances = np.diag(smoothed.covariance(parameter_sample(smoothed)))
+    variances = np.diag(smoothed.covariance(smoothed.filtered.parameter_sample))
     return np.sqrt(np.maximum(variances[[entries[0] for entries in places]], 0.0))
 
 

@@ -25,6 +25,7 @@ Compact = NDArray[np.float32]
 Number = TypeVar("Number", np.float32, np.float64)
 
 Keep = Literal["all", "means", "nothing"]
+"""What a pass keeps: what the smoother needs, what smoothed means alone need, or nothing."""
 
 REFERENCE_STEP = 50e-6
 """Time for which the numbers of `PassSettings` hold [s]."""
@@ -34,7 +35,7 @@ SPIN = 0.07
 """Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
 LEARNING = 7.0
 """Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
-MEMORY = 64_000_000
+PASS_MEMORY = 64_000_000
 """Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again."""
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
@@ -134,8 +135,8 @@ def pass_settings(problem: DropProblem, *, force: float, share: float, substeps:
 class Stretch:
     """What the smoother needs of some samples of a pass beside its means; K samples, n estimated.
 
-    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed, where
-    they are.
+    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed; there
+    are none where only means are wanted.
     """
 
     first: int
@@ -143,7 +144,7 @@ class Stretch:
     transitions: Compact
     rows: Array
     gains: Array
-    kicks: Array
+    impulse_sigmas: Array
 
     @property
     def has_covariances(self) -> bool:
@@ -162,7 +163,7 @@ class Storage:
         How much is taken [B]; that of two stretches in any case.
     """
 
-    def __init__(self, memory: int = MEMORY) -> None:
+    def __init__(self, memory: int = PASS_MEMORY) -> None:
         self._memory = memory
         self._blocks: dict[str, NDArray[Any]] = {}
         self._held: dict[int, tuple[Array, Stretch]] = {}
@@ -184,14 +185,17 @@ class Storage:
         """Memory taken [B]."""
         return sum(block.nbytes for block in self._blocks.values())
 
-    def hold(self, slot: int, means: Array, stretch: Stretch) -> None:
-        """Remember which pass, told by its means, and which stretch of it a slot of the memory holds."""
-        kind = stretch.has_covariances
+    def begin(self, slot: int, means: Array, keep: Keep) -> None:
+        """Forget what a slot holds, and what other passes, or passes that kept something else, have left."""
         self._held = {
             place: one
             for place, one in self._held.items()
-            if one[0] is means and one[1].has_covariances == kind
-        } | {slot: (means, stretch)}
+            if place != slot and one[0] is means and one[1].has_covariances == (keep == "all")
+        }
+
+    def hold(self, slot: int, means: Array, stretch: Stretch) -> None:
+        """Remember which pass, told by its means, and which stretch of it a slot of the memory holds."""
+        self._held[slot] = means, stretch
 
     def held(self, means: Array, first: int) -> Stretch | None:
         """The stretch of a pass that begins at a sample, if nothing was written over it."""
@@ -219,21 +223,24 @@ class _Course:
         """Room for the samples of a stretch, and its place in the memory."""
         n, s, updates = len(self.mean), self.problem.n_dynamic, self.problem.n_channels + 1
         columns, bearings = s + len(self.problem.unknowns), len(self.problem.model.bearing_names)
-        kept = 0 if keep == "nothing" else self.length + 1
         packed = n * (n + 1) // 2 if keep == "all" else 0
-        slots = storage.slots(kept * (4 * (packed + s * columns) + 8 * (2 * updates * n + bearings)) or 1)
-        slots = min(slots, len(self.problem.time) // self.length + 1)
-        slot = number % slots
-        # One block for all places: the system gets a large one back at once.
+        size = (self.length + 1) * (4 * (packed + s * columns) + 8 * (2 * updates * n + bearings))
+        slots = (
+            1 if keep == "nothing" else min(storage.slots(size), len(self.problem.time) // self.length + 1)
+        )
+        slot, kept = number % slots, 0 if keep == "nothing" else self.length + 1
+
+        def room(name: str, kind: type[Number], *shape: int) -> NDArray[Number]:
+            # one block for all slots: the system gets a large one back at once
+            return storage.array(name, (slots, kept, *shape), kind)[slot, :count]
+
         return slot, Stretch(
             first=number * self.length,
-            covariances=storage.array("covariances", (slots, self.length + 1, packed), np.float32)[
-                slot, :count
-            ],
-            transitions=storage.array("transitions", (slots, kept, s, columns), np.float32)[slot, :count],
-            rows=storage.array("rows", (slots, kept, updates, n), np.float64)[slot, :count],
-            gains=storage.array("gains", (slots, kept, updates, n), np.float64)[slot, :count],
-            kicks=storage.array("kicks", (slots, kept, bearings), np.float64)[slot, :count],
+            covariances=room("covariances", np.float32, packed),
+            transitions=room("transitions", np.float32, s, columns),
+            rows=room("rows", np.float64, updates, n),
+            gains=room("gains", np.float64, updates, n),
+            impulse_sigmas=room("impulse sigmas", np.float64, bearings),
         )
 
     def followed(
@@ -246,6 +253,7 @@ class _Course:
         problem, means, first = self.problem, filled[0], number * self.length
         chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
         slot, stretch = self.stretch(number, chosen.stop - first, keep, storage)
+        storage.begin(slot, means, keep)
         done = F.forward_pass(
             min(first + self.resumed, 1),
             means[first].copy() if first else self.mean,
@@ -266,11 +274,12 @@ class _Course:
             stretch.transitions,
             stretch.rows,
             stretch.gains,
-            stretch.kicks,
+            stretch.impulse_sigmas,
             filled[1][chosen],
             filled[2][chosen],
         )
-        storage.hold(slot, means, stretch)
+        if keep != "nothing":
+            storage.hold(slot, means, stretch)
         return first + int(done), stretch
 
 
@@ -280,8 +289,8 @@ class Forward:
 
     ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
     per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
-    unknown impulses of the pass [N s]; ``parameter_sample`` is where parameters are read; ``last`` is the
-    covariance (n, n) of the last sample reached, in single precision, and ``reached`` the same as it is. What
+    unknown impulses of the pass [N s]; ``reached`` is the
+    covariance (n, n) where the pass ended: of the last sample, or of the one that lost the drop. What
     the smoother needs besides is filtered again from ``starts``, the covariances at the beginning of every
     stretch: kept for all samples it would be hundreds of megabytes.
     """
@@ -291,8 +300,6 @@ class Forward:
     means: Array
     innovations: Array
     innovation_variances: Array
-    parameter_sample: int
-    last: Array
     reached: Array
     course: _Course
     starts: tuple[Array, ...]
@@ -300,7 +307,7 @@ class Forward:
     def stretch(self, number: int, storage: Storage, keep: Keep = "all") -> Stretch:
         """What the smoother needs of a stretch: as it is held, or filtered again with the same bits."""
         held = storage.held(self.means, number * self.course.length)
-        if held is not None and (keep == "means" or held.has_covariances):
+        if held is not None and held.has_covariances == (keep == "all"):
             return held
         filled = (self.means, self.innovations, self.innovation_variances)
         return self.course.followed(number, self.starts[number].copy(), filled, keep, storage)[1]
@@ -310,6 +317,17 @@ class Forward:
         number = min(sample // self.course.length, len(self.starts) - 1)
         stretch = self.stretch(number, Storage(0))
         return _unpacked(stretch, sample, self.means.shape[1])
+
+    @property
+    def parameter_sample(self) -> int:
+        """Sample at which parameters are read: shortly after the first contacts."""
+        return min(self.course.problem.parameter_sample, max(self.done - 1, 0))
+
+    @property
+    def last(self) -> Array:
+        """Covariance (n, n) of the last sample that was followed."""
+        whole = self.done == len(self.means)
+        return self.reached if whole else self.covariance(max(self.done - 1, 0))
 
     @property
     def nis(self) -> float:
@@ -393,7 +411,7 @@ def forward(
     storage, starts = storage or Storage(), []
     for number in range(max(math.ceil((count - 1) / course.length), 1)):
         starts.append(P.copy())
-        done, stretch = course.followed(number, P, filled, keep, storage)
+        done, _stretch = course.followed(number, P, filled, keep, storage)
         if done <= min((number + 1) * course.length, count - 1):
             break
     return Forward(
@@ -402,8 +420,6 @@ def forward(
         means=filled[0],
         innovations=filled[1],
         innovation_variances=filled[2],
-        parameter_sample=problem.parameter_sample,
-        last=_unpacked(stretch, max(done - 1, 0), n) if keep == "all" else P,
         reached=P,
         course=course,
         starts=tuple(starts),
@@ -451,11 +467,6 @@ class Smoothed:
             raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
         P = self.spread[found[0]]
         return np.asarray(P - P @ self.information[found[0]] @ P)
-
-
-def parameter_sample(smoothed: Smoothed) -> int:
-    """Sample at which parameters are read: shortly after the first contacts."""
-    return min(smoothed.filtered.parameter_sample, len(smoothed.means) - 1)
 
 
 def smooth(
@@ -539,9 +550,10 @@ def smooth(
 def smooth_means(
     filtered: Forward, score: Array | None = None, *, storage: Storage | None = None
 ) -> tuple[Array, Array]:
-    """Smoothed means (N, n) alone, and λ before the first measurement: half of what `smooth` takes, or less.
+    """Smoothed means (N, n) alone, and λ before the first measurement, without any covariance.
 
-    ``score`` (n,) is what later drops say about the last sample, ``storage`` that of the forward pass.
+    Where a pass goes on from another, the sample they share is left empty. ``score`` (n,) is what later drops
+    say about the last sample, ``storage`` that of the forward pass.
     """
     n, course = filtered.means.shape[1], filtered.course
     means = np.empty((filtered.done, n))
@@ -564,7 +576,7 @@ def smooth_means(
             stretch.transitions[held],
             stretch.rows[held],
             stretch.gains[held],
-            stretch.kicks[held],
+            stretch.impulse_sigmas[held],
             filtered.innovations[samples],
             filtered.innovation_variances[samples],
             means[samples],

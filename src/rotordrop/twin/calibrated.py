@@ -26,7 +26,7 @@ from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.rotor.unknowns import weight_per_magnet
 from rotordrop.track.consistency import Check, consistency_checks
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.smoother import Smoothed
 from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Search, track_drops
@@ -137,7 +137,7 @@ def calibrate_machine(
     }
     consistent = all(check.passed for one in checks.values() for check in one)
     problem, smoothed = tracked.problems[-1], tracked.smoothed[-1]
-    at = parameter_sample(smoothed)
+    at = smoothed.filtered.parameter_sample
     covariance = smoothed.covariance(at)
     mean = smoothed.means[at]
     widening = widening_of(check for one in checks.values() for check in one)
@@ -184,7 +184,7 @@ def _of_drop(problem: DropProblem, mean: Array, covariance: Array) -> dict[str, 
 
 def _lift(problem: DropProblem, smoothed: Smoothed) -> tuple[RecordedLift, ...]:
     """What a drop shows of the remanent force of each magnet, in shares of the weight it carries."""
-    at, machine = parameter_sample(smoothed), problem.model.machine
+    at, machine = smoothed.filtered.parameter_sample, problem.model.machine
     mean, sigma = smoothed.means[at], np.sqrt(np.maximum(np.diag(smoothed.covariance(at)), 0.0))
     share = weight_per_magnet(machine)
     places = {unknown.path: problem.n_dynamic + k for k, unknown in enumerate(problem.unknowns)}

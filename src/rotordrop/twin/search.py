@@ -43,7 +43,7 @@ from rotordrop.track.consistency import DIRECTIONS, consistency_checks, judged_b
 from rotordrop.track.noise_size import forward_passes, likeliest_noise, likelihood_of
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, Smoothed, parameter_sample
+from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rises import Rises, carried
@@ -605,9 +605,9 @@ def is_doubtful(before: TrackedDrops, after: TrackedDrops) -> bool:
     """Whether a fit has an unknown where its prior or the first impacts hardly leave it, or at its bound."""
     if largest_move(before, after) > PLAUSIBLE_MOVE:
         return True
-    for problem, smoothed in zip(after.problems, after.smoothed, strict=True):
+    for problem, means, filtered in zip(after.problems, after.trajectories, after.filtered, strict=True):
         chosen = problem.parameter_slice
-        values = smoothed.means[parameter_sample(smoothed)][chosen]
+        values = means[filtered.parameter_sample][chosen]
         sigma, low, high = _spread_and_bounds(problem)
         ways = np.abs(values - problem.mean[chosen]) / sigma
         if ((ways > PLAUSIBLE_WAY) | (values <= low) | (values >= high)).any():
@@ -631,12 +631,14 @@ def largest_move(before: TrackedDrops, after: TrackedDrops) -> float:
     What the first does not have, such as unknowns of a sensor plane that it leaves out, has not moved.
     """
     moves = [0.0]
-    drops = zip(before.problems, before.smoothed, after.problems, after.smoothed, strict=True)
-    for problem, smoothed, fine, found in drops:
-        at, chosen = parameter_sample(smoothed), problem.parameter_slice
+    drops = zip(
+        before.problems, before.smoothed, after.problems, after.trajectories, after.filtered, strict=True
+    )
+    for problem, smoothed, fine, means, filtered in drops:
+        at, chosen = smoothed.filtered.parameter_sample, problem.parameter_slice
         mean, variance = smoothed.means[at][chosen], np.diag(smoothed.covariance(at))[chosen]
         known = {one.path: pair for one, *pair in zip(problem.unknowns, mean, variance, strict=True)}
-        values = found.means[parameter_sample(found)][fine.parameter_slice]
+        values = means[filtered.parameter_sample][fine.parameter_slice]
         for unknown, value in zip(fine.unknowns, values, strict=True):
             if unknown.path in known:
                 middle, spread = known[unknown.path]

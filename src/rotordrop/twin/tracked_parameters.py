@@ -18,7 +18,7 @@ from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.consistency import is_lost as is_lost_record
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.smoother import Smoothed
 from rotordrop.twin.mixture import mixed
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
 
@@ -92,7 +92,7 @@ def parameters(
 
     Where model and record disagree, a parameter may be anything between its prior and the fit.
     """
-    at = parameter_sample(smoothed)
+    at = smoothed.filtered.parameter_sample
     values = fitted_values(problem, smoothed.means[at], smoothed.covariance(at), widening)
     found = []
     for unknown, value in zip(problem.unknowns, values, strict=True):
@@ -167,7 +167,7 @@ def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening
 
 def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> JointEstimate:
     """What belongs to the machine as it was shortly after the first contacts, with all covariances."""
-    at, places = parameter_sample(smoothed), problem.machine_indices
+    at, places = smoothed.filtered.parameter_sample, problem.machine_indices
     sensors = problem.model.machine.sensors
     paths = [unknown.path for unknown in problem.unknowns if unknown.scope == "machine"]
     paths += [parameter(part, "sensor").path_of(s.name) for part in ("gain", "offset") for s in sensors]

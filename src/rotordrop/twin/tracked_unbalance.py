@@ -11,7 +11,7 @@ from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
 from rotordrop.known import NINETY, Known
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Smoothed, parameter_sample
+from rotordrop.track.smoother import Smoothed
 from rotordrop.twin.tracked_loads import INCONSISTENT
 from rotordrop.twin.tracked_parameters import determination, parameter_widening
 
@@ -38,7 +38,7 @@ def plane_unbalances(
     """
     first = power_off + float(problem.time[0])
     turned = None if marks is None else angle_since_mark(marks, first)
-    at = parameter_sample(smoothed)
+    at = smoothed.filtered.parameter_sample
     mean, covariance = smoothed.means[at], smoothed.covariance(at)
     found = []
     for plane, unbalance in enumerate(problem.model.machine.unbalances):

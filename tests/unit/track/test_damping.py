@@ -13,7 +13,6 @@ from rotordrop.arrays import Array
 from rotordrop.track import calibration
 from rotordrop.track.calibration import MOST_REPEATS, Stage, converged, track
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import parameter_sample
 
 
 def test_damping_holds_the_parameters_to_the_pass_before(impacts: DropProblem) -> None:
@@ -25,7 +24,7 @@ def test_damping_holds_the_parameters_to_the_pass_before(impacts: DropProblem) -
     def steps(damping: float) -> Array:
         fit = track([impacts], (replace(stage, damping=damping),))
         found = fit.smoothed[0]
-        return np.abs(found.means[parameter_sample(found)][impacts.parameter_slice] - start) / sigma
+        return np.abs(found.means[found.filtered.parameter_sample][impacts.parameter_slice] - start) / sigma
 
     constant = impacts.targets.drift == 0.0
     free, held, between = (steps(damping)[constant] for damping in (0.0, 1e8, 1.0))
@@ -48,7 +47,9 @@ def test_passes_go_on_while_the_likelihood_changes(
     """Each begins where the one before ended, half way where the likelihood fell, with the same noise."""
     seen: list[Any] = []
 
-    def one_pass(_problems: Any, _stages: Any, *, references: Any, noise_factor: float, progress: Any) -> Any:
+    def one_pass(
+        _problems: Any, _stages: Any, *, references: Any, noise_factor: float, progress: Any, **_: Any
+    ) -> Any:
         seen.append((references[0][0, 0], noise_factor))
         progress("fitting", 0.0)
         ended = [np.full((3, 1), float(len(seen)))]
@@ -65,3 +66,22 @@ def test_passes_go_on_while_the_likelihood_changes(
         place = 0.5 * (place + k + 1.0) if fell else k + 1.0
     assert seen == begins
     assert shares == [k / MOST_REPEATS for k in range(passes)]
+
+
+def test_a_pass_that_lost_a_drop_gives_no_middle_to_begin_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of three passes the second follows one of two drops less far."""
+    begun: list[list[int]] = []
+    ends = [(30, 30), (30, 12), (30, 30), (30, 30)]
+
+    def one_pass(_problems: Any, _stages: Any, *, references: Any, **_: Any) -> Any:
+        begun.append([len(one) for one in references])
+        number = len(begun) - 1
+        reached = [np.zeros((end, 1)) for end in ends[number]]
+        return SimpleNamespace(
+            negative_log_likelihood=[-100.0, -50.0, -20.0, -20.0][number], trajectories=reached
+        )
+
+    monkeypatch.setattr(calibration, "track", one_pass)
+    stage = Stage(until=0.2, force=0.07, share=0.01, passes=1)
+    converged([], stage, [np.zeros((20, 1))] * 2)
+    assert begun == [[20, 20], [30, 30], [30, 12], [30, 30]]

@@ -13,7 +13,7 @@ import pytest
 
 from rotordrop.track.forces import force_history
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, PassSettings, forward, smooth
+from rotordrop.track.smoother import Forward, PassSettings, forward, smooth, smooth_means
 
 SAMPLES = 3
 SCRIPT = """
@@ -32,9 +32,12 @@ def whole_pass(problem: DropProblem) -> dict[str, np.ndarray]:
     again = forward(problem, PassSettings(impulse=3e-3, share=0.03), reference=filtered.means)
     smoothed = smooth(again, watched=problem.watched, kept=(0, SAMPLES - 1))
     history = force_history(problem, smoothed)
-    return {"means": smoothed.means, "watched": smoothed.watched, "information": smoothed.information} | {
-        name: getattr(history, name) for name in ("force", "magnitude_sigma", "stress", "contact_force")
-    }
+    return {
+        "means": smoothed.means,
+        "alone": smooth_means(again)[0],
+        "watched": smoothed.watched,
+        "information": smoothed.information,
+    } | {name: getattr(history, name) for name in ("force", "magnitude_sigma", "stress", "contact_force")}
 
 
 def in_contact(problem: DropProblem, filtered: Forward) -> DropProblem:

@@ -256,7 +256,7 @@ def test_process_noise_is_an_impulse_between_rotor_and_race(flight):
     expected[here, here] = drift**2 * DT
     np.testing.assert_allclose(covariance, expected, rtol=1e-12, atol=1e-30)
     score, taken = np.arange(1.0, n + 1.0), np.zeros(n)
-    P.take_noise_of(score, p, numbers, sigmas, drift, taken)
+    P.subtract_process_noise(score, p, numbers, sigmas, drift, taken)
     np.testing.assert_allclose(taken, -expected @ score, rtol=1e-12, atol=1e-30)
 
 

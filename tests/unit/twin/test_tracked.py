@@ -36,7 +36,6 @@ from rotordrop.rotor.unknowns import bearing_unknowns
 from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import corrections_by_record, input_state_estimate
-from rotordrop.track.smoother import parameter_sample
 from rotordrop.twin.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA
 from rotordrop.twin.problems import Drops, drop_problem, tail_first
 from rotordrop.twin.search import Search, track_drops
@@ -615,7 +614,7 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
     assert not is_inconsistent(fit), (fit.nis, fit.noise_factors)
     problem, smoothed = fit.problems[0], fit.smoothed[0]
     assert problem.n_channels == 6
-    theta = smoothed.means[parameter_sample(smoothed)][problem.parameter_slice]
+    theta = smoothed.means[smoothed.filtered.parameter_sample][problem.parameter_slice]
     paths = [unknown.path for unknown in problem.unknowns]
     for name, gap in made.truth["air_gap_m"].items():
         assert theta[paths.index(f"{name}.air_gap")] == pytest.approx(gap, abs=2e-6)
@@ -624,7 +623,7 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
 def test_an_inertia_that_a_bounded_drag_stands_in_for_is_not_determined(workshop: TrackedDrop) -> None:
     """A sixth of the true inertia was "determined" where the drag went far beyond its bound."""
     problem, smoothed = workshop.problem, workshop.smoothed
-    at = parameter_sample(smoothed)
+    at = smoothed.filtered.parameter_sample
     mean, covariance = smoothed.means[at].copy(), smoothed.covariance(at)
     paths = [unknown.path for unknown in problem.unknowns]
     inertia, drag = (paths.index(f"DE.race.{name}") for name in ("inertia", "drag_coefficient"))
