@@ -28,7 +28,7 @@ from rotordrop.track.smoother import (
     smooth,
     smooth_means,
 )
-from rotordrop.units import GRAVITY
+from rotordrop.units import fall_time
 
 Progress = Callable[[str, float], None]
 
@@ -83,7 +83,7 @@ QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, force=0.07, share=0.01, pa
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
 REFERENCE_CONTACT = 0.0075
-REFERENCE_FALL = math.sqrt(2.0 * 0.25e-3 / GRAVITY)
+REFERENCE_FALL = fall_time(0.25e-3)
 """First contact and time of a free fall that the windows of the schedules are written for [s]."""
 WHOLE_DROP = 0.1
 """Windows from here on are parts of the drop, not of its first contacts [s]."""

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from rotordrop import units
 from rotordrop.arrays import Array
 from rotordrop.elements.table import parameter
 from rotordrop.evidence.colour import SlowNoise
@@ -37,7 +38,7 @@ RING_SIGMA = (0.3e-6, 1e-3)
 
 def fall_time(machine: Machine, gap: float | None = None) -> float:
     """Time [s] of a free fall through a gap [m], the narrowest of a machine by default."""
-    return math.sqrt(2.0 * (smallest_gap(machine) if gap is None else gap) / float(machine.gravity))
+    return units.fall_time(smallest_gap(machine) if gap is None else gap, float(machine.gravity))
 
 
 def prior_at_power_off(
