@@ -81,8 +81,6 @@ def test_a_filter_that_lost_the_drop_is_judged_by_what_it_followed() -> None:
         means=nothing,
         innovations=innovations,
         innovation_variances=variances,
-        parameter_sample=0,
-        last=nothing,
         reached=nothing,
         course=nothing,  # type: ignore[arg-type]
         starts=(),
