@@ -10,7 +10,7 @@ import pytest
 
 from rotordrop.arrays import Array
 from rotordrop.track import _propagation as P
-from rotordrop.track import calibration, smoother
+from rotordrop.track import smoother
 from rotordrop.track._covariance import is_covariance, pack, unpack
 from rotordrop.track.calibration import filtered_chain, handed_on, smoothed_chain, smoothed_means_of_chain
 from rotordrop.track.problem import WATCHED, DropProblem, private_copy
@@ -639,7 +639,6 @@ def test_means_of_a_chain_are_those_of_its_smoother(impacts, monkeypatch):
     monkeypatch.setattr(smoother, "_stretch_length", lambda _: 60)
     drops = [lost_at(impacts, 300), impacts]
     filtered = filtered_chain(drops, SETTINGS, [None, None], 0.025)
-    monkeypatch.setattr(calibration, "LOOSER", (1.0,))
     alone = smoothed_means_of_chain(drops, filtered, [Storage(), Storage()])
     for means, smoothed in zip(alone, smoothed_chain(drops, filtered), strict=True):
         assert unlike(means, smoothed) < 2e-3
@@ -671,6 +670,9 @@ def test_a_pass_that_goes_on_gives_the_bits_of_one_in_one_go(impacts: DropProble
     assert then.negative_log_likelihood + first.negative_log_likelihood == pytest.approx(
         whole.negative_log_likelihood
     )
+    alone, behind = smooth_means(then)[0][1:], smooth(then, kept=(50,))
+    away, deviation = np.abs(alone - behind.means[1:]), np.sqrt(np.diag(behind.covariance(50)))
+    assert np.max(away[:, deviation > 0.0] / deviation[deviation > 0.0]) < 2e-3
     # backwards in four parts, of the last of which nothing but what it says of the others is wanted
     smoothed = smooth(whole, watched=impacts.watched, kept=())
     middle = count - cut - 50
