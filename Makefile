@@ -9,37 +9,47 @@ OUTPUT := output/demo
 MACHINE := src/rotordrop/machine/examples/lp400.toml
 RECORDS := src/rotordrop/examples/lp400
 
-.PHONY: help demo test arithmetic lint docs audit bench lock wheelhouse offline clean
+.PHONY: help demo test slow test-all arithmetic lint docs audit bench lock kernels wheel wheelhouse offline clean
 .DEFAULT_GOAL := help
 
 help: ## list the commands
-	@sed -n 's/^\([a-z]*\):.*## /make \1 - /p' $(firstword $(MAKEFILE_LIST))
+	@sed -n 's/^\([a-z-]*\):.*## /make \1 - /p' $(firstword $(MAKEFILE_LIST))
 
 demo: $(READY) ## estimate force and stress from a bundled (simulated) recording and write the report
 	@mkdir -p $(OUTPUT)
+	@echo "Estimating, for about 20 seconds; the first time after an installation it compiles for about a minute ..."
 	@$(BIN)/rotordrop estimate $(MACHINE) $(RECORDS)/drop_060.h5 --tail $(RECORDS)/drop_060_tail.csv \
 		--json $(OUTPUT)/estimate.json --report $(OUTPUT)/report.html
 	@echo "The recording is simulated. The report is $(CURDIR)/$(OUTPUT)/report.html"
 
+# One worker a core; each begins with a part of the list and takes over from another what that has not begun.
+PYTEST := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
+
 test: $(READY) ## run the tests
-	@$(BIN)/python -m pytest $(TESTS)
+	@$(PYTEST) -m "not slow" $(TESTS)
+
+slow: $(READY) ## run the tests that "make test" leaves out
+	@$(PYTEST) -m slow $(TESTS)
+
+test-all: test slow ## run all tests
 
 NUMERIC := tests/unit/physics tests/unit/rotor tests/unit/simulate tests/validation
 FITTED := tests/unit/track/test_filter_and_smoother.py tests/unit/track/test_propagation.py \
 	tests/unit/replay/test_first_impacts.py
 
-# An old processor has another linear algebra and no fused multiply-add at once; tests/unit/simulate/test_fingerprint.py
+# An old processor has another linear algebra and no fused multiply-add at once; tests/unit/simulate/test_result.py
 # tries each of the two alone.
 arithmetic: $(READY) ## run the numeric tests with the arithmetic of other processors
 	@OPENBLAS_CORETYPE=Prescott GLIBC_TUNABLES=glibc.cpu.hwcaps=-FMA,-AVX2 \
 		$(BIN)/python -m pytest -q -m "not slow" $(NUMERIC) $(FITTED)
 	@OPENBLAS_CORETYPE=Haswell $(BIN)/python -m pytest -q -m "not slow" $(FITTED)
 
-lint: $(READY) ## check style, types and layers
+lint: $(READY) ## check style, types, layers and sizes
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports --no-cache
+	@$(BIN)/python tools/rooms.py
 
 docs: $(READY) ## build the documentation and run its examples
 	@$(BIN)/python docs/generate_validation.py
@@ -60,11 +70,20 @@ lock: $(READY) ## renew requirements.lock from pyproject.toml
 	@$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --upgrade --quiet \
 		--generate-hashes --no-emit-index-url --no-annotate --no-header >> requirements.lock
 
-wheelhouse: $(READY) ## collect into the folder wheelhouse what an installation without a network needs
+kernels: $(READY)
+	@echo "Compiling the kernels that the wheel carries (about three minutes) ..."
+	@$(BIN)/python tools/kernels.py build/kernels
+
+wheel: kernels ## build into the folder dist a wheel that carries its compiled kernels
+	@ROTORDROP_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
+		--no-build-isolation -w dist .
+
+wheelhouse: kernels ## collect into the folder wheelhouse what an installation without a network needs
 	@rm -rf wheelhouse
 	@$(BIN)/python -m pip download --quiet --disable-pip-version-check --only-binary :all: --require-hashes \
 		-r requirements.lock -d wheelhouse
-	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w wheelhouse . ./bench
+	@ROTORDROP_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
+		--no-build-isolation -w wheelhouse . ./bench
 	@echo "Copy this folder with wheelhouse to a computer of the same kind and with the same Python; there: make offline"
 
 offline: ## make .venv from the folder wheelhouse, without a network
@@ -89,7 +108,7 @@ $(READY): requirements.lock pyproject.toml bench/pyproject.toml
 	@test -x $(BIN)/python || "$(PYTHON)" -m venv .venv || \
 		{ rm -rf .venv; echo "$(PYTHON) cannot make a virtual environment;" \
 			"on Debian and Ubuntu install the package python3-venv" >&2; exit 1; }
-	@echo "Installing into .venv what requirements.lock names (once, some minutes) ..."
+	@echo "Installing into .venv what requirements.lock names (once, about a minute and a half) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e . -e bench
 	@touch $(READY)

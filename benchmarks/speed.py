@@ -30,7 +30,6 @@ import numba
 import numpy as np
 import scipy
 from naive_drop import NaiveDrop
-from tuned_drop import TunedDrop
 
 from rotordrop.machine import example_machine
 from rotordrop.rotor.parameters import DropModel, build_drop_model
@@ -83,22 +82,20 @@ def naive_error(drop: NaiveDrop, model: DropModel) -> float:
 
 
 def one_core(model: DropModel, rounds: int) -> dict[str, Any]:
-    """Naive and tuned numpy over ours, in rounds that take turns."""
-    naive, tuned = NaiveDrop(model, CASE), TunedDrop(model, CASE)
+    """Naive numpy over ours, in rounds that take turns."""
+    naive = NaiveDrop(model, CASE)
     simulate_drop(model, CASE)
     full, whole = cost(lambda: naive.run(CASE.duration))
     say(
         f"naive, whole drop: {full:.1f} s for {whole.calls} right-hand sides, "
         f"{1e6 * full / whole.calls:.1f} µs each"
     )
-    calls, ours, naives, tuneds = whole.calls, [], [], []
+    calls, ours, naives = whole.calls, [], []
     for _ in range(rounds):
         ours.append(statistics.median(cost(lambda: simulate_drop(model, CASE))[0] for _ in range(9)))
         seconds, run = cost(lambda: naive.run(STRETCH))
         naives.append(seconds * calls / run.calls)
-        seconds, run = cost(lambda: tuned.run(STRETCH))
-        tuneds.append(seconds * calls / run.calls)
-        say(f"ours {1e3 * ours[-1]:.2f} ms, naive {naives[-1]:.1f} s, tuned numpy {tuneds[-1]:.1f} s")
+        say(f"ours {1e3 * ours[-1]:.2f} ms, naive {naives[-1]:.1f} s")
     result = simulate_drop(model, CASE)
     state = np.asarray(result.state[5000, : len(naive.start)])
     return {
@@ -113,8 +110,6 @@ def one_core(model: DropModel, rounds: int) -> dict[str, Any]:
         "ratio_of_whole_drop": full / statistics.median(ours),
         "ratio_per_round": [n / o for n, o in zip(naives, ours, strict=True)],
         "ratio": statistics.median(n / o for n, o in zip(naives, ours, strict=True)),
-        "tuned_right_hand_side_us": right_hand_side(tuned, state),
-        "tuned_ratio": statistics.median(n / o for n, o in zip(tuneds, ours, strict=True)),
     }
 
 
@@ -185,7 +180,7 @@ def main() -> None:
     results["one_core"] = one_core(model, options.rounds)
     if len(cores) > 1:
         os.sched_setaffinity(0, cores)
-    say("ratio to naive numpy {ratio:.0f}, to tuned numpy {tuned_ratio:.0f}".format(**results["one_core"]))
+    say("ratio to naive numpy {ratio:.0f}".format(**results["one_core"]))
     results["first_result"] = first_result(options.rounds)
     text = "first result: cold {cold_s:.1f} s, warm {warm_s:.2f} s (processor {warm_processor_s:.2f} s)"
     say((text + ", same bits: {bit_identical}").format(**results["first_result"]))

@@ -1,7 +1,5 @@
 """What may stand where the program keeps a file, and a limit of time for who opens it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """Published estimates of which a test needs a part; what it does not name is empty."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """One machine in many sizes: a plain rotor on two touchdown bearings, scaled to a mass, longer if asked."""
 
-from __future__ import annotations
-
 from rotordrop.machine import Machine, loads_machine
 
 MASS_AT_ONE = 32.7

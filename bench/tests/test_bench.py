@@ -1,7 +1,5 @@
 """DropBench: a list that stays, recordings that come back the same, a table that counts what is missing."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -9,13 +7,11 @@ import math
 import pytest
 
 from rotordrop.errors import UsageError
-from rotordrop.files import write_json
+from rotordrop.files import digest_of_file, write_json
 from rotordrop.machine import load_machine
-from rotordrop.record.record import sha256_of
-from rotordrop_bench import DROPS, Violations, make_bench, read_truth, score_bench
+from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_bench
 from rotordrop_bench.cli.app import run
 from rotordrop_bench.departures import departures
-from rotordrop_bench.drops import LISTS, SINCE
 from rotordrop_bench.make import chosen_drops
 from rotordrop_bench.rotors import ROTORS, bench_rotor
 from rotordrop_bench.true_values import KINDS, violated_kinds
@@ -32,12 +28,16 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("version", "expected"), [("1", "8dd028365b3c049a"), ("2", "cc2c7a5a86b4a900"), ("3", "71515e7df797632f")]
+    ("drops", "expected"),
+    [
+        (DROPS[:73], "8dd028365b3c049a"),
+        (DROPS[73:99], "cc2c7a5a86b4a900"),
+        (DROPS[99:], "71515e7df797632f"),
+    ],
 )
-def test_the_list_of_a_version_is_fixed(version, expected):
-    """A change of the list or of a rotor asks for another version, here too."""
-    digest = hashlib.sha256(repr(LISTS[version]).encode())
-    for drop in LISTS[version]:
+def test_the_list_is_fixed(drops, expected):
+    digest = hashlib.sha256(repr(drops).encode())
+    for drop in drops:
         parts = departures(bench_rotor(drop.rotor), 2.0 * math.pi * drop.speed, drop.departures)
         digest.update(repr(parts).encode())
     for rotor in ROTORS:
@@ -49,19 +49,6 @@ def test_the_list_of_a_version_is_fixed(version, expected):
             ]
         digest.update(" ".join(f"{number:.6g}" for number in numbers).encode())
     assert digest.hexdigest()[:16] == expected
-
-
-def test_a_tilted_machine_is_scored_as_one_with_a_side_force():
-    assert Truth(values={"violated": ["tilted machine", "wear"]}).violated == ("side force", "wear")
-
-
-def test_a_version_is_chosen_by_its_name():
-    assert [len(chosen_drops([f"version {v}"])) for v in LISTS] == [73, 26, 8]
-    assert {SINCE[drop.name] for drop in chosen_drops(["version 1"])} == {"1"}
-    later = chosen_drops(["version 2"])
-    sizes = [drop.departures[0] for drop in later]
-    assert len(set(sizes)) == len(later) and {size for _, size in sizes} == {0, 1}
-    assert {drop.rotor for drop in later} == set(ROTORS)
 
 
 def test_the_list_spans_what_it_promises():
@@ -82,6 +69,9 @@ def test_the_list_spans_what_it_promises():
     assert {len(drop.departures) for drop in DROPS} == {0, 1, 2, 3}
     seeds = {(drop.machine_seed, drop.drop_seed) for drop in DROPS}
     assert len(seeds) == len(DROPS)
+    later = [drop for drop in DROPS if drop.family.startswith("later kinds")]
+    assert {drop.rotor for drop in later} == set(ROTORS)
+    assert len({drop.departures[0] for drop in later}) == len(later)
 
 
 @pytest.mark.parametrize("drop", DROPS, ids=lambda drop: drop.name)
@@ -93,7 +83,6 @@ def test_a_hidden_machine_has_the_departures_of_the_list(drop):
 
 
 def test_no_drop_says_what_is_hidden(folder):
-    """Estimators get machine, recording and tail; the truth stands elsewhere."""
     files = sorted(str(p.relative_to(folder / "drops")) for p in (folder / "drops").rglob("*.*"))
     assert files == [
         "drop_004/machine.toml",
@@ -109,7 +98,7 @@ def test_no_drop_says_what_is_hidden(folder):
     assert load_machine(folder / "drops/drop_034/machine.toml") == bench_rotor("13 kg")
 
 
-def test_what_is_there_stays_and_what_was_cut_off_comes_back_the_same(folder):
+def test_what_is_cut_off_comes_back_the_same_and_the_truth_says_where_it_belongs(folder):
     record = folder / "drops/drop_004/record.csv"
     truth = folder / "truth/drop_004.json"
     before, when = (record.read_bytes(), truth.read_bytes()), record.stat().st_mtime_ns
@@ -119,14 +108,12 @@ def test_what_is_there_stays_and_what_was_cut_off_comes_back_the_same(folder):
     record.write_text("half")
     assert make_bench(folder, MADE) == ["drop_004"]
     assert (record.read_bytes(), truth.read_bytes()) == before
-
-
-def test_the_truth_says_where_it_belongs(folder):
     truth = read_truth(folder / "truth/drop_034.json")
-    assert truth.values["bench_version"] == "1"
+    assert truth.values["bench_version"] == VERSION
     assert truth.values["violated"] == ["long remanence"]
     assert truth.structure["remanence.time_constant"] == 0.01
     assert all(rows[0][0] < 0.1 for rows in truth.values["contact_intervals_0_0p25_s"].values())
+    assert Truth(values={"violated": ["tilted machine", "wear"]}).violated == ("side force", "wear")
 
 
 def _estimates(folder, factor=1.0, half=0.02):
@@ -166,13 +153,12 @@ def test_true_estimates_have_no_error(folder, estimates):
 
 
 def test_an_estimate_counts_for_the_recording_it_was_made_of(folder, estimates):
-    """The document of ``rotordrop estimate`` names its recording, and all of the bench are ``record.csv``."""
     _estimates(estimates)
     for name in MADE:
         file = estimates / f"{name}.json"
         recorded = {
             "record": "record.csv",
-            "record_sha256": sha256_of(folder / "drops" / MADE[0] / "record.csv"),
+            "record_sha256": digest_of_file(folder / "drops" / MADE[0] / "record.csv"),
         }
         file.write_text(json.dumps(json.loads(file.read_text()) | recorded))
     scores = score_bench(folder, estimates)
@@ -208,30 +194,15 @@ def test_parameters_of_a_lost_drop_are_missing_if_the_estimator_states_them_else
     assert row.lost >= 0.5
 
 
-def test_the_table_is_printed_and_written(folder, estimates, tmp_path, capsys):
-    _estimates(estimates)
-    file = tmp_path / "scores.json"
-    assert run(["score-all", str(folder), str(estimates), "--json", str(file)]) == 0
-    out = capsys.readouterr().out
-    assert "DropBench, version 3" in out
-    assert "Drops: 2; estimates that call themselves not consistent: 0." in out
-    assert json.loads(file.read_text())["bench_version"] == "3"
-
-
-def test_another_version_is_refused(folder, estimates, tmp_path):
+def test_what_the_bench_does_not_have_is_refused(folder, estimates, tmp_path):
     (tmp_path / "old/truth").mkdir(parents=True)
     old = json.loads((folder / "truth/drop_004.json").read_text()) | {"bench_version": "0"}
     write_json(tmp_path / "old/truth/drop_004.json", old, sealed=True)
-    with pytest.raises(
-        UsageError, match="is of version '0' of the bench, here the drop is of version '1'; make"
-    ):
+    with pytest.raises(UsageError, match="is of version '0' of the bench, this is version '2026'; make"):
         score_bench(tmp_path / "old", estimates)
-
-
-def test_an_unknown_drop_names_what_there_is():
     with pytest.raises(
         UsageError,
-        match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg', a version",
+        match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg', or a family",
     ):
         chosen_drops(["drop_999"])
     assert {drop.rotor for drop in chosen_drops(["6 t"])} == {"6 t"}
@@ -251,7 +222,14 @@ def test_a_call_without_folders_says_what_it_needs(call, message, tmp_path, monk
     assert message in capsys.readouterr().err.replace("\n", " ")
 
 
-def test_the_list_is_printed_without_making_anything(capsys):
+def test_list_and_table_are_printed(capsys, folder, estimates, tmp_path):
     assert run(["list", "--only", "two departures"]) == 0
     out = capsys.readouterr().out
     assert out.count("two departures: ") == 6
+    _estimates(estimates)
+    file = tmp_path / "scores.json"
+    assert run(["score-all", str(folder), str(estimates), "--json", str(file)]) == 0
+    out = capsys.readouterr().out
+    assert f"DropBench, version {VERSION}" in out
+    assert "Drops: 2; estimates that call themselves not consistent: 0." in out
+    assert json.loads(file.read_text())["bench_version"] == VERSION

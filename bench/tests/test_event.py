@@ -1,27 +1,40 @@
-"""Hidden machines: repeatable, within their ranges, and broken only where asked."""
+"""Hidden machines: repeatable, within their ranges, broken only where asked; their rest at any weight."""
 
-from __future__ import annotations
+from operator import attrgetter
 
 import numpy as np
 import pytest
+from tests.scaled_machines import scaled_machine
 
 from rotordrop.elements.table import rows
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
-from rotordrop_bench import VIOLATIONS, Violations, hidden_machine
+from rotordrop.physics import columns as L
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate._rhs import drop_derivative, scratch_of
+from rotordrop_bench import VIOLATIONS, Violations, hidden_machine, synthesize_drop
 from rotordrop_bench.event import LARGEST_JITTER, LARGEST_ORBIT, drop_conditions, stream
+from rotordrop_bench.settled import settled_coordinates
 from rotordrop_bench.true_values import machine_truth
 
 
-def test_the_same_seed_draws_the_same_machine(known, hidden):
+@pytest.fixture(scope="module")
+def pairs(known, hidden):
+    """True and plain bearings of the machine with violations of a name."""
+
+    def of(name):
+        broken = hidden_machine(known, 3, name).machine
+        return list(zip(broken.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True))
+
+    return of
+
+
+def test_the_same_seed_draws_the_same_machine_and_stream(known, hidden):
     again = hidden_machine(known, 3)
     assert machine_truth(again.machine) == machine_truth(hidden.machine)
     assert again.model.parameters.bearing.tobytes() == hidden.model.parameters.bearing.tobytes()
     other = machine_truth(hidden_machine(known, 4).machine)
-    assert other["support_stiffness"] != machine_truth(hidden.machine)["support_stiffness"]
-
-
-def test_a_stream_does_not_depend_on_the_other_ones():
+    assert other["support.stiffness_N_per_m"] != machine_truth(hidden.machine)["support.stiffness_N_per_m"]
     assert stream(5, "noise").random() == stream(5, "noise").random()
     assert stream(5, "noise").random() != stream(5, "drop").random()
     assert stream(5, "noise").random() != stream(6, "noise").random()
@@ -43,7 +56,7 @@ def test_drawn_values_spread_and_stay_in_the_ranges_of_the_owner(example):
     assert 0.6 <= min(factors) < 0.8 < 1.2 < max(factors) <= 1.45
 
 
-def test_the_truth_of_every_estimated_parameter_is_drawn(known, hidden):
+def test_what_is_estimated_is_drawn_and_the_rotor_exact(known, hidden):
     """Else its estimate would be scored against what the estimator was told."""
     structure = {"contact.exponent", "support.anisotropy"}  # drawn as a violation of the model, when asked
     for true, told in zip(hidden.machine.touchdown_bearings, known.touchdown_bearings, strict=True):
@@ -51,21 +64,9 @@ def test_the_truth_of_every_estimated_parameter_is_drawn(known, hidden):
             if row.entries:
                 same = float(row.described(true)) == float(row.described(told))
                 assert same == (row.path in structure), row.path
-
-
-def _at(part, path):
-    for key in path.split("."):
-        part = getattr(part, key)
-    return part
-
-
-def test_the_rotor_itself_is_exact(known, hidden):
     assert hidden.machine.rotor.elements == known.rotor.elements
     assert hidden.machine.sensors == known.sensors
     assert hidden.model.basis.size == 16
-
-
-def test_without_a_draw_the_owner_is_right(known):
     plain = hidden_machine(known, 3, drawn=False)
     assert machine_truth(plain.machine) == machine_truth(known)
 
@@ -83,17 +84,16 @@ def test_without_a_draw_the_owner_is_right(known):
         ("anisotropic support 0.6", "support.stiffness_horizontal", 0.6),
     ],
 )
-def test_a_violation_changes_what_it_names_at_every_bearing(known, hidden, name, path, factor):
-    broken = hidden_machine(known, 3, name)
-    for true, plain in zip(broken.machine.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True):
-        assert float(_at(true, path)) == pytest.approx(factor * float(_at(plain, path)), rel=1e-12)
+def test_a_violation_changes_what_it_names_at_every_bearing(pairs, name, path, factor):
+    value = attrgetter(path)
+    for true, plain in pairs(name):
+        assert float(value(true)) == pytest.approx(factor * float(value(plain)), rel=1e-12)
         assert float(true.support.stiffness) == float(plain.support.stiffness)
         assert float(true.air_gap) == float(plain.air_gap)
 
 
-def test_another_exponent_is_as_deep_at_a_typical_force(known, hidden):
-    broken = hidden_machine(known, 3, "contact exponent 1.5")
-    for true, plain in zip(broken.machine.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True):
+def test_another_exponent_is_as_deep_at_a_typical_force(known, pairs):
+    for true, plain in pairs("contact exponent 1.5"):
         typical = 5.0 * 0.5 * 9.81 * known.rotor.mass
         depths = [
             (typical / float(b.contact.stiffness)) ** (1 / float(b.contact.exponent)) for b in (true, plain)
@@ -102,15 +102,12 @@ def test_another_exponent_is_as_deep_at_a_typical_force(known, hidden):
         assert depths[0] == pytest.approx(depths[1], rel=1e-12)
 
 
-def test_violations_of_the_sensors_leave_the_machine_alone(known, hidden):
+def test_violations_of_the_sensors_leave_the_machine_alone_and_unknown_ones_are_named(known, hidden):
     for name in ("sensor planes 30 mm off", "anti-alias filter", "none"):
         assert machine_truth(hidden_machine(known, 3, name).machine) == machine_truth(hidden.machine)
     assert VIOLATIONS["sensor planes 30 mm off"] == Violations.model_validate(
         {"sensors": {"plane_shift": "30 mm"}}
     )
-
-
-def test_an_unknown_violation_names_those_there_are(known):
     with pytest.raises(
         UsageError, match="unknown violation 'moon'; choose one of 'none', 'contact stiffness"
     ):
@@ -121,20 +118,42 @@ def test_conditions_of_drops_differ_within_their_limits(hidden):
     drawn = [drop_conditions(hidden, 400.0, seed) for seed in range(30)]
     assert len({c.start.rotor_angle for c in drawn}) == 30
     assert all(abs(c.jitter) <= LARGEST_JITTER for c in drawn)
-    assert (
-        max(c.jitter for c in drawn)
-        > 0.5 * LARGEST_JITTER
-        > -0.5 * LARGEST_JITTER
-        > min(c.jitter for c in drawn)
-    )
+    late = [c.jitter for c in drawn]
+    assert max(late) > 0.5 * LARGEST_JITTER > -0.5 * LARGEST_JITTER > min(late)
     for c in drawn:
         assert np.all(np.abs(c.start.orbit) <= LARGEST_ORBIT)
         assert np.all(c.start.remanent_force[:, 1] > 0.0)
         assert np.all(c.start.remanent_force[:, 1] < 0.31 * hidden.machine.rotor.mass * 9.81 / 2)
     assert drop_conditions(hidden, 400.0, 1).start.rotor_angle == drawn[1].start.rotor_angle
     assert drop_conditions(hidden, 400.0, 1, jitter=False).jitter == 0.0
-
-
-def test_a_drop_at_standstill_is_refused(hidden):
     with pytest.raises(UsageError, match="a drop at 0 rad/s cannot be synthesized"):
         drop_conditions(hidden, 0.0, 1)
+
+
+SIZES = [(5.0, 1.0), (36.0, 1.0), (60.0, 1.2), (130.0, 1.5), (6000.0, 1.0), (6000.0, 1.3)]
+
+
+@pytest.mark.parametrize(("mass", "slenderness"), SIZES)
+def test_a_rotor_of_any_mass_finds_its_rest(mass, slenderness):
+    machine = scaled_machine(mass, slenderness=slenderness)
+    assert machine.rotor.mass == pytest.approx(mass, rel=0.03)
+    model = build_drop_model(machine)
+    layout, p = model.layout, model.parameters
+    state = layout.zeros()
+    state[: layout.n_coordinates] = settled_coordinates(model)
+    change, work = layout.zeros(), scratch_of(p)
+    drop_derivative(0.0, state, p, change, work)
+    left = change[layout.velocity_of(layout.modal_y)]
+    assert np.max(np.abs(left)) < 1e-8 * np.max(np.abs(p.gravity))
+    carried = -state[layout.support].reshape(-1, 2)[:, 1] * p.bearing[:, L.SUPPORT_STIFFNESS_Y]
+    assert np.sum(carried) == pytest.approx(9.81 * machine.rotor.mass, rel=1e-8)
+    assert carried == pytest.approx(model.load_shares, rel=1e-3)
+
+
+def test_a_heavy_slender_rotor_is_synthesized_with_its_tail():
+    machine = scaled_machine(130.0, slenderness=1.5)
+    drop = synthesize_drop(hidden_machine(machine, 1), float(machine.speed.nominal), 1, duration=0.02)
+    assert drop.tail is not None
+    depth = np.hypot(*np.mean(drop.tail.signals.reshape(-1, 2, 2), axis=0).T)
+    gaps = [float(bearing.air_gap) for bearing in machine.touchdown_bearings]
+    assert depth == pytest.approx(gaps, rel=0.3)

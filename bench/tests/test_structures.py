@@ -1,7 +1,5 @@
 """Structures of hidden machines: absent they leave every bit, present they keep the laws of mechanics."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -9,18 +7,17 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from rotordrop import build_drop_model, simulate_drop
 from rotordrop.elements.load import Load
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.errors import SimulationError, UsageError
+from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics import departure as D
 from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force
 from rotordrop.physics.contact import contact_force
 from rotordrop.rotor.assembly import free_free_modes
-from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, UnbalanceJump
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
 from rotordrop_bench import Violations, hidden_machine
 from rotordrop_bench.ball_tables import fast_pair, held_pair, table_row, thrust_pair
@@ -41,12 +38,12 @@ def violations(**parts):
 
 
 @pytest.fixture(scope="module")
-def model(known) -> DropModel:
+def model(known):
     return build_drop_model(known, "quick")
 
 
 @pytest.fixture(scope="module")
-def case() -> DropCase:
+def case():
     return DropCase(speed=SPEED, duration=0.03, start=LEVITATED)
 
 
@@ -55,7 +52,7 @@ def plain(model, case):
     return simulate_drop(model, case)
 
 
-def departed(model, **parts) -> DropModel:
+def departed(model, **parts):
     """A quick model of a machine with violations; with a row for every bearing, whether it departs or not."""
     v = violations(**parts)
     machine = violated(model.machine, v)
@@ -106,11 +103,8 @@ def same_bits(found, plain):
     assert len(plain.contacts) > 1
 
 
-def test_an_unbalance_that_comes_after_the_end_leaves_every_bit(known, case, plain):
+def test_what_is_late_or_has_no_compliance_leaves_every_bit(known, case, plain, model):
     same_bits(jumping(known, case, node=3, amount="1 g mm", time="1 s"), plain)
-
-
-def test_a_foundation_and_a_tilt_without_compliance_leave_every_bit(model, case, plain):
     tilt = {"tilt_stiffness": "600 N/um", "tilt_frequency": "11 kHz"}
     rows = departed(model, foundation=FOUNDATION, race=tilt).parameters.departure
     compliances = [D.FOUNDATION_MODE + D.COMPLIANCE, D.TILT_MODE + D.COMPLIANCE]
@@ -154,16 +148,12 @@ def test_a_structure_that_is_present_moves_the_drop(model, case, plain, parts):
     ("amounts", "keys", "apart"),
     [
         ({"eccentricity": "12 um"}, {"eccentricity": 12e-6, "eccentricity_phase": 1.0 - 0.5 * np.pi}, 1e-4),
-        (
-            {"ovality": "5 um"},
-            {"oval": 5e-6, "oval_phase": 1.0 - 0.5 * np.pi},
-            5e-3,
-        ),  # 2 % of the gap, squared
+        # 2 % of the gap, squared
+        ({"ovality": "5 um"}, {"oval": 5e-6, "oval_phase": 1.0 - 0.5 * np.pi}, 5e-3),
     ],
     ids=["eccentric", "oval"],
 )
 def test_a_sleeve_moves_the_drop_as_that_of_a_machine_file_does(known, model, amounts, keys, apart):
-    """Two sets of equations; both first impacts, before their difference grows."""
     case = DropCase(speed=SPEED, duration=0.012)
     found = hidden_drop(model, case, sleeve={**amounts, "angle": "1 rad"})
     names = [bearing.name for bearing in known.touchdown_bearings]
@@ -174,14 +164,29 @@ def test_a_sleeve_moves_the_drop_as_that_of_a_machine_file_does(known, model, am
     assert np.abs(found.bearing_force - round_one.bearing_force).max() > 20.0 * apart * size
 
 
-@pytest.mark.parametrize("parts", PRESENT.values(), ids=PRESENT)
+RADIAL = {"hardening": 0.5, "hardening_force": "2.6 kN", "hardening_radial": True}
+KEPT = PRESENT | {
+    "all together": {
+        "support": AXES
+        | {"hardening": 0.5, "hardening_force": "2 kN", "slip_force": "80 N", "slip_travel": "1 um"},
+        "foundation": FOUNDATION,
+        **PRESENT["tilt"],
+        **PRESENT["law"],
+        "centre": {"x": "20 um"},
+    },
+    "radial hardening": {"support": AXES | RADIAL},
+}
+
+
+@pytest.mark.parametrize("parts", KEPT.values(), ids=KEPT)
 def test_energy_is_kept_and_booked_by_place_with_every_structure(model, parts):
     """But for a gap that changes: what moves the bore works against the contact."""
     changed = departed(model, **parts)
-    case = DropCase(speed=SPEED, duration=0.03, tolerance=1e-8)
-    found = simulate_drop(changed, case)
+    speed = 0.0 if parts.get("support") == AXES | RADIAL else SPEED
+    found = simulate_drop(changed, DropCase(speed=speed, duration=0.03, tolerance=1e-8))
     assert np.max(found.indentation) > 0.0
-    assert losses(changed, found).total == pytest.approx(found.state[-1, changed.layout.dissipated], rel=1e-6)
+    lost = found.state[-1, changed.layout.dissipated]
+    assert lost > 1e-3 and losses(changed, found).total == pytest.approx(lost, rel=1e-6)
     if "gap" not in parts:
         # an oval is known to the first order of its size over the displacement, 2 % here
         share = 1e-4 if "ovality" in parts.get("sleeve", {}) else 1e-6
@@ -194,7 +199,8 @@ def test_tables_of_balls_have_the_force_of_the_drop_model_in_its_limit(known):
     numbers = numbers_of(bearing)
     constants = numbers.constants
     for way in (2e-6, 15e-6):
-        expected, _ = ball_sum(numbers, way)
+        places = numbers.places()
+        expected, _ = ball_set_force(numbers.entries(), places, way, 0.0, np.empty((2, places.shape[1])))
         assert thrust_pair(constants, way, 0.0)[0] == pytest.approx(expected, rel=2e-3)
         assert fast_pair(bearing, constants, way, 0.0)[0] == pytest.approx(expected, rel=2e-3)
         assert held_pair(constants, way)[0] < 0.99 * expected
@@ -243,7 +249,6 @@ def test_a_rotor_let_go_lands_as_a_mass_that_falls_on_a_spring(model):
 
 
 def test_a_landed_rotor_that_is_damped_presses_with_its_thrust(model):
-    """The steady limit: what the bench knew before, its balls as `thrust_pair` has them."""
     damped = THRUST | {"stiffness": "5e6 N/m", "damping": 8.0}
     landing = departed(model, bearing={"DE": {"face": damped}})
     found = simulate_drop(landing, DropCase(speed=SPEED, duration=0.12))
@@ -260,7 +265,6 @@ def test_a_landed_rotor_that_is_damped_presses_with_its_thrust(model):
 
 
 def test_a_landing_moves_as_that_of_a_machine_file_does(known):
-    """Two sets of equations for face and balls; no damping of the face."""
     bearing, arm = known.touchdown_bearings[1], 40e-3
     face = {
         "gap": "20 um",
@@ -285,7 +289,6 @@ def test_a_landing_moves_as_that_of_a_machine_file_does(known):
 
 
 def test_a_rotor_under_thrust_rests_on_softer_balls(known):
-    """Its contact angles are steeper: less of each load is radial."""
     plain, pressed = (
         hidden_machine(known, 3, violations(**parts), reduction="quick", drawn=False)
         for parts in ({"centre": {"x": "1 nm"}}, {"bearing": {"DE": {"face": THRUST | {"thrust": "2 kN"}}}})
@@ -299,19 +302,7 @@ def test_a_rotor_under_thrust_rests_on_softer_balls(known):
     assert ways[1] > 1.2 * ways[0]
 
 
-def test_a_thrust_on_two_faces_is_refused(known):
-    with pytest.raises(UsageError, match=r"thrust at NDE and DE; the rotor lands on one face"):
-        hidden_machine(known, 3, violations(face=THRUST))
-
-
-def test_a_thrust_beside_a_table_of_balls_is_refused(known):
-    parts = {"DE": {"face": THRUST, "balls": {"held_preload": True}}}
-    with pytest.raises(UsageError, match=r"DE: balls under a thrust have no 'held_preload'"):
-        hidden_machine(known, 3, violations(bearing=parts))
-
-
 def test_a_seat_with_play_holds_the_bearing_behind_it(known):
-    """Within the play it gives no force; behind it, that of a bearing without, moved by the play."""
     bearing, play = known.touchdown_bearings[0], 5e-6
     loose, tight = (
         table_row(bearing, BallsViolation.model_validate(balls), 200.0, SPEED)
@@ -326,7 +317,6 @@ def test_a_seat_with_play_holds_the_bearing_behind_it(known):
 
 
 def test_a_loose_bearing_lies_in_its_seat_and_is_not_damped_there(known):
-    """Levitated, its race has sunk by the play; a push aside meets damping behind the play, not within."""
     play = 5e-6
     hidden = hidden_machine(known, 1, violations(balls={"seat_play": f"{play} m"}), drawn=False)
     model, state = hidden.model, hidden.model.at_rest()
@@ -339,11 +329,6 @@ def test_a_loose_bearing_lies_in_its_seat_and_is_not_damped_there(known):
         rates = model.layout.zeros()
         drop_derivative(0.0, state, model.parameters, rates, scratch_of(model.parameters))
         assert bool(rates[model.layout.n_coordinates + x] < -pushed) == damped
-
-
-def ball_sum(numbers, way):
-    entries = numbers.entries()
-    return ball_set_force(entries, numbers.places(), way, 0.0, np.empty((2, numbers.places().shape[1])))
 
 
 def test_a_held_preload_is_that_of_springs_without_rate_and_friction(known):
@@ -366,7 +351,6 @@ def test_a_held_preload_is_that_of_springs_without_rate_and_friction(known):
 
 
 def test_a_ribbon_of_springs_that_slip_has_the_loop_of_their_sum():
-    """Slow cycles far beyond its travel: friction at its slip force, and stiff as its springs at first."""
     row, own, rates = D.no_departure(), np.zeros(D.N_STATES), np.zeros(D.N_STATES)
     row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = 1e8, 400.0
     step, forces = 1e-9, []
@@ -414,31 +398,6 @@ def test_a_mirrored_machine_moves_mirrored(known, radial):
     mirror = np.array([-1.0, 1.0])
     assert other.displacement == pytest.approx(one.displacement * mirror, abs=2e-8)
     assert np.max(np.abs(one.displacement[..., 0])) > 2e-5
-
-
-def test_energy_is_kept_by_all_structures_together(known):
-    """Stored plus dissipated minus put in stays what it was; the parts that take part are all there."""
-    together = departed(
-        build_drop_model(known, "quick"),
-        support=AXES
-        | {"hardening": 0.5, "hardening_force": "2 kN", "slip_force": "80 N", "slip_travel": "1 um"},
-        foundation=FOUNDATION,
-        race={"tilt_stiffness": "600 N/um", "tilt_frequency": "11 kHz"},
-        contact={"law": [{"depth": "1 um", "force": "90 N"}, {"depth": "4 um", "force": "1.6 kN"}]},
-        centre={"x": "20 um"},
-    )
-    case = DropCase(speed=SPEED, duration=0.04, start=CentredStart(), tolerance=1e-8)
-    found = simulate_drop(together, case)
-    assert np.ptp(found.state[:, together.layout.dissipated]) > 1e-3
-    assert found.certificate.energy_residual < 1e-6 * found.certificate.energy_scale
-
-
-def test_radial_hardening_has_a_potential(known):
-    """Else a support could give more energy than it took."""
-    radial = AXES | {"hardening": 0.5, "hardening_force": "2.6 kN", "hardening_radial": True}
-    changed = departed(build_drop_model(known, "quick"), support=radial)
-    found = simulate_drop(changed, DropCase(speed=0.0, duration=0.03, tolerance=1e-8))
-    assert found.certificate.energy_residual < 1e-6 * found.certificate.energy_scale
 
 
 @pytest.mark.parametrize("amplitude", [2e-6, 10e-6])
@@ -511,30 +470,22 @@ def test_an_oval_sleeve_touches_where_its_contour_is_nearest_to_the_bore(known):
             assert (ux * vx + uy * vy) / math.hypot(ux, uy) == pytest.approx(rate, abs=4e-4)
 
 
-def test_friction_wears_off_with_the_heat(known):
-    row, own = departures_of(known, violations(friction={"wear": 0.6, "wear_heat": "20 J"}))[0], np.zeros(12)
-    left = []
-    for own[D.HEAT] in (0.0, 20.0, 1e3):
-        left.append(D.friction_left(row, own))
-    assert left == pytest.approx([1.0, 1.0 - 0.6 * (1.0 - math.exp(-1.0)), 0.4], rel=1e-9)
+def rest_of(known, angle=0.0, **parts):
+    """Where a rotor at an angle rests in its bearings [m], x and y, shape (2, B)."""
+    model = hidden_machine(known, 3, violations(**parts), reduction="quick").model
+    rest, layout = settled_coordinates(model, angle), model.layout
+    return np.array([model.parameters.bearing_shape @ rest[p] for p in (layout.modal_x, layout.modal_y)])
 
 
 def test_a_tilted_rotor_rests_aside_by_the_tilt(known):
-    hidden = hidden_machine(known, 3, violations(stand={"tilt": "3 deg"}), reduction="quick")
-    layout, shape = hidden.model.layout, hidden.model.parameters.bearing_shape
-    rest = settled_coordinates(hidden.model)
-    aside = np.arctan2(shape @ rest[layout.modal_x], -(shape @ rest[layout.modal_y]))
-    assert np.degrees(aside) == pytest.approx(3.0, abs=0.02)
+    x, y = rest_of(known, stand={"tilt": "3 deg"})
+    assert np.degrees(np.arctan2(x, -y)) == pytest.approx(3.0, abs=0.02)
 
 
-def test_an_oval_sleeve_rests_on_the_place_that_is_down(known):
-    rests = []
-    for ovality in ("0 um", "5 um"):
-        hidden = hidden_machine(known, 3, violations(sleeve={"ovality": ovality}), reduction="quick")
-        layout, shape = hidden.model.layout, hidden.model.parameters.bearing_shape
-        rests.append([shape @ settled_coordinates(hidden.model, a)[layout.modal_y] for a in (0.0, np.pi / 2)])
-    raised = np.array(rests[1]) - np.array(rests[0])  # on its short axis it lies deeper
-    assert raised[0] == pytest.approx(-5e-6, abs=1e-7) and raised[1] == pytest.approx(5e-6, abs=1e-7)
+@pytest.mark.parametrize(("angle", "raised"), [(0.0, -5e-6), (np.pi / 2, 5e-6)])
+def test_an_oval_sleeve_rests_on_the_place_that_is_down(known, angle, raised):
+    on_round, on_oval = (rest_of(known, angle, sleeve={"ovality": one})[1] for one in ("0 um", "5 um"))
+    assert on_oval - on_round == pytest.approx(raised, abs=1e-7)  # on its short axis it lies deeper
 
 
 def test_a_bowed_shaft_stands_off_the_line_of_its_ends(known):
@@ -553,19 +504,24 @@ def test_a_bowed_shaft_stands_off_the_line_of_its_ends(known):
     assert off == pytest.approx(4.0 * 10e-6 * along * (1.0 - along), abs=0.3e-6)
 
 
-def test_the_gap_drifts_and_closes_with_heat(known):
-    own = np.zeros(D.N_STATES)
+def test_the_gap_drifts_and_gap_and_friction_change_with_heat(known):
+    def after(row, heat):
+        own = np.zeros(D.N_STATES)
+        own[D.HEAT] = heat
+        return D.gap_now(row, own, 1.0, 280e-6), D.friction_left(row, own)
+
     row = departures_of(known, violations(gap={"drift": "-10 um", "drift_time": "0.2 s"}))[0]
-    gaps = [D.gap_now(row, own, t, 280e-6) for t in (-1.0, 0.0, 0.1, 0.2, 50.0)]
+    gaps = [D.gap_now(row, np.zeros(D.N_STATES), t, 280e-6) for t in (-1.0, 0.0, 0.1, 0.2, 50.0)]
     assert gaps == pytest.approx([280e-6, 280e-6, 275e-6, 270e-6, 270e-6], rel=1e-12)
     row = departures_of(known, violations(gap={"closing": "10 um", "heat": "50 J"}))[0]
-    gaps = []
-    for own[D.HEAT] in (0.0, 50.0, 1e4):
-        gaps.append(D.gap_now(row, own, 1.0, 280e-6))
+    gaps = [after(row, heat)[0] for heat in (0.0, 50.0, 1e4)]
     assert gaps == pytest.approx([280e-6, (280 - 10 * (1 - math.exp(-1.0))) * 1e-6, 270e-6], rel=1e-9)
+    row = departures_of(known, violations(friction={"wear": 0.6, "wear_heat": "20 J"}))[0]
+    left = [after(row, heat)[1] for heat in (0.0, 20.0, 1e3)]
+    assert left == pytest.approx([1.0, 1.0 - 0.6 * (1.0 - math.exp(-1.0)), 0.4], rel=1e-9)
 
 
-def test_an_unbalance_from_the_start_is_that_of_the_machine(known, case):
+def test_an_unbalance_comes_from_the_start_or_with_the_first_contact(known, case, plain):
     here, first = replace(case, start=CentredStart()), known.unbalances[0]
     bare = known.with_values({"unbalance.0.amount": 0.0})
     jump = {"node": first.node, "amount": "40 g mm", "phase": f"{float(first.phase)} rad", "time": "0 s"}
@@ -574,9 +530,6 @@ def test_an_unbalance_from_the_start_is_that_of_the_machine(known, case):
     early = found.time < 0.02
     expected = simulate_drop(whole, here).displacement
     assert found.displacement[early] == pytest.approx(expected[early], abs=1e-9)
-
-
-def test_an_unbalance_comes_with_the_first_contact(known, case, plain):
     found = jumping(known, case, node=33, amount="600 g mm")
     first = plain.contacts.start[0]
     before = found.time < first - 2e-5
@@ -585,10 +538,13 @@ def test_an_unbalance_comes_with_the_first_contact(known, case, plain):
     assert np.max(np.abs(found.displacement[later] - plain.displacement[later])) > 1e-7
 
 
-def test_an_unbalance_outside_the_rotor_is_refused(model, case):
+def test_what_cannot_be_computed_says_what_to_do(model, case, known):
     jump = UnbalanceJump(node=99, amount=1e-4, time=0.01)
     with pytest.raises(SimulationError, match=r"comes at node 99; give one of the nodes 1 to"):
         simulate_drop(model, replace(case, jump=jump))
+    hidden = hidden_machine(known, 3, violations(centre={"x": "20 um"}), reduction="quick")
+    with pytest.raises(SimulationError, match=r"stopped at .* a violation is too extreme .* milder"):
+        true_drop(hidden, replace(case, most_steps=10))
 
 
 def test_youngs_modulus_moves_the_bending_frequencies_by_its_root(known):
@@ -623,9 +579,3 @@ def test_a_machine_at_rest_has_no_acceleration(known):
     drop_derivative(1e9, y, p, rates, scratch_of(p))
     left = rates[model.layout.velocity_of(model.layout.modal_y)]
     assert np.max(np.abs(left)) < 1e-6 * np.max(np.abs(p.gravity))
-
-
-def test_a_drop_that_cannot_be_computed_says_what_to_do(known, case):
-    hidden = hidden_machine(known, 3, violations(centre={"x": "20 um"}), reduction="quick")
-    with pytest.raises(SimulationError, match=r"stopped at .* a violation is too extreme .* milder"):
-        true_drop(hidden, replace(case, most_steps=10))

@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
+from rotordrop.one_thread import ENVIRONMENT
+
 FORKS = sys.platform == "linux"
 """Whether children are copies of a process that has imported what they need. Windows has no such copies, and
 libraries of macOS do not survive them."""
@@ -93,7 +95,7 @@ def _begun(command: list[str], held: int) -> subprocess.Popen[bytes]:
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"},
+        env=os.environ | ENVIRONMENT,
         start_new_session=True,
         pass_fds=(held,) if os.name == "posix" else (),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -14,6 +15,7 @@ from pydantic_core import core_schema
 
 from rotordrop.errors import UsageError
 from rotordrop.files import DIGEST, read_sealed, without_digest
+from rotordrop.require import require
 
 ABSENT: Any = None
 """Default of a field that may be left out. It is then not written, and null is refused in its place."""
@@ -78,6 +80,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     DamagedFileError
         If it has no digest, or holds other values than were written with it.
     """
+    require(path, "path", str, PathLike)
     try:
         return read_sealed(path, "give it as a command wrote it with --json")
     except OSError as fault:
@@ -130,6 +133,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     UsageError
         If it cannot be read, or is no TOML.
     """
+    require(path, "path", str, PathLike)
     try:
         return parse_toml(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:

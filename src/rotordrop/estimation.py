@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rotordrop.estimate.methods import Method as Method
 from rotordrop.estimate.methods import Replay as Replay
 from rotordrop.estimate.methods import Tracked as Tracked
+from rotordrop.one_thread import one_thread
+from rotordrop.progress import Shown, shown
+from rotordrop.require import require
 
 if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate, Estimates
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
 
-Progress = Callable[[str, float], None]
 FOLLOWED = Tracked()
 
 
@@ -25,7 +27,7 @@ def estimate_drop(
     *,
     method: Method = FOLLOWED,
     name: str | None = None,
-    progress: Progress | None = None,
+    progress: Shown = None,
 ) -> Estimate:
     """Estimate force and stress of the touchdown bearings from one recorded drop.
 
@@ -41,8 +43,8 @@ def estimate_drop(
         A drop model that follows the record, or the paper's open-loop replay, with options.
     name : str, optional
         Name of the drop; the file's by default.
-    progress : callable, optional
-        Called with a text and the fraction done.
+    progress : callable or False, optional
+        Called with a text and the fraction done; by default a bar in a terminal or a notebook.
 
     Raises
     ------
@@ -59,10 +61,17 @@ def estimate_drop(
     >>> Replay(draws=128).draws
     128
     """
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+
+    require(machine, "machine", Machine)
+    require(record, "record", Record)
+    require(tail, "tail", Record, none=True)
     names = None if name is None else [name]
     return estimate_drops(machine, [record], [tail], method=method, names=names, progress=progress)[0]
 
 
+@one_thread()
 def estimate_drops(
     machine: Machine,
     records: Sequence[Record],
@@ -70,7 +79,7 @@ def estimate_drops(
     *,
     method: Method = FOLLOWED,
     names: Sequence[str] | None = None,
-    progress: Progress | None = None,
+    progress: Shown = None,
 ) -> Estimates:
     """Estimate several recorded drops of one machine; tracked ones share its parameters in one fit.
 
@@ -86,8 +95,8 @@ def estimate_drops(
         How, with options.
     names : sequence of str, optional
         Names of the drops; file stems by default.
-    progress : callable, optional
-        Called with a text and the fraction done.
+    progress : callable or False, optional
+        Called with a text and the fraction done; by default a bar in a terminal or a notebook.
 
     Raises
     ------
@@ -98,14 +107,11 @@ def estimate_drops(
     from rotordrop.estimate.estimate import Estimates
     from rotordrop.estimate.record_facts import facts_of
     from rotordrop.evidence.evidence import Evidence, insisted
+    from rotordrop.evidence.given import given_drops
     from rotordrop.evidence.one_end import as_dropped
 
-    if not isinstance(method, Tracked | Replay):
-        raise UsageError(f"the method is {method!r}; expected Tracked(...) or Replay(...).")
-    tails = [None] * len(records) if tails is None else tails
-    if len(tails) != len(records):
-        raise UsageError(f"{len(tails)} tails for {len(records)} records; expected one, or None, for each.")
-    stems = names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)]
+    require(method, "the method", Tracked, Replay, hint="Write Tracked() or Replay()")
+    records, tails, stems = given_drops(machine, records, tails, names)
     ways = [as_dropped(record, machine) for record in records]
     held = [[amb.name for amb in way.ambs if amb.stays_on] for way in ways]
     if any(one != held[0] for one in held):
@@ -114,7 +120,7 @@ def estimate_drops(
             f"({'; '.join(', '.join(one) or 'none stays on' for one in held)}); expected the same of all. "
             "Estimate them apart"
         )
-    machine = ways[0] if ways else machine
+    machine = ways[0]
     if isinstance(method, Replay) and any(held):
         raise RecordError(
             f"{held[0][0]} stayed held by its magnets in {stems[0]}, and the replay knows no drop of one "
@@ -128,15 +134,17 @@ def estimate_drops(
     if isinstance(method, Replay):
         from rotordrop.replay.replay import replay_drop
 
-        return Estimates(
-            replay_drop(machine, record, tail, method, one, name=stem, progress=progress)
-            for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
-        )
+        with shown(progress, "estimating") as tell:
+            return Estimates(
+                replay_drop(machine, record, tail, method, one, name=stem, progress=tell)
+                for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
+            )
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.twin.tracked import followed_drops
     from rotordrop.twin.tracked_estimate import estimate_of
 
     model = build_drop_model(machine)
     evidence = [insisted(one.with_facts(base=model)) for one in evidence]
-    drops = followed_drops(machine, evidence, quick=method.quick, progress=progress)
-    return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))
+    with shown(progress, "estimating") as tell:
+        drops = followed_drops(machine, evidence, quick=method.quick, progress=tell)
+        return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))

@@ -180,20 +180,16 @@ def new_hdf5(path: str | os.PathLike[str], *, track_order: bool = False) -> Iter
 
 
 @contextmanager
-def read_hdf5(path: Path, remedy: str, *, always_sealed: bool = False) -> Iterator[Any]:
-    """Open an HDF5 file (``h5py.File``) of `new_hdf5`; one that is not what was written is refused.
-
-    Files of older versions have no digest; `always_sealed` refuses those too.
-    """
+def read_hdf5(path: Path, remedy: str) -> Iterator[Any]:
+    """Open an HDF5 file (``h5py.File``) of `new_hdf5`; one that is not what was written is refused."""
     import h5py
 
     sealed = hdf5_is_sealed(path, remedy)
-    if always_sealed and not sealed:
-        raise DamagedFileError(f"{path} is damaged: its digest is gone; {remedy}")
     with h5py.File(path, "r") as file:
-        if HDF5_SEALED in file.attrs and not sealed:
-            # the library cuts off what stands behind a file that it opens for writing
-            raise DamagedFileError(f"{path} was changed after rotordrop wrote it; {remedy}")
+        if not sealed:  # the library cuts off what stands behind a file that it opens for writing
+            raise DamagedFileError(
+                f"{path} is no file of rotordrop, or was changed after rotordrop wrote it; {remedy}"
+            )
         yield file
 
 

@@ -223,6 +223,14 @@ def parse_quantity(text: object, kind: str) -> float:
     return _convert(number, unit, text, kind, wanted)
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of anything."""
+    try:
+        return bool(text) and _unit(_plain_unit(text), text, "length") is not None
+    except UsageError:
+        return False
+
+
 def in_si(value: object, kind: str, name: str) -> float:
     """Give a number in SI units: a text is read with its unit, a float is in SI units already.
 
@@ -319,19 +327,11 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
 
 
-_WORDS = ((1e12, "trillion"), (1e9, "billion"), (1e6, "million"))
-
-
 def format_amount(number: float) -> str:
-    """Write a cost or a factor to three digits as one says it: ``"128"``, ``"1110"``, ``"2.98 million"``.
-
-    Less than a thousandth is "< 0.001": smaller ones differ in nothing that is decided by them.
-    """
-    rounded = float(f"{number:.3g}")
-    if 0.0 < abs(number) < 1e-3:
-        return "< 0.001" if number > 0.0 else "> −0.001"
-    factor, word = next((one for one in _WORDS if abs(rounded) >= one[0]), (1.0, ""))
-    return f"{rounded / factor:.15g} {word}".rstrip().replace("-", "−")
+    """Write a factor to three digits as one says it: ``"128"``, ``"1110"``; below a thousandth "< 0.001"."""
+    if 0.0 < number < 1e-3:
+        return "< 0.001"
+    return f"{float(f'{number:.3g}'):.15g}"
 
 
 def format_moment(time: float) -> str:

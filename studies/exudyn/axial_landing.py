@@ -12,17 +12,17 @@ axis. The script reads what it needs from the case and writes its numbers into i
 
 from __future__ import annotations
 
-import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
-from rigid_drop import solve
+from rigid_drop import solve, write_expected
 
-CASE = Path(__file__).resolve().parents[2] / "tests" / "validation" / "cases" / "E02.json"
+CASE = Path(__file__).resolve().parents[2] / "tests" / "validation" / "cases" / "E02.toml"
 
 FAR = 1e3
 """Radius [m] of the sphere that stands for a plane: within 1e-10 m of it over the motion compared."""
@@ -156,21 +156,19 @@ def land(inputs: dict[str, Any], step: float) -> np.ndarray:
 
 def main() -> None:
     """Simulate with two steps, say how far apart they are, and write the numbers of the case."""
-    case = json.loads(CASE.read_text(encoding="utf-8"))
-    inputs = case["inputs"]
+    inputs = tomllib.loads(CASE.read_text(encoding="utf-8"))["inputs"]
     coarse, fine = (land(inputs, step) for step in (1e-7, 5e-8))
     print(
         "largest difference between both steps [m], [rad/s]:", np.abs(coarse - fine).max(axis=0), fine.shape
     )
     every = round(inputs["compared_step"] / inputs["output_step"])
-    case["expected"] = [
-        {"name": f"{name}, {1e3 * i * inputs['compared_step']:g} ms", "value": round(value, 12)}
-        | {"unit": unit, "tol_abs": tolerance}
+    rows = [
+        (f"{name}, {1e3 * i * inputs['compared_step']:g} ms", round(value, 12), unit, tolerance)
         for i, row in enumerate(fine[::every].tolist())
         if i > 0
         for value, (name, unit, tolerance) in zip(row, COMPARED, strict=True)
     ]
-    CASE.write_text(json.dumps(case, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_expected(CASE, rows)
     print("largest displacement [m]:", np.abs(fine).max(axis=0))
 
 

@@ -11,7 +11,8 @@ its numbers into it.
 
 from __future__ import annotations
 
-import json
+import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
 
-CASE = Path(__file__).resolve().parents[2] / "tests" / "validation" / "cases" / "E01.json"
+CASE = Path(__file__).resolve().parents[2] / "tests" / "validation" / "cases" / "E01.toml"
 
 TOLERANCE = 1e-7
 """Of the compared displacements [m]. After the first contact both codes are 2e-9 m apart, as finite rotations
@@ -114,23 +115,28 @@ def solve(system: Any, inputs: dict[str, Any], step: float) -> None:
     system.SolveDynamic(settings, solverType=exu.DynamicSolverType.RK44)
 
 
+def write_expected(file: Path, rows: Iterable[tuple[str, float, str, float]]) -> None:
+    """Write name, value, unit and absolute tolerance of each number into the file of a case."""
+    given, head, _ = file.read_text(encoding="utf-8").partition("[expected]\n")
+    lines = (f'"{n}" = {{ value = {v}, unit = "{unit}", tol_abs = {tol} }}\n' for n, v, unit, tol in rows)
+    file.write_text(given + head + "".join(lines), encoding="utf-8")
+
+
 def main() -> None:
     """Simulate with two steps, say how far apart they are, and write the numbers of the case."""
-    case = json.loads(CASE.read_text(encoding="utf-8"))
-    inputs = case["inputs"]
+    inputs = tomllib.loads(CASE.read_text(encoding="utf-8"))["inputs"]
     bearings = inputs["bearings"]
     coarse, fine = (drop(inputs, step) for step in (1e-7, 5e-8))
     print("largest difference between both steps [m]:", np.abs(coarse - fine).max(), fine.shape)
     every = round(inputs["compared_step"] / inputs["output_step"])
-    case["expected"] = [
-        {"name": f"{axis} at {bearing['name']}, {1e3 * i * inputs['compared_step']:.0f} ms", "value": value}
-        | {"unit": "m", "tol_abs": TOLERANCE}
+    rows = [
+        (f"{axis} at {bearing['name']}, {1e3 * i * inputs['compared_step']:.0f} ms", value, "m", TOLERANCE)
         for i, at_instant in enumerate(np.round(fine[::every], 12).tolist())
         if i > 0
         for bearing, at_bearing in zip(bearings, at_instant, strict=True)
         for axis, value in zip("xy", at_bearing, strict=True)
     ]
-    CASE.write_text(json.dumps(case, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_expected(CASE, rows)
     print("largest displacement [m]:", np.hypot(*np.moveaxis(fine, -1, 0)).max())
 
 

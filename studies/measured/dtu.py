@@ -216,7 +216,7 @@ def main() -> None:
         "three fitted": three[:2],
     }.items():
         whole = replace(record, sensors=seen.sensors)
-        for bandwidth in (150.0, 300.0, None):
+        for bandwidth in (150.0, 300.0, 539.0):
             line = impact(text, described, whole, force, phase, bandwidth)
             print(line, flush=True)
             lines.append(line)

@@ -1,7 +1,5 @@
 """What is installed: floors in pyproject.toml, a lock file with hashes, without addresses, free licences."""
 
-from __future__ import annotations
-
 import re
 import runpy
 import tomllib
@@ -19,7 +17,7 @@ COPYLEFT = {"mat73", "rota-order", "nevergrad", "sdypy"}
 LESSER_COPYLEFT = {"nptdms", "asammdf", "psycopg"}
 
 
-def _names(requirements: list[str]) -> set[str]:
+def _names(requirements):
     return {re.split(r"[\[<>=~! ;]", requirement)[0].lower() for requirement in requirements}
 
 
@@ -49,17 +47,11 @@ def test_what_was_not_looked_up_is_not_called_free_of_vulnerabilities():
     ]
 
 
-def test_each_locked_package_has_a_hash():
+def test_locked_packages_have_hashes_and_no_address_or_copyleft():
     blocks = re.split(r"\n(?=\S)", LOCK.split("\n", 1)[1].strip())
     assert len(blocks) >= len(LOCKED) > 30
     assert [block for block in blocks if "--hash=sha256:" not in block] == []
-
-
-def test_the_lock_file_names_no_address():
     assert re.search(r"://|--index|--extra-index|--find-links|--trusted-host", LOCK) is None
-
-
-def test_no_copyleft_package_is_needed():
     extras = SETTINGS["project"]["optional-dependencies"]
     everything = LOCKED | {name for requirements in extras.values() for name in _names(requirements)}
     assert everything & COPYLEFT == set()

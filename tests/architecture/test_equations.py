@@ -1,34 +1,18 @@
 """Every public function of the physics names its source and the unit of what it takes and gives."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def _load(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-index = _load("equation_index")
+spec = importlib.util.spec_from_file_location("equation_index", ROOT / "docs" / "equation_index.py")
+index = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(index)
 EQUATIONS = index.equations()
-
-
-def test_the_index_is_not_empty_and_reaches_over_the_paper():
-    numbers = {equation.order[0] for equation in EQUATIONS}
-    assert {2, 6, 8, 11, 13} <= numbers
 
 
 @pytest.mark.parametrize(
@@ -59,8 +43,8 @@ def test_a_parameter_without_unit_is_found(tmp_path):
     [
         ("Force [N].\n\n    Source: Neisi 2020, eq. (8).", "Neisi 2020, eq. (8)", True),
         (
-            "Force.\n\n    Source: Neisi 2020, eq. (8), turned\n    round. Not validated: all.",
-            "Neisi 2020, eq. (8), turned round",
+            "Force.\n\n    Source: eq. (8), turned\n    round. Not validated: all.",
+            "eq. (8), turned round",
             False,
         ),
         ("Force [N], from eq. (8).", None, True),

@@ -1,7 +1,5 @@
 """What README, Makefile and documentation promise exists: files, verbs, options, public names."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
@@ -14,16 +12,12 @@ from rotordrop.cli.app import VerbTable, run
 
 ROOT = Path(__file__).resolve().parents[2]
 VERBS = VerbTable.verbs()
-TEXTS = [
-    ROOT / "README.md",
-    ROOT / "Makefile",
-    *sorted((ROOT / "docs").glob("*.md")),
-    *sorted((ROOT / "src" / "rotordrop").rglob("*.md")),
-]
+TEXTS = [ROOT / "README.md", ROOT / "Makefile", *sorted((ROOT / "docs").glob("*.md"))]
+TEXTS += sorted((ROOT / "src" / "rotordrop").rglob("*.md"))
 COMMAND = re.compile(r"^(?:\s*@\$\(BIN\)/)?rotordrop ((?:study )?[a-z-]+)((?:.*\\\n)*.*)$", re.MULTILINE)
 
 
-def _commands() -> list[tuple[str, str, list[str]]]:
+def _commands():
     """Give every command line of the texts: file, verb, options."""
     found = []
     for file in TEXTS:
@@ -59,22 +53,23 @@ def test_the_help_of_every_verb_ends_with_an_example_that_has_its_options():
         assert options <= known or verb == "log", line
 
 
-def test_the_files_of_the_demo_exist():
+def test_the_files_of_the_demo_exist_and_make_lists_its_commands():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     variables = dict(re.findall(r"^([A-Z]+) :?= (\S+)$", makefile, re.MULTILINE))
     demo = makefile.split("\ndemo:")[1].split("\n\n")[0]
     for name in re.findall(r"\$\((MACHINE|RECORDS)\)(\S*)", demo):
         assert (ROOT / (variables[name[0]] + name[1])).is_file(), name
+    done = subprocess.run(["make", "-C", str(ROOT), "-s", "help"], capture_output=True, text=True, check=True)
+    listed = re.findall(r"^make (\w+) - \w+", done.stdout, re.MULTILINE)
+    assert listed[:2] == ["help", "demo"]
+    assert {"test", "lint", "docs", "lock", "clean"} <= set(listed)
 
 
-def test_every_link_between_the_texts_leads_somewhere():
+def test_every_link_leads_somewhere_and_what_the_readme_imports_is_public():
     for file in TEXTS:
         for target in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", file.read_text(encoding="utf-8")):
             if not target.startswith("generated/"):
                 assert (file.parent / target).exists(), f"{file.name} links to {target}"
-
-
-def test_what_the_readme_imports_is_public():
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     for names in re.findall(r"from rotordrop import ([^\n]+)", "\n".join(blocks)):
@@ -100,22 +95,9 @@ def test_the_commands_of_the_readme_name_files_that_are_there_by_then(tmp_path, 
 
 
 def test_bundled_recordings_are_called_simulated_everywhere():
-    for file in (
-        ROOT / "README.md",
-        ROOT / "src/rotordrop/examples/lp400/README.md",
-        ROOT / "docs/getting_started.md",
-    ):
-        assert "simulated" in file.read_text(encoding="utf-8") or "by simulation" in file.read_text(
-            encoding="utf-8"
-        )
+    for name in ("README.md", "src/rotordrop/examples/lp400/README.md", "docs/getting_started.md"):
+        assert re.search("simulated|by simulation", (ROOT / name).read_text(encoding="utf-8"))
     assert "The recording is simulated" in (ROOT / "Makefile").read_text(encoding="utf-8")
-
-
-def test_make_lists_its_commands():
-    done = subprocess.run(["make", "-C", str(ROOT), "-s", "help"], capture_output=True, text=True, check=True)
-    listed = re.findall(r"^make (\w+) - \w+", done.stdout, re.MULTILINE)
-    assert listed[:2] == ["help", "demo"]
-    assert {"test", "lint", "docs", "lock", "clean"} <= set(listed)
 
 
 def test_an_old_python_is_refused_with_the_way_out(tmp_path):
@@ -128,13 +110,8 @@ def test_an_old_python_is_refused_with_the_way_out(tmp_path):
         (clone / name).write_bytes((ROOT / name).read_bytes())
     make = shutil.which("make")
     assert make is not None
-    done = subprocess.run(
-        [make, "-s", "test", "SHELL=/bin/sh"],
-        cwd=clone,
-        capture_output=True,
-        text=True,
-        env={"PATH": str(tmp_path)},
-    )
+    told = {"capture_output": True, "text": True, "env": {"PATH": str(tmp_path)}}
+    done = subprocess.run([make, "-s", "test", "SHELL=/bin/sh"], cwd=clone, **told)
     assert done.returncode != 0
     assert "rotordrop needs Python 3.11 or newer, and the python3 found here is Python 3.9.2" in done.stderr
     assert "make PYTHON=/path/to/python3" in done.stderr

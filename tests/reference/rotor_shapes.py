@@ -1,19 +1,12 @@
 """Static flexibility of a rotor and of its reduction; what is left of a shape without its rigid modes."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
-from rotordrop.arrays import Array
 from rotordrop.physics.linear_algebra import product
-from rotordrop.rotor.assembly import N_RIGID, RotorFE, free_free_modes, rigid_modes
-from rotordrop.rotor.reduction import RotorBasis
+from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rigid_modes
 
 
-def elastic_flexibility(fe: RotorFE, nodes: Sequence[int], omega: float = 0.0) -> Array:
+def elastic_flexibility(fe, nodes, omega=0.0):
     """Displacement at each node per unit force there by bending alone, shape (P,) [m/N].
 
     The rotor is free and its rigid motion is left out; ``omega`` is the frequency of the force [rad/s].
@@ -24,7 +17,7 @@ def elastic_flexibility(fe: RotorFE, nodes: Sequence[int], omega: float = 0.0) -
     )
 
 
-def residual_flexibility(fe: RotorFE, basis: RotorBasis, nodes: Sequence[int], omega: float = 0.0) -> Array:
+def residual_flexibility(fe, basis, nodes, omega=0.0):
     """What a reduced rotor gives way too little per unit force at each node, shape (P,) [m/N].
 
     Times the contact stiffness it estimates the relative truncation error of a contact force whose time
@@ -35,12 +28,12 @@ def residual_flexibility(fe: RotorFE, basis: RotorBasis, nodes: Sequence[int], o
     return elastic_flexibility(fe, nodes, omega) - reduced
 
 
-def _modal_flexibility(shapes: Array, eigenvalues: Array, index: NDArray[np.intp], omega: float) -> Array:
+def _modal_flexibility(shapes, eigenvalues, index, omega):
     rows = shapes[index, N_RIGID:]
     return np.asarray(np.sum(rows**2 / (eigenvalues[N_RIGID:] - omega**2), axis=1))
 
 
-def bending_part(fe: RotorFE, shape: Array) -> Array:
+def bending_part(fe, shape):
     """What is left of a shape (2N,) without its rigid modes [m, rad]: how far it is from a straight rotor."""
     rigid = rigid_modes(fe)
     return shape - product(rigid, product(rigid.T, product(fe.mass, shape)))

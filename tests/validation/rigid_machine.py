@@ -1,15 +1,12 @@
 """A rigid rotor in one touchdown bearing, which may have balls as good as rigid: small drop cases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rotordrop.machine import loads_machine
 from rotordrop.physics import columns as L
-from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 
 LINK = 1e13
@@ -22,9 +19,7 @@ _BALLS = 8
 _PRESS = 1e-2
 
 
-def disc_in(
-    more: str, mass: float, gravity: float, speed: float = 100.0, inertia: tuple[float, float] = (0.01, 0.01)
-) -> DropModel:
+def disc_in(more, mass, gravity, speed=100.0, inertia=(0.01, 0.01)):
     """Drop model of a disc at node 2, the middle of a thin shaft, in the bearings of a text.
 
     Its mass [kg], polar and diametral inertia [kg m²]; gravity [m/s²] and nominal speed [Hz].
@@ -45,37 +40,31 @@ materials = {{ steel = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, densi
     return build_drop_model(machine, Reduction(modes=2, attachment=False))
 
 
-def rigid_model(
-    values: dict[str, Any],
-    link: float = LINK,
-    more: str = "",
-    inertia: tuple[float, float] = (0.01, 0.01),
-    arrangement: str = "single",
-) -> DropModel:
-    """Drop model of a rigid rotor.
+def rigid_model(values, link=LINK, more="", inertia=(0.01, 0.01), arrangement="single"):
+    """Drop model of a rigid rotor in one bearing.
 
-    Parameters
-    ----------
-    values : dict
-        m, c, K, n, lam, g; ms, Ks, Cs of the support; where they are there: mu, I, r, me and phase from +x.
-    link : float
-        Stiffness of the balls [N/m].
-    more : str
-        What the file says beside it.
-    inertia : tuple of float
-        Polar and diametral inertia of the rotor [kg m²].
-    arrangement : str
-        That of the balls: one row, or "X" where a race moves along its axis.
+    Values of `bearing_of`, m [kg], g [m/s²], where they are there me [kg m] and phase from +x [rad];
+    stiffness of the balls [N/m], what the file says beside, polar and diametral inertia of the rotor [kg m²].
     """
-    v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"], "me": 0.0, "phase": 0.0} | values
-    half = 0.5 * v["ms"]
+    v = {"me": 0.0, "phase": 0.0} | values
     phase = v["phase"] - 0.5 * np.pi
-    unbalance = f'[[unbalances]]\nnode = 2\namount = "{v["me"]} kg m"\nphase = "{phase} rad"'
-    bearing = f"""
-{unbalance if v["me"] else ""}
+    unbalance = f'[[unbalances]]\nnode = 2\namount = "{v["me"]} kg m"\nphase = "{phase} rad"\n'
+    bearing = bearing_of(v, arrangement=arrangement) + more
+    model = disc_in((unbalance if v["me"] else "") + bearing, v["m"] - SHAFT, v["g"], inertia=inertia)
+    return replace(model, parameters=linked(model, link, 0.5 * v["ms"]))
+
+
+def bearing_of(values, name="A", node=2, arrangement="single"):
+    """A bearing of a file: c, K, n, lam; ms, Ks, Cs of the support; mu, I and r where they are there.
+
+    Its balls are one row, or "X" where a race moves along its axis.
+    """
+    v = {"mu": 0.0, "I": 1e-3, "r": 100.0 * values["c"]} | values
+    half = 0.5 * v["ms"]
+    return f"""
 [[touchdown_bearings]]
-name = "A"
-node = 2
+name = "{name}"
+node = {node}
 air_gap = "{v["c"]} m"
 bore_radius = "{v["r"]} m"
 damping_time = "0 s"
@@ -85,13 +74,10 @@ contact = {{ stiffness = "{v["K"]} N/m^{v["n"]:.4f}", exponent = {v["n"]}, dampi
 friction = {{ static = {v["mu"]}, dynamic = {v["mu"]} }}
 race = {{ mass = "{half} kg", inertia = "{v["I"]} kg m^2", drag_coefficient = 0.0 }}
 support = {{ mass = "{half} kg", stiffness = "{v["Ks"]} N/m", damping = "{v["Cs"]} N s/m" }}
-{more}
 """
-    model = disc_in(bearing, v["m"] - SHAFT, v["g"], inertia=inertia)
-    return replace(model, parameters=linked(model, link, half))
 
 
-def linked(model: DropModel, link: float, half: Any) -> L.KernelParameters:
+def linked(model, link, half):
     """Balls pressed in so far that they are one stiff spring, damped against the ringing of the race."""
     bearing = model.parameters.bearing.copy()
     bearing[:, L.GROOVE_DISTANCE] = 1e-3

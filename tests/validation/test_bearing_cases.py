@@ -1,16 +1,11 @@
 """Hertz contact and ball bearing cases: tables, textbook examples, standards and two catalogues."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, checks_of, load_case
-from numpy.typing import NDArray
+from cases import checks_of, load_case
 from tests.reference import closed_forms
 from tests.reference.ball_bearing_catalogue import (
     conformity_of_rigidity,
@@ -21,20 +16,17 @@ from tests.reference.ball_bearing_catalogue import (
 )
 from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 
-from rotordrop.arrays import Array
-from rotordrop.elements.catalog.lookup import CatalogueBearing, designations, find_bearing
+from rotordrop.elements.catalog.lookup import designations, find_bearing
 from rotordrop.physics import hertz
-from rotordrop.physics.ball_bearing import BearingConstants, axial_rigidity, bearing_constants
+from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.severity.fatigue import ball_row, share_by_16281
 
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
 CLASSES = ("light", "medium", "heavy")
 
 
-def contact_parameters(inputs: Inputs) -> dict[str, float]:
+def contact_parameters(inputs):
     numbers = {}
     for F_rho in inputs["F_rho"]:
         a_star, b_star, delta_star = hertz.contact_parameters(F_rho)
@@ -46,7 +38,7 @@ def contact_parameters(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def curvatures(inputs: Inputs) -> dict[str, float]:
+def curvatures(inputs):
     numbers = {}
     for name, bearing in (("209", inputs["b209"]), ("218", inputs["b218"])):
         f = bearing["f"] if "f" in bearing else bearing["groove_radius"] / bearing["Dw"]
@@ -60,7 +52,7 @@ def curvatures(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def iso_16281_equilibrium(inputs: Inputs) -> dict[str, float]:
+def iso_16281_equilibrium(inputs):
     """A deep-groove row: contact angle and axial offset come from the clearance; the race starts centred."""
     names = (
         "load case 1: radial displacement",
@@ -74,9 +66,7 @@ def iso_16281_equilibrium(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def deep_groove_equilibrium(
-    inputs: Inputs, load: Mapping[str, float]
-) -> tuple[BearingConstants, NDArray[np.float64]]:
+def deep_groove_equilibrium(inputs, load):
     """The row of H03, and where its race lies under a load case."""
     A_0 = inputs["ri"] + inputs["re"] - inputs["Dw"]
     constants = bearing_constants(
@@ -100,7 +90,7 @@ def deep_groove_equilibrium(
     return constants, bearing_equilibrium(constants, [0.0, -load["Fr"], load["Fa"], 0.0, 0.0], start=start)
 
 
-def iso_16281_life(inputs: Inputs) -> dict[str, float]:
+def iso_16281_life(inputs):
     """Revolutions until the share of the rating life is one, under a load that does not change."""
     row = ball_row(
         inputs["C"],
@@ -120,7 +110,7 @@ def iso_16281_life(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def stribeck_loaded_inner_race(inputs: Inputs) -> dict[str, float]:
+def stribeck_loaded_inner_race(inputs):
     eta = hertz.compliance(inputs["E"], inputs["nu"], inputs["E"], inputs["nu"])
     f = inputs["groove_radius"] / inputs["Dw"]
     contact = hertz.race_contact(inputs["Dw"], inputs["dm"], f, 0.0, eta, inner=True)
@@ -135,7 +125,7 @@ def stribeck_loaded_inner_race(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def palmgren_line_contact(inputs: Inputs) -> dict[str, float]:
+def palmgren_line_contact(inputs):
     first = inputs["l_mm"][0]
     stiffness = {f"K(l={mm} mm)": closed_forms.line_contact_stiffness(1e-3 * mm) for mm in inputs["l_mm"]}
     return stiffness | {
@@ -143,7 +133,7 @@ def palmgren_line_contact(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def cylinder_on_a_block(inputs: Inputs) -> dict[str, float]:
+def cylinder_on_a_block(inputs):
     (E_1, E_2), (nu_1, nu_2) = inputs["E"], inputs["nu"]
     line = hertz.LineContact(
         radius=inputs["radius"], length=1.0, compliance=hertz.compliance(E_1, nu_1, E_2, nu_2)
@@ -152,7 +142,7 @@ def cylinder_on_a_block(inputs: Inputs) -> dict[str, float]:
     return {"largest pressure": line.maximum_pressure(load), "half width": line.half_width(load)}
 
 
-def circular_contacts(inputs: Inputs) -> dict[str, float]:
+def circular_contacts(inputs):
     steel, ceramic = (tuple(inputs[name][key] for key in ("E", "nu")) for name in ("steel", "Si3N4"))
     all_steel, hybrid = hertz.compliance(*steel, *steel), hertz.compliance(*ceramic, *steel)
     numbers = {}
@@ -179,12 +169,12 @@ def circular_contacts(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def catalogue(maker: str) -> list[CatalogueBearing]:
+def catalogue(maker):
     bearings = (find_bearing(designation) for designation in designations())
     return [bearing for bearing in bearings if bearing.maker == maker]
 
 
-def gmn_errors(bearings: list[CatalogueBearing], eta: float, *, angle_changes: bool = True) -> Array:
+def gmn_errors(bearings, eta, *, angle_changes=True):
     """Relative errors of the rigidity at light and strong preload; the medium one gives the conformity."""
     balls = [bearing.complement for bearing in bearings]
     D_w, D_pw = (np.array([getattr(b, f"{name}_diameter") for b in balls]) for name in ("ball", "pitch"))
@@ -202,7 +192,7 @@ def gmn_errors(bearings: list[CatalogueBearing], eta: float, *, angle_changes: b
     return np.concatenate(predicted)
 
 
-def gmn_catalogue(inputs: Inputs) -> dict[str, float]:
+def gmn_catalogue(inputs):
     steel = (inputs["steel"]["E"], inputs["steel"]["nu"])
     errors = np.abs(gmn_errors(catalogue(inputs["maker"]), hertz.compliance(*steel, *steel)))
     return {
@@ -211,7 +201,7 @@ def gmn_catalogue(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def fag_errors(bearings: list[CatalogueBearing]) -> Array:
+def fag_errors(bearings):
     """Relative errors of rigidity and lift-off force at three preloads, two free numbers per bearing."""
     F_V, C_a, lift_off = (
         np.array([[getattr(b, quantity)[c] for c in CLASSES] for b in bearings])
@@ -224,7 +214,7 @@ def fag_errors(bearings: list[CatalogueBearing]) -> Array:
     return np.hstack(errors)
 
 
-def fag_catalogue(inputs: Inputs) -> dict[str, float]:
+def fag_catalogue(inputs):
     errors = np.abs(fag_errors(catalogue(inputs["maker"])))
     return {
         "median |error| over all numbers": float(np.median(errors)),
@@ -233,7 +223,7 @@ def fag_catalogue(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def papers_touchdown_bearing(inputs: Inputs) -> dict[str, float]:
+def papers_touchdown_bearing(inputs):
     numbers = {}
     for F_V in (96, 452, 1026):
         constants = bearing_constants(
@@ -257,7 +247,7 @@ def papers_touchdown_bearing(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "H01a": contact_parameters,
     "H02": curvatures,
     "H03a": iso_16281_equilibrium,
@@ -271,46 +261,10 @@ CASES: dict[str, Compute] = {
     "H12": cylinder_on_a_block,
 }
 
-
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("H02", {"b209__f": 0.5201}),
-        ("H02", {"b218__alpha_deg": 40.1}),
-        ("H03a", {"ri": 0.0060}),
-        ("H03a", {"E": 210.5e9}),
-        ("H03a", {"re": 0.0062}),
-        ("H03b", {"ri": 0.0060}),
-        ("H03b", {"C": 23410.0}),
-        ("H05", {"groove_radius": 0.004891}),
-        ("H05", {"Q": 556.0}),
-        ("H08", {"Q": 1001.0}),
-        ("H09", {"steel__E": 2.101e11}),
-        ("H09", {"Si3N4__nu": 0.261}),
-        ("H11", {"fi": 0.52}),
-        ("H11", {"alpha0_deg": 24.0}),
-        ("H11", {"Dw": 0.0105}),
-        ("H12", {"radius": 0.0501}),
-        ("H12", {"load_per_length": 35.1e6}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)
 
 
-def test_perturbed_curvature_difference_fails_the_table() -> None:
-    case = load_case("H01a")
-    shifted = contact_parameters({"F_rho": [F + 1e-4 for F in case.inputs["F_rho"]]})
-    with pytest.raises(AssertionError, match=r"(?s)H01a .*deviation"):
-        check(case, dict(zip((e.name for e in case.expected), shifted.values(), strict=True)))
-
-
-def test_palmgren_length_matters() -> None:
-    case = load_case("H08")
-    numbers = palmgren_line_contact({**case.inputs, "l_mm": [10.01, 25.01]})
-    with pytest.raises(AssertionError, match=r"(?s)H08 .*deviation"):
-        check(case, dict(zip((e.name for e in case.expected), numbers.values(), strict=True)))
-
-
-def test_fixed_contact_angle_fails_the_gmn_catalogue() -> None:
+def test_fixed_contact_angle_fails_the_gmn_catalogue():
     case = load_case("H06a")
     steel = (case.inputs["steel"]["E"], case.inputs["steel"]["nu"])
     bearings = catalogue("GMN")
@@ -323,7 +277,7 @@ def test_fixed_contact_angle_fails_the_gmn_catalogue() -> None:
     ("quantity", "preload_class", "factor"),
     [("preload", "medium", 1.05), ("lift_off", "heavy", 0.95), ("axial_rigidity", "light", 1.1)],
 )
-def test_perturbed_numbers_fail_the_fag_catalogue(quantity: str, preload_class: str, factor: float) -> None:
+def test_perturbed_numbers_fail_the_fag_catalogue(quantity, preload_class, factor):
     case = load_case("H07a")
     bearings = catalogue("FAG")
     changed = []

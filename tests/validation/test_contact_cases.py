@@ -4,44 +4,22 @@ The integrators restart nothing: their steps are short enough for make and break
 starts at zero, and the times of make and break are the roots of the gap.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, check, checks_of, load_case
+from cases import checks_of
 from rigid_machine import rigid_model
 from scipy.integrate import solve_ivp
 from tests.reference import closed_forms, impact
 
-from rotordrop.arrays import Array
+from rotordrop import DropCase, PlacedStart, simulate_drop
 from rotordrop.physics import whirl
-from rotordrop.physics.contact import contact_force, contact_law
 from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
-from rotordrop.simulate.case import DropCase, PlacedStart
-from rotordrop.simulate.drop import simulate_drop
-
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
 
 
-def hunt_crossley_force(delta: float, rate: float, K: float, n: float, lam: float) -> float:
-    """Normal force [N] of the contact kernel, none without indentation."""
-    return contact_force(contact_law(K, n, lam), delta, rate)[0] if delta > 0.0 else 0.0
-
-
-def integrate(
-    motion: Callable[[float, Array], Sequence[float]],
-    start: Sequence[float],
-    end: float,
-    events: Callable[[float, Array], float],
-    max_step: float,
-    method: str = "DOP853",
-) -> Any:
+def integrate(motion, start, end, events, max_step, method="DOP853"):
     return solve_ivp(
         motion,
         (0.0, end),
@@ -55,7 +33,7 @@ def integrate(
     )
 
 
-def sphere_contact_points(inputs: Inputs) -> dict[str, float]:
+def sphere_contact_points(inputs):
     """Simbody's own combination of two bodies and friction law around the library's normal force."""
     s_1, s_2 = (k ** (2 / 3) for k in inputs["stiffness_k"])
     d_1, d_2 = inputs["dissipation"]
@@ -65,10 +43,10 @@ def sphere_contact_points(inputs: Inputs) -> dict[str, float]:
         2 * a * b / (a + b) for a, b in (inputs[f"mu_{kind}"] for kind in ("static", "dynamic", "viscous"))
     )
 
-    def normal(rate: float) -> float:
-        return hunt_crossley_force(0.5, rate, K, 1.5, lam)
+    def normal(rate):
+        return impact.hunt_crossley_force(0.5, rate, K, 1.5, lam)
 
-    def friction(slip: float) -> float:
+    def friction(slip):
         vr = slip / inputs["transition_velocity"]
         return normal(0.0) * (min(vr, 1) * (mu_d + 2 * (mu_s - mu_d) / (1 + vr**2)) + mu_v * abs(slip))
 
@@ -82,33 +60,18 @@ def sphere_contact_points(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def rebound_speed(m: float, K: float, n: float, lam: float, v_0: float) -> float:
-    """Speed after one integrated impact of the contact kernel."""
-
-    def motion(_: float, state: Array) -> Sequence[float]:
-        return state[1], -hunt_crossley_force(state[0], state[1], K, n, lam) / m
-
-    def gap(_: float, state: Array) -> float:
-        return float(state[0])
-
-    gap.terminal, gap.direction = True, -1  # type: ignore[attr-defined]
-    duration = impact.elastic_contact_time(m, K, n, v_0)
-    solution = integrate(motion, [0.0, v_0], 6 * duration, gap, duration / 100)
-    return -float(solution.y_events[0][0][1])
-
-
-def restitution(inputs: Inputs) -> dict[str, float]:
+def restitution(inputs):
     """The integrated kernel; the closed form must agree with it too."""
     numbers = {}
     for a_v0 in inputs["a_v0"]:
         lam = a_v0 / inputs["v0"] / 1.5
-        e = rebound_speed(inputs["m"], inputs["K"], inputs["n"], lam, inputs["v0"]) / inputs["v0"]
+        e = impact.strike(inputs["m"], inputs["K"], inputs["n"], lam, inputs["v0"])[1] / inputs["v0"]
         assert e == pytest.approx(impact.restitution(lam, inputs["v0"]), abs=1e-7)
         numbers[f"restitution at a*v0={a_v0}"] = e
     return numbers
 
 
-def elastic_impact(inputs: Inputs) -> dict[str, float]:
+def elastic_impact(inputs):
     m, K, v_0 = inputs["m"], inputs["K"], inputs["v0"]
     numbers = {}
     for n in inputs["n"]:
@@ -119,7 +82,7 @@ def elastic_impact(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def bouncing_ball(inputs: Inputs) -> dict[str, float]:
+def bouncing_ball(inputs):
     """One drop from each height, onto a ground that stands still, with the λ that asks for e at its speed."""
     e, g = inputs["e"], inputs["g"]
     heights, times = [inputs["h"]], []
@@ -151,7 +114,7 @@ def bouncing_ball(inputs: Inputs) -> dict[str, float]:
     return numbers | {f"bounce height {k}": heights[k] for k in (1, 2, 3)}
 
 
-def mass_caught_by_a_spring(inputs: Inputs) -> dict[str, float]:
+def mass_caught_by_a_spring(inputs):
     """Drop of a rigid rotor of the case's mass; race and support stand as good as still."""
     values = {"m": inputs["m"], "c": inputs["gap"], "K": inputs["k"], "n": 1.0, "lam": 0.0, "g": inputs["g"]}
     model = rigid_model(values | {"ms": 2.0, "Ks": 1e9, "Cs": 4e4}, link=1e10)
@@ -168,14 +131,14 @@ def mass_caught_by_a_spring(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def friction_oscillator(inputs: Inputs) -> dict[str, float]:
+def friction_oscillator(inputs):
     m, k, mu, N = inputs["m"], inputs["k"], inputs["mu"], inputs["N"]
 
-    def motion(_: float, state: Array) -> Sequence[float]:
+    def motion(_, state):
         friction = N * stribeck_coefficient(state[1], mu, mu, 0.5, inputs["smoothing_speed"])
         return state[1], (-k * state[0] - friction) / m
 
-    def standstill(t: float, state: Array) -> float:
+    def standstill(t, state):
         return float(state[1]) if t > 0 else -1.0
 
     half_period = math.pi * math.sqrt(m / k)
@@ -190,18 +153,18 @@ def friction_oscillator(inputs: Inputs) -> dict[str, float]:
     return numbers | {"time between turning points (half period)": float(np.mean(np.diff(times[:3])))}
 
 
-def ring_spin_up(inputs: Inputs) -> dict[str, float]:
+def ring_spin_up(inputs):
     """The race integrated under the friction kernel until it runs with the rotor's surface."""
     r, torque_arm = inputs["r"], inputs["N"] * inputs["r"]
 
-    def slip(omega_i: float) -> float:
+    def slip(omega_i):
         return surface_speed(0.0, inputs["Omega"], r, omega_i, r)
 
-    def motion(_: float, state: Array) -> Sequence[float]:
+    def motion(_, state):
         mu = stribeck_coefficient(slip(state[0]), inputs["mu"], inputs["mu"], 0.5, 5e-3)
         return (mu * torque_arm / inputs["I"],)
 
-    def synchronous(_: float, state: Array) -> float:
+    def synchronous(_, state):
         return slip(state[0]) - 5e-3
 
     closed = whirl.race_spin_up_time(inputs["I"], inputs["mu"], inputs["N"], r, inputs["Omega"])
@@ -211,7 +174,7 @@ def ring_spin_up(inputs: Inputs) -> dict[str, float]:
     return {"time to synchronism": time}
 
 
-def rolling_whirl(inputs: Inputs) -> dict[str, float]:
+def rolling_whirl(inputs):
     two_pi = 2 * math.pi
     whirl_speed = closed_forms.rolling_whirl_speed(two_pi * inputs["Omega_Hz"], inputs["R"], inputs["c"])
     force = closed_forms.whirl_force(inputs["m"], inputs["c2"], two_pi * inputs["whirl_Hz"])
@@ -221,7 +184,7 @@ def rolling_whirl(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def vertical_drop(inputs: Inputs) -> dict[str, float]:
+def vertical_drop(inputs):
     """Drop of a rigid rotor; the case counts downwards, we upwards."""
     case = DropCase(speed=0.0, duration=0.03, output_step=1e-6, tolerance=1e-9, spin="constant")
     result = simulate_drop(rigid_model(dict(inputs)), case)
@@ -244,7 +207,7 @@ def vertical_drop(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def planar_drop(inputs: Inputs) -> dict[str, float]:
+def planar_drop(inputs):
     """Drop of a rigid rotor; the case smooths friction otherwise, below a slip that does not occur."""
     values = dict(inputs) | {"me": inputs["m"] * inputs["e"]}
     case = DropCase(speed=inputs["Om"], duration=0.015, output_step=1e-6, tolerance=1e-9, spin="constant")
@@ -260,7 +223,7 @@ def planar_drop(inputs: Inputs) -> dict[str, float]:
     }
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "C01": sphere_contact_points,
     "C02a": restitution,
     "C04a": elastic_impact,
@@ -273,43 +236,4 @@ CASES: dict[str, Compute] = {
     "D03": planar_drop,
 }
 
-
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("C01", {"radius": 0.8000001}),
-        ("C01", {"dissipation": [0.5001, 1.0]}),
-        ("C01", {"mu_dynamic": [0.5, 0.2001]}),
-        ("C04a", {"K": 1.0001e8}),
-        ("C04a", {"v0": 0.1001}),
-        ("C05", {"e": 0.7005}),
-        ("C05", {"g": 9.82}),
-        ("C06", {"k": 101.0}),
-        ("C06", {"gap": 2.01}),
-        ("C08", {"mu": 0.101}),
-        ("C08", {"k": 1.01e4}),
-        ("C08", {"smoothing_speed": 0.02}),
-        ("C11", {"I": 3.02e-4}),
-        ("C13", {"c": 2.751e-4}),
-        ("C13", {"m": 10.01}),
-        ("D01", {"lam": 0.09}),
-        ("D01", {"n": 1.11}),
-        ("D01", {"Ks": 1.001e8}),
-        ("D01", {"Cs": 3010.0}),
-        ("D03", {"lam": 0.1}),
-        ("D03", {"mu": 0.131}),
-        ("D03", {"I": 3.01e-4}),
-        ("D03", {"phase": 2.01}),
-        ("D03", {"Om": -1319.4689145077132}),
-    ],
-)
-
-
-@pytest.mark.parametrize("factor", [0.99, 1.01])
-def test_perturbed_damping_fails_the_restitution(factor: float) -> None:
-    case = load_case("C02a")
-    numbers = {
-        f"restitution at a*v0={a}": impact.restitution(factor * a / 1.5, 1.0) for a in case.inputs["a_v0"]
-    }
-    with pytest.raises(AssertionError, match=r"C02a .*\n.*deviation .* tolerance"):
-        check(case, numbers)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

@@ -1,30 +1,17 @@
 """Balls at speed: angles, loads and stiffness of one ball between grooves under its centrifugal force."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
-import pytest
-from cases import Compute, checks_of
+from cases import checks_of
 
-from rotordrop.physics.ball_bearing import BearingConstants, bearing_constants
-from rotordrop.physics.fast_balls import (
-    FastBalls,
-    ball_equilibrium,
-    centred_balls,
-    offset_on_springs,
-)
-
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
+from rotordrop.physics.ball_bearing import bearing_constants
+from rotordrop.physics.fast_balls import FastBalls, ball_equilibrium, centred_balls, offset_on_springs
 
 
-def row_of(v: Inputs) -> tuple[BearingConstants, FastBalls]:
-    described: Any = SimpleNamespace(
+def row_of(v):
+    described = SimpleNamespace(
         ball_diameter=v["ball_diameter"],
         pitch_diameter=v["pitch_diameter"],
         ball_count=v["balls"],
@@ -46,7 +33,7 @@ def row_of(v: Inputs) -> tuple[BearingConstants, FastBalls]:
     return constants, FastBalls.of(described, constants)
 
 
-def at_speeds(v: Inputs) -> dict[str, float]:
+def at_speeds(v):
     constants, balls = row_of(v)
     found = {"approach by preload": constants.preload_approach}
     for speed, names in v["shown"].items():
@@ -69,7 +56,7 @@ def at_speeds(v: Inputs) -> dict[str, float]:
     return found
 
 
-def governing_speed(v: Inputs) -> float:
+def governing_speed(v):
     """Speed [Hz] at which the stress on the outer race overtakes that on the inner one."""
     constants, balls = row_of(v)
     low, high = 1.0, 600.0
@@ -82,7 +69,7 @@ def governing_speed(v: Inputs) -> float:
     return middle
 
 
-def others(v: Inputs) -> dict[str, float]:
+def others(v):
     omega = 2.0 * math.pi * v["speed"]
     _, balls = row_of(v)
     offset = offset_on_springs(balls, v["balls"], v["preload"], omega)
@@ -99,7 +86,7 @@ def others(v: Inputs) -> dict[str, float]:
     }
 
 
-def slopes(v: Inputs) -> dict[str, float]:
+def slopes(v):
     _, balls = row_of(v)
     force = np.array([0.0, v["step"]])
     ball = ball_equilibrium(balls, balls.axial_offset, balls.radial_offset, force)
@@ -109,9 +96,7 @@ def slopes(v: Inputs) -> dict[str, float]:
     }
 
 
-def gyroscopic_moment(
-    balls: FastBalls, omega: float, inner_angle: float, outer_angle: float
-) -> tuple[float, float]:
+def gyroscopic_moment(balls, omega, inner_angle, outer_angle):
     """Moment of a ball [N m] that does not spin on the outer race, J ω_c ω_R sin β, and its orbit [rad/s].
 
     Jones 1960; Harris, Rolling Bearing Analysis.
@@ -128,7 +113,7 @@ def gyroscopic_moment(
     return inertia * orbit * spin * lean * cosine, orbit
 
 
-def controlled(v: Inputs) -> dict[str, float]:
+def controlled(v):
     """A thrust on one row, whose balls gyrate, held by friction at the outer race."""
     _, balls = row_of(v)
     omega = 2.0 * math.pi * v["speed"]
@@ -149,17 +134,6 @@ def controlled(v: Inputs) -> dict[str, float]:
     return {"inner angle": math.degrees(inner), "outer angle": math.degrees(outer)}
 
 
-CASES: dict[str, Compute] = {"FB01": at_speeds, "FB02": others, "FB03": slopes, "FB04": controlled}
+CASES = {"FB01": at_speeds, "FB02": others, "FB03": slopes, "FB04": controlled}
 
-
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("FB01", {"ball_density": 3300.0}),
-        ("FB01", {"preload": 535.0}),
-        ("FB02", {"speed": 560.0}),
-        ("FB03", {"contact_angle": 25.3}),
-        ("FB04", {"sense": -1.0}),
-        ("FB04", {"ball_density": 7600.0}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

@@ -1,30 +1,20 @@
 """Magnets in the control loop: operating point, margins, lift, and drops of a rotor in one magnet."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-import pytest
-from cases import Compute, checks_of
+from cases import checks_of
 from rigid_machine import disc_in
 
+from rotordrop import build_drop_model, simulate_drop
 from rotordrop.elements.magnet import Magnet
 from rotordrop.physics import magnet_loop as loop
 from rotordrop.physics.magnet import magnet_force
-from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import DropCase, MagnetEvent, StateStart
-from rotordrop.simulate.drop import simulate_drop
-from rotordrop.simulate.result import DropResult
-
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
 
 
-def magnet_of(v: Inputs) -> Magnet:
+def magnet_of(v):
     return Magnet(
         turns=v["turns"],
         pole_area=f"{v['pole_area']} m^2",
@@ -36,7 +26,7 @@ def magnet_of(v: Inputs) -> Magnet:
     )
 
 
-def operating_point(v: Inputs) -> dict[str, float]:
+def operating_point(v):
     magnet = magnet_of(v)
     by_current, by_way = magnet.slopes
     pull = magnet_force(magnet.force, v["gap"], v["x"], v["bias"], v["bias"])[0]
@@ -49,12 +39,12 @@ def operating_point(v: Inputs) -> dict[str, float]:
     }
 
 
-def proportional_of(v: Inputs) -> float:
+def proportional_of(v):
     by_current, by_way = magnet_of(v).slopes
     return float(v["proportional_over_ks_ki"] * by_way / by_current)
 
 
-def pd_roots(v: Inputs) -> dict[str, float]:
+def pd_roots(v):
     by_current, by_way = magnet_of(v).slopes
     plant = (
         np.array([[0.0, 1.0], [by_way / v["mass"], 0.0]]),
@@ -68,11 +58,11 @@ def pd_roots(v: Inputs) -> dict[str, float]:
     return {"decay": decay, "frequency": frequency}
 
 
-def pid_margins(v: Inputs) -> dict[str, float]:
+def pid_margins(v):
     by_current, by_way = magnet_of(v).slopes
     gains = (proportional_of(v), v["integral"], v["derivative"])
 
-    def opened(w: float) -> complex:
+    def opened(w):
         response = loop.pid_response(w, gains, 2.0 * math.pi * v["filter"])
         lag = 1.0 + 1j * w / (2.0 * math.pi * v["bandwidth"])
         return by_current * response / lag / (-v["mass"] * w * w - by_way)
@@ -86,7 +76,7 @@ def pid_margins(v: Inputs) -> dict[str, float]:
     }
 
 
-def lift(v: Inputs) -> dict[str, float]:
+def lift(v):
     found = loop.linear_lift(v["mass"], magnet_of(v).slopes, v["current"], v["mass"] * v["g"], v["depth"])
     return {
         "deepest place": found.deepest,
@@ -96,7 +86,7 @@ def lift(v: Inputs) -> dict[str, float]:
     }
 
 
-def model_of(v: Inputs, gap: float, gravity: float) -> DropModel:
+def model_of(v, gap, gravity):
     """A disc in one magnet, above a touchdown bearing."""
     more = f"""
 [[ambs]]
@@ -121,7 +111,7 @@ support = {{ mass = "1e6 kg", stiffness = "1e14 N/m", damping = "0 N s/m" }}
     return build_drop_model(machine, Reduction(modes=2, attachment=False), loops=True)
 
 
-def dropped(v: Inputs, action: str, gap: float, gravity: float, duration: float) -> DropResult:
+def dropped(v, action, gap, gravity, duration):
     """A drop from the middle whose coils carry the bias, after one action of the magnets."""
     model = model_of(v, gap, gravity)
     state = model.at_rest()
@@ -137,8 +127,8 @@ def dropped(v: Inputs, action: str, gap: float, gravity: float, duration: float)
     return simulate_drop(model, case)
 
 
-def fall_with_bias(v: Inputs) -> dict[str, float]:
-    def speed(action: str) -> float:
+def fall_with_bias(v):
+    def speed(action):
         drop = dropped(v, action, v["depth"], v["g"], 0.012)
         start = float(drop.contacts.start[0])
         before = drop.time < start
@@ -156,7 +146,7 @@ def fall_with_bias(v: Inputs) -> dict[str, float]:
     }
 
 
-def decay(v: Inputs) -> dict[str, float]:
+def decay(v):
     drop = dropped(v, "bias decays", 2.75e-4, 0.0, v["time"])
     assert drop.magnets is not None
     current = float(drop.magnets.current[-1, 0, 0, 0])
@@ -168,7 +158,7 @@ def decay(v: Inputs) -> dict[str, float]:
     }
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "MG01": operating_point,
     "MG02": pd_roots,
     "MG03": pid_margins,
@@ -177,16 +167,4 @@ CASES: dict[str, Compute] = {
     "MG06": decay,
 }
 
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("MG01", {"turns": 121}),
-        ("MG01", {"x": -2.76e-4}),
-        ("MG02", {"derivative": 51.7}),
-        ("MG03", {"integral": 3.01e5}),
-        ("MG03", {"bandwidth": 1010.0}),
-        ("MG04", {"current": 4.01}),
-        ("MG05", {"bias": 4.01}),
-        ("MG06", {"resistance": 0.501}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

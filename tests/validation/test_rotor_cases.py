@@ -1,45 +1,38 @@
 """Rotor cases: published codes, a book and closed forms; every number by our elements and modes."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pytest
-from cases import Compute, checks_of
+from cases import checks_of
 from scipy.optimize import minimize_scalar
 from tests.reference.closed_forms import rectangle_shear_coefficient
 
 from rotordrop.physics.timoshenko import Section, round_section
-from rotordrop.rotor.assembly import PointMass, RotorFE, assemble, modes_on_springs
+from rotordrop.rotor.assembly import PointMass, assemble, modes_on_springs
 from rotordrop.rotor.critical_speeds import critical_speeds
-from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.rotor.suspension import Support, spring
-from rotordrop.rotor.whirl import WhirlModes, unbalance_response, whirl_modes
-
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
+from rotordrop.rotor.reduction import Reduction, reduce_rotor
+from rotordrop.rotor.suspension import spring
+from rotordrop.rotor.whirl import unbalance_response, whirl_modes
 
 RIGID = Reduction(modes=2, attachment=False)
 PINNED = 1e14
 
 
-def rpm(value: float) -> float:
+def rpm(value):
     return value * 2.0 * math.pi / 60.0
 
 
-def uniform(section: Section, length: float, elements: int, discs: tuple[PointMass, ...] = ()) -> RotorFE:
+def uniform(section, length, elements, discs=()):
     """A uniform shaft of equal elements, without material damping."""
     return assemble(np.linspace(0.0, length, elements + 1), [section] * elements, discs, modal_damping=0.0)
 
 
-def node_at(inputs: Inputs, z: float) -> int:
+def node_at(inputs, z):
     return 1 + round(z / inputs["L"] * inputs["elements"])
 
 
-def disc_of(inputs: Inputs, disc: Mapping[str, float]) -> PointMass:
+def disc_of(inputs, disc):
     """A disc by its inertias, or a cylinder of the shaft's density."""
     node = node_at(inputs, disc["z"])
     if "m" in disc:
@@ -52,7 +45,7 @@ def disc_of(inputs: Inputs, disc: Mapping[str, float]) -> PointMass:
     )
 
 
-def disc_rotor(inputs: Inputs) -> tuple[RotorFE, list[Support]]:
+def disc_rotor(inputs):
     nu = inputs["nu"] if "nu" in inputs else inputs["E"] / (2.0 * inputs["G"]) - 1.0
     section = round_section(inputs["d"], 0.0, inputs["E"], nu, inputs["rho"])
     discs = tuple(disc_of(inputs, disc) for disc in inputs["discs"])
@@ -61,12 +54,12 @@ def disc_rotor(inputs: Inputs) -> tuple[RotorFE, list[Support]]:
     return rotor, [spring(node, inputs["stiffness"], inputs["damping"]) for node in nodes]
 
 
-def at_speeds(inputs: Inputs) -> dict[str, WhirlModes]:
+def at_speeds(inputs):
     rotor, supports = disc_rotor(inputs)
     return {f"{speed:.0f} rpm": whirl_modes(rotor, rpm(speed), supports) for speed in inputs["speeds_rpm"]}
 
 
-def undamped_disc_rotor(inputs: Inputs) -> dict[str, float]:
+def undamped_disc_rotor(inputs):
     return {
         f"lateral natural frequency {k + 1} at {speed}": modes.eigenvalue[k].imag
         for speed, modes in at_speeds(inputs).items()
@@ -74,7 +67,7 @@ def undamped_disc_rotor(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def damped_disc_rotor(inputs: Inputs) -> dict[str, float]:
+def damped_disc_rotor(inputs):
     numbers = {}
     for speed, modes in at_speeds(inputs).items():
         for k in range(6 if speed == "0 rpm" else 5):
@@ -83,7 +76,7 @@ def damped_disc_rotor(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def three_disc_rotor(inputs: Inputs) -> dict[str, float]:
+def three_disc_rotor(inputs):
     numbers = {}
     for speed, modes in at_speeds(inputs).items():
         for k in range(4):
@@ -92,7 +85,7 @@ def three_disc_rotor(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def lumped_stations(inputs: Inputs) -> dict[str, float]:
+def lumped_stations(inputs):
     """Massless elements between stations that carry all the mass."""
     stations = inputs["stations_m_Ip_It"]
     nu = inputs["E"] / (2.0 * inputs["G"]) - 1.0
@@ -108,7 +101,7 @@ def lumped_stations(inputs: Inputs) -> dict[str, float]:
     return {f"natural frequency {k + 1}": modes.frequency[k] for k in range(8)}
 
 
-def spinning_simply_supported_shaft(inputs: Inputs) -> dict[str, float]:
+def spinning_simply_supported_shaft(inputs):
     """Shear and rotary inertia off, gyroscopic effect on."""
     area, second_moment = math.pi * inputs["R"] ** 2, 0.25 * math.pi * inputs["R"] ** 4
     section = Section(
@@ -130,7 +123,7 @@ def spinning_simply_supported_shaft(inputs: Inputs) -> dict[str, float]:
     return numbers
 
 
-def deep_square_beam(inputs: Inputs) -> dict[str, float]:
+def deep_square_beam(inputs):
     side, E, nu, rho = inputs["square_side"], inputs["E"], inputs["nu"], inputs["rho"]
     second_moment = side**4 / 12.0
     section = Section(
@@ -145,7 +138,7 @@ def deep_square_beam(inputs: Inputs) -> dict[str, float]:
     return {f"bending mode {k + 1} (double)": modes.frequency[k] for k in range(3)}
 
 
-def ends_of_the_map(inputs: Inputs) -> dict[str, float]:
+def ends_of_the_map(inputs):
     """Critical speed map at standstill at its soft and its stiff end."""
     section = round_section(inputs["d"], 0.0, inputs["E"], inputs["nu"], inputs["rho"])
     rotor = uniform(section, inputs["L"], inputs["elements"])
@@ -160,19 +153,19 @@ def ends_of_the_map(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def rigid_rotor(a: float, b: float, m: float, polar: float, diametral: float) -> RotorBasis:
+def rigid_rotor(a, b, m, polar, diametral):
     """A body on a shaft without mass, a behind the first end and b before the other, as rigid modes."""
     section = round_section(0.1, 0.0, 2e11, 0.3, 0.0)
     body = PointMass(node=2, mass=m, polar_inertia=polar, diametral_inertia=diametral)
     return reduce_rotor(assemble([0.0, a, a + b], [section] * 2, [body]), RIGID)
 
 
-def jeffcott_unbalance(inputs: Inputs) -> dict[str, float]:
+def jeffcott_unbalance(inputs):
     m, k, c = inputs["m"], inputs["k"], inputs["c"]
     rotor = rigid_rotor(0.5, 0.5, m, 0.0, 1e-3)
     held = [spring(node, 0.5 * k, 0.5 * c) for node in (1, 3)]
 
-    def amplitude(omega: float) -> float:
+    def amplitude(omega):
         response = unbalance_response(rotor, omega, {2: m * inputs["eccentricity"]}, held)
         return float(np.abs(response[0, 1, 0]))
 
@@ -188,7 +181,7 @@ def jeffcott_unbalance(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def rigid_rotor_on_springs(inputs: Inputs) -> dict[str, float]:
+def rigid_rotor_on_springs(inputs):
     body = (inputs["m"], inputs["Ip"], inputs["Id"])
     even, uneven = inputs["symmetric"], inputs["unsymmetric"]
     rotor = rigid_rotor(even["a"], even["b"], *body)
@@ -205,7 +198,7 @@ def rigid_rotor_on_springs(inputs: Inputs) -> dict[str, float]:
     } | {f"unsymmetric mode {k + 1} at 12000 rpm": others.frequency[k] for k in range(4)}
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "R01": undamped_disc_rotor,
     "R02": undamped_disc_rotor,
     "R05": damped_disc_rotor,
@@ -218,40 +211,4 @@ CASES: dict[str, Compute] = {
     "R18": rigid_rotor_on_springs,
 }
 
-
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("R01", {"d": 0.0501}),
-        ("R01", {"G": 76e9}),
-        ("R01", {"rho": 7820.0}),
-        ("R01", {"stiffness": [1.001e6, 1.001e6]}),
-        ("R02", {"stiffness": [1e6, 0.803e6]}),
-        ("R02", {"bearing_z": [0.25, 1.5]}),
-        ("R02", {"E": 211.2e9}),
-        ("R05", {"damping": [3.1e3, 3.1e3]}),
-        ("R05", {"damping": [3e3, 2.9e3]}),
-        ("R05", {"discs__1__od": 0.352}),
-        ("R07", {"element_length": 0.251}),
-        ("R07", {"stiffness": [1.01e6, 0.8e6]}),
-        ("R07", {"speed_rpm": 1000}),
-        ("R08", {"damping": [710.0, 500.0]}),
-        ("R08", {"E": 2.01e11}),
-        ("R08", {"discs__2__Ip": 1.25}),
-        ("R10", {"Omega": 11000.0}),
-        ("R10", {"R": 0.0252}),
-        ("R12", {"nu": 0.2}),
-        ("R12", {"square_side": 2.03}),
-        ("R13", {"E": 2.11e11}),
-        ("R13", {"d": 0.0502}),
-        ("R13", {"support_stiffness": [1e6, 1e14]}),
-        ("R13", {"support_stiffness": [100.0, 1e9]}),
-        ("R16", {"c": 802.0}),
-        ("R16", {"m": 10.001}),
-        ("R16", {"eccentricity": 2.01e-5}),
-        ("R18", {"Ip": 0.605}),
-        ("R18", {"Id": 2.81}),
-        ("R18", {"unsymmetric__a": 0.303}),
-        ("R18", {"unsymmetric__k2": 1.304e6}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

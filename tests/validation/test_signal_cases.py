@@ -1,14 +1,9 @@
 """Signal and statistics cases: the paper's waterfall grid, Hann correction, coast-down, axes, quartiles."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
-import pytest
-from cases import Compute, checks_of
+from cases import checks_of
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.physics.aerodynamics import exponential_deceleration
@@ -16,11 +11,8 @@ from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
-pytestmark = pytest.mark.acceptance
-Inputs = Mapping[str, Any]
 
-
-def waterfall_grid(inputs: Inputs) -> dict[str, float]:
+def waterfall_grid(inputs):
     settings = WaterfallSettings(points=inputs["nfft"], overlap=inputs["overlap"])
     frames = {f"frames for N={n}": float(settings.frame_count(n)) for n in inputs["points"]}
     # The count is that of frames really computed, not only of the formula.
@@ -30,10 +22,10 @@ def waterfall_grid(inputs: Inputs) -> dict[str, float]:
     return frames | {"frequency resolution": computed.resolution}
 
 
-def hann_amplitudes(inputs: Inputs) -> dict[str, float]:
+def hann_amplitudes(inputs):
     points = 32768
 
-    def highest(off: float) -> float:
+    def highest(off):
         phase = 2.0 * math.pi * (1000.0 + off) * np.arange(points) / points
         tone = inputs["A"] * np.column_stack([np.cos(phase), np.zeros(points)])
         (found,) = waterfalls(
@@ -50,7 +42,7 @@ def hann_amplitudes(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def exponential_coast_down(inputs: Inputs) -> dict[str, float]:
+def exponential_coast_down(inputs):
     tau = inputs["dt"] / math.log(inputs["n0"] / inputs["n1"])
     omega = 2.0 * math.pi * inputs["n0"]
     return {
@@ -60,7 +52,7 @@ def exponential_coast_down(inputs: Inputs) -> dict[str, float]:
     }
 
 
-def sensor_axes(inputs: Inputs) -> dict[str, float]:
+def sensor_axes(inputs):
     angles = {"S1": "45 deg", "S2": "135 deg"}
     sensors = [Sensor.model_validate({"name": n, "node": 5, "angle": a}) for n, a in angles.items()]
     along = np.array([[inputs["s1"], inputs["s2"]]])
@@ -68,7 +60,7 @@ def sensor_axes(inputs: Inputs) -> dict[str, float]:
     return {"horizontal": float(displacement[0]), "vertical": float(displacement[1])}
 
 
-def box_plot(inputs: Inputs) -> dict[str, float]:
+def box_plot(inputs):
     hazen = stress_statistics(inputs["data"], rule="hazen")
     linear = stress_statistics(inputs["data"], rule="linear")
     return {
@@ -84,7 +76,7 @@ def box_plot(inputs: Inputs) -> dict[str, float]:
     }
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "S01": waterfall_grid,
     "S02": hann_amplitudes,
     "S03": exponential_coast_down,
@@ -92,13 +84,4 @@ CASES: dict[str, Compute] = {
     "S06a": box_plot,
 }
 
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("S01", {"overlap": 0.49}),
-        ("S02", {"A": 1.0001}),
-        ("S03", {"n1": 58.001}),
-        ("S05", {"s2": -5.0001e-5}),
-        ("S06a", {"data": [*range(1, 11), 101.0]}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

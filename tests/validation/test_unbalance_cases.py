@@ -1,25 +1,18 @@
 """Unbalance response, deflected shapes, amplification factors and separation margins against known ones."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from cases import Compute, checks_of
+from cases import checks_of
 from test_rotor_cases import disc_rotor, rigid_rotor, rpm
 
-from rotordrop.rotor.campbell import Separation, response_peaks
+from rotordrop.rotor.campbell import Separation
 from rotordrop.rotor.suspension import Link, Support, spring
-from rotordrop.rotor.unbalanced import orbit_axis
 from rotordrop.rotor.whirl import unbalance_response
 
-Inputs = Mapping[str, Any]
 
-
-def amplification(inputs: Inputs) -> dict[str, float]:
+def amplification(inputs):
     """Amplification factor of a single mass from its response, and the margins that follow from it."""
     m, k, zeta = inputs["m"], inputs["k"], inputs["damping_ratio"]
     omega = math.sqrt(k / m)
@@ -27,19 +20,23 @@ def amplification(inputs: Inputs) -> dict[str, float]:
     held = [spring(node, 0.5 * k, zeta * math.sqrt(k * m)) for node in (1, 3)]
     speeds = np.linspace(0.3 * omega, 2.0 * omega, 20001)
     amplitude = np.abs(unbalance_response(rotor, speeds, {2: m * inputs["eccentricity"]}, held)[:, 1, 0])
-    (peak,) = response_peaks(speeds, amplitude)
+    top = int(np.argmax(amplitude))
+    level = amplitude[top] / math.sqrt(2.0)
+    low = float(np.interp(level, amplitude[: top + 1], speeds[: top + 1]))
+    high = float(np.interp(-level, -amplitude[top:], speeds[top:]))
+    peak, factor = float(speeds[top]), float(speeds[top]) / (high - low)
     found = {
-        "speed of the peak": peak.speed / rpm(1.0),
-        "amplitude of the peak": peak.amplitude,
-        "amplification factor": peak.factor,
+        "speed of the peak": peak / rpm(1.0),
+        "amplitude of the peak": float(amplitude[top]),
+        "amplification factor": factor,
     }
-    for name, (low, high) in inputs["operating_rpm"].items():
-        one = Separation.of(peak.speed, peak.factor, rpm(low), rpm(high))
+    for name, (lowest, highest) in inputs["operating_rpm"].items():
+        one = Separation.of(peak, factor, rpm(lowest), rpm(highest))
         found |= {f"{name}: margin": one.margin, f"{name}: required margin": one.required}
     return found
 
 
-def fixed_point(inputs: Inputs) -> dict[str, float]:
+def fixed_point(inputs):
     """A mass on a shaft in series with springs and dampers: where damping does not matter."""
     m, shaft, bearing = inputs["m"], inputs["shaft_stiffness"], inputs["bearing_stiffness"]
     rotor = rigid_rotor(0.5, 0.5, m, 0.0, 1e-3)
@@ -57,7 +54,7 @@ def fixed_point(inputs: Inputs) -> dict[str, float]:
     return found
 
 
-def couple_unbalance(inputs: Inputs) -> dict[str, float]:
+def couple_unbalance(inputs):
     """A rigid rotor with opposite unbalances at its ends: only the conical motion answers."""
     a, k, c, amount = inputs["a"], inputs["k"], inputs["c"], inputs["unbalance"]
     rotor = rigid_rotor(a, a, inputs["m"], inputs["Ip"], inputs["Id"])
@@ -70,7 +67,7 @@ def couple_unbalance(inputs: Inputs) -> dict[str, float]:
     return found
 
 
-def unlike_supports(inputs: Inputs) -> dict[str, float]:
+def unlike_supports(inputs):
     """A mass on supports that differ in x and y: between its critical speeds it whirls against its spin."""
     m, k_x, k_y, zeta = inputs["m"], inputs["k_x"], inputs["k_y"], inputs["damping_ratio"]
     rotor = rigid_rotor(0.5, 0.5, m, 0.0, 1e-3)
@@ -88,7 +85,13 @@ def unlike_supports(inputs: Inputs) -> dict[str, float]:
     return found
 
 
-def response_of(inputs: Inputs, node: int, speed: float) -> np.ndarray:
+def orbit_axis(displacement):
+    """Half the major axis of orbits (x, y), last axis 2: a forward and a backward circle make the ellipse."""
+    x, y = displacement[..., 0], displacement[..., 1]
+    return np.asarray(0.5 * np.abs(x + 1j * y) + 0.5 * np.abs(np.conj(x) + 1j * np.conj(y)))
+
+
+def response_of(inputs, node, speed):
     """Displacement (x, y) of a node of a disc rotor under the unbalances of the case."""
     fe, held = disc_rotor(inputs)
     unbalances = {int(n): complex(u) for n, u in inputs["unbalances"].items()}
@@ -96,7 +99,7 @@ def response_of(inputs: Inputs, node: int, speed: float) -> np.ndarray:
     return np.asarray(moved[0, node - 1])
 
 
-def two_discs(inputs: Inputs) -> dict[str, float]:
+def two_discs(inputs):
     found = {}
     for speed in inputs["speeds"]:
         x, y = np.abs(response_of(inputs, 1, speed))
@@ -104,7 +107,7 @@ def two_discs(inputs: Inputs) -> dict[str, float]:
     return found
 
 
-def probe(inputs: Inputs) -> dict[str, float]:
+def probe(inputs):
     found = {}
     for speed in inputs["speeds"]:
         moved = response_of(inputs, 1, speed)
@@ -116,12 +119,12 @@ def probe(inputs: Inputs) -> dict[str, float]:
     return found
 
 
-def deflected_shape(inputs: Inputs) -> dict[str, float]:
+def deflected_shape(inputs):
     (speed,) = inputs["speeds"]
     return {f"major axis at node {n}": float(orbit_axis(response_of(inputs, n, speed))) for n in (1, 2)}
 
 
-CASES: dict[str, Compute] = {
+CASES = {
     "U01": amplification,
     "U02": fixed_point,
     "U03": couple_unbalance,
@@ -131,20 +134,4 @@ CASES: dict[str, Compute] = {
     "U07": deflected_shape,
 }
 
-
-test_case, test_a_changed_input_is_noticed = checks_of(
-    CASES,
-    [
-        ("U01", {"damping_ratio": 0.0505}),
-        ("U01", {"k": 4.03e6}),
-        ("U02", {"bearing_stiffness": 6.1e6}),
-        ("U02", {"journal_mass": 1.0}),
-        ("U03", {"Ip": 0.55}),
-        ("U03", {"c": 210.0}),
-        ("U04", {"k_y": 6.1e6}),
-        ("U04", {"damping_ratio": 0.031}),
-        ("U05", {"stiffness": [1.001e6, 0.8e6]}),
-        ("U06", {"d": 0.0501}),
-        ("U07", {"stiffness": [1.01e6, 2e6]}),
-    ],
-)
+test_case, test_a_changed_input_is_noticed = checks_of(CASES)

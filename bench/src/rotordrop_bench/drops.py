@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import cycle
+from itertools import count, cycle
+from typing import Any
 
-from rotordrop_bench.departures import DEPARTURES, LARGE, LATER_DEPARTURES, LATEST_DEPARTURES, SLIGHT
+from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT
 from rotordrop_bench.rotors import ROTORS
 
-VERSION = "3"
+VERSION = "2026"
 """Changes whenever a drop of the list does; scores of different versions are not comparable."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchDrop:
-    """One drop of the bench."""
+    """One drop of the bench; its name says nothing of what is hidden."""
 
     name: str
-    """Name, which says nothing of what is hidden."""
     family: str
     """What is scored together."""
     rotor: str
@@ -64,92 +65,60 @@ TRIPLES: tuple[tuple[str, ...], ...] = (
     ("foundation mode", "turned support axes", "sensor lag"),
 )
 RATES = (10e3, 50e3, 100e3)
+SIZES = ((SLIGHT, "slight"), (LARGE, "large"))
+FIRST = 21
+"""Kinds of departures in the first family of them; the others but the last are in the second."""
 
 
-FIRST_LATER = 101
-"""Number of the first drop that came with version 2."""
-FIRST_LATEST = 201
-"""Number of the first drop that came with version 3."""
+class _List:
+    """Numbers the drops of a list, and gives each a rotor and a speed in turn."""
 
+    def __init__(self, first: int) -> None:
+        self.numbers, self.rotors = count(first), cycle(ROTORS)
+        self.speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
 
-def _listed() -> tuple[BenchDrop, ...]:
-    found: list[BenchDrop] = []
-    speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
-    rotors = cycle(ROTORS)
-
-    def add(family: str, rotor: str, machine_seed: int, **more: object) -> None:
-        number = len(found) + 1
-        found.append(
-            BenchDrop(
-                name=f"drop_{number:03d}",
-                family=family,
-                rotor=rotor,
-                speed=next(speeds[rotor]),
-                machine_seed=machine_seed,
-                drop_seed=9000 + number,
-                **more,  # type: ignore[arg-type]
-            )
+    def drop(
+        self, family: str, seed: int, *kinds: tuple[str, int], rotor: str = "", **more: Any
+    ) -> BenchDrop:
+        number, rotor = next(self.numbers), rotor or next(self.rotors)
+        return BenchDrop(
+            name=f"drop_{number:03d}",
+            family=family,
+            rotor=rotor,
+            speed=more.pop("speed", 0.0) or next(self.speeds[rotor]),
+            machine_seed=seed,
+            drop_seed=9000 + number,
+            departures=kinds,
+            **more,
         )
 
+    def single(self, family: str, seed: int, kinds: list[str], size: int) -> Iterator[BenchDrop]:
+        """Drops with one departure each."""
+        for i, kind in enumerate(kinds):
+            yield self.drop(family, seed + 100 * size + i, (kind, size))
+
+
+def _listed() -> Iterator[BenchDrop]:
+    kinds, drops = list(DEPARTURES), _List(1)
     for i, rotor in enumerate(ROTORS):
-        add("right", rotor, 700 + i)
-        add("right, without tail", rotor, 700 + i, tail=False)
-    for size, word in ((SLIGHT, "slight"), (LARGE, "large")):
-        for i, kind in enumerate((*DEPARTURES, "unbalance jump")):
-            add(f"one departure, {word}", next(rotors), 800 + 100 * size + i, departures=((kind, size),))
-        next(rotors)  # else each kind would meet one rotor in both sizes
-    for i, kinds in enumerate(PAIRS):
-        add("two departures", next(rotors), 1000 + i, departures=tuple((kind, SLIGHT) for kind in kinds))
-    for i, kinds in enumerate(TRIPLES):
-        add("three departures", next(rotors), 1100 + i, departures=tuple((kind, SLIGHT) for kind in kinds))
+        yield drops.drop("right", 700 + i, rotor=rotor)
+        yield drops.drop("right, without tail", 700 + i, rotor=rotor, tail=False)
+    for size, word in SIZES:
+        yield from drops.single(f"one departure, {word}", 800, kinds[:FIRST], size)
+        next(drops.rotors)  # else each kind would meet one rotor in both sizes
+    for seed, family, groups in ((1000, "two departures", PAIRS), (1100, "three departures", TRIPLES)):
+        for i, group in enumerate(groups):
+            yield drops.drop(family, seed + i, *((kind, SLIGHT) for kind in group))
     for i, rate in enumerate(RATES):
-        add("other sampling rates", next(rotors), 1200 + i, sampling_rate=rate)
-    return tuple(found)
+        yield drops.drop("other sampling rates", 1200 + i, sampling_rate=rate)
+    drops = _List(101)
+    for size, word in SIZES:
+        yield from drops.single(f"later kinds, {word}", 1300, kinds[FIRST:-1], size)
+    drops = _List(201)
+    for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(SIZES), strict=False)):
+        family = f"{kinds[-1]}, {word}"
+        yield drops.drop(family, 1500 + i, (kinds[-1], size), rotor=rotor, speed=SPEEDS[rotor][1])
 
 
-def _later() -> tuple[BenchDrop, ...]:
-    found: list[BenchDrop] = []
-    rotors, speeds = cycle(ROTORS), {rotor: cycle(values) for rotor, values in SPEEDS.items()}
-    for size, word in ((SLIGHT, "slight"), (LARGE, "large")):
-        for i, kind in enumerate(LATER_DEPARTURES):
-            number, rotor = FIRST_LATER + len(found), next(rotors)
-            found.append(
-                BenchDrop(
-                    name=f"drop_{number:03d}",
-                    family=f"later kinds, {word}",
-                    rotor=rotor,
-                    speed=next(speeds[rotor]),
-                    machine_seed=1300 + 100 * size + i,
-                    drop_seed=9000 + number,
-                    departures=((kind, size),),
-                )
-            )
-    return tuple(found)
-
-
-def _latest() -> tuple[BenchDrop, ...]:
-    """Every rotor once, slight and large in turn, at the second of its speeds."""
-    (kind,) = LATEST_DEPARTURES
-    found = []
-    for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(((SLIGHT, "slight"), (LARGE, "large"))))):
-        number = FIRST_LATEST + i
-        found.append(
-            BenchDrop(
-                name=f"drop_{number:03d}",
-                family=f"seat play, {word}",
-                rotor=rotor,
-                speed=SPEEDS[rotor][1],
-                machine_seed=1500 + i,
-                drop_seed=9000 + number,
-                departures=((kind, size),),
-            )
-        )
-    return tuple(found)
-
-
-LISTS: dict[str, tuple[BenchDrop, ...]] = {"1": _listed(), "2": _later(), VERSION: _latest()}
-"""What came with each version; the drops of an earlier one stay as they are, bit for bit."""
-DROPS: tuple[BenchDrop, ...] = tuple(drop for drops in LISTS.values() for drop in drops)
+DROPS: tuple[BenchDrop, ...] = tuple(_listed())
 """All drops of the bench, in order."""
-SINCE: dict[str, str] = {drop.name: version for version, drops in LISTS.items() for drop in drops}
-"""Version with which a drop came, by its name; its truth file has it."""

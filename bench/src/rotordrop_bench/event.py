@@ -69,21 +69,9 @@ def hidden_machine(
     """Draw a machine whose owner knows it as described.
 
     Supports differ by -40 to +45 %; air gap, contact, friction, preload, race, damping, drag, first ball and
-    unbalance differ as first guesses do. Values keep to the range the description states.
-
-    Parameters
-    ----------
-    machine : Machine
-        What the owner knows.
-    seed : int
-        Seed of the draw; the same seed gives the same machine.
-    violations : str or Violations
-        What the estimator's model cannot represent, by name from `VIOLATIONS`, by the path of a case file
-        (.toml), or in full.
-    drawn : bool
-        False takes the description itself for the truth.
-    reduction : Reduction
-        Basis of the true rotor.
+    unbalance differ as first guesses do. Values keep to the range the description states; the same seed gives
+    the same machine, and without ``drawn`` the description is the truth. Violations come by name from
+    `VIOLATIONS`, by the path of a case file (.toml), or in full.
     """
     broken = named_violations(violations)
     broken.check_names(machine)
@@ -99,18 +87,18 @@ def hidden_machine(
     if len(rows):
         # a departing support does not have the structures that a machine file may state
         for bearing in true.touchdown_bearings:
+            lost = "and the drop has violations too, which would take its place; leave"
             if bearing.mount.present:
                 raise UsageError(
-                    f"the machine file states {bearing.name}.mount and the drop has violations too, which "
-                    "would take its place; leave the mount or the violations out"
+                    f"the machine file states {bearing.name}.mount {lost} the mount or the violations out"
                 )
             for row in structure_rows_of("bearing"):
                 own = row.stated(bearing)
                 if own is not None and float(own) != 0.0:
                     raise UsageError(
-                        f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} and the drop "
-                        "has violations too, which would take its place; leave it out of the machine file "
-                        "and give it as a violation (support.axes_angle, support.hardening or foundation)"
+                        f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} {lost} it out "
+                        "of the machine file and give it as a violation (support.axes_angle, "
+                        "support.hardening or foundation)"
                     )
     return HiddenMachine(
         machine=true,

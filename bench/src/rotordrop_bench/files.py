@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from rotordrop.files import atomic_path, make_folder, write_json
-from rotordrop.record.record import Record, sha256_of
-from rotordrop.record.recording import recording_of
-from rotordrop.record.writers import write_delimited, write_hdf5
+from rotordrop.files import atomic_path, digest_of_file, make_folder, write_json, write_text
+from rotordrop.machine import Machine
+from rotordrop.machine.saving import save_machine
+from rotordrop.record.record import Record, as_recording, write_hdf5
+from rotordrop.record.recording import Recording
 from rotordrop_bench.recording import SyntheticDrop
 
 Format = Literal["csv", "h5"]
@@ -26,40 +28,24 @@ def write_synthetic(
     formats: Sequence[Format] = ("csv",),
     histories: bool = True,
 ) -> tuple[Path, ...]:
-    """Write the files of a synthetic drop.
+    """Write the files of a synthetic drop into a folder, and give them, the recording first.
 
-    Parameters
-    ----------
-    drop : SyntheticDrop
-        What to write.
-    folder : path-like
-        Where to; it is made when it does not exist. The truth goes into its subfolder ``truth``.
-    name : str, optional
-        Stem of the files; the name of the drop by default.
-    formats : sequence of {"csv", "h5"}
-        Formats of the recording; the tail is always text.
-    histories : bool
-        Whether the true histories are written beside the truth.
-
-    Returns
-    -------
-    tuple of Path
-        The files, the recording first.
+    The truth goes into a subfolder of its own, with the true histories where they are wanted; the tail is
+    always text. The stem of the files is the name of the drop by default.
     """
     folder, stem = Path(folder), name or str(drop.truth["name"])
     make_folder(folder / TRUTH_FOLDER)
-    paths = []
-    for kind in formats:
-        paths.append(folder / f"{stem}.{kind}")
-        write_record(drop.record, paths[-1])
+    paths = [folder / f"{stem}.{kind}" for kind in formats]
+    for path in paths:
+        write_record(drop.record, path)
+    hashes = {path.name: digest_of_file(path) for path in paths}
     if drop.tail is not None:
         paths.append(folder / f"{stem}_tail.csv")
         write_record(drop.tail, paths[-1])
-    hashes = {f"{stem}.{kind}": sha256_of(folder / f"{stem}.{kind}") for kind in formats}
     paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
     write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes}, sealed=True)
     if histories:
-        paths.append(folder / TRUTH_FOLDER / f"{stem}.npz")
+        paths.append(paths[-1].with_suffix(".npz"))
         # forces and stresses in single precision, displacements in double, as in the supplied files
         precise = ("t0", "fs", "first_250ms_t0", "bearing_displacement", "sensor_plane_displacement")
         stored = {k: v if k in precise else v.astype(np.float32) for k, v in drop.histories.items()}
@@ -68,17 +54,39 @@ def write_synthetic(
     return tuple(paths)
 
 
+def write_drop(drop: SyntheticDrop, known: Machine, place: Path, truth: Path, **more: Any) -> None:
+    """Write ``machine.toml``, ``record.csv`` and ``tail.csv`` of a drop into a folder, then its truth.
+
+    A drop whose truth is there is complete.
+    """
+    make_folder(place)
+    make_folder(truth.parent)
+    save_machine(known, place / "machine.toml")
+    write_record(drop.record, place / "record.csv")
+    if drop.tail is not None:
+        write_record(drop.tail, place / "tail.csv")
+    sums = {"record.csv": digest_of_file(place / "record.csv")}
+    write_json(truth, {**drop.truth, **more, "record_sha256": sums}, sealed=True)
+
+
 def write_record(record: Record, path: Path) -> None:
     """Write a record, as HDF5 where the file ends so, else as text."""
-    recording = recording_of(
-        record.time,
-        record.signals,
-        record.channel_names,
-        speed_time=record.speed_time,
-        speed=record.speed_readings,
-        metadata=record.metadata,
-    )
-    if path.suffix == ".h5":
-        write_hdf5(recording, path)
-    else:
-        write_delimited(recording, path)
+    recording = as_recording(replace(record, marks=None, notes=(), warnings=()))
+    (write_hdf5 if path.suffix == ".h5" else write_delimited)(recording, path)
+
+
+def write_delimited(recording: Recording, path: Path) -> None:
+    """Write a recording as text, displacements in micrometres; a speed that is read less often is held."""
+    clock = recording.channels[0].time
+    step = float(np.median(np.diff(clock)))
+    # two digits beyond the step, so that the even clock is found again on reading
+    names, columns, formats = ["Time [s]"], [clock], [f"%.{max(int(np.ceil(-np.log10(step))) + 2, 3)}f"]
+    for channel in recording.channels:
+        length = channel.unit == "m"
+        held = np.clip(np.searchsorted(channel.time, clock, side="right") - 1, 0, len(channel.time) - 1)
+        names.append(f"{channel.name} [{'um' if length else channel.unit}]")
+        columns.append(channel.values[held] * (1e6 if length else 1.0))
+        formats.append("%.3f" if length else "%.4f")
+    lines = [";".join(formats) % tuple(row) for row in np.column_stack(columns)]
+    header = [f"# {key}: {value}" for key, value in recording.metadata.items()]
+    write_text(path, "\n".join([*header, ";".join(names), *lines]) + "\n")

@@ -15,7 +15,6 @@ from rotordrop.simulate.case import DropCase, UnbalanceJump
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine, drop_conditions, stream
-from rotordrop_bench.motion import housing_motion, true_motion
 from rotordrop_bench.sensor_chain import (
     SensorChain,
     SensorErrors,
@@ -28,7 +27,8 @@ from rotordrop_bench.sensor_chain import (
     true_rows,
 )
 from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
-from rotordrop_bench.true_values import true_histories, true_values
+from rotordrop_bench.true_values import housing_motion, true_histories, true_motion, true_values
+from rotordrop_bench.violations import SensorViolation
 
 TRUE_TOLERANCE = 1e-8
 """Tolerance of the true simulation, that of the reference [1]."""
@@ -67,43 +67,14 @@ def synthesize_drop(
 ) -> SyntheticDrop:
     """Simulate a drop of a hidden machine and record it.
 
-    Parameters
-    ----------
-    hidden : HiddenMachine
-        The true machine.
-    speed : float
-        Speed at power-off [rad/s].
-    seed : int
-        Seed of this drop: start, noise, trigger. The sensor errors belong to the machine.
-    sensor_chain : SensorChain, optional
-        Quality of the measuring chain.
-    duration, before : float
-        Length of the recording after and before the trigger [s].
-    tail : bool
-        Whether the settled tail is made too.
-    conditions : DropConditions, optional
-        Start of the drop, in place of a drawn one.
-    tolerance : float
-        Tolerance of the true simulation [1].
-    name : str
-        Name of the recording.
-
-    Returns
-    -------
-    SyntheticDrop
-        Recording, tail, truth and histories.
+    The speed is that at power-off [rad/s], ``duration`` and ``before`` the length of the recording after and
+    before the trigger [s], the tolerance that of the true simulation [1]. The seed is that of start, noise
+    and trigger; the sensor errors belong to the machine. Conditions take the place of a drawn start.
     """
-    chain = fitted_to(sensor_chain or SensorChain(), hidden.known)
-    corner = hidden.violations.sensors.anti_alias_frequency
-    chain = chain if corner is None else replace(chain, anti_alias_frequency=float(corner))
-    wrong = hidden.violations.sensors
-    if wrong.model_fields_set & {"flicker", "clock_error", "speed_delay"}:
-        chain = replace(
-            chain,
-            flicker=float(wrong.flicker),
-            clock_error=float(wrong.clock_error),
-            speed_delay=float(wrong.speed_delay),
-        )
+    chain, wrong = fitted_to(sensor_chain or SensorChain(), hidden.known), hidden.violations.sensors
+    own = wrong.model_fields_set - SensorViolation.model_fields.keys()
+    changed: dict[str, Any] = {key: float(getattr(wrong, key)) for key in own}
+    chain = replace(chain, **changed)
     conditions = conditions or drop_conditions(hidden, speed, seed)
     case = DropCase(
         speed=conditions.speed,
@@ -139,11 +110,12 @@ def true_drop(hidden: HiddenMachine, case: DropCase) -> DropResult:
     if jump is not None:
         if jump.time is None:
             plain = simulate_drop(hidden.model, case)
-            touching = plain.time[np.any(plain.indentation > 0.0, axis=1)]
-            time = float(touching[0]) if len(touching) else np.inf
+            time = float(next(iter(plain.time[np.any(plain.indentation > 0.0, axis=1)]), np.inf))
         else:
             time = float(jump.time)
-        comes = UnbalanceJump(node=jump.node, amount=float(jump.amount), phase=float(jump.phase), time=time)
+        comes = UnbalanceJump(
+            node=jump.node, amount=float(jump.amount), phase=float(jump.phase), time=float(time)
+        )
         case = replace(case, jump=comes)
     result = simulate_drop(hidden.model, case)
     if not result.finished:
@@ -159,17 +131,19 @@ def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
     sensors = hidden.machine.sensors
     errors = drawn_errors(chain, len(sensors), stream(hidden.seed, "sensors"))
     broken = [hidden.violations.of_sensor(sensor.name) for sensor in sensors]
+    keys = ("plane_shift", "cross_axis", "follows_housing", "time_constant", "curvature", "curvature_at")
+    wrong = {key: np.array([float(getattr(one, key)) for one in broken]) for key in keys}
     random = stream(hidden.seed, "cross axis")
     drawn = random.uniform(0.5, 1.0, len(sensors)) * random.choice([-1.0, 1.0], len(sensors))
     alone = [hidden.violations.sensor.get(sensor.name) for sensor in sensors]
     exact = [one is not None and "cross_axis" in one.model_fields_set for one in alone]
     return replace(
         errors,
-        plane_shift=errors.plane_shift + np.array([float(v.plane_shift) for v in broken]),
-        cross_axis=np.array([float(v.cross_axis) for v in broken]) * np.where(exact, 1.0, drawn),
-        follows_housing=np.array([float(v.follows_housing) for v in broken]),
-        time_constant=np.array([float(v.time_constant) for v in broken]),
-        curvature=np.array([float(v.curvature) / float(v.curvature_at) ** 2 for v in broken]),
+        plane_shift=errors.plane_shift + wrong["plane_shift"],
+        cross_axis=wrong["cross_axis"] * np.where(exact, 1.0, drawn),
+        follows_housing=wrong["follows_housing"],
+        time_constant=wrong["time_constant"],
+        curvature=wrong["curvature"] / wrong["curvature_at"] ** 2,
     )
 
 
@@ -184,14 +158,12 @@ def _record(
     duration: float,
     name: str,
 ) -> Record:
-    dense = oversampling(chain, errors)
-    rate = chain.sampling_rate
+    dense, rate = oversampling(chain, errors), chain.sampling_rate
     start, stop = -round(before * rate), round(duration * rate)
     time = np.arange(start * dense, stop * dense + 1) / (rate * dense)
     true_time = (1.0 + chain.clock_error) * (time - conditions.jitter)
     amplitudes, angle, speed = true_motion(hidden, result, conditions, true_time)
-    rows = true_rows(hidden.machine, hidden.model.basis, errors)
-    along = amplitudes @ rows.T - _with_housing(hidden, errors, housing_motion(result, true_time))
+    along = _along(hidden, errors, amplitudes, housing_motion(result, true_time))
     signals = readings(along, time, angle, chain, errors, stream(seed, "noise"))
     time, speed = time[::dense], speed[::dense]
     if chain.speed_delay > 0.0:
@@ -209,12 +181,13 @@ def _record(
     )
 
 
-def _with_housing(hidden: HiddenMachine, errors: SensorErrors, supports: Array) -> Array:
-    """Motion of the sensors along their own directions [m], shape (N, S), from that of the supports."""
+def _along(hidden: HiddenMachine, errors: SensorErrors, amplitudes: Array, supports: Array) -> Array:
+    """Displacement along the sensors [m], shape (N, S), less that of a bracket with the support (N, B, 2)."""
+    rows = true_rows(hidden.machine, hidden.model.basis, errors)
     names = [bearing.name for bearing in hidden.machine.touchdown_bearings]
     at = [names.index(sensor.bearing) for sensor in hidden.machine.sensors]
-    along = np.einsum("nsa,sa->ns", supports[:, at], directions(hidden.machine, errors))
-    return np.asarray(errors.follows_housing * along)
+    moved = np.einsum("nsa,sa->ns", supports[:, at], directions(hidden.machine, errors))
+    return np.asarray(amplitudes @ rows.T - errors.follows_housing * moved)
 
 
 def _tail(
@@ -230,10 +203,8 @@ def _tail(
     slow = replace(chain, sampling_rate=TAIL_RATE, anti_alias_frequency=None)
     time = np.arange(round(TAIL_DURATION * TAIL_RATE)) / TAIL_RATE
     amplitudes = swinging_amplitudes(hidden.model, rest, swing, (1.0 + chain.clock_error) * time)
-    rows = true_rows(hidden.machine, hidden.model.basis, errors)
     angle = np.full(len(time), random.uniform(0.0, 2.0 * np.pi))
-    supports = rest[hidden.model.layout.support].reshape(-1, 2)
-    along = amplitudes @ rows.T - _with_housing(hidden, errors, supports[None])
+    along = _along(hidden, errors, amplitudes, rest[hidden.model.layout.support].reshape(1, -1, 2))
     # a swing of some hertz is no matter for a lag that a drop survives
     prompt = replace(errors, time_constant=np.zeros(len(errors.gain)))
     signals = readings(along, TAIL_START + time, angle, slow, prompt, random)

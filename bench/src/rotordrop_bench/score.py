@@ -24,7 +24,6 @@ SAME_IMPACT = 5e-4
 """An estimated impact belongs to a true one when it peaks within it, widened by this [s]; chosen, not
 measured."""
 
-
 Score = dict[str, Any]
 """How far one value is from the truth: ``estimate``, ``truth``, ``error`` [SI], and where they are known
 ``relative_error``, ``covered`` (whether the 90 % interval holds the truth), ``half_width`` over the truth."""
@@ -33,32 +32,15 @@ Score = dict[str, Any]
 def score_estimate(
     estimate: Estimate | str | Path, truth: Truth | Mapping[str, Any] | str | Path, *, drop: str | None = None
 ) -> dict[str, Any]:
-    """Compare an estimate with the truth of its recording.
+    """Compare the result of ``rotordrop estimate --json`` with the truth of its recording.
 
-    Parameters
-    ----------
-    estimate : mapping or path
-        Result of ``rotordrop estimate --json``, of one recording or of several.
-    truth : Truth, mapping or path
-        Truth file of a recording, ours or a supplied one.
-    drop : str, optional
-        Which recording of an estimate of several, or the name the recording was given since; the name of the
-        truth when left out.
-
-    Returns
-    -------
-    dict
-        ``method`` and ``consistent`` (what the estimate says of itself); ``named``, what it says the machine
-        has beyond the base model, and ``violated``, what it has; ``drop``,
-        ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
-        ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
-        bearing where the estimate lists impacts; ``coverage`` over all intervals.
-
-    Raises
-    ------
-    UsageError
-        If the estimate is none, or is one of another recording: by the hash of the file where the truth has
-        it, else by its name.
+    ``drop`` is the recording meant of an estimate of several, or the name it was given since; an estimate of
+    another recording is refused, by the hash of the file where the truth has it, else by its name. The
+    scores are ``method`` and ``consistent`` (what the estimate says of itself); ``named``, what it says the
+    machine has beyond the base model, and ``violated``, what it has; ``drop``,
+    ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
+    ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
+    bearing where the estimate lists impacts; ``coverage`` over all intervals.
     """
     if not isinstance(truth, Truth):
         truth = truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
@@ -66,20 +48,12 @@ def score_estimate(
         estimate = read_json(Path(estimate), "rotordrop estimate --json")
     found = _one_drop(estimate, truth, drop)
     _refuse_another_recording(found, truth, drop)
-    named = {name: found.get("bearings", {}).get(name, {}) for name in truth.bearing_names}
-    bearings = {name: _scores(fields, truth.of_bearing(name)) for name, fields in named.items()}
-    instant = found.get("drop_instant_s")
-    if not isinstance(instant, Mapping):
-        instant = {"value": instant, "interval_90": found.get("drop_instant_interval_90_s")}
+    told = {name: found.get("bearings", {}).get(name, {}) for name in truth.bearing_names}
+    bearings = {name: _scores(fields, truth.of_bearing(name)) for name, fields in told.items()}
+    instant = {"value": found.get("drop_instant_s"), "interval_90": found.get("drop_instant_interval_90_s")}
     of_drop = {"drop_instant_s": "t_off_in_record_s", "speed_Hz": "n0_hz"}
-    whole = _scores(
-        {"drop_instant_s": instant, "speed_Hz": found.get("speed_Hz")},
-        {
-            name: float(truth.values[key])
-            for name, key in of_drop.items()
-            if truth.values.get(key) is not None
-        },
-    )
+    true = {name: float(v) for name, key in of_drop.items() if (v := truth.values.get(key)) is not None}
+    whole = _scores({"drop_instant_s": instant, "speed_Hz": found.get("speed_Hz")}, true)
     listed = {str(entry.get("path")): entry.get("estimate") for entry in _listed(found, "parameters")}
     structure = _scores(listed, truth.structure)
     every = [score for scores in (whole, *bearings.values(), structure) for score in scores.values()]
@@ -89,18 +63,15 @@ def score_estimate(
             f"{', '.join(sorted(found)) or 'nothing'}; expected the JSON of 'rotordrop estimate'"
         )
     judged = [score["covered"] for score in every if "covered" in score]
-    impacts = {name: _impact_scores(fields, truth, name) for name, fields in named.items()}
+    impacts = {name: _impact_scores(fields, truth, name) for name, fields in told.items()}
+    named = [one for one in _listed(found, "structure") if "name" in one and one.get("probability") is None]
     return {
         "name": truth.name,
         "method": found.get("method"),
         "consistent": found.get("consistent", _at(found, "consistency.consistent")),
         "drop": whole,
         "bearings": bearings,
-        "named": [
-            entry["name"]
-            for entry in _listed(found, "structure")
-            if "name" in entry and entry.get("probability") is None
-        ],
+        "named": [entry["name"] for entry in named],
         "violated": list(truth.violated),
         "structure": structure,
         "impacts": {name: score for name, score in impacts.items() if score},
@@ -132,14 +103,14 @@ def _one_drop(estimate: Estimate, truth: Truth, drop: str | None) -> Estimate:
 def _refuse_another_recording(estimate: Estimate, truth: Truth, drop: str | None) -> None:
     """Refuse an estimate of another recording: its numbers compare with nothing."""
     hashes, own = truth.values.get("record_sha256"), estimate.get("record_sha256")
-    if hashes and own:
-        if own not in hashes.values():
-            raise UsageError(
-                f"the estimate is of a recording with SHA-256 {str(own)[:12]}…, and the truth {truth.name!r} "
-                f"belongs to {', '.join(f'{file} ({sha[:12]}…)' for file, sha in hashes.items())}; give the "
-                "truth of that recording"
-            )
+    if hashes and own in hashes.values():
         return
+    if hashes and own:
+        belongs = ", ".join(f"{file} ({sha[:12]}…)" for file, sha in hashes.items())
+        raise UsageError(
+            f"the estimate is of a recording with SHA-256 {str(own)[:12]}…, and the truth {truth.name!r} "
+            f"belongs to {belongs}; give the truth of that recording"
+        )
     record = estimate.get("record")
     names = {estimate.get("name"), Path(record).stem if isinstance(record, str) else None} - {None}
     if names and (drop or truth.name) not in names:
@@ -200,9 +171,9 @@ def _impact_scores(fields: Mapping[str, Any], truth: Truth, bearing: str) -> dic
         return {}
     true, least = truth.impacts(bearing), LARGE_IMPACT * truth.bearing_load
     true = true[true[:, 2] > least]
-    matches = [_matching(listed, row) for row in true]
-    errors = [(m[0] - row[2]) / row[2] for m, row in zip(matches, true, strict=True) if m is not None]
-    covered = [m[1] <= row[2] <= m[2] for m, row in zip(matches, true, strict=True) if m is not None and m[3]]
+    found = [(m, row[2]) for row in true if (m := _matching(listed, row)) is not None]
+    errors = [(peak - force) / force for (peak, _), force in found]
+    covered = [ends[0] <= force <= ends[1] for (_, ends), force in found if ends is not None]
     return {
         "true_impacts": len(true),
         "above_N": least,
@@ -213,24 +184,14 @@ def _impact_scores(fields: Mapping[str, Any], truth: Truth, bearing: str) -> dic
     }
 
 
-def _matching(listed: list[Any], row: Array) -> tuple[float, float, float, bool] | None:
-    best = None
+def _matching(listed: list[Any], row: Array) -> tuple[float, tuple[float, float] | None] | None:
+    """Peak and its interval [N] of the largest listed impact within a true one; None where there is none."""
+    peaks = []
     for impact in listed:
-        time, peak = _number(impact, "time_s", "peak_time_s"), _number(impact, "peak_force_N", "peak_N")
-        if time is None or peak is None or not row[0] - SAME_IMPACT <= time <= row[1] + SAME_IMPACT:
+        when, peak = _at(impact, "peak_time_s"), _at(impact, "peak_force_N.value")
+        if not all(isinstance(one, int | float) for one in (when, peak)):
             continue
-        entry = impact.get("peak_force_N", impact.get("peak_N"))
-        interval = entry.get("interval_90") if isinstance(entry, Mapping) else None
-        low, high = _ends(interval) if interval is not None else (math.nan, math.nan)
-        if best is None or peak > best[0]:
-            best = (peak, low, high, interval is not None)
-    return best
-
-
-def _number(entry: Any, *names: str) -> float | None:
-    for name in names:
-        value = entry.get(name) if isinstance(entry, Mapping) else None
-        value = value.get("value") if isinstance(value, Mapping) else value
-        if isinstance(value, int | float):
-            return float(value)
-    return None
+        if row[0] - SAME_IMPACT <= when <= row[1] + SAME_IMPACT:
+            interval = _at(impact, "peak_force_N.interval_90")
+            peaks.append((float(peak), None if interval is None else _ends(interval)))
+    return max(peaks, key=lambda peak: peak[0], default=None)

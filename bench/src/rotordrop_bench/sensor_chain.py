@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ class SensorChain:
     """Largest deviation of a gain from 1 [1]."""
     offset: float = 10e-6
     """Largest offset of a sensor [m]."""
+    normal: bool = False
+    """Whether these two are standard deviations of normal errors instead, as in an estimator's prior."""
     noise: float = 0.45e-6
     """Noise [m rms]."""
     hum: float = 0.1e-6
@@ -76,17 +79,9 @@ class SensorChain:
             raise UsageError(f"{self.bits} bits are no converter; expected 0 (none) to 32")
 
 
-PERFECT = SensorChain(
-    gain_error=0.0,
-    offset=0.0,
-    noise=0.0,
-    hum=0.0,
-    runout_1x=0.0,
-    runout_2x=0.0,
-    bits=0,
-    speed_noise=0.0,
-    speed_resolution=0.0,
-)
+_SIZES = ("gain_error", "offset", "noise", "hum", "runout_1x", "runout_2x", "speed_noise", "speed_resolution")
+_NONE: dict[str, Any] = dict.fromkeys(_SIZES, 0.0)
+PERFECT = SensorChain(bits=0, **_NONE)
 """Sensors without any error."""
 
 
@@ -125,11 +120,13 @@ class SensorErrors:
 
 def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) -> SensorErrors:
     """Draw the errors of a machine's sensors within the limits of the chain."""
-    gain = 1.0 + chain.gain_error * random.uniform(-1.0, 1.0, sensors)
-    offset = chain.offset * random.uniform(-1.0, 1.0, sensors)
+    drawn = random.standard_normal if chain.normal else lambda count: random.uniform(-1.0, 1.0, count)
+    gain = 1.0 + chain.gain_error * drawn(sensors)
+    offset = chain.offset * drawn(sensors)
     angle = chain.angle_error * random.uniform(-1.0, 1.0, sensors)
     size = random.uniform(0.3, 1.0, (2, sensors))
     turn = np.exp(2j * np.pi * random.uniform(0.0, 1.0, (2, sensors)))
+    nothing = ("cross_axis", "follows_housing", "time_constant", "curvature")
     return SensorErrors(
         gain=gain,
         offset=offset,
@@ -137,10 +134,7 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
         runout_1x=chain.runout_1x * size[0] * turn[0],
         runout_2x=chain.runout_2x * size[1] * turn[1],
         plane_shift=np.full(sensors, chain.plane_shift),
-        cross_axis=np.zeros(sensors),
-        follows_housing=np.zeros(sensors),
-        time_constant=np.zeros(sensors),
-        curvature=np.zeros(sensors),
+        **{name: np.zeros(sensors) for name in nothing},
     )
 
 

@@ -82,6 +82,12 @@ def without_magnets(model: DropModel) -> KernelParameters:
     return model.parameters._replace(flags=flags)
 
 
+def _rigid(model: DropModel, ways: Array) -> Array:
+    """Modal amplitudes of a rotor that moves rigidly by ways (B, k) [m] at its bearings, shape (m, k)."""
+    nodes = np.array([bearing.node for bearing in model.machine.touchdown_bearings])
+    return rigid_amplitudes(model, np.asarray(model.fe.node_positions)[nodes - 1], ways)
+
+
 def load_potential(model: DropModel, coordinates: Array) -> float:
     """Work [J] that the loads have done on the way to a place of rest."""
     p, layout = model.parameters, model.layout
@@ -100,11 +106,10 @@ def lowest_energy(
     force_and_stiffness: Callable[[Array], tuple[Array, Array]],
     name: str,
 ) -> Array:
-    """Coordinates of lowest energy near a start, by Newton steps damped until the energy falls.
+    """Coordinates (n,) of lowest energy [J] near a start, by Newton steps damped until the energy falls.
 
-    Start and the mass behind each coordinate have shape (n,), the largest generalised weight sets the scale
-    of the damping; energies are in [J], the force left over has shape (n,), the tangent stiffness (n, n); the
-    name of the machine is for the message when none is found.
+    The largest generalised weight sets the scale of the damping by the mass (n,) behind each coordinate; the
+    force left over has shape (n,), the tangent stiffness (n, n).
     """
     # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
     # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
@@ -229,9 +234,7 @@ def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
             down[b] = max(brentq(lacking, 0.0, reach) - ways[b], 0.0)
     found = coordinates.copy()
     found[layout.race][1::2] -= down
-    nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
-    positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
-    found[layout.modal_y] += rigid_amplitudes(model, positions, -down[:, None])[:, 0]
+    found[layout.modal_y] += _rigid(model, -down[:, None])[:, 0]
     return found
 
 
@@ -254,9 +257,7 @@ def _guess(model: DropModel) -> Array:
     p = model.parameters.bearing
     play = np.array([numbers_of(bearing).play for bearing in model.machine.touchdown_bearings])
     down = p[:, L.AIR_GAP] + sag_of_model(model).indentation + play
-    nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
-    positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
-    return rigid_amplitudes(model, positions, -down[:, None])[:, 0]
+    return _rigid(model, -down[:, None])[:, 0]
 
 
 def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time: Array) -> Array:
@@ -271,9 +272,7 @@ def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time
     decay = np.exp(-time / swing.decay_time)[:, None]
     turn = 2.0 * np.pi * np.array([small_frequency(d, float(model.machine.gravity)) for d in depth])
     angle = swing.amplitude * decay * np.cos(turn * time[:, None] + swing.phase)
-    nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
-    positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
-    per_end = rigid_amplitudes(model, positions, np.eye(len(nodes)))
+    per_end = _rigid(model, np.eye(len(shape)))
     x = coordinates[layout.modal_x] + (depth * (np.sin(aside + angle) - np.sin(aside))) @ per_end.T
     y = rest + (depth * (np.cos(aside) - np.cos(aside + angle))) @ per_end.T
     return np.hstack([x, y])

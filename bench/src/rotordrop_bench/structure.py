@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ def violated(machine: Machine, violations: Violations) -> Machine:
 
 
 def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float) -> Mapping[str, float]:
-    contact, support, friction = bearing.contact, bearing.support, bearing.friction
+    contact = bearing.contact
     stiffness = float(contact.stiffness) * float(v.contact.stiffness)
     values: dict[str, float] = {}
     if v.contact.exponent is not None:
@@ -73,28 +74,20 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
         exponent = float(v.contact.exponent)
         stiffness = stiffness_of_exponent(law, typical, exponent)
         values["contact.exponent"] = exponent
-    dynamic = float(friction.dynamic) if v.friction.dynamic is None else float(v.friction.dynamic)
+    rubs = 1.0 if v.friction.dynamic is None else float(v.friction.dynamic) / float(bearing.friction.dynamic)
     factors = {
-        "contact.damping": (float(contact.damping), float(v.contact.damping)),
-        "race.mass": (float(bearing.race.mass), float(v.race.mass)),
-        "race.inertia": (float(bearing.race.inertia), float(v.race.inertia) * float(v.race.mass)),
-        "friction.stribeck_speed": (float(friction.stribeck_speed), float(v.friction.stribeck_speed)),
-        "friction.dynamic": (float(friction.dynamic), dynamic / float(friction.dynamic)),
-        "friction.static": (
-            float(friction.static),
-            dynamic / float(friction.dynamic) * float(v.friction.static),
-        ),
-        "support.stiffness_horizontal": (
-            float(support.stiffness_horizontal),
-            float(v.support.stiffness_ratio),
-        ),
-        "support.damping": (float(support.damping), float(v.support.damping)),
-        "support.damping_horizontal": (
-            float(support.damping_horizontal),
-            float(v.support.damping) * float(v.support.damping_ratio),
-        ),
+        "contact.damping": float(v.contact.damping),
+        "race.mass": float(v.race.mass),
+        "race.inertia": float(v.race.inertia) * float(v.race.mass),
+        "friction.stribeck_speed": float(v.friction.stribeck_speed),
+        "friction.dynamic": rubs,
+        "friction.static": rubs * float(v.friction.static),
+        "support.stiffness_horizontal": float(v.support.stiffness_ratio),
+        "support.damping": float(v.support.damping),
+        "support.damping_horizontal": float(v.support.damping) * float(v.support.damping_ratio),
     }
-    values |= {path: value * factor for path, (value, factor) in factors.items() if factor != 1.0}
+    changed = {path: factor for path, factor in factors.items() if factor != 1.0}
+    values |= {path: float(attrgetter(path)(bearing)) * factor for path, factor in changed.items()}
     if stiffness != float(contact.stiffness):
         values["contact.stiffness"] = stiffness
     if v.balls.first_ball_angle is not None:
@@ -118,15 +111,23 @@ def departures_of(machine: Machine, violations: Violations) -> Array:
 
 def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float) -> Array:
     row = D.no_departure()
-    support, gap, foundation = v.support, v.gap, v.foundation
+    support, foundation = v.support, v.foundation
     angle = float(support.axes_angle)
     if angle != 0.0:
         row[[D.AXIS_COSINE, D.AXIS_SINE]] = math.cos(angle), math.sin(angle)
     deflection = float(support.hardening_force) / float(bearing.support.stiffness)
     row[D.HARDENING] = float(support.hardening) / deflection**2
     row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
-    if float(support.slip_force) > 0.0:
-        row[[D.SLIP_FORCE, D.SLIP_TRAVEL]] = float(support.slip_force), float(support.slip_travel)
+    pairs: tuple[tuple[list[int], Known | None, Known | None], ...] = (
+        ([D.SLIP_FORCE, D.SLIP_TRAVEL], support.slip_force, support.slip_travel),
+        ([D.RIBBON_STIFFNESS, D.RIBBON_SLIP], support.ribbon_stiffness, support.ribbon_slip),
+        ([D.GAP_DRIFT, D.GAP_DRIFT_TIME], v.gap.drift, v.gap.drift_time),
+        ([D.GAP_CLOSING, D.GAP_HEAT], v.gap.closing, v.gap.heat),
+        ([D.WEAR, D.WEAR_HEAT], v.friction.wear, v.friction.wear_heat),
+    )
+    for columns, given, reach in pairs:
+        if given is not None and reach is not None and float(given) != 0.0:
+            row[columns] = float(given), float(reach)
     _further(row, bearing, v, load, nominal)
     if foundation.mass is not None and foundation.frequency is not None:
         across = foundation.frequency_horizontal or foundation.frequency
@@ -140,20 +141,13 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
             w * w / float(v.race.tilt_stiffness), frequency, frequency, v.race.tilt_damping_ratio
         )
     row[[D.CENTRE_X, D.CENTRE_Y]] = float(v.centre.x), float(v.centre.y)
-    if float(gap.drift) != 0.0:
-        row[[D.GAP_DRIFT, D.GAP_DRIFT_TIME]] = float(gap.drift), float(gap.drift_time)
-    if float(gap.closing) != 0.0:
-        row[[D.GAP_CLOSING, D.GAP_HEAT]] = float(gap.closing), float(gap.heat)
     row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = float(v.sleeve.eccentricity), float(v.sleeve.ovality)
     row[D.SLEEVE_ANGLE] = float(v.sleeve.angle)
-    if float(v.friction.wear) > 0.0:
-        row[[D.WEAR, D.WEAR_HEAT]] = float(v.friction.wear), float(v.friction.wear_heat)
     if v.balls.turn:
         balls = bearing.bearing
-        share = (
-            float(balls.ball_diameter) * math.cos(float(balls.contact_angle)) / float(balls.pitch_diameter)
-        )
-        row[D.CAGE_RATIO] = 0.5 * (1.0 - share)  # turn of the cage per turn of the inner race
+        radial = float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
+        # turn of the cage per turn of the inner race
+        row[D.CAGE_RATIO] = 0.5 * (1.0 - radial / float(balls.pitch_diameter))
     law = [(float(p.depth), float(p.force)) for p in v.contact.law]
     row[D.LAW_PIECES] = max(len(law) - 1, 0)
     for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(law)):  # a power of the depth each
@@ -167,14 +161,11 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
 def _further(
     row: Array, bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float
 ) -> None:
-    """Fill stop, ribbon, face and table of balls."""
+    """Fill stop, face and table of balls."""
     gap, stiffness = v.support.stop_gap, v.support.stop_stiffness
     if gap is not None and stiffness is not None:
         loss = 2.0 * float(v.support.stop_damping) * math.sqrt(float(stiffness) * float(bearing.support.mass))
         row[[D.STOP_GAP, D.STOP_STIFFNESS, D.STOP_DAMPING]] = float(gap), float(stiffness), loss
-    spring, slip = v.support.ribbon_stiffness, v.support.ribbon_slip
-    if spring is not None and slip is not None:
-        row[[D.RIBBON_STIFFNESS, D.RIBBON_SLIP]] = float(spring), float(slip)
     row[D.LOOSE_WAY] = float(v.balls.seat_play)
     if float(v.face.thrust) > 0.0:
         if v.balls.tabulated:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotordrop.arrays import Array
 from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
 from rotordrop.severity.numbers import LOADS
-from rotordrop_bench.drops import SINCE, VERSION
+from rotordrop_bench.drops import VERSION
 from rotordrop_bench.make import chosen_drops, truth_path
 from rotordrop_bench.score import score_estimate
 from rotordrop_bench.truth import Truth, read_truth
@@ -59,47 +60,19 @@ class BenchScores:
     it named and what was there, and the errors of its peaks."""
     unscored: dict[str, str]
     """Drops without a usable estimate, with the reason; they count as missing values."""
-
-    @property
-    def named_rightly(self) -> int:
-        """Departures that estimates named, of those that were there."""
-        return sum(len(set(drop["named"]) & set(drop["violated"])) for drop in self.drops)
-
-    @property
-    def departures(self) -> int:
-        """Departures that were there; those of a drop without an estimate count."""
-        return sum(len(drop["violated"]) for drop in self.drops)
-
-    @property
-    def named_wrongly(self) -> int:
-        """Drops whose estimate named a departure that was not there."""
-        return sum(bool(set(drop["named"]) - set(drop["violated"])) for drop in self.drops)
-
-    def as_json(self) -> dict[str, Any]:
-        """Everything, ready for JSON."""
-        return {
-            "bench_version": VERSION,
-            "departures": self.departures,
-            "named_rightly": self.named_rightly,
-            "named_wrongly": self.named_wrongly,
-            "rows": [asdict(row) for row in self.rows],
-            "drops": list(self.drops),
-            "unscored": self.unscored,
-        }
+    departures: int
+    named_rightly: int
+    """Departures that were there, those of a drop without an estimate too, and those that were named."""
+    named_wrongly: int
+    """Drops whose estimate named a departure that was not there."""
 
 
 def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] = ()) -> BenchScores:
-    """Compare estimates with the hidden truth of the drops of a bench.
+    """Compare estimates with the hidden truth of the drops that `make_bench` made in a folder.
 
-    Parameters
-    ----------
-    folder : path-like
-        Folder of the bench, as `make_bench` left it.
-    estimates : path-like
-        Folder with ``NAME.json`` for each drop: the JSON of ``rotordrop estimate``, or at least
-        ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``.
-    only : iterable of str
-        Names of drops, families or rotors; all that were made when empty.
+    The estimates are ``NAME.json`` for each drop: the JSON of ``rotordrop estimate``, or at least
+    ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``. ``only`` holds
+    names of drops, families or rotors; all that were made when empty.
     """
     folder, estimates, wanted = Path(folder), Path(estimates), list(only)
     made = [drop for drop in chosen_drops(wanted) if truth_path(folder, drop.name).is_file()]
@@ -110,46 +83,44 @@ def score_bench(folder: str | Path, estimates: str | Path, only: Iterable[str] =
     if not estimates.is_dir():
         raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")
     truths = [read_truth(truth_path(folder, drop.name)) for drop in made]
-    scores: list[Mapping[str, Any]] = []
-    unscored = {}
-    for drop, truth in zip(made, truths, strict=True):
-        found = _scored(estimates / f"{drop.name}.json", truth, SINCE[drop.name])
-        if isinstance(found, str):
-            unscored[drop.name] = found
-            found = {}
-        scores.append(found)
+    found = [
+        _scored(estimates / f"{drop.name}.json", truth) for drop, truth in zip(made, truths, strict=True)
+    ]
+    unscored = {drop.name: why for drop, why in zip(made, found, strict=True) if isinstance(why, str)}
+    scores: list[Mapping[str, Any]] = [{} if isinstance(one, str) else one for one in found]
     stated = {f for scored in scores for mine in scored.get("bearings", {}).values() for f in mine}
     entries, drops = [], []
     for drop, truth, scored in zip(made, truths, scores, strict=True):
         entries += [(drop.family, *entry) for entry in _entries(scored, truth, stated)]
         peaks = {bearing: own.get("peak_force_N") for bearing, own in scored.get("bearings", {}).items()}
-        drops.append(
-            {
-                "name": drop.name,
-                "family": drop.family,
-                "rotor": drop.rotor,
-                "consistent": scored.get("consistent"),
-                "named": scored.get("named", []),
-                "peak_errors": {b: peak["relative_error"] for b, peak in peaks.items() if peak},
-                "violated": list(truth.violated),
-            }
-        )
+        facts = {"name": drop.name, "family": drop.family, "rotor": drop.rotor}
+        told = {"consistent": scored.get("consistent"), "named": scored.get("named", [])}
+        errors = {bearing: peak["relative_error"] for bearing, peak in peaks.items() if peak}
+        drops.append({**facts, **told, "peak_errors": errors, "violated": list(truth.violated)})
     rows = []
     for family in (EVERY, *dict.fromkeys(family for family, *_ in entries)):
         for quantity in dict.fromkeys(quantity for _, quantity, _ in entries):
             chosen = [score for of, q, score in entries if q == quantity and family in (EVERY, of)]
             if chosen:
                 rows.append(_row(family, quantity, chosen))
-    return BenchScores(rows=tuple(rows), drops=tuple(drops), unscored=unscored)
+    pairs = [(set(drop["named"]), set(drop["violated"])) for drop in drops]
+    return BenchScores(
+        rows=tuple(rows),
+        drops=tuple(drops),
+        unscored=unscored,
+        departures=sum(len(drop["violated"]) for drop in drops),
+        named_rightly=sum(len(named & there) for named, there in pairs),
+        named_wrongly=sum(bool(named - there) for named, there in pairs),
+    )
 
 
-def _scored(file: Path, truth: Truth, since: str) -> dict[str, Any] | str:
+def _scored(file: Path, truth: Truth) -> dict[str, Any] | str:
     """Scores of one estimate, or why there are none."""
     version = truth.values.get("bench_version")
-    if version != since:
+    if version != VERSION:
         raise UsageError(
-            f"{truth.path} is of version {version!r} of the bench, here the drop is of version {since!r}; "
-            "make the bench again in another folder"
+            f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make "
+            "the bench again in another folder"
         )
     if not file.is_file():
         return f"there is no {file.name}"
@@ -182,19 +153,24 @@ def _entries(scored: Mapping[str, Any], truth: Truth, stated: set[str]) -> list[
 
 def _row(family: str, quantity: str, scores: list[Mapping[str, Any] | None]) -> BenchRow:
     there = [score for score in scores if score is not None]
-    errors = np.abs([score["relative_error"] for score in there if score.get("relative_error") is not None])
-    covered = [score["covered"] for score in there if score.get("covered") is not None]
-    widths = [score["half_width"] for score in there if score.get("half_width") is not None]
     missing = len(scores) - len(there)
+
+    def of(key: str) -> Array:
+        return np.abs([float(score[key]) for score in there if score.get(key) is not None])
+
+    def over(numbers: Array, measure: Callable[[Array], Any]) -> float | None:
+        return float(measure(numbers)) if len(numbers) else None
+
+    errors = of("relative_error")
     return BenchRow(
         family=family,
         quantity=quantity,
         values=len(there),
         missing=missing,
-        median=float(np.median(errors)) if len(errors) else None,
-        ninetieth=float(np.quantile(errors, 0.9)) if len(errors) else None,
-        worst=float(np.max(errors)) if len(errors) else None,
-        covered=float(np.mean(covered)) if covered else None,
-        half_width=float(np.median(widths)) if widths else None,
+        median=over(errors, np.median),
+        ninetieth=over(errors, lambda sizes: np.quantile(sizes, 0.9)),
+        worst=over(errors, np.max),
+        covered=over(of("covered"), np.mean),
+        half_width=over(of("half_width"), np.median),
         lost=float((np.sum(errors > LOST) + missing) / len(scores)),
     )

@@ -1,9 +1,9 @@
-"""Read what is true about a simulated recording: ours and the supplied truth files have the same layout."""
+"""Read what is true about a simulated recording, ours or a supplied one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,26 @@ from rotordrop.errors import UsageError
 from rotordrop.severity.numbers import LOADS
 
 _NEEDED = ("air_gap_m", "peak_force_N")
-_STRESSES = {"peak_stress_Pa": ("max_stress_MPa", 1e6), "mean_stress_Pa": ("mean_stress_MPa", 1e6)}
-"""Field and unit of a truth file for the fields of an estimate that it calls otherwise."""
-
+SUPPLIED: dict[str, tuple[str, ...]] = {
+    "equivalent_stiffness_N_per_m": ("equivalent_stiffness",),
+    "support.stiffness_N_per_m": ("support_stiffness",),
+    "support.mass_kg": ("support_mass",),
+    "support.damping_N_s_per_m": ("support_damping",),
+    "contact.stiffness_N_per_m_n": ("contact_K",),
+    "contact.exponent": ("contact", "n"),
+    "contact.damping_s_per_m": ("contact", "lam"),
+    "friction.static": ("friction_static",),
+    "friction.dynamic": ("friction_dynamic",),
+    "friction.stribeck_speed_m_per_s": ("contact", "v_stribeck"),
+    "race.mass_kg": ("ring", "m"),
+    "race.inertia_kg_m2": ("ring_Ip",),
+    "race.drag_coefficient": ("bearing", "drag_mu"),
+    "damping_time_s": ("bearing", "Cb_over_Kb"),
+    "peak_stress_Pa": ("max_stress_MPa",),
+    "mean_stress_Pa": ("mean_stress_MPa",),
+}
+"""Where a supplied truth file has what it calls otherwise than an estimate: a number, one for each bearing,
+or a list of bearings and a key."""
 
 SEEN_AS = {"tilted machine": "side force"}
 """Kinds of violations that a drop does not tell from another one."""
@@ -30,8 +47,6 @@ class Truth:
 
     values: Mapping[str, Any]
     """The fields of the truth file."""
-    histories: Mapping[str, Array] = field(default_factory=dict, repr=False)
-    """True histories, empty when there is no file of them."""
     path: Path | None = None
     """Where the truth was read."""
 
@@ -55,11 +70,17 @@ class Truth:
 
     def of_bearing(self, bearing: str) -> dict[str, float]:
         """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
-        found = {row.field: self._of_bearing(bearing, row.truth) for row in published().values() if row.truth}
-        for load in LOADS:
-            place, unit = _STRESSES.get(load.field, (load.field, 1.0))
-            found[load.field] = self._of_bearing(bearing, (place,), unit)
-        return {path: value for path, value in found.items() if value is not None}
+        found = {}
+        for path in (*published(), *(load.field for load in LOADS)):
+            place = (path,) if path in self.values else SUPPLIED.get(path, (path,))
+            value = self.values.get(place[0])
+            if isinstance(value, Mapping):
+                value = value.get(bearing)
+            elif isinstance(value, Sequence):
+                value = value[self.bearing_names.index(bearing)].get(place[1])
+            if value is not None:
+                found[path] = (1e6 if place[0].endswith("_MPa") else 1.0) * float(value)
+        return found
 
     @property
     def violated(self) -> tuple[str, ...]:
@@ -71,15 +92,6 @@ class Truth:
         """True values of structures beyond the base model [SI], by path such as ``"NDE.support.cubic"``."""
         return {path: float(value) for path, value in self.values.get("structure", {}).items()}
 
-    def _of_bearing(self, bearing: str, place: tuple[str, ...], unit: float = 1.0) -> float | None:
-        """A value of one bearing [SI]; None where this truth does not have it."""
-        value = self.values.get(place[0])
-        if isinstance(value, Mapping):
-            value = value.get(bearing)
-        elif isinstance(value, Sequence):
-            value = value[self.bearing_names.index(bearing)].get(place[1])
-        return None if value is None else unit * float(value)
-
     def impacts(self, bearing: str) -> Array:
         """Start [s], end [s] and peak force [N] of every contact of a bearing, shape (R, 3)."""
         rows = self.values.get("contact_intervals_0_0p25_s", {}).get(bearing, [])
@@ -87,23 +99,17 @@ class Truth:
 
 
 def read_truth(path: str | Path) -> Truth:
-    """Read a truth file, ours or a supplied one, with the histories beside it (.npz) where they exist."""
-    path = Path(path)
-    values = read_json(path, "rotordrop-bench synthesize")
-    histories = {}
-    if (beside := path.with_suffix(".npz")).is_file():
-        with np.load(beside) as stored:
-            histories = {name: stored[name] for name in stored.files}
-    return truth_of(values, path=path, histories=histories)
+    """Read a truth file, ours or a supplied one."""
+    return truth_of(read_json(Path(path), "rotordrop-bench synthesize"), path=Path(path))
 
 
-def truth_of(values: Any, *, path: Path | None = None, histories: Mapping[str, Array] | None = None) -> Truth:
+def truth_of(values: Any, *, path: Path | None = None) -> Truth:
     """Truth from the fields of a truth file, refused when it is none."""
     missing = [key for key in _NEEDED if not isinstance(values, Mapping) or key not in values]
     if missing:
+        keys = " and no ".join(map(repr, missing))
         raise UsageError(
-            f"{path or 'the given object'} is no truth file: it has no "
-            f"{' and no '.join(map(repr, missing))}; "
+            f"{path or 'the given object'} is no truth file: it has no {keys}; "
             "give the .json that 'rotordrop-bench synthesize' wrote, or a supplied truth file"
         )
-    return Truth(values=values, histories=histories or {}, path=path)
+    return Truth(values=values, path=path)

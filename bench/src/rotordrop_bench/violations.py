@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -14,12 +15,15 @@ from rotordrop.elements.values import (
     ContactExponent,
     Force,
     Length,
+    NonNegative,
     Physical,
     Positive,
     PositiveForce,
+    PositiveFrequency,
     PositiveLength,
     PositiveMass,
     PositiveTime,
+    Share,
     Stiffness,
     Time,
     Unbalance,
@@ -31,14 +35,11 @@ from rotordrop.machine import Machine
 from rotordrop.machine.loading import load_description
 from rotordrop.machine.schema import description_schema
 
-Share = Annotated[Known, Physical("dimensionless", least=0.0, most=1.0)]
 CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
 Lift = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
-Frequency = Annotated[Known, Physical("frequency", above=0.0)]
 ClockError = Annotated[Known, Physical("dimensionless", least=-0.1, most=0.1)]
 AboveOne = Annotated[Known, Physical("dimensionless", above=1.0)]
 Energy = Annotated[Known, Physical("energy", above=0.0)]
-NonNegativeNumber = Annotated[Known, Physical("dimensionless", least=0.0)]
 MOST_POINTS = 9
 """Points of a contact law: the kernel keeps eight pieces, by definition of its columns."""
 NO_CHANGE = "as the machine has it"
@@ -56,15 +57,13 @@ class Violation(Description):
             given = [key for key in group if key in self.model_fields_set]
             missing = [key for key in group if key not in self.model_fields_set]
             if given and missing:
-                raise Misfit(
-                    f"{given[0]!r} needs {missing[0]!r} beside it; add it or leave out both", (given[0],)
-                )
+                words = f"{given[0]!r} needs {missing[0]!r} beside it; add it or leave out both"
+                raise Misfit(words, (given[0],))
 
     def values(self) -> dict[str, Any]:
         """What was given, by key [SI]."""
-        return {
-            key: _plain(getattr(self, key)) for key in type(self).model_fields if key in self.model_fields_set
-        }
+        given = (key for key in type(self).model_fields if key in self.model_fields_set)
+        return {key: _plain(getattr(self, key)) for key in given}
 
 
 def _plain(value: Any) -> Any:
@@ -85,9 +84,9 @@ class SupportViolation(Violation):
     stiffness_ratio: Positive = default(1.0, NO_CHANGE)
     damping_ratio: Positive = default(1.0, NO_CHANGE)
     """Factors on stiffness and damping along the first axis, which at angle zero is horizontal [1]."""
-    damping: NonNegativeNumber = default(1.0, NO_CHANGE)
+    damping: NonNegative = default(1.0, NO_CHANGE)
     """Factor on the damping along both axes [1]."""
-    hardening: NonNegativeNumber = default(0.0, "a linear spring")
+    hardening: NonNegative = default(0.0, "a linear spring")
     """How much the spring force exceeds that of the linear spring, at the force below [1]."""
     hardening_force: PositiveForce = default(1.0, "of no effect without hardening")
     """Force of the linear spring at which that holds [N]."""
@@ -102,7 +101,7 @@ class SupportViolation(Violation):
     """Travel of the support up to a stop [m]."""
     stop_stiffness: Stiffness | None = None
     """Stiffness of the stop [N/m]."""
-    stop_damping: NonNegativeNumber = default(0.0, "a stop without loss")
+    stop_damping: NonNegative = default(0.0, "a stop without loss")
     """Damping ratio of the mass of the support on its stop [1]."""
     ribbon_stiffness: Stiffness | None = None
     """Stiffness of a ribbon before it slips [N/m]."""
@@ -122,11 +121,11 @@ class FoundationViolation(Violation):
 
     mass: PositiveMass | None = None
     """Modal mass at the support [kg]."""
-    frequency: Frequency | None = None
+    frequency: PositiveFrequency | None = None
     """Vertical natural frequency without support [Hz]."""
-    frequency_horizontal: Frequency | None = None
+    frequency_horizontal: PositiveFrequency | None = None
     """Horizontal natural frequency without support [Hz]; the vertical one when left out."""
-    damping_ratio: NonNegativeNumber = default(0.03, "a bolted steel frame")
+    damping_ratio: NonNegative = default(0.03, "a bolted steel frame")
     """Damping ratio of the mode [1]."""
 
     together: ClassVar = (("mass", "frequency"),)
@@ -151,7 +150,7 @@ class ContactViolation(Violation):
     """Another contact of rotor and race."""
 
     stiffness: Positive = default(1.0, NO_CHANGE)
-    damping: NonNegativeNumber = default(1.0, NO_CHANGE)
+    damping: NonNegative = default(1.0, NO_CHANGE)
     """Factors on contact stiffness and contact damping [1]."""
     exponent: ContactExponent | None = None
     """Another exponent [1]; equally deep at five times the mean load of a bearing."""
@@ -167,14 +166,13 @@ class ContactViolation(Violation):
             raise Misfit("the contact has both 'law' and 'exponent'; keep one of them", ("law",))
         if not 2 <= len(self.law) <= MOST_POINTS:
             raise Misfit(f"a law has 2 to {MOST_POINTS} points, not {len(self.law)}", ("law",))
-        for index in range(1, len(self.law)):
-            for key in ("depth", "force"):
-                low, high = (float(getattr(self.law[i], key)) for i in (index - 1, index))
+        for key in ("depth", "force"):
+            for index, (low, high) in enumerate(pairwise(float(getattr(point, key)) for point in self.law)):
                 if not high > low:
                     raise Misfit(
-                        f"{key} {high:g} at point {index + 1} does not exceed {low:g} before it; order the "
+                        f"{key} {high:g} at point {index + 2} does not exceed {low:g} before it; order the "
                         "points so that depth and force grow",
-                        ("law", index, key),
+                        ("law", index + 1, key),
                     )
 
 
@@ -187,9 +185,9 @@ class RaceViolation(Violation):
     """Factor on its polar moment of inertia [1]."""
     tilt_stiffness: Stiffness | None = None
     """Stiffness of the tilt where the rotor touches, in series with the contact [N/m]."""
-    tilt_frequency: Frequency | None = None
+    tilt_frequency: PositiveFrequency | None = None
     """Natural frequency of the tilt [Hz]."""
-    tilt_damping_ratio: NonNegativeNumber = default(0.02, "steel on balls")
+    tilt_damping_ratio: NonNegative = default(0.02, "steel on balls")
     """Damping ratio of the tilt [1]."""
 
     together: ClassVar = (("tilt_stiffness", "tilt_frequency"),)
@@ -241,17 +239,14 @@ class BallsViolation(Violation):
     """Way of the bearing in its seat, from the middle, before the seat holds it [m]."""
 
     @property
-    def tabulated(self) -> bool:
-        """Whether the balls have a load of their own over the deflection of the race."""
-        return self._of_the_table() > 0
-
-    def _of_the_table(self) -> int:
+    def tabulated(self) -> int:
+        """How many of these give the balls a load of their own over the deflection of the race."""
         return self.held_preload + self.inertia + (float(self.seat_play) > 0.0)
 
     def check(self) -> None:
         """Refuse two of what a table holds one of."""
         super().check()
-        if self._of_the_table() > 1:
+        if self.tabulated > 1:
             raise Misfit("balls have one of 'held_preload', 'inertia' and 'seat_play'; leave out the others")
 
 
@@ -266,9 +261,9 @@ class FaceViolation(Violation):
     """Radius at which the face rubs [m]."""
     stiffness: Stiffness = default(1e9, "a steel shoulder on a ring, chosen")
     """Stiffness of the face [N/m]."""
-    damping: NonNegativeNumber = default(0.05, "steel on steel, chosen")
+    damping: NonNegative = default(0.05, "steel on steel, chosen")
     """Damping ratio of the race on it [1]."""
-    friction: NonNegativeNumber = default(0.1, "as between rotor and race")
+    friction: NonNegative = default(0.1, "as between rotor and race")
     """Friction coefficient of the face [1]."""
 
     together: ClassVar = (("thrust", "gap", "arm"),)
@@ -297,25 +292,15 @@ class BearingViolations(Violation):
     """What is violated at a touchdown bearing."""
 
     support: SupportViolation = SupportViolation()
-    """Its support."""
     foundation: FoundationViolation = FoundationViolation()
-    """The foundation under the support."""
     contact: ContactViolation = ContactViolation()
-    """Contact of rotor and race."""
     race: RaceViolation = RaceViolation()
-    """The race."""
     friction: FrictionViolation = FrictionViolation()
-    """Friction of rotor and race."""
     gap: GapViolation = GapViolation()
-    """The air gap."""
     balls: BallsViolation = BallsViolation()
-    """The balls."""
     face: FaceViolation = FaceViolation()
-    """The face of the race."""
     sleeve: SleeveViolation = SleeveViolation()
-    """The landing sleeve of the rotor."""
     centre: CentreViolation = CentreViolation()
-    """Its centre."""
 
 
 class SensorViolation(Violation):
@@ -341,7 +326,7 @@ class SensorViolation(Violation):
 class ChainViolation(SensorViolation):
     """What is violated at all sensors."""
 
-    anti_alias_frequency: Frequency | None = None
+    anti_alias_frequency: PositiveFrequency | None = None
     """Corner of a filter before the sampling that nobody mentions [Hz]."""
     flicker: Length = default(0.0, "white noise alone")
     """Noise with a power that falls as one over the frequency, beside the white one [m rms]."""
@@ -378,7 +363,7 @@ class RotorViolation(Violation):
     """Factor on the drawn unbalances, which may leave the grade [1]."""
     bow: Length = default(0.0, "straight")
     """How far the middle of the shaft stands off the line of its ends [m], towards +x at rotor angle zero."""
-    bow_speed: Frequency = default(1.0, "of no effect without bow")
+    bow_speed: PositiveFrequency = default(1.0, "of no effect without bow")
     """Speed [Hz] at which it bends as a bowed shaft does. It goes with the square of the speed, as an
     unbalance, so that it is exact there only."""
 
@@ -439,36 +424,28 @@ class Violations(BearingViolations):
     bearing: dict[Name, BearingViolations] = Field(default_factory=dict)
     """At one touchdown bearing, before what is said for all."""
     sensors: ChainViolation = ChainViolation()
-    """At every sensor."""
     sensor: dict[Channel, SensorViolation] = Field(default_factory=dict)
     """At one sensor, before what is said for all."""
     magnets: MagnetViolation = MagnetViolation()
-    """The magnets."""
     rotor: RotorViolation = RotorViolation()
-    """The rotor."""
     stand: StandViolation = StandViolation()
-    """How the machine stands."""
     unbalance_jump: UnbalanceJump | None = None
-    """An unbalance that comes during the drop."""
     side_force: SideForce | None = None
-    """A force that stays."""
     seal: Seal | None = None
-    """A seal that rubs."""
 
     def of_bearing(self, name: str) -> BearingViolations:
         """What holds at one bearing: what is said of it, then what is said of all."""
+        every = {key: getattr(self, key) for key in BearingViolations.model_fields}
         own = self.bearing.get(name)
-        parts = {
-            key: _over(getattr(self, key), getattr(own, key) if own else None)
-            for key in BearingViolations.model_fields
-        }
-        return BearingViolations(**parts)
+        return BearingViolations(
+            **{key: _over(part, own and getattr(own, key)) for key, part in every.items()}
+        )
 
     def of_sensor(self, name: str) -> SensorViolation:
         """What holds at one sensor: what is said of it, then what is said of all."""
-        every = {key: getattr(self.sensors, key) for key in self.sensors.model_fields_set}
-        every = {key: value for key, value in every.items() if key in SensorViolation.model_fields}
-        found: SensorViolation = _over(SensorViolation(**every), self.sensor.get(name))
+        said = self.sensors.model_fields_set & SensorViolation.model_fields.keys()
+        every = SensorViolation(**{key: getattr(self.sensors, key) for key in said})
+        found: SensorViolation = _over(every, self.sensor.get(name))
         return found
 
     def check_names(self, machine: Machine) -> None:
@@ -477,12 +454,11 @@ class Violations(BearingViolations):
             ("bearing", self.bearing, [b.name for b in machine.touchdown_bearings]),
             ("sensor", self.sensor, [s.name for s in machine.sensors]),
         ):
-            for name in named:
-                if name not in there:
-                    raise UsageError(
-                        f"the violations name the {what} {name!r}, which the machine does not have; "
-                        f"it has {', '.join(there)}"
-                    )
+            if missing := [name for name in named if name not in there]:
+                raise UsageError(
+                    f"the violations name the {what} {missing[0]!r}, which the machine does not have; "
+                    f"it has {', '.join(there)}"
+                )
         landing = [b.name for b in machine.touchdown_bearings if float(self.of_bearing(b.name).face.thrust)]
         if len(landing) > 1:
             raise UsageError(
@@ -490,11 +466,12 @@ class Violations(BearingViolations):
                 f"'face' to one of them, as bearing.{landing[0]}.face"
             )
         nodes = len(machine.rotor.node_positions)
-        for what, part in (
-            ("unbalance comes", self.unbalance_jump),
-            ("side force acts", self.side_force),
-            ("seal sits", self.seal),
-        ):
+        placed = {
+            "unbalance comes": self.unbalance_jump,
+            "side force acts": self.side_force,
+            "seal sits": self.seal,
+        }
+        for what, part in placed.items():
             if part is not None and part.node > nodes:
                 raise UsageError(
                     f"the {what} at node {part.node}, outside the rotor; its nodes are 1 to {nodes}"
@@ -505,27 +482,24 @@ def _over(every: Any, own: Any) -> Any:
     """Violations of one part: its own values before those of all parts."""
     if own is None:
         return every
-    given = {key: getattr(every, key) for key in every.model_fields_set}
-    given |= {key: getattr(own, key) for key in own.model_fields_set}
-    return type(every)(**given)
-
-
-def _of(**parts: Any) -> Violations:
-    return Violations.model_validate(parts)
+    return type(every)(**{key: getattr(one, key) for one in (every, own) for key in one.model_fields_set})
 
 
 VIOLATIONS: dict[str, Violations] = {
-    "none": Violations(),
-    "contact stiffness +25 %": _of(contact={"stiffness": 1.25}),
-    "contact stiffness -25 %": _of(contact={"stiffness": 0.75}),
-    "contact exponent 1.5": _of(contact={"exponent": 1.5}),
-    "contact damping +50 %": _of(contact={"damping": 1.5}),
-    "race inertia +25 %": _of(race={"inertia": 1.25}),
-    "race inertia -25 %": _of(race={"inertia": 0.75}),
-    "sharper friction": _of(friction={"stribeck_speed": 0.2, "static": 1.3}),
-    "anisotropic support 0.6": _of(support={"stiffness_ratio": 0.6}),
-    "sensor planes 30 mm off": _of(sensors={"plane_shift": "30 mm"}),
-    "anti-alias filter": _of(sensors={"anti_alias_frequency": "4 kHz"}),
+    name: Violations.model_validate(parts)
+    for name, parts in {
+        "none": {},
+        "contact stiffness +25 %": {"contact": {"stiffness": 1.25}},
+        "contact stiffness -25 %": {"contact": {"stiffness": 0.75}},
+        "contact exponent 1.5": {"contact": {"exponent": 1.5}},
+        "contact damping +50 %": {"contact": {"damping": 1.5}},
+        "race inertia +25 %": {"race": {"inertia": 1.25}},
+        "race inertia -25 %": {"race": {"inertia": 0.75}},
+        "sharper friction": {"friction": {"stribeck_speed": 0.2, "static": 1.3}},
+        "anisotropic support 0.6": {"support": {"stiffness_ratio": 0.6}},
+        "sensor planes 30 mm off": {"sensors": {"plane_shift": "30 mm"}},
+        "anti-alias filter": {"sensors": {"anti_alias_frequency": "4 kHz"}},
+    }.items()
 }
 
 

@@ -59,10 +59,9 @@ def refuse_beside(option: str, others: Mapping[str, object]) -> None:
         raise UsageError(f"{option} does not go with {', '.join(given)}; leave out the one or the other")
 
 
-def machine_first(first: Path, second: Path) -> tuple[Path, Path]:
-    """A machine file and a record in this order, in whichever they were given: machine files are .toml."""
-    exchanged = second.suffix.lower() == ".toml" and first.suffix.lower() != ".toml"
-    return (second, first) if exchanged else (first, second)
+def machine_first(*files: Path) -> list[Path]:
+    """A machine file before its records, in whichever order they were given: machine files are .toml."""
+    return sorted(files, key=lambda file: file.suffix.lower() != ".toml")
 
 
 Reduction = StrEnum("Reduction", ["accurate", "quick", "full"])
@@ -97,16 +96,13 @@ Data = Annotated[
     Path | None,
     Option(
         metavar="FOLDER",
-        help="Write every table and figure of the report as CSV.",
+        help="Write every table of the report as CSV.",
         file_okay=False,
         show_default=False,
     ),
 ]
 Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
 TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
-Film = Annotated[
-    Path | None, file_option("--film", "Write a film of orbit and force, slowed down, as animated GIF.")
-]
 Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
 Profile = Annotated[Path | None, file_option("--profile", "Profile of the recorder, for its tails too.")]
 Tail = Annotated[
@@ -119,7 +115,7 @@ Planes = Annotated[
     Option(
         "--map",
         metavar="TEXT",
-        help='Channels of a plane, "NDE: X1 0 deg, Y1 90 deg", or of a sensor, "S_NDE_A=X1"; repeatable.',
+        help='Channels of a plane, "NDE: X1 0 deg, Y1 90 deg", of a sensor, "S_NDE_A=X1"; or "likely".',
     ),
 ]
 Threads = Annotated[

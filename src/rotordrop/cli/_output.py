@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from threading import Event, Thread
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.files import require_place, with_digest, write_json, write_text
+from rotordrop.progress import Progress, is_shown, shown
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,12 +28,10 @@ _PLAIN_WIDTH = 110
 BETWEEN_LINES_S = 5.0
 """Pause between two lines on the progress where there is no terminal [s]; chosen, not measured."""
 
-OUTPUTS = ("json", "report", "film", "output", "share")
+OUTPUTS = ("json", "report", "output")
 """Parameters of the verbs that name files to write; other paths are read."""
 FILLED = ("target", "folder", "data")
 """Parameters that name a folder to fill, or a file that is never replaced unasked."""
-
-Progress = Callable[[str, float], None]
 
 _inputs: list[Path] = []
 
@@ -61,13 +60,12 @@ def deliver(
     *,
     report: Path | None = None,
     data: Path | None = None,
-    film: Path | None = None,
 ) -> None:
     """Write page, tables and JSON where they were asked for, and print the summary.
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
     in place of the summary, which is a page or a function that prints on the console it is given. Pages and
-    tables need a page. A film has been written, and is named.
+    tables need a page.
     """
     if not callable(summary) and report is not None:
         from rotordrop.report.page import write_page
@@ -93,8 +91,6 @@ def deliver(
         print_summary(summary, out)
         if report is not None:
             out.print(f"Report: {report}")
-        if film is not None:
-            out.print(f"Film: {film}")
     if json_file is not None:
         out.print(f"JSON: {json_file}")
 
@@ -208,21 +204,10 @@ def _progress_lines(title: str) -> Iterator[Progress]:
         lines.join()
 
 
-@contextmanager
-def progress_bar(title: str) -> Iterator[Progress]:
+def progress_bar(title: str) -> AbstractContextManager[Progress]:
     """Show a bar with the time left on standard error while a long computation runs.
 
-    Yields a function to call with the name of the present stage and the fraction done (0 to 1). Where
+    It gives a function to call with the name of the present stage and the fraction done (0 to 1). Where
     standard error is not a terminal it gets a line now and then: stage and fraction, if they have changed.
     """
-    if not sys.stderr.isatty():
-        with _progress_lines(title) as told:
-            yield told
-        return
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"))
-    with Bars(*columns, TimeRemainingColumn(), console=console(sys.stderr), transient=True) as bars:
-        task = bars.add_task(title, total=1.0)
-        yield lambda stage, fraction: bars.update(task, completed=fraction, description=stage or title)
+    return shown(None, title) if is_shown() else _progress_lines(title)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import errno
+import logging
 import os
 import signal
 import sys
@@ -27,10 +28,8 @@ from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._output import with_files_apart
 from rotordrop.cli._terminal import interruptions_kept, open_streams, printable
-from rotordrop.errors import OutputError, RotordropError, UsageError
-
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Our matrices are small: threads inside linear algebra cost more than they give, above all on busy cores."""
+from rotordrop.errors import OutputError, RotordropError, UnmatchedError, UsageError
+from rotordrop.one_thread import ENVIRONMENT
 
 BROKEN_PIPE = 141
 """Exit code when the reader has gone: 128 plus the number of the signal, the standard of shells."""
@@ -77,19 +76,17 @@ VERBS: dict[str, tuple[Verb, ...]] = {
         Verb("calibrate", "Calibrate a machine on several recorded drops", _HERE + "estimate"),
     ),
     "Judge": (
-        Verb("restart", "Judge whether a machine may run again after a drop", _HERE + "restart"),
+        Verb("restart", "Show what is known before a machine runs again", _HERE + "restart"),
         Verb("compare", "Compare drops: which was worst, and how sure that is", _HERE + "compare"),
         Verb("log", "Keep the log of a machine's drops and what they are allowed", _HERE + "log"),
         Verb("study run", "Compute many drops and show how they are spread", _HERE + "study"),
         Verb("study show", "Show what is there of a study", _HERE + "study"),
         Verb("study repeat", "See what else could have happened at a recorded drop", _HERE + "study"),
-        Verb("study rare", "Find the probability of a rare drop, to one in a million", _HERE + "study"),
-        Verb("study design", "Choose supports, gap or preload for the mildest drops", _HERE + "study"),
     ),
     "Simulate": (
         Verb("simulate", "Simulate a drop and show forces, stresses and contacts", _HERE + "simulate"),
         Verb("coast-down", "Simulate a whole coast-down, from power-off to standstill", _HERE + "simulate"),
-        Verb("critical-speeds", "Show critical speeds and modes, or the unbalance response", _HERE + "rotor"),
+        Verb("critical-speeds", "Show critical speeds and damped modes against the speed", _HERE + "rotor"),
     ),
     "Describe a machine": (
         Verb("init", "Write a machine file to start from, or copy an example", _HERE + "machine"),
@@ -103,24 +100,6 @@ VERBS: dict[str, tuple[Verb, ...]] = {
     ),
 }
 """The verbs by what one wants to do, as the help page shows them."""
-
-NOW = {
-    "fingerprint": "rotordrop doctor --fingerprint",
-    "changed": "rotordrop compare BEFORE AFTER --changes",
-    "split": "rotordrop look RECORD MACHINE --split FOLDER",
-    "share": "rotordrop look RECORD --share FILE --licence CC-BY-4.0",
-    "rare": "rotordrop study rare",
-    "design": "rotordrop study design",
-    "repeat": "rotordrop study repeat",
-    "import-rotor": "rotordrop convert",
-    "export-rotor": "rotordrop convert --to ross",
-    "schema": "rotordrop init --schema machine, numbers, estimate or look",
-    "unbalance-response": "rotordrop critical-speeds --unbalance",
-    "synthesize": "rotordrop-bench synthesize",
-    "score": "rotordrop-bench score",
-    "bench": "rotordrop-bench list, make or score-all",
-}
-"""What has another name now, or is looked for under one."""
 
 # Typer carries its own copy of click in new versions and uses the installed one in old versions.
 _CallError: type[Exception] = next(c for c in typer.BadParameter.__mro__ if c.__name__ == "ClickException")
@@ -159,8 +138,6 @@ class VerbTable(TyperGroup):
                 typer.echo(f"{self.program} {verb.name}: {verb.line}")
             raise typer.Exit
         wrong = " ".join(args[: 2 if family else 1])
-        if wrong in NOW and self.program == "rotordrop":
-            raise UsageError(f"there is no command {wrong!r}; it is {NOW[wrong]} now")
         close = get_close_matches(wrong, known, 1) or ["--help"]
         raise UsageError(f"there is no command {wrong!r}; try '{self.program} {close[0]}'")
 
@@ -207,7 +184,8 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
     except typer.Exit as stop:
         return stop.exit_code
     except RotordropError as error:
-        return fail(str(error), error.exit_code)
+        code = fail(str(error), error.exit_code)
+        return code if not _likeliest_wanted(error) else run([*arguments, "--map", "likely"], program, name)
     except _CallError as error:
         called: Any = getattr(error, "ctx", None)
         path = called.command_path if called else name
@@ -228,15 +206,31 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
         return fail(f"{place}: {error.strerror or error}", OutputError.exit_code)
 
 
+def _likeliest_wanted(error: RotordropError) -> bool:
+    """Whether somebody at a terminal takes the likeliest channels where no names tell."""
+    known = isinstance(error, UnmatchedError) and "likeliest" in error.remedy
+    return known and sys.stdin.isatty() and typer.confirm("Use the likeliest?", default=True, err=True)
+
+
 def _discard_standard_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _print_log() -> None:
+    """Show on standard error what the package logs, such as that kernels are compiled."""
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    log = logging.getLogger("rotordrop")
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+
+
 def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
     """Entry point of the command ``rotordrop``, or of another program with verbs of its own."""
-    for variable in ONE_THREAD:
-        os.environ.setdefault(variable, "1")
+    for variable, number in ENVIRONMENT.items():
+        os.environ.setdefault(variable, number)
     open_streams()
+    _print_log()
     with interruptions_kept() as was_pressed:
         try:
             code = run(sys.argv[1:], program, name)

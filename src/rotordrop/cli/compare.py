@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -12,11 +13,6 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, refuse_beside
 from rotordrop.cli._output import deliver
 from rotordrop.errors import UsageError
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from rotordrop.estimate.changed import Changes
 
 
 def compare(
@@ -50,28 +46,28 @@ def compare(
     Example: rotordrop compare drop1.json drop2.json
     """
     if changed:
-        others = {
-            "--scatter": scatter,
-            "--limit": limit,
-            "--allowed": allowed,
-            "--report": report,
-            "--data": data,
-        }
-        refuse_beside("--changes", others)
+        others = {"--scatter": scatter, "--limit": limit, "--allowed": allowed, "--report": report}
+        refuse_beside("--changes", others | {"--data": data})
         _deliver_changes(estimates, json)
         return
     from rotordrop.estimate.published import read_drops
-    from rotordrop.report.compare_page import compare_page, rankings
-    from rotordrop.report.compared_drop import ComparedDrop, left_out
-    from rotordrop.report.limits import limit_statement, read_limits
+    from rotordrop.report.compare_page import (
+        ComparedDrop,
+        compare_page,
+        left_out,
+        limit_statement,
+        rankings,
+        read_limits,
+    )
 
+    found = [(path, name, drop) for path in estimates for name, drop in read_drops(path).items()]
+    records = Counter(drop.record for *_, drop in found)
+    stems = Counter(path.stem for path in estimates)
     drops: list[ComparedDrop] = []
-    for path in estimates:
-        for name, drop in read_drops(path).items():
-            taken = any(name == other.name for other in drops)
-            alike = sum(other.stem == path.stem for other in estimates) > 1
-            called = f"{path.resolve().parent.name}/{path.stem}" if alike else path.stem
-            drops.append(ComparedDrop(f"{called}: {name}" if taken or alike else name, drop))
+    for path, name, drop in found:
+        place = path.stem if stems[path.stem] == 1 else f"{path.resolve().parent.name}/{path.stem}"
+        of_place = place if name == path.stem else f"{place}: {name}"
+        drops.append(ComparedDrop(drop.record if records[drop.record] == 1 else of_place, drop))
     if len(drops) < 2:
         raise UsageError(
             f"{len(drops)} drop to compare; at least two are needed. "
@@ -105,7 +101,8 @@ def compare(
 def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.estimate.published import read_drop
-    from rotordrop.report.spread import finite
+    from rotordrop.report.changed_section import told_changes
+    from rotordrop.report.content import ReportContent, Statement, finite
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")
@@ -117,33 +114,7 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
         )
     found = changes(before, after)
     content = asdict(found) | {"sentence": found.sentence()}
-    deliver(finite(content), json, lambda out: _print_changes(found, out))
-
-
-def _print_changes(found: Changes, out: Console) -> None:
-    from rich.table import Table
-
-    from rotordrop.elements.table import row_of
-    from rotordrop.estimate.changed import asked_for
-    from rotordrop.report.quantity import Quantity
-    from rotordrop.units import format_chance
-
-    columns = ("parameter", "before", "after", "change (90 %)", "changed that much", "found from")
-    table = Table(*columns, box=None)
-    for one in found.found:
-        kind = row_of(one.path).display_kind
-        low, high = one.interval_90
-        text = "the records do not say"
-        if one.determined and one.factor:
-            text = f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
-        elif one.determined:
-            text = f"{1e6 * one.change:+.3g} µm ({1e6 * low:+.3g} to {1e6 * high:+.3g})"
-        before, after = (Quantity(value=value, kind=kind).text for value in (one.before, one.after))
-        share = format_chance(one.probability) if one.determined else "–"
-        table.add_row(one.path, before, after, text, share, one.found_from)
-    out.print(table)
-    out.print(found.sentence())
-    out.print(
-        f'{asked_for()}; "found from" is the change that these records show in 19 of 20 cases. '
-        "A record that a model does not follow can show changes that are none."
-    )
+    statement, told = told_changes(found)
+    title = f"{found.second} against {found.first}"
+    page = ReportContent(title=title, verdict=(statement, Statement(told.note)), summary=(told,))
+    deliver(finite(content), json, page)

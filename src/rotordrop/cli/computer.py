@@ -27,9 +27,7 @@ USUAL_PORT = 8737
 
 EXTRAS = {
     "io": ("recordings of TDMS and Excel, shaft tables of Excel", ("npTDMS", "openpyxl")),
-    "xarray": ("to_xarray(), to_dataframe()", ("xarray", "h5netcdf")),
-    "parquet": ("histories as Parquet", ("pyarrow",)),
-    "film": ("films of drops", ("pillow",)),
+    "tables": ("to_xarray(), to_dataframe(), Parquet", ("xarray", "h5netcdf", "pyarrow")),
     "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),
     "cluster": ("studies on a Dask cluster", ("distributed",)),
     "serve": ("the page of 'rotordrop serve'", ("starlette", "uvicorn")),
@@ -44,7 +42,6 @@ def serve(
     port: Annotated[
         int, Option("--port", min=0, max=65535, help="Where to listen; 0 takes a free port.")
     ] = USUAL_PORT,
-    log: Annotated[str | None, text_option("LOG", "Log of drops; one in FOLDER by default.")] = None,
     open_page: Annotated[bool, Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Serve a local page: look at drops, estimate, read reports.
@@ -62,7 +59,7 @@ def serve(
         if open_page:
             typer.launch(address)
 
-    serve_page(place, port, announce, lambda words: console(sys.stderr).print(words), log)
+    serve_page(place, port, announce, lambda words: console(sys.stderr).print(words))
 
 
 def data_folder() -> Path:
@@ -147,14 +144,18 @@ def _version(name: str) -> str | None:
 
 
 def _cache() -> dict[str, Any]:
-    """Where compiled code is kept, whether it can be written, and how much of it is there."""
-    from rotordrop.physics._compile import cache_folder, is_writable
+    """Compiled code that came with the package, and where more is kept, whether it can be written there."""
+    from rotordrop.physics._compile import _SHIPPED, cache_folder
+    from rotordrop.physics._numba import _is_portable_here
 
-    folder = Path(cache_folder())
-    files = list(folder.rglob("*.nbc")) if folder.is_dir() else []
+    folder = cache_folder()
+    shipped = (_SHIPPED / folder.name).glob("*.object") if _is_portable_here() else ()
+    files = list(folder.glob("*.object"))
+    nearest = next(parent for parent in (folder, *folder.parents) if parent.exists())
     return {
+        "shipped": len(list(shipped)),
         "folder": str(folder),
-        "writable": is_writable(folder),
+        "writable": os.access(nearest, os.W_OK),
         "kernels": len(files),
         "bytes": sum(file.stat().st_size for file in files),
     }
@@ -163,11 +164,15 @@ def _cache() -> dict[str, Any]:
 def cache_lines(cache: dict[str, Any]) -> list[str]:
     """What to say of compiled code."""
     place = cache["folder"]
+    if cache["shipped"]:
+        came = f"compiled code came with the package: {cache['shipped']} kernels"
+        return [came, *cache_lines(cache | {"shipped": 0})] if cache["kernels"] else [came]
     if not cache["kernels"]:
+        takes = "half a minute more for a simulation, a minute for an estimate"
         if cache["writable"]:
-            return [f"compiled code is not cached yet in {place}; the first run takes a minute or two"]
+            return [f"compiled code is not cached yet in {place}; the first run takes {takes}"]
         return [
-            f"problem: {place} cannot be written; every run compiles again, for a minute or two. "
+            f"problem: {place} cannot be written; every run compiles again: {takes}. "
             "Name another folder in NUMBA_CACHE_DIR"
         ]
     size = cache["bytes"] / 1e6

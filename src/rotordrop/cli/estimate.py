@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
     from rotordrop.report.content import ReportContent
-    from rotordrop.twin.calibrated import Calibration
 
 
 Method = StrEnum("Method", ["tracked", "replay"])
@@ -45,7 +44,6 @@ def estimate(
     report: Annotated[
         Path | None, file_option("--report", "Write the report, one offline HTML file per drop.")
     ] = None,
-    film: options.Film = None,
     since: Annotated[
         Path | None, file_option("--since", "Earlier estimate (.json), for what changed.")
     ] = None,
@@ -73,9 +71,7 @@ def estimate(
     from rotordrop.estimate.published import read_drop
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
-    from rotordrop.report.estimate_page import estimate_page, estimate_summary
-    from rotordrop.report.estimate_screen import estimate_screen
-    from rotordrop.report.film import require_film, write_film
+    from rotordrop.report.estimate_page import estimate_page, estimate_screen, estimate_summary
     from rotordrop.report.origin import origin_here
     from rotordrop.report.page import write_page
     from rotordrop.twin.search import is_calibrated
@@ -84,6 +80,7 @@ def estimate(
         raise UsageError(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
+    machine, *records = options.machine_first(machine, *records)
     description, earlier = load_machine(machine), None if since is None else read_drop(since)
     require_own_drops(records)
     if quick and method is Method.tracked and not is_calibrated(description):
@@ -92,14 +89,10 @@ def estimate(
             f"Calibrate it with 'rotordrop calibrate {machine.name} RECORD... --output calibrated.toml', "
             "or leave --quick out."
         )
-    reports, films, outputs, folders = (
-        places_beside(named, records) for named in (report, film, output, data)
-    )
+    reports, outputs, folders = (places_beside(named, records) for named in (report, output, data))
     if output is not None:
         require_format(output)
-    if film is not None:
-        require_film(film)
-    require_places(json, *reports, *films, *outputs)
+    require_places(json, *reports, *outputs)
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
@@ -118,17 +111,10 @@ def estimate(
         made.save(place)
     for made, place in zip(estimates, folders, strict=False):
         made.data(place)
-    for made, place in zip(estimates, films, strict=False):
-        write_film(made.bearings, place, simulated=made.simulated_record, certain=made.consistent)
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
-    words = (
-        ("Report", reports),
-        ("Film", films),
-        ("Histories", outputs),
-        ("Tables and figures", folders),
-    )
-    written = [f"{word}: {place}" for word, places in words for place in places]
+    words = {"Report": reports, "Histories": outputs, "Tables": folders}
+    written = [f"{word}: {place}" for word, places in words.items() for place in places]
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
     deliver(numbers, json, lambda out: _summarise(screens, written, out))
@@ -227,6 +213,7 @@ def calibrate(
     from rotordrop.machine.saving import save_machine
     from rotordrop.twin.calibrated import calibrate_machine, calibration_json
 
+    machine, *records = options.machine_first(machine, *records)
     require_own_drops(records)
     description = load_machine(machine)
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
@@ -239,9 +226,16 @@ def calibrate(
         save_machine(result.machine, output)
 
     def summarise(out: Console) -> None:
-        print_calibration(result, out)
+        out.print(result.sentence())
+        for name, checks in result.checks.items():
+            for check in checks:
+                if check.failed:
+                    out.print(f"{name}: {check.said()}")
+        for pair in result.confounded:
+            apart = f"(correlation {pair.correlation:.2f}); {pair.way_out}"
+            out.print(f"confounded: {pair.first} and {pair.second} {apart}")
         if written:
-            out.print(f"Calibrated machine: {output}")
+            out.print(f"Calibrated machine, every value with its interval: {output}")
 
     deliver(calibration_json(result), json, summarise)
     if not result.consistent:
@@ -251,26 +245,3 @@ def calibrate(
             "estimate the wrong way. Leave out the drop that does not fit, check sensors and bearing nodes, "
             "or give better guesses; --even-if-inconsistent writes the file all the same."
         )
-
-
-def print_calibration(result: Calibration, out: Console) -> None:
-    """Print every calibrated value in display units, what cannot be told apart, and what does not fit."""
-    from rich.table import Table
-
-    from rotordrop.elements.table import row_of
-    from rotordrop.report.quantity import Quantity
-
-    table = Table("parameter", "estimate", "90 % interval", "verdict", box=None)
-    for path, value in result.values.items():
-        shown = Quantity(value=value.value, kind=row_of(path).display_kind, interval_90=value.interval_90)
-        table.add_row(path, shown.text, shown.interval_text, value.status)
-    out.print(table)
-    for pair in result.confounded:
-        out.print(
-            f"confounded: {pair.first} and {pair.second} (correlation {pair.correlation:.2f}); {pair.way_out}"
-        )
-    for name, checks in result.checks.items():
-        for check in checks:
-            if check.failed:
-                out.print(f"{name}: {check.said()}")
-    out.print(result.sentence())

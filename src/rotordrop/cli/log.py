@@ -1,13 +1,11 @@
-"""Keep the log of a machine's drops and what they are allowed: one SQLite file, or PostgreSQL by URL."""
+"""Keep the log of a machine's drops and what they are allowed: one SQLite file, or a data base by URL."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-import sys
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from enum import StrEnum
@@ -19,19 +17,20 @@ from typer import Argument
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
-from rotordrop.cli._output import console, deliver, progress_bar, require_places
-from rotordrop.errors import RotordropError, UsageError
+from rotordrop.cli._output import console, deliver, require_places
+from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rotordrop.ledger.book import LoggedDrop
+    from rotordrop.report.content import ReportContent
 
+LATEST = 8
+"""Drops on the first screen; chosen, not measured."""
 WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
 WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
 
 
-Action = StrEnum("Action", ["add", "show", "allow", "remove", "export", "reestimate"])
+Action = StrEnum("Action", ["add", "show", "allow", "remove", "export"])
 """What to do with a log."""
 
 
@@ -40,7 +39,7 @@ def log(
         Action,
         Argument(
             metavar="ACTION",
-            help="add an estimate, show, allow, remove a drop, export a table, reestimate what was kept.",
+            help="add an estimate, show, allow, remove a drop, export a table.",
         ),
     ],
     where: Annotated[str, Argument(metavar="LOG", help="SQLite file, or postgresql://….")],
@@ -57,9 +56,7 @@ def log(
     drops: Annotated[int | None, typer.Option(metavar="N", help="allow: number of drops.")] = None,
     seconds: Annotated[float | None, measured("time", "allow: time in all, as in '600 s'.")] = None,
     source: Annotated[str, text_option("TEXT", "allow: who agreed on it, and where.")] = "",
-    keep: Annotated[
-        Path | None, text_option("DIR", "reestimate: where 'rotordrop watch' kept the records.")
-    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Show all drops, not the latest alone.")] = False,
     json: options.Json = None,
 ) -> None:
     """Add a drop to the log of a machine, list what is there, and count it against an allowance.
@@ -68,7 +65,6 @@ def log(
     """
     from rotordrop.ledger import book
 
-    _say_what_has_no_digest(where)
     if action is Action.export and what is not None:
         if Path(what).resolve() == Path(where).resolve():
             raise UsageError(f"{what} is the log itself; name another file for the table")
@@ -84,9 +80,6 @@ def log(
         console().print(f"drop {what} was removed")
     elif action is Action.allow:
         _allow(where, machine, bearings, drops, seconds, source)
-    if action is Action.reestimate:
-        _reestimate(where, keep, machine, json)
-        return
     log = book.read_log(where)
     found = book.logged_drops(log, machine=machine)
     if action is Action.export:
@@ -101,7 +94,7 @@ def log(
         "statement": book.STATEMENT,
     }
     said = [*(share.sentence() for share in shares), *(one.sentence() for one in rising)]
-    deliver(content, json, lambda out: out.print(_table(found), *said, book.STATEMENT, sep="\n"))
+    deliver(content, json, _page(where, found, [*said, book.STATEMENT], whole=everything))
 
 
 def _allow(
@@ -119,28 +112,6 @@ def _allow(
             f"{', '.join(sorted(map(repr, logged)))}; an allowance counts drops of the machine of "
             "exactly its name"
         )
-
-
-def _reestimate(where: str, keep: Path | None, machine: str | None, json: Path | None) -> None:
-    from rotordrop.cli.watch import kept_beside
-    from rotordrop.watch.again import reestimate
-
-    with progress_bar("estimating again") as progress:
-        found = reestimate(where, kept_beside(where, keep), machine, lambda name: progress(name, 0.0))
-    numbers = [asdict(one) | {"moved": one.moved} for one in found.numbers]
-    content = {"numbers": numbers, "left_out": {str(key): why for key, why in found.left_out.items()}}
-    deliver(content, json, lambda out: out.print(*found.sentences(), sep="\n", markup=False))
-
-
-def _say_what_has_no_digest(where: str) -> None:
-    from rotordrop.ledger.book import read_log
-
-    with suppress(RotordropError):  # a log that is not there yet, or damaged
-        if not read_log(where).sealed:
-            console(sys.stderr).print(
-                "note: an older rotordrop made this log, without digests; the next drop or allowance that is "
-                "added gives it some"
-            )
 
 
 def _drop(what: str | None, bearings: str, recorded: str, duration: float | None, cause: str) -> LoggedDrop:
@@ -179,26 +150,33 @@ def _export(found: Mapping[int, LoggedDrop], file: str | None) -> None:
     console().print(f"Table: {file}")
 
 
-def _table(found: Mapping[int, LoggedDrop]) -> Table:
-    from rich.table import Table
+def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, whole: bool) -> ReportContent:
+    """What is used, and the drops: the latest ones, or all of them."""
+    from rotordrop.report.content import ReportContent, Statement, Table
+    from rotordrop.units import format_minute
 
-    from rotordrop.units import format_minute, format_quantity
-
-    table = Table(
-        "drop", "machine", "bearings", "date", "record", "speed", "duration", "largest force (90 %)"
-    )
-    for number, drop in found.items():
+    shown, rows = [*found.items()][0 if whole else -LATEST :], []
+    several = len({(drop.machine, drop.bearing_set) for drop in found.values()}) > 1
+    for number, drop in shown:
         forces = [one for one in drop.severity if one.quantity == "peak_force_N"]
         worst = max(forces, key=lambda one: one.upper, default=None)
         day = format_minute(drop.recorded or drop.added)
-        table.add_row(
-            str(number),
-            drop.machine,
-            drop.bearing_set,
-            day if drop.recorded else f"logged {day}",
-            f"{drop.record} (simulated)" if drop.simulated else drop.record,
-            format_quantity(drop.speed, "speed"),
-            "" if drop.duration is None else f"{drop.duration:.4g} s",
-            "" if worst is None else f"{worst.bearing} {worst.lower:.0f} to {worst.upper:.0f} N",
-        )
-    return table
+        lasted = "" if drop.duration is None else f", {drop.duration:.4g} s"
+        told = {
+            "drop": str(number),
+            **({"machine, bearings": f"{drop.machine}, {drop.bearing_set}"} if several else {}),
+            "date": day if drop.recorded else f"logged {day}",
+            "record": f"{drop.record} (simulated)" if drop.simulated else drop.record,
+            "speed": f"{drop.speed / (2.0 * math.pi):.4g} Hz{lasted}",
+            "largest force (90 %)": ""
+            if worst is None
+            else f"{worst.bearing} {worst.lower:.0f} to {worst.upper:.0f} N",
+        }
+        rows.append(told)
+    table = Table(tuple(rows[0]) if rows else ("drop",), tuple(tuple(row.values()) for row in rows))
+    left = [f"{len(found) - len(shown)} earlier drops: --all"] if len(shown) < len(found) else []
+    return ReportContent(
+        title=f"Log of drops: {where}",
+        verdict=tuple(map(Statement, [*said, *left])),
+        summary=(table,),
+    )

@@ -16,11 +16,10 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
 from rotordrop.cli._output import STANDARD_OUTPUT, console, deliver, deliver_text, require_places
 from rotordrop.errors import OutputError, UsageError
+from rotordrop.units import percent, si_unit
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from rotordrop.machine import Machine
+    from rotordrop.machine.ross_files import Spring
 
 TEMPLATE_FILE = Path("machine.toml")
 
@@ -115,10 +114,7 @@ def init(
 
 def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
-    from pydantic import ValidationError
-
-    from rotordrop.machine.saving import machine_text
-    from rotordrop.machine.simple import SimpleMachine, simple_machine
+    from rotordrop.machine.simple import simple_text
 
     missing = [f"--{name.replace('_', '-')}" for name, value in given.items() if not value]
     if missing and not (sys.stdin and sys.stdin.isatty()):
@@ -127,24 +123,13 @@ def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
             "give them as options"
         )
     said = {name: value or typer.prompt(_QUESTIONS[name], err=True).strip() for name, value in given.items()}
-    numbers: dict[str, Any] = dict(said)
-    for name in ("bearings", "sensors"):
-        places = [place.strip() for place in said[name].replace(";", ",").split(",")]
-        if len(places) != 2:
-            raise UsageError(f'--{name} needs two planes, such as "110 mm, 980 mm"')
-        numbers[name] = tuple(places)
-    try:
-        machine = simple_machine(SimpleMachine(**numbers, preload=preload))
-    except ValidationError as error:
-        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
-        raise UsageError(f"these numbers make no machine: {reasons}") from None
-    return machine_text(machine)
+    return simple_text({**said, "preload": preload or ""})
 
 
 def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
     """Copy the machine file of an example, its shaft table and recordings; or none when one stands there."""
+    from rotordrop.examples import example_files
     from rotordrop.files import atomic_path, make_folder
-    from rotordrop.record.examples import example_files
 
     machine, *others = example_files(name).values()
     contents = {"machine.toml": machine.read_bytes()} | {one.name: one.read_bytes() for one in others}
@@ -181,71 +166,23 @@ def check(
     from rotordrop.machine import load_machine
     from rotordrop.report.machine_content import machine_content, machine_json
     from rotordrop.report.page import write_page
-    from rotordrop.report.terminal import print_summary
     from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 
     described = load_machine(machine)
     summary = summarise_machine(described)
     warnings = machine_warnings(described, summary, speed)
 
-    def summarise(out: Console) -> None:
-        print_summary(machine_content(described, summary, warnings, brief=not everything), out)
-        for line in rotor_lines(described):
-            out.print(line, no_wrap=True, crop=True)
-
     if report is not None:
         write_page(machine_content(described, summary, warnings, drawn=True), report)
-    deliver(machine_json(described, summary, warnings), json, summarise)
-
-
-WIDTH = 96
-"""Columns of the drawing; chosen, not measured."""
-HALF_ROWS = 3
-"""Rows above and below the axis; chosen, not measured."""
-SHAFT, LAYER, DISC = "█", "░", "┃"
-
-
-def rotor_lines(machine: Machine, width: int = WIDTH) -> list[str]:
-    """Draw the rotor as lines of text, NDE at the left.
-
-    Full blocks are the shaft, light ones layers without stiffness, bars discs. Below stand the marks:
-    ``▲`` touchdown bearing, ``M`` AMB, ``s`` sensor plane.
-    """
-    nodes, elements = machine.rotor.node_positions, machine.rotor.elements
-    begin, length = nodes[0], nodes[-1] - nodes[0]
-    reach = max(max(e.outer_diameter, e.layer_diameter or 0.0) for e in elements)
-    rows = range(-HALF_ROWS, HALF_ROWS + 1)
-
-    def place(node: int) -> int:
-        fraction = (nodes[node - 1] - begin) / length
-        return min(width - 1, int(fraction * width))
-
-    columns = []
-    for i in range(width):
-        z = begin + (i + 0.5) / width * length
-        element = elements[next(k for k in range(len(nodes) - 1) if z <= nodes[k + 1])]
-        column = ""
-        for row in rows:
-            diameter = reach * abs(row) / HALF_ROWS * 0.95
-            layer = diameter < (element.layer_diameter or 0.0)
-            column += SHAFT if diameter < element.outer_diameter else LAYER if layer else " "
-        columns.append(column)
-    for disc in machine.rotor.discs:
-        columns[place(disc.node)] = DISC * len(rows)
-    lines = ["".join(signs).rstrip() for signs in zip(*columns, strict=True)]
-    for parts, mark in ((machine.touchdown_bearings, "▲"), (machine.ambs, "M"), (machine.sensors, "s")):
-        marks = [" "] * width
-        for part in parts:
-            marks[place(part.node)] = mark
-        if parts:
-            lines.append("".join(marks).rstrip())
-    return [*lines, "█ shaft  ░ layer  ┃ disc  ▲ touchdown bearing  M AMB  s sensor plane"]
+    page = machine_content(described, summary, warnings, brief=not everything)
+    deliver(machine_json(described, summary, warnings), json, page)
 
 
 def bearings(
     designation: Annotated[
         str, Argument(metavar="DESIGNATION", help='Such as 71914, "7016 ACD/HCP4A", "6016-2Z/C3".')
     ],
+    everything: Annotated[bool, Option("--all", help="Also the listed bearings of this size.")] = False,
     json: options.Json = None,
 ) -> None:
     """Search bearings by designation: size, angle, balls listed or inferred, clearance, preload.
@@ -253,14 +190,15 @@ def bearings(
     Example: rotordrop bearings "7016 ACD/HCP4A"
     """
     from rotordrop.elements.catalog.lookup import find_bearing, search_bearings
-    from rotordrop.report.bearing_content import bearing_content, bearing_json
+    from rotordrop.report.machine_content import bearing_content, bearing_json
 
     try:
         find_bearing(designation)
     except LookupError as error:
         raise UsageError(str(error)) from None
     found = search_bearings(designation)
-    deliver([bearing_json(bearing) for bearing in found], json, bearing_content(designation, found))
+    content = bearing_content(designation, found, whole=everything)
+    deliver([bearing_json(bearing) for bearing in found], json, content)
 
 
 def _schema_text(document: Document) -> str:
@@ -310,8 +248,8 @@ def convert(
         refuse_beside("--to ross", others)
         _written_for_ross(source, output or Path("rotor_ross.toml"), json)
         return
-    from rotordrop.machine.ross_files import read_rotor
-    from rotordrop.report.rotor_content import imported_content, imported_json
+    from rotordrop.machine.ross_files import MAGNETIC, read_rotor
+    from rotordrop.report.machine_content import imported_content, imported_json
 
     imported = read_rotor(source)
     deliver(imported_json(imported), json, imported_content(imported, source.name))
@@ -322,8 +260,7 @@ def convert(
 
     made_up = {
         "balance_grade.grade": "balance grade",
-        "touchdown_bearings.support": "supports",
-        "ambs.node": "planes of the magnets",
+        "rotor.modal_damping": "modal damping",
         "sensors.node": "planes of the sensors",
         "sensors.angle": "angles of the sensors",
     }
@@ -336,12 +273,21 @@ def convert(
     ):
         if given is None:
             made_up[path] = what
-    ends = sorted({spring.node for spring in imported.springs if spring.kind == "BearingElement"})
+    magnets, ends = (
+        sorted({spring.node for spring in imported.springs if spring.kind == kind})
+        for kind in (MAGNETIC, "BearingElement")
+    )
     last = len(imported.rotor.node_positions)
     if len(ends) < 2:
-        ends = [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
+        ends = magnets if len(magnets) > 1 else [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
         made_up["touchdown_bearings.node"] = "planes of the touchdown bearings"
+    if len(magnets) < 2:
+        magnets = ends
+        made_up["ambs.node"] = "planes of the magnets"
     nodes = (ends[0], ends[-1])
+    supports = {s.node: _support(s, source.name) for s in imported.springs if s.support is not None}
+    if not set(nodes) <= set(supports):
+        made_up["touchdown_bearings.support"] = "supports"
     if nodes[0] == nodes[1]:
         raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")
     length = imported.rotor.node_positions[-1]
@@ -359,9 +305,16 @@ def convert(
         support="1e8 N/m",
         name=source.stem,
     )
-    planes = [("NDE", nodes[0]), ("DE", nodes[1])]
+    planes, magnet_planes = ([("NDE", at[0]), ("DE", at[-1])] for at in (nodes, magnets))
     notes = [f"rotor from {source.name} ({imported.source})", *imported.notes]
-    machine = drafted_machine(rotor=imported.rotor, bearings=planes, sensors=planes, known=known, notes=notes)
+    machine = drafted_machine(
+        rotor=imported.rotor.changed(modal_damping=float(imported.rotor.modal_damping)),
+        bearings=planes,
+        sensors=magnet_planes,
+        known=known,
+        notes=notes,
+        supports=supports,
+    )
     marked = dict.fromkeys(made_up, MADE_UP) | {
         f"touchdown_bearings.support.{value}": MADE_UP for value in ("stiffness", "mass")
     }
@@ -369,6 +322,17 @@ def convert(
     console(sys.stderr).print(
         f"made up, marked in the file: {', '.join(made_up.values())}", soft_wrap=True, highlight=False
     )
+
+
+def _support(spring: Spring, source: str) -> dict[str, Any]:
+    """The support of a bearing of another program, as a machine file describes it."""
+    below = spring.support or spring
+    pairs = {"mass": spring.support_mass, "stiffness": below.stiffness, "damping": below.damping}
+    return {
+        f"{name}{end}": {"value": f"{value!r} {si_unit(name)}", "source": source}
+        for name, pair in pairs.items()
+        for end, value in zip(("_horizontal", ""), pair, strict=True)
+    }
 
 
 def _written_for_ross(machine: Path, output: Path, json: Path | None) -> None:
@@ -388,9 +352,9 @@ def _written_for_ross(machine: Path, output: Path, json: Path | None) -> None:
         for amb in described.ambs
     ]
     write_ross(described.rotor, output, springs)
-    content = {
-        "file": str(output),
-        "elements": len(described.rotor.elements),
-        "mass_kg": described.rotor.mass,
-    }
-    deliver(content, json, lambda out: out.print(f"written: {output}"))
+    damping = float(described.rotor.modal_damping)
+    without = f"; left out: modal damping of {percent(damping, 1)}, which files of ROSS do not hold"
+    without *= damping > 0.0
+    elements, mass = len(described.rotor.elements), described.rotor.mass
+    content = {"file": str(output), "elements": elements, "mass_kg": mass, "left_out": without[12:]}
+    deliver(content, json, lambda out: out.print(f"written: {output}{without}"))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
+from rotordrop.cli._options import file_option, measured, refuse_beside
 from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import RecordError, UsageError
 
@@ -19,10 +19,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from rotordrop.machine import Machine
-    from rotordrop.spectrum.coast_down import CoastDownSignal
-
-Licence = StrEnum("Licence", {"zero": "CC0-1.0", "by": "CC-BY-4.0", "share_alike": "CC-BY-SA-4.0"})
-"""Licences under which a record may be shared."""
 
 
 def look(
@@ -46,16 +42,6 @@ def look(
             file_okay=False,
         ),
     ] = None,
-    share: Annotated[
-        Path | None,
-        file_option(
-            "--share", "Write the record without names, header and paths as HDF5, and look no further."
-        ),
-    ] = None,
-    licence: Annotated[Licence | None, Option(help="Under which it may be used; goes with --share.")] = None,
-    channel: Annotated[
-        list[str] | None, text_option("NAME", "Channel to share; repeatable, all when left out.")
-    ] = None,
     report: options.Report = None,
     json: options.Json = None,
 ) -> None:
@@ -68,21 +54,16 @@ def look(
     if len(files) == 2 and all(file.suffix.lower() not in ("", ".toml") for file in files):
         told = " and ".join(str(file) for file in files)
         raise UsageError(f"look takes one record and its machine file (.toml), and {told} are two records")
-    machine, record = (None, files[0]) if len(files) == 1 else options.machine_first(*files)
+    *first, record = options.machine_first(*files)
+    machine = first[0] if first else None
     if split is not None and machine is None:
         raise UsageError(
             "--split needs the machine file too: rotordrop look machine.toml both.h5 --split parts"
         )
     others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
-    for option, given in (("--split", split), ("--share", share)):
-        if given is not None:
-            refuse_beside(option, {**others, "--split": split if option == "--share" else None})
-    if share is None and (licence or channel):
-        raise UsageError("--licence and --channel say how a record is shared; give --share FILE.h5 too")
+    if split is not None:
+        refuse_beside("--split", others)
     described = _loaded(machine)
-    if share is not None:
-        _share(record, share, licence, described, channel or (), mapping or (), profile)
-        return
     if split is not None and described is not None:
         _split(record, described, split, mapping or (), profile)
         return
@@ -124,39 +105,10 @@ def _split(
         console().print(f"{place}: {part.time[0]:.6g} to {part.time[-1]:.6g} s, {len(part.time)} samples")
 
 
-def _share(
-    record: Path,
-    place: Path,
-    licence: Licence | None,
-    machine: Machine | None,
-    channels: Sequence[str],
-    mapping: Sequence[str],
-    profile: Path | None,
-) -> None:
-    """Write a record for others, and say what is in it and what is not."""
-    from rotordrop.record.profile import rules_of
-    from rotordrop.record.share import LICENCES, share_record, shared_files
-
-    if licence is None:
-        raise UsageError(f"--share needs a licence: --licence {LICENCES[1]}, one of {', '.join(LICENCES)}")
-    require_places(*shared_files(place, with_machine=machine is not None))
-    rules = rules_of(profile, mapping)
-    done = share_record(record, place, licence.value, machine=machine, channels=channels, profile=rules)
-    out = console()
-    for file, digest in done.files.items():
-        out.print(f"{file}: SHA-256 {digest}")
-    out.print(f"channels: {', '.join(f'{new} (here {old})' for new, old in done.channels.items())}")
-    out.print(f"left out: {', '.join(done.left_out)}")
-
-
 def profile(
     record: Annotated[Path, Argument(metavar="RECORD", help="A file of the recorder.")],
     output: Annotated[Path, file_option("--output", "Profile to write, a .toml file.", "-o")],
     machine: Annotated[Path | None, file_option("--machine", "Machine whose sensors need a channel.")] = None,
-    channel: Annotated[
-        list[str] | None,
-        text_option("SENSOR=CHANNEL", "Channel of a sensor of the machine, as by --map; repeatable."),
-    ] = None,
     mapping: options.Planes = None,
     unit: Annotated[str | None, Option(help="Unit of displacements that name none, um.")] = None,
     sensitivity: Annotated[str | None, Option(help='Volts per length, "8 mV/um".')] = None,
@@ -176,7 +128,7 @@ def profile(
 
     Example: rotordrop profile record.csv
     """
-    from rotordrop.record.columns import guess_profile
+    from rotordrop.evidence.unsaid import guess_profile
     from rotordrop.record.profile import profile_of, rules_of, save_profile
     from rotordrop.record.readers import read_recording
 
@@ -201,7 +153,7 @@ def profile(
         for key, entry in entries.items()
         if entry is not None
     }
-    given = rules_of(profile_of(stated, "the options"), [*(channel or []), *(mapping or [])])
+    given = rules_of(profile_of(stated, "the options"), mapping or [])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors
@@ -336,38 +288,39 @@ def waterfall(
 
     Example: rotordrop waterfall machine.toml coastdown.h5 --report waterfall.html
     """
-    from rotordrop.estimate.recorded_coast_down import with_found_air_gaps
+    from rotordrop.estimate.waterfall import waterfall as analyse
     from rotordrop.machine import load_machine
+    from rotordrop.record.record import Record, read_record
+    from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
     from rotordrop.report.origin import origin_here
     from rotordrop.report.waterfall_page import waterfall_page
-    from rotordrop.spectrum.coast_down import WaterfallChoice, analyse_coast_down
-    from rotordrop.spectrum.findings_file import write_findings
-    from rotordrop.spectrum.machine_candidates import machine_candidates
-    from rotordrop.spectrum.waterfall import WaterfallSettings, settings_for
+    from rotordrop.simulate.coast_down_file import is_coast_down
+    from rotordrop.spectrum.coast_down import WaterfallChoice, write_findings
 
     machine, record = options.machine_first(machine, record)
-    described = load_machine(machine)
-    signal, simulated = _signal(described, record, mapping or (), profile)
-    if against is Against.speed and signal.profile is None:
-        raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
-    samples = next(iter(signal.planes.values())).shape[0]
+    described, simulated = load_machine(machine), SIMULATED_MACHINE
+    read: Path | Record = record
+    if not is_coast_down(record):
+        read = read_record(record, described, profile=profile, mapping=mapping or ())
+        simulated = SIMULATED_RECORD if read.is_simulated else ""
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
         highest_frequency=highest or WaterfallChoice().highest_frequency,
-        settings=WaterfallSettings(points=points or settings_for(samples).points, overlap=overlap),
+        points=points,
+        overlap=overlap,
     )
-    planes = {name: name for name in signal.planes}
-    candidates = machine_candidates(with_found_air_gaps(described, signal), planes)
     with progress_bar("frequencies") as progress:
-        found = analyse_coast_down(signal, candidates, choice, progress=progress)
+        found = analyse(described, read, choice, progress=progress)
+    if against is Against.speed and found.signal.profile is None:
+        raise UsageError(f"--against speed: {record} has no rotor speed; use --against time")
     page = waterfall_page(
         found,
         title=f"Frequencies of a coast-down of {described.name}",
         facts=(
             ("machine", f"{described.name} ({machine.name})"),
             ("record", record.name),
-            ("centre of the bearings", signal.centre),
+            ("centre of the bearings", found.signal.centre),
             *origin_here(sys.argv[1:], [("machine file", machine), ("record", record)]).facts(),
         ),
         simulated=simulated,
@@ -379,19 +332,3 @@ def waterfall(
         write_findings(found, output)
     content = {"simulated_record": bool(simulated), **found.as_json()}
     deliver(content, json, page, report=report, data=data)
-
-
-def _signal(
-    machine: Machine, path: Path, mapping: Sequence[str], profile: Path | None
-) -> tuple[CoastDownSignal, str]:
-    """Open a recording or a simulated file, with the sentence that says it is simulated."""
-    from rotordrop.estimate.recorded_coast_down import recorded_coast_down
-    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
-    from rotordrop.record.record import read_record
-    from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
-    from rotordrop.simulate.coast_down_file import is_coast_down
-
-    if is_coast_down(path):
-        return simulated_coast_down(path, machine), SIMULATED_MACHINE
-    record = read_record(path, machine, profile=profile, mapping=mapping)
-    return recorded_coast_down(machine, record), SIMULATED_RECORD if record.is_simulated else ""

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rotordrop.machine import Machine
     from rotordrop.simulate.case import MagnetEvent, Start
 
 STANDSTILL = "standstill"
@@ -57,7 +56,7 @@ def simulate(
     delay: Annotated[float, measured("time", "Levitated: magnets hold on.", "0 s")] = 0.0,
     stays_on: Annotated[
         list[str] | None,
-        text_option("AMB", 'This magnet holds on while the others let go, "NDE": a drop of one end.'),
+        text_option("AMB", 'Magnet that stays on, "NDE" (one end falls).'),
     ] = None,
     remanent_force: Annotated[
         list[str] | None,
@@ -88,7 +87,6 @@ def simulate(
         Path | None, file_option("--output", "Write all histories as HDF5 (NetCDF4).", "-o")
     ] = None,
     report: options.Report = None,
-    film: options.Film = None,
     data: options.Data = None,
     json: options.Json = None,
 ) -> None:
@@ -97,19 +95,12 @@ def simulate(
     Example: rotordrop simulate machine.toml --speed "60 Hz" --report drop.html
     """
     from rotordrop.machine import load_machine
-    from rotordrop.report.simulate_summary import simulate_summary
-    from rotordrop.report.simulation_numbers import simulation_numbers
+    from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
     from rotordrop.report.terminal import summary_console
-    from rotordrop.rotor.parameters import DropModel
-    from rotordrop.simulate.ahead import loop_compiled_ahead
     from rotordrop.simulate.case import DropCase, LevitatedStart, PlacedStart
     from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
-    if film is not None:
-        from rotordrop.report.film import require_film
-
-        require_film(film)
     if stays_on and (magnets or relevitate is not None):
         raise UsageError(
             "--stays-on has the spring and damper of a magnet and cannot go with --magnets or --relevitate, "
@@ -149,28 +140,17 @@ def simulate(
     if warning is not None:
         errors.print(warning, soft_wrap=True)
 
-    def modelled() -> DropModel:
-        model = model_for(described, case)
-        compiled()
-        return model
-
-    with loop_compiled_ahead(lambda text: errors.print(text, soft_wrap=True)) as compiled:
-        model = interruptible(modelled)
+    model = interruptible(lambda: model_for(described, case))
     result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
         result.save(output)
-    if film is not None:
-        from rotordrop.estimate.bearing_drop import simulated_bearings
-        from rotordrop.report.film import write_film
-
-        write_film(simulated_bearings(result), film, simulated=True)
     if report is None and data is None:
         said = simulate_summary(result, described)  # draws nothing: plotly takes half a second to load
     else:
         from rotordrop.report.simulate_page import simulate_page
 
         said = simulate_page(result, described)
-    deliver(simulation_numbers(result, described), json, said, report=report, data=data, film=film)
+    deliver(simulation_numbers(result, described), json, said, report=report, data=data)
     result.check_finished()
 
 
@@ -284,16 +264,15 @@ def coast_down(
     Example: rotordrop coast-down machine.toml --speed "60 Hz" --report coast.html
     """
     from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
+    from rotordrop.estimate.waterfall import waterfall
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
     from rotordrop.report.coast_down_page import coast_down_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import summary_console
     from rotordrop.rotor.parameters import build_drop_model
-    from rotordrop.simulate._coast_run import MOST_STEPS_PER_WINDOW
-    from rotordrop.simulate.case import CentredStart, LevitatedStart
-    from rotordrop.simulate.coast_down import simulate_coast_down
-    from rotordrop.simulate.coast_down_case import CoastDownCase
+    from rotordrop.simulate.case import CentredStart, CoastDownCase, LevitatedStart
+    from rotordrop.simulate.coast_down import MOST_STEPS_PER_WINDOW, simulate_coast_down
     from rotordrop.simulate.coast_down_certificate import certify_coast_down
     from rotordrop.simulate.expected_steps import long_run
 
@@ -334,21 +313,10 @@ def coast_down(
     numbers: dict[str, Any] = result.as_json()
     if report is not None:
         # with samples on disk the page also has waterfalls, lines and resonances
-        analysis = None if result.path is None else _frequencies(described, result.path)
+        analysis = None if result.path is None else waterfall(described, result.path)
         write_page(coast_down_page(result, described, analysis, certificate), report)
         numbers["frequencies"] = None if analysis is None else analysis.as_json()
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
     deliver(numbers, json, coast_down_page(result, described, certificate=certificate))
     result.check_finished()
-
-
-def _frequencies(machine: Machine, path: Path) -> Any:
-    from rotordrop.estimate.simulated_coast_down import simulated_coast_down
-    from rotordrop.spectrum.coast_down import analyse_coast_down
-    from rotordrop.spectrum.machine_candidates import machine_candidates
-
-    signal = simulated_coast_down(path, machine)
-    candidates = machine_candidates(machine, {name: name for name in signal.planes})
-    with progress_bar("frequencies") as progress:
-        return analyse_coast_down(signal, candidates, progress=progress)

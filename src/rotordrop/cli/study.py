@@ -1,11 +1,10 @@
-"""Studies of many drops: run one, show it, repeat a recorded drop, find rare ones, choose a design."""
+"""Studies of many drops: run one, show it, repeat a recorded drop."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,13 +12,10 @@ from typer import Argument, Option
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured
-from rotordrop.cli._output import Progress, console, deliver, progress_bar
+from rotordrop.cli._output import console, deliver, progress_bar
 from rotordrop.errors import UsageError, unknown_key
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from rotordrop.study.run import StudyProgress
     from rotordrop.study.summary import StudyResults
 
 ByOption = Annotated[
@@ -39,11 +35,6 @@ DropsOption = Annotated[
 ]
 
 
-def _drops_of(bar: Progress) -> Callable[[StudyProgress], None]:
-    """Shows the progress of a study by a bar."""
-    return lambda done: bar(f"{done.drops} of {done.of} drops, {done.rate:.1f}/s", done.drops / done.of)
-
-
 def study_run(
     place: Annotated[
         Path, Argument(metavar="STUDY", help="Study file (.toml) or the folder of a study that has begun.")
@@ -52,10 +43,6 @@ def study_run(
         Path | None, Option(metavar="FOLDER", help="Folder of the study; the name of its file by default.")
     ] = None,
     threads: options.Threads = None,
-    claim: Annotated[
-        bool,
-        Option("--claim", help="Help with a study that others work on: stop when nothing is left to claim."),
-    ] = False,
     dask: Annotated[
         str | None,
         Option(metavar="ADDRESS", help='Dask scheduler, "tcp://…", or "local" for a cluster made here.'),
@@ -81,9 +68,7 @@ def study_run(
     planned = study_of(place) if begun else load_study(place)
     home = place if begun else folder or place.with_suffix("")
     with progress_bar(planned.name) as bar:
-        results = run_study(
-            planned, home, threads=threads, dask=dask, wait_for_others=not claim, report=_drops_of(bar)
-        )
+        results = run_study(planned, home, threads=threads, dask=dask, progress=bar)
     _deliver_results(results, place, by or (), above or (), output, report, data, json)
 
 
@@ -166,7 +151,7 @@ def study_repeat(
     """
     from rotordrop.estimate.published import read_drop
     from rotordrop.machine import load_machine
-    from rotordrop.report.repeat_page import repeat_numbers, repeat_page
+    from rotordrop.report.study_page import repeat_numbers, repeat_page
     from rotordrop.study.repeat import recorded_numbers, repeat_study, repeats
     from rotordrop.study.run import run_study
 
@@ -179,62 +164,8 @@ def study_repeat(
     length = 0.2 if drop is None else drop.estimated_until_s
     study = repeat_study(described, omega, duration=length, drops=drops, seed=seed)
     with progress_bar(study.name) as bar:
-        results = run_study(study, folder, threads=threads, report=_drops_of(bar))
+        results = run_study(study, folder, threads=threads, progress=bar)
     # at another speed the recorded drop is none of these
     recorded = {} if drop is None or speed is not None else recorded_numbers(drop)
     found = repeats(results, recorded, worst_of=worst_of)
     deliver(repeat_numbers(results, found), json, repeat_page(results, found), report=report)
-
-
-def study_rare(
-    study: Annotated[Path, Argument(metavar="STUDY", help="Study file (.toml).")],
-    column: Annotated[str, Option(metavar="COLUMN", help='Quantity of a study, such as "NDE.peak_force".')],
-    above: Annotated[str, Option(metavar="LIMIT", help='Limit with its unit, such as "12 kN".')],
-    samples: Annotated[int, Option(metavar="N", help="Points of a level, a multiple of ten.")] = 500,
-    repeats: Annotated[int, Option(metavar="N", help="Independent repeats.")] = 8,
-    threads: options.Threads = None,
-    json: options.Json = None,
-) -> None:
-    """Find the probability that a drop exceeds a limit, where that is rare.
-
-    Example: rotordrop study rare study.toml --column NDE.peak_force --above "9 kN"
-    """
-    from rotordrop.study.plan import load_study
-    from rotordrop.study.quantities import column_of
-    from rotordrop.study.rare import rare_drops
-    from rotordrop.units import parse_quantity
-
-    plan = load_study(study)
-    limit = parse_quantity(above, column_of(plan.machine, column).kind)
-    with progress_bar(plan.name) as bar:
-        found = rare_drops(plan, column, limit, samples=samples, runs=repeats, threads=threads, progress=bar)
-    sentence = found.sentence(f"{column} above {above}")
-
-    def summarise(out: Console) -> None:
-        out.print(sentence)
-        out.print("The spread is that of the values that vary in the study, not of all that is unknown.")
-
-    content = {"machine": plan.machine.name, "digest": plan.digest, "column": column, "above": limit}
-    deliver(content | asdict(found) | {"sentence": sentence}, json, summarise)
-
-
-def study_design(
-    plan: Annotated[Path, Argument(metavar="DESIGN", help="Design file (.toml).")],
-    folder: Annotated[
-        Path | None, Option(metavar="FOLDER", help="Folder of the drops; the name of the file by default.")
-    ] = None,
-    threads: options.Threads = None,
-    report: options.Report = None,
-    json: options.Json = None,
-) -> None:
-    """Choose values of a machine within bounds for the mildest drops.
-
-    Example: rotordrop study design design.toml --report design.html
-    """
-    from rotordrop.report.design_page import design_numbers, design_page
-    from rotordrop.study.design import best_designs, load_design
-
-    read = load_design(plan)
-    with progress_bar(read.study.name) as bar:
-        found = best_designs(read, folder or plan.with_suffix(""), threads=threads, report=_drops_of(bar))
-    deliver(design_numbers(read, found), json, design_page(read, found), report=report)

@@ -68,9 +68,9 @@ def watch(
 
 def kept_beside(log: str, keep: Path | None) -> Kept:
     """The records kept for a log."""
+    from rotordrop.jobs.workspace import Workspace
     from rotordrop.ledger.book import is_url
     from rotordrop.watch.kept import Kept
-    from rotordrop.web.workspace import Workspace
 
     if keep is None and is_url(log):
         raise UsageError("a log in a data base has no folder beside it; name one for the records with --keep")

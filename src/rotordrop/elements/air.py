@@ -31,7 +31,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         guess_sigma=0.7,
         given_sigma=0.0,
         entries=(Entry(array="spin", column=L.AERO_TIME_CONSTANT),),
-        truth=("tau_aero",),
     ),
 )
 """Unknowns of the drag of the air, in every drop anew."""

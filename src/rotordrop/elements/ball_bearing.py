@@ -505,9 +505,11 @@ class BallBearing(RaceBearing):
     def reason(self, name: str) -> str:
         """Say why a value that was left out is what it is."""
         entry = self.catalogue_entry()
-        if entry is not None and name in ("ball_count", "ball_material"):
+        if entry is not None and name in ("ball_count", "ball_count_range", "ball_material"):
             listed = f"{entry.maker} catalogue" if entry.listed else "the designation"
-            return entry.complement.basis if name == "ball_count" else listed
+            return listed if name == "ball_material" else entry.complement.basis
+        if name == "arrangement" and self.arrangement != type(self).model_fields[name].default:
+            return "the designation"
         return super().reason(name)
 
 
@@ -575,7 +577,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.AXIAL_OFFSET),
         step=Step.IMPACTS,
         field="preload_N",
-        truth=("preload_N",),
         stored="bearing.preload",
         estimated_by=_by_offset,
         taken_over="welcome",

@@ -329,7 +329,7 @@ class BallNumbers(BearingNumbers):
         note = f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind"
         yield _figure(
             "force_on_springs",
-            "force with preload springs in place of spacers",
+            "peak force if preloaded by springs, ×",
             "dimensionless",
             left,
             note=note,
@@ -407,25 +407,6 @@ class BallNumbers(BearingNumbers):
         """Preload and angle of the first ball."""
         yield Spread(path="preload", low=0.8, high=1.25, described=self.balls.preload)
         yield Spread(path="bearing.first_ball_angle", low=0.0, high=2.0 * math.pi / self.balls.ball_count)
-
-    def truth(self) -> dict[str, float]:
-        """Geometry, materials, preload and where the balls stand."""
-        balls = self.balls
-        return {
-            "Dw": float(balls.ball_diameter),
-            "Z": balls.ball_count,
-            "Dpw": float(balls.pitch_diameter),
-            "alpha_deg": math.degrees(float(balls.contact_angle)),
-            "fi": float(balls.conformity_inner),
-            "fo": float(balls.conformity_outer),
-            "E_ring": float(balls.ring_youngs_modulus),
-            "nu_ring": float(balls.ring_poisson_ratio),
-            "E_ball": float(balls.ball_youngs_modulus),
-            "nu_ball": float(balls.ball_poisson_ratio),
-            "preload_N": float(balls.preload),
-            "beta0_deg": math.degrees(float(balls.first_ball_angle)),
-            "row2_offset_pitch": float(balls.second_row_offset),
-        }
 
 
 def _figure(

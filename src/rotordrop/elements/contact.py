@@ -172,7 +172,6 @@ EXPONENT = Parameter(
         Entry(array="bearing", column=L.CONTACT_STIFFNESS, rule=Rule.AT_TYPICAL_DEPTH),
     ),
     field="contact.exponent",
-    truth=("contact", "n"),
     changes={"contact.stiffness": _of_the_file},
     filed=_pair_of_the_file,
 )
@@ -189,7 +188,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         step=Step.IMPACTS,
         leading=True,
         field="contact.stiffness_N_per_m_n",
-        truth=("contact_K",),
         taken_over="welcome",
         separated_by={"air_gap": "a static push with a known force gives the contact stiffness"},
     ),
@@ -203,7 +201,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.CONTACT_DAMPING),
         step=Step.IMPACTS,
         field="contact.damping_s_per_m",
-        truth=("contact", "lam"),
         taken_over="welcome",
     ),
 )

@@ -238,7 +238,8 @@ def _node_at(position: Known, nodes: tuple[float, ...], place: tuple[str | int, 
     if abs(nodes[nearest] - position.value) > NODE_TOLERANCE:
         raise Misfit(
             f"there is no node at {position.value * 1e3:.7g} mm; the nearest is node {nearest + 1} at "
-            f"{nodes[nearest] * 1e3:.7g} mm: end a shaft section at this position or give the node",
+            f"{nodes[nearest] * 1e3:.7g} mm: give every part its 'position' and none its 'node', or end a "
+            "shaft section there",
             place,
         )
     return nearest + 1

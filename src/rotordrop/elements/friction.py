@@ -93,7 +93,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         role=Role.DERIVED,
         step=Step.SWEEP,
         field="friction.static",
-        truth=("friction_static",),
         taken_over="welcome",
     ),
     Parameter(
@@ -110,7 +109,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.FRICTION_DYNAMIC, L.FRICTION_STATIC),
         step=Step.SWEEP,
         field="friction.dynamic",
-        truth=("friction_dynamic",),
         taken_over="needed",
         separated_by={"race.inertia": "a speed sensor on the inner race gives its spin-up"},
     ),
@@ -125,7 +123,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.STRIBECK_SPEED),
         spin_up_only=True,
         field="friction.stribeck_speed_m_per_s",
-        truth=("contact", "v_stribeck"),
     ),
 )
 """Unknowns of the friction."""

@@ -258,6 +258,13 @@ class ActiveMagneticBearing(Placed):
             )
 
     @property
+    def loop_is_given(self) -> bool:
+        """Whether stiffness and damping were given, or follow from a given PID controller."""
+        if self.controller is not None and self.controller.kind == "pid":
+            return True
+        return "default" not in (self.stiffness.status, self.damping.status)
+
+    @property
     def further_states(self) -> tuple[int, ...]:
         """The currents of its four coils."""
         return (L.INTERNAL,) * 4

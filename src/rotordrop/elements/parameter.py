@@ -147,9 +147,6 @@ class Parameter:
     """Path of another value of the part that is inferred from the same size, with the same error in it."""
     field: str = ""
     """Field of the JSON document, unit included."""
-    truth: tuple[str, ...] = ()
-    """Where a truth file has it: a field with a number or one number per bearing, or a list of bearings and a
-    key."""
     taken_over: Literal["needed", "welcome", "no"] = "no"
     """Whether an earlier estimate must have, or may have, it to stand for the identification."""
     common_sigma: float = 0.0

@@ -94,7 +94,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.02,
         entries=bearing_entries(L.RACE_MASS),
         field="race.mass_kg",
-        truth=("ring_m",),
     ),
     Parameter(
         path="race.inertia",
@@ -113,7 +112,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         spin_up_only=True,
         inferred_with="race.mass",
         field="race.inertia_kg_m2",
-        truth=("ring_Ip",),
         taken_over="welcome",
     ),
     Parameter(
@@ -127,7 +125,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.DRAG_COEFFICIENT),
         spin_up_only=True,
         field="race.drag_coefficient",
-        truth=("bearing", "drag_mu"),
     ),
 )
 """Unknowns of a race."""

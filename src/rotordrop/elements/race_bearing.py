@@ -312,10 +312,6 @@ class BearingNumbers(ABC):
         """How far its own parameters may lie in a hidden machine."""
         yield from ()
 
-    @abstractmethod
-    def truth(self) -> dict[str, float]:
-        """Its parameters in the fields of truth files."""
-
 
 def numbers_of(bearing: TouchdownBearing) -> BearingNumbers:
     """The numbers of a touchdown bearing, whatever its kind."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import (
+    NODE_TOLERANCE,
     Description,
     Misfit,
     Name,
@@ -308,6 +309,23 @@ class Rotor(Description):
                 )
                 raise Misfit(f"{told}{end}", place)
         place_on_nodes(self.discs, self.node_positions, "discs")
+
+    def cut_at(self, places: Sequence[float]) -> tuple[AnySection, ...]:
+        """Sections with a node at each of the places [m]; those that are given by nodes as they are."""
+        cut: list[AnySection] = []
+        start = 0.0
+        for section in self.sections:
+            if not isinstance(section, SectionByLength):
+                return self.sections
+            step = section.length.value / section.elements
+            nodes = [start + step * k for k in range(section.elements + 1)]
+            new = {
+                p for p in places if start < p < nodes[-1] and min(abs(p - z) for z in nodes) > NODE_TOLERANCE
+            }
+            ends = pairwise(sorted({*nodes, *new}))
+            cut += [section.changed(length=f"{b - a!r} m", elements=1) for a, b in ends] if new else [section]
+            start = nodes[-1]
+        return tuple(cut)
 
     def _check_nodes(self) -> None:
         positions, expected = self.node_positions, 1

@@ -109,7 +109,3 @@ class SleeveNumbers(BearingNumbers):
     def room_to_grow(self) -> tuple[float, str]:
         """Nothing is compared: heat of a sleeve is not reckoned."""
         return math.inf, "nothing"
-
-    def truth(self) -> dict[str, float]:
-        """None of a ball bearing."""
-        return {}

@@ -274,7 +274,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         decisive=True,
         leading=True,
         field="support.stiffness_N_per_m",
-        truth=("support_stiffness",),
         taken_over="needed",
         separated_by={
             "support.mass": (
@@ -289,7 +288,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         guess_sigma=0.03,
         entries=(Entry(array="bearing", column=L.SUPPORT_STIFFNESS_X, rule=Rule.SCALE),),
         field="support.anisotropy",
-        truth=("support_anisotropy",),
         ratio=("support.stiffness_horizontal", "support.stiffness"),
         wider=_of_turned_axes,
     ),
@@ -307,7 +305,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         decisive=True,
         leading=True,
         field="support.mass_kg",
-        truth=("support_mass",),
         taken_over="needed",
     ),
     Parameter(
@@ -324,7 +321,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         step=Step.IMPACTS,
         leading=True,
         field="support.damping_N_s_per_m",
-        truth=("support_damping",),
         taken_over="needed",
     ),
 )

@@ -208,7 +208,6 @@ AIR_GAP = Parameter(
     entries=bearing_entries(L.AIR_GAP),
     step=Step.TAIL,
     field="air_gap_m",
-    truth=("air_gap_m",),
     separated_by={"offset": "a lift test of the rotor in its magnets gives the diametral clearance"},
 )
 
@@ -221,7 +220,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         role=Role.DERIVED,
         step=Step.FIRST_CONTACT,
         field="equivalent_stiffness_N_per_m",
-        truth=("equivalent_stiffness",),
     ),
 )
 """Unknowns of the clearance, and of bearing and support together."""
@@ -237,7 +235,6 @@ DAMPING: tuple[Parameter, ...] = (
         entries=(Entry(array="bearing", column=L.BEARING_DAMPING, rule=Rule.RATIO),),
         step=Step.IMPACTS,
         field="damping_time_s",
-        truth=("bearing", "Cb_over_Kb"),
         taken_over="welcome",
     ),
 )

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rotordrop.known import Known
+
 WORTH_SAYING = 0.95
 """Half width left over the one there is from which a further number is not worth its measurement
 [1] (chosen)."""
+WIDE = 0.05
+"""Half a 90 % interval of a peak force over the force from which it is said why [1] (chosen)."""
+
+
+def is_wide(peak: Known) -> bool:
+    """Whether a peak force is known so badly that it is said why."""
+    return peak.high - peak.low > 2.0 * WIDE * abs(peak.value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,8 +29,6 @@ class Advice:
     half_widths: dict[str, float]
     narrowed: dict[str, float]
     """Half the 90 % interval of the peak force of every bearing as it is, and as it would be [N]."""
-    at_most: bool = False
-    """Whether the interval may become narrower than said, because the model does not fit without it."""
 
     @property
     def left(self) -> float:
@@ -35,5 +42,4 @@ class Advice:
             for name, half in self.half_widths.items()
             if self.narrowed[name] < WORTH_SAYING * half
         ]
-        less = " or less; the model may well fit then" if self.at_most else ""
-        return f"{self.measurement} would narrow the peak force: {', '.join(parts)}{less}"
+        return f"{self.measurement} would narrow the peak force: {', '.join(parts)}"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.estimate.published import Agreement, BearingAgreement, Window
 from rotordrop.evidence.contacts import contact_intervals
 
 AFTER_CONTACT = 2e-3
@@ -29,66 +30,20 @@ TENFOLD = 33e-3
 """Time in which small differences of two drops grow tenfold [s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class WindowAgreement:
-    """Agreement over one window; B bearings."""
-
-    name: str
-    """The window in words."""
-    start: float
-    end: float
-    """From power-off [s]."""
-    rms: Array
-    """Root mean square distance of the orbits [m], shape (B,)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BearingAgreement:
-    """Contacts and bounces of one bearing; K contacts."""
-
-    measured_contacts: Array
-    simulated_contacts: Array
-    """Begin and end of the first contacts [s from power-off], shape (K, 2)."""
-    measured_bounce: float
-    simulated_bounce: float
-    """Height of the first bounce above the rest position [m]; NaN when it was not seen."""
-    horizon: float
-    """Time up to which the orbits differ by less than a tenth of the air gap [s from power-off]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Agreement:
-    """Agreement of a simulated drop with the record."""
-
-    windows: tuple[WindowAgreement, ...]
-    """First contact, 20, 50 and 200 ms."""
-    bearings: tuple[BearingAgreement, ...]
-    """Contacts, bounces, horizon of every bearing."""
-    disagreement: float
-    """The one number of the friction sweep for these orbits [m]."""
-    expected_horizon: float | None = None
-    """Time up to which draws of all uncertain values stay within a tenth of the air gap of each other [s]:
-    beyond it a point-by-point comparison means nothing even with a right model."""
-
-    @property
-    def horizon(self) -> Array:
-        """Time up to which the orbits differ by less than a tenth of the air gap [s], shape (B,)."""
-        return np.array([bearing.horizon for bearing in self.bearings])
-
-
 def compare_orbits(
     time: Array,
     measured: Array,
     simulated: Array,
     gaps: Array,
+    names: Sequence[str],
     *,
     at: Array | None = None,
     expected_horizon: float | None = None,
 ) -> Agreement:
     """Compare a measured and a simulated orbit, shapes (T, B, 2) [m], at the times of the measured one.
 
-    Times (T,) count from power-off [s], ``at`` are those of the simulated orbit where they differ; gaps have
-    shape (B,) [m]; the expected horizon is what the spread of draws leaves [s].
+    Times (T,) count from power-off [s], ``at`` are those of the simulated orbit where they differ; the
+    bearings have these gaps (B,) [m] and names; the expected horizon is what the spread of draws leaves [s].
     """
     if at is not None:
         columns = simulated.reshape(len(at), -1).T
@@ -104,41 +59,41 @@ def compare_orbits(
     close = max((first[1] for first in firsts), default=float(time[0]))
     inside = time >= begin
     return Agreement(
-        windows=_windows(time, apart, begin, close),
-        bearings=tuple(
-            BearingAgreement(
-                measured_contacts=seen[:CONTACTS_LISTED],
-                simulated_contacts=made[:CONTACTS_LISTED],
-                measured_bounce=_bounce(time, measured[:, b], seen, float(gaps[b])),
-                simulated_bounce=_bounce(time, simulated[:, b], made, float(gaps[b])),
-                horizon=horizon(time, apart[:, b], float(gaps[b])),
+        windows=_windows(time, apart, begin, close, names),
+        bearings={
+            names[b]: BearingAgreement(
+                measured_contacts_s=seen[:CONTACTS_LISTED].tolist(),
+                simulated_contacts_s=made[:CONTACTS_LISTED].tolist(),
+                measured_bounce_m=_bounce(time, measured[:, b], seen, float(gaps[b])),
+                simulated_bounce_m=_bounce(time, simulated[:, b], made, float(gaps[b])),
+                horizon_s=horizon(time, apart[:, b], float(gaps[b])),
             )
             for b, (seen, made) in enumerate(contacts)
-        ),
-        disagreement=orbit_disagreement(time[inside], apart[inside], begin),
-        expected_horizon=expected_horizon,
+        },
+        orbit_disagreement_m=orbit_disagreement(time[inside], apart[inside], begin),
+        expected_horizon_s=expected_horizon,
     )
 
 
-def _windows(time: Array, apart: Array, begin: float, close: float) -> tuple[WindowAgreement, ...]:
+def _windows(time: Array, apart: Array, begin: float, close: float, names: Sequence[str]) -> list[Window]:
     spans = [("first contact", begin, close + AFTER_CONTACT)]
     spans += [(f"{1e3 * end:.0f} ms", 0.0, end) for end in WINDOWS]
     found = []
     for name, start, end in spans:
         inside = (time >= start) & (time <= end)
         if inside.any():
-            rms = np.sqrt(np.mean(apart[inside] ** 2, axis=0))
-            found.append(WindowAgreement(name=name, start=start, end=min(end, float(time[-1])), rms=rms))
-    return tuple(found)
+            rms = dict(zip(names, np.sqrt(np.mean(apart[inside] ** 2, axis=0)).tolist(), strict=True))
+            found.append(Window(name=name, start=start, end=min(end, float(time[-1])), rms=rms))
+    return found
 
 
-def _bounce(time: Array, place: Array, contacts: Array, gap: float) -> float:
+def _bounce(time: Array, place: Array, contacts: Array, gap: float) -> float | None:
     """Largest height above the lowest point of the air gap between first and second contact [m]."""
     if not len(contacts):
-        return float("nan")
+        return None
     until = contacts[1, 0] if len(contacts) > 1 else float(time[-1])
     flight = (time >= contacts[0, 1]) & (time <= until)
-    return float(place[flight, 1].max() + gap) if flight.any() else float("nan")
+    return float(place[flight, 1].max() + gap) if flight.any() else None
 
 
 def horizon(time: Array, apart: Array, gap: float) -> float:

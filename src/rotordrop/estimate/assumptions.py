@@ -86,10 +86,10 @@ def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
         return
     within = NINETY * sensor_prior(parameter("gain", "sensor"), taken[0].gain, smallest_gap(machine)).sigma
     yield (
-        f"the machine file states no gain of {', '.join(sensor.name for sensor in taken)}: taken as "
-        f"calibrated, each within ±{percent(within, 1)} (90 %). A larger error that all share would be in "
-        "forces and gaps; a range of the gain in that file, such as 0.8 to 1.2, lets the estimate find it",
-        f"gains within ±{percent(within, 1)}",
+        f"no gain given of {', '.join(sensor.name for sensor in taken)}: ±{percent(within, 1)} assumed "
+        "(90 %); a larger error of all would be in forces and gaps. A range of the gain in the machine file, "
+        "such as 0.8 to 1.2, has it estimated",
+        f"gains ±{percent(within, 1)}",
     )
 
 
@@ -109,11 +109,10 @@ def _lag(problem: DropProblem) -> Iterator[tuple[str, str]]:
     lag = math.sqrt(2.0 * SMALL_LOSS) / (2.0 * math.pi * contact)
     cut_off = 1.0 / (2.0 * math.pi * lag)
     yield (
-        "the machine file states no time constant of the sensors: they are taken as fast. A lag of "
-        f"{1e6 * lag:.0f} µs (a bandwidth of {1e-3 * cut_off:.2g} kHz) would hide about "
-        f"{percent(SMALL_LOSS)} of a peak of these contacts of {contact:.0f} Hz, and readings need not show "
-        "it; a time constant in the machine file, for all sensors, takes it into account",
-        f"sensors faster than {1e-3 * cut_off:.2g} kHz",
+        f"no bandwidth of the sensors given: more than {1e-3 * cut_off:.2g} kHz assumed, else peaks of these "
+        f"contacts of {contact:.0f} Hz are more than {percent(SMALL_LOSS)} low; a time constant in the "
+        "machine file takes it into account",
+        f"sensors > {1e-3 * cut_off:.2g} kHz",
     )
 
 
@@ -136,10 +135,8 @@ def _thrust(problem: DropProblem) -> Iterator[tuple[str, str]]:
     """A load along the axis that nobody stated: no sensor across the axis shows it."""
     if not problem.model.machine.axial:
         yield (
-            "the machine file states no load along the axis, and no sensor across it shows one. It presses "
-            "on all balls of a bearing: on a simulated rotor of 6 t with 0.8 of the weight on that bearing "
-            "the stress was 16 % higher than found without it, its force as found; an axial load "
-            "in the machine file and the face it lands on take it into account",
+            "no axial load given; one would raise the stress, not the force. Describe it, and the face it "
+            "lands on, in the machine file",
             "no axial load",
         )
 
@@ -153,19 +150,19 @@ def _level(evidence: Evidence) -> Iterator[str]:
 
 
 def _gaps(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
-    """Where the search for the air gaps begins without a tail, and why there."""
-    if not isinstance(evidence.settled_level, Missing):
+    """Where the search for the air gaps begins where no tail tells them, and why there."""
+    level = evidence.settled_level
+    if not isinstance(level, Missing):
         return
-    names = problem.model.bearing_names
-    reach = evidence.reach
+    reach, names = evidence.reach, problem.model.bearing_names
     for b, (name, entry) in enumerate(zip(names, problem.gap_entries, strict=True)):
         begin = format_quantity(float(problem.start[entry]), "length")
-        sigma = math.sqrt(float(problem.covariance[entry, entry]))
-        within = format_quantity(NINETY * sigma, "length")
+        within = format_quantity(NINETY * math.sqrt(float(problem.covariance[entry, entry])), "length")
         moved = not isinstance(reach, Missing) and problem.start[entry] == reach[b]
         origin = "the reach of the first force" if moved else "the machine file"
         why = f" ({reach.reason})" if isinstance(reach, Missing) else ""
-        yield f"{name}: without a tail the air gap begins at {begin} ± {within} (90 %), by {origin}{why}"
+        tail = "without a tail" if evidence.tail is None else f"as the tail is not used ({level.reason}),"
+        yield f"{name}: {tail} the air gap begins at {begin} ± {within} (90 %), by {origin}{why}"
 
 
 def _air(problem: DropProblem) -> Iterator[tuple[str, str]]:

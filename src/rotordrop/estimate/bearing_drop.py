@@ -17,8 +17,8 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.estimate import published
 from rotordrop.estimate.published import Value
+from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import Known
-from rotordrop.record.impacts import after_flights, lasting_from
 from rotordrop.severity.statistics import Statistics, stress_statistics
 from rotordrop.simulate.certificate import refined_peak
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from rotordrop._version import __version__
 from rotordrop.estimate import published
-from rotordrop.estimate.agreement import Agreement
 from rotordrop.estimate.bearing_drop import finite, published_bearing
-from rotordrop.estimate.estimate import Estimate, Structure
+from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import FORMAT, Value
 from rotordrop.estimate.severity_numbers import severity_values
@@ -23,7 +21,7 @@ from rotordrop.simulate.fingerprint import fingerprint
 
 def published_drop(estimate: Estimate) -> published.Drop:
     """What is published of an estimate; Python and the command line get the same."""
-    record, method, joint = estimate.record, estimate.method, estimate.joint
+    record, method = estimate.record, estimate.method
     return published.Drop(
         format=FORMAT,
         verdict=estimate.verdict.value,
@@ -63,7 +61,7 @@ def published_drop(estimate: Estimate) -> published.Drop:
             bearing.name: published_bearing(bearing, severity_values(estimate, bearing))
             for bearing in estimate.bearings
         },
-        structure=published_structure(estimate.structure),
+        structure=list(estimate.structure),
         advice=[
             published.Advice(
                 measurement=one.measurement,
@@ -85,7 +83,7 @@ def published_drop(estimate: Estimate) -> published.Drop:
             )
             for one in estimate.cross_check
         ],
-        later_motion=[published.LaterMotion(**asdict(one), larger=one.larger) for one in estimate.later],
+        later_motion=list(estimate.later),
         parameters=[
             published.Parameter(
                 path=one.path,
@@ -95,15 +93,7 @@ def published_drop(estimate: Estimate) -> published.Drop:
             )
             for one in estimate.parameters
         ],
-        joint=None
-        if joint is None
-        else published.Joint(
-            paths=list(joint.paths),
-            mean=joint.mean.tolist(),
-            covariance=[float(f"{c:.9g}") for c in joint.covariance[np.tril_indices(len(joint.paths))]],
-            prior_mean=joint.prior_mean.tolist(),
-            prior_standard_deviation=joint.prior_sigma.tolist(),
-        ),
+        joint=estimate.joint,
         sensors={
             one.sensor: published.Sensor(
                 gain_error=Value.of_known(one.gain_error),
@@ -143,29 +133,15 @@ def combined(documents: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[
     }
 
 
-def published_structure(structure: Sequence[Structure]) -> list[published.Structure]:
-    """What a machine has beyond the base model."""
-    return [
-        published.Structure(
-            name=one.name,
-            log_likelihood_rise=finite(one.gain),
-            sentence=one.sentence,
-            probability=one.probability,
-        )
-        for one in structure
-    ]
-
-
 def _value(known: Known | None) -> Value | None:
     return None if known is None else Value.of_known(known)
 
 
 def _replay(estimate: Estimate) -> dict[str, Any]:
     """What a replay has beside the common result; nothing for another method."""
-    steps, agreement = estimate.replay, estimate.agreement
+    steps = estimate.replay
     if steps is None:
         return {}
-    assert agreement is not None
     names = [bearing.name for bearing in estimate.bearings]
     return {
         "fixed": steps.fixed or None,
@@ -173,7 +149,7 @@ def _replay(estimate: Estimate) -> dict[str, Any]:
         "first_contact": {
             name: _first_contact(contact) for name, contact in zip(names, steps.contacts, strict=True)
         },
-        "agreement": _agreement(agreement, names),
+        "agreement": estimate.agreement,
     }
 
 
@@ -189,27 +165,4 @@ def _first_contact(contact: TimedContact) -> published.FirstContact:
         half_period_stiffness_N_per_m=contact.equivalent_stiffness,
         half_period_stiffness_error_N_per_m=contact.standard_error,
         gravity_corrected_stiffness_N_per_m=contact.corrected_stiffness,
-    )
-
-
-def _agreement(agreement: Agreement, names: Sequence[str]) -> published.Agreement:
-    bearings = {
-        name: published.BearingAgreement(
-            measured_contacts_s=one.measured_contacts.tolist(),
-            simulated_contacts_s=one.simulated_contacts.tolist(),
-            measured_bounce_m=finite(one.measured_bounce),
-            simulated_bounce_m=finite(one.simulated_bounce),
-            horizon_s=one.horizon,
-        )
-        for name, one in zip(names, agreement.bearings, strict=True)
-    }
-    windows = [
-        published.Window(**{**asdict(window), "rms": dict(zip(names, window.rms.tolist(), strict=True))})
-        for window in agreement.windows
-    ]
-    return published.Agreement(
-        windows=windows,
-        bearings=bearings,
-        orbit_disagreement_m=agreement.disagreement,
-        expected_horizon_s=agreement.expected_horizon,
     )

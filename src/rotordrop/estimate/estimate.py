@@ -7,7 +7,7 @@ is made.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from html import escape
@@ -15,13 +15,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
-from rotordrop.estimate.agreement import Agreement
 from rotordrop.estimate.bearing_drop import BearingDrop
-from rotordrop.estimate.later_motion import LaterMotion
 from rotordrop.estimate.methods import Method
+from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff
@@ -42,18 +43,18 @@ if TYPE_CHECKING:
 class Verdict(Enum):
     """What model and record say of each other; the values are the sentences a reader sees first."""
 
-    CONSISTENT = "The model is consistent with the record."
-    EXTENDED = "With an extension of the base model, the model is consistent with the record."
+    CONSISTENT = "The model follows the record."
+    EXTENDED = "With an extension of the base model, the model follows the record."
     ONE_DIRECTION = (
         "Not every plane shows both directions: forces across the missing one rest on the model alone. "
         "Intervals are 2 × as wide, and no independent cross-check is possible."
     )
     WIDENED = (
-        "The model is not consistent with the record. Only ranges are stated: they hold the independent "
+        "The model does not follow the record. Only ranges are stated: they hold the independent "
         "cross-check too."
     )
     REPLACED = (
-        "The model is not consistent with the record and lost it at a bearing. Loads there are those of the "
+        "The model does not follow the record and lost it at a bearing. Loads there are those of the "
         "independent cross-check, as ranges."
     )
     OPEN_LOOP = (
@@ -117,35 +118,6 @@ class FittedParameter:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointEstimate:
-    """How the errors of what belongs to the machine hang together, in the measures it is estimated in."""
-
-    paths: tuple[str, ...]
-    """Parameters, gains and offsets of the sensors."""
-    mean: Array
-    covariance: Array
-    """Of the errors of the mean, as the filter holds it, shape (n, n)."""
-    prior_mean: Array
-    prior_sigma: Array
-    """What the record made of them, and what was known before, shape (n,)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Structure:
-    """Something the machine has beyond the base model, as far as the record says."""
-
-    name: str
-    """What it is called."""
-    gain: float
-    """Rise of the logarithm of the marginal likelihood that it brought [1]; infinite where the model without
-    it needed larger process noise. Of another model, the logarithm of its odds."""
-    sentence: str
-    """What was found, with intervals."""
-    probability: float | None = None
-    """Probability of another model that the record does not tell from the stated one [1]."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class SensorErrors:
     """Gain error [1] and offset [m] of one sensor as estimated, and its noise (standard deviation) [m]."""
 
@@ -169,6 +141,25 @@ class Innovations:
     C)."""
     limits: tuple[float, float]
     """Mean normalised squares between which model and record count as consistent [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorMotion:
+    """Displacement along every sensor as it was read and as the estimate gives it; N samples, C channels."""
+
+    channels: tuple[str, ...]
+    """Names of the sensors."""
+    time: Array
+    """Time from power-off [s], shape (N,)."""
+    measured: Array
+    estimated: Array
+    """Readings, NaN where nothing was read, and those of the estimated motion, gain and offset as found [m],
+    shape (N, C)."""
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of their difference [m], shape (C,)."""
+        return np.asarray(np.sqrt(np.nanmean((self.measured - self.estimated) ** 2, axis=0)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +233,7 @@ class Estimate:
     """The consistency checks behind it; empty for a replay."""
     sensors: tuple[SensorErrors, ...] = ()
     """Gain, offset and noise of every sensor; empty for a replay."""
-    joint: JointEstimate | None = None
+    joint: Joint | None = None
     """How the errors of parameters and sensors hang together; None where they are not held together."""
     unbalance: tuple[PlaneUnbalance, ...] = ()
     """Amount and phase of the unbalance of every plane; empty for a replay."""
@@ -252,6 +243,8 @@ class Estimate:
     """Comparisons with the estimate without contact law; empty where none was made."""
     innovations: Innovations | None = None
     """What the filter did not foresee; None for a replay."""
+    at_sensors: SensorMotion | None = None
+    """Measured beside estimated motion where it was measured; None for a replay."""
     nis: float | None = None
     noise_factor: float | None = None
     """Mean normalised innovation squared [1], and size of the process noise over the usual one [1]."""
@@ -315,7 +308,7 @@ class Estimate:
         return as_dataframe(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Histories as a labelled data set with units and long names (needs ``rotordrop[xarray]``)."""
+        """Histories as a labelled data set with units and long names (needs ``rotordrop[tables]``)."""
         from rotordrop.estimate.histories import as_dataset
 
         return as_dataset(self)
@@ -341,19 +334,13 @@ class Estimate:
 
         write_histories(self, path)
 
-    @property
-    def figures(self) -> Mapping[str, Any]:
-        """Figures of the report by name, such as ``"force"`` and ``"displacement NDE"``; plotly figures."""
-        found: Mapping[str, Any] = _above("rotordrop.report.estimate_page", "estimate_figures")(self)
-        return found
-
     def report(self, path: str | Path) -> None:
         """Write the report, one offline HTML file."""
         page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
         _above("rotordrop.report.page", "write_page")(page, path)
 
     def data(self, folder: str | Path) -> None:
-        """Write every table and figure of the report as CSV into a folder."""
+        """Write every table of the report as CSV into a folder."""
         page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
         _above("rotordrop.report.csv_files", "write_data")(page, folder)
 
@@ -382,8 +369,13 @@ class Estimate:
         peaks = "; ".join(f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings)
         return f"<Estimate {self.name} of {self.machine.name}: {peaks}. {self.verdict.value}>"
 
+    def summary(self) -> str:
+        """What a terminal shows first: verdict, loads with intervals, what limits them, what to do next."""
+        screen = _above("rotordrop.report.estimate_page", "estimate_screen")(self)
+        return str(_above("rotordrop.report.terminal", "summary_text")(screen))
+
     def _repr_html_(self) -> str:
-        return summary_html([self])
+        return f"<pre>{escape(self.summary())}</pre>"
 
 
 class Estimates(tuple[Estimate, ...]):
@@ -398,24 +390,7 @@ class Estimates(tuple[Estimate, ...]):
         return pandas.DataFrame([row for estimate in self for row in estimate.rows()])
 
     def _repr_html_(self) -> str:
-        return summary_html(self)
-
-
-def summary_html(estimates: Iterable[Estimate]) -> str:
-    """A small table of drops and bearings for a notebook; names from files are escaped."""
-    head = "".join(f"<th>{text}</th>" for text in ("drop", "bearing", "peak force", "peak stress", "verdict"))
-    rows = []
-    for estimate in estimates:
-        for bearing in estimate.bearings:
-            cells = (
-                estimate.name,
-                bearing.name,
-                _peak_text(bearing.peak_force.known),
-                _peak_text(bearing.peak_stress.known, "pressure"),
-                estimate.verdict.value,
-            )
-            rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+        return "".join(estimate._repr_html_() for estimate in self)
 
 
 def _peak_text(known: Known, kind: str = "force") -> str:

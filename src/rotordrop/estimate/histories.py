@@ -16,6 +16,7 @@ from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.files import atomic_path, new_hdf5
+from rotordrop.labelled import Stored, put
 
 if TYPE_CHECKING:
     import pandas
@@ -156,7 +157,7 @@ def require_format(path: Path) -> str:
         )
     if suffix == ".parquet" and find_spec("pyarrow") is None:
         raise OutputError(
-            f"{path}: Parquet needs a package that is not installed; install rotordrop[parquet], "
+            f"{path}: Parquet needs a package that is not installed; install rotordrop[tables], "
             "or write .csv or .h5"
         )
     return suffix
@@ -198,9 +199,7 @@ def _parquet(estimate: Estimate, time: Array, columns: tuple[Column, ...], path:
 
 def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
     """HDF5 that opens as NetCDF4: every quantity over time and bearing, with units and long name."""
-    import h5py
-
-    names = [bearing.name for bearing in estimate.bearings]
+    names = tuple(bearing.name for bearing in estimate.bearings)
     with new_hdf5(path, track_order=True) as file:
         file.attrs["Conventions"] = "CF-1.8"
         file.attrs["format"] = "rotordrop histories 1"
@@ -208,19 +207,13 @@ def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pa
         file.attrs["verdict"] = estimate.sentence
         file.attrs.update(_marks(estimate))
         file.attrs["record_sha256"] = estimate.record.sha256
-        file["time"] = time
-        file["time"].attrs.update({"units": "s", "long_name": "time from power-off"})
-        file["bearing"] = np.array(names, dtype=h5py.string_dtype())
-        for name in ("time", "bearing"):
-            file[name].make_scale(name)
+        put(file, "time", time, Stored("time", "s", "time from power-off"))
+        put(file, "bearing", names, Stored("bearing"))
         for quantity in dict.fromkeys(c.quantity for c in columns):
             found = {c.bearing: c for c in columns if c.quantity == quantity}
             values = np.full((len(time), len(names)), np.nan)
             for k, name in enumerate(names):
                 if name in found:
                     values[:, k] = found[name].values
-            data = file.create_dataset(quantity, data=values, compression="gzip", shuffle=True)
             one = next(iter(found.values()))
-            data.attrs.update({"units": one.unit, "long_name": one.text})
-            data.dims[0].attach_scale(file["time"])
-            data.dims[1].attach_scale(file["bearing"])
+            put(file, quantity, values, Stored("time bearing", one.unit, one.text))

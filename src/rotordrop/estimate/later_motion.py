@@ -3,45 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.units import format_moment
+from rotordrop.estimate.published import LaterMotion
 
 RESOLVED = 4.0
 """Difference of two largest distances that counts, in standard deviations of the noise [1]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LaterMotion:
-    """How far the rotor moved at one bearing after the part that was estimated, beside the part itself."""
-
-    bearing: str
-    """Name of the bearing."""
-    first: float
-    first_time: float
-    """Largest measured distance from the bearing centre [m] in the estimated part, and when [s]."""
-    later: float
-    later_time: float
-    """The same in the rest of the record."""
-    resolved: float
-    """Difference that the readings show [m]."""
-
-    @property
-    def larger(self) -> bool:
-        """Whether the rotor went further out after the estimated part than in it."""
-        return self.later > self.first + self.resolved
-
-    def sentence(self) -> str:
-        """What this means for the stated peaks."""
-        beyond = 1e6 * (self.later - self.first)
-        return (
-            f"{self.bearing}: the rotor went {beyond:.1f} µm further out at {format_moment(self.later_time)} "
-            "than in the part of the record that was estimated; the largest force of this drop may be there, "
-            "and the stated peak is not it"
-        )
 
 
 def later_motion(
@@ -60,14 +29,16 @@ def later_motion(
         if not all(len(samples) for samples in inside):
             continue
         first, later = (samples[np.argmax(radius[samples, b])] for samples in inside)
+        before, after, resolved = float(radius[first, b]), float(radius[later, b]), RESOLVED * noise
         found.append(
             LaterMotion(
                 bearing=name,
-                first=float(radius[first, b]),
+                first=before,
                 first_time=float(time[first]),
-                later=float(radius[later, b]),
+                later=after,
                 later_time=float(time[later]),
-                resolved=RESOLVED * noise,
+                resolved=resolved,
+                larger=after > before + resolved,
             )
         )
     return tuple(found)

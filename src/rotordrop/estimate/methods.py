@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
+
+from rotordrop.require import require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,6 +17,9 @@ class Tracked:
 
     quick: bool = False
     """One pass instead of three; for a calibrated machine only."""
+
+    def __post_init__(self) -> None:
+        require(self.quick, "quick", bool)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +34,11 @@ class Replay:
     """Starts of the search for the supports."""
     threads: int | None = None
     """Threads; all cores by default."""
+
+    def __post_init__(self) -> None:
+        require(self.fixed, "fixed", str, PathLike, Mapping, none=True)
+        for name in ("draws", "starts", "threads"):
+            require(getattr(self, name), name, int, least=float(name != "draws"), none=name == "threads")
 
 
 Method: TypeAlias = Tracked | Replay

@@ -22,7 +22,7 @@ from rotordrop.json_schema import DIALECT, closed
 from rotordrop.known import Known
 from rotordrop.severity.numbers import NUMBERS
 from rotordrop.severity.statistics import Statistics
-from rotordrop.units import si_unit
+from rotordrop.units import format_moment, si_unit
 
 FORMAT = "rotordrop estimate 2"
 MADE_BY = "rotordrop estimate --json"
@@ -235,6 +235,15 @@ class LaterMotion(Document):
     resolved: float
     larger: bool
     """Whether the rotor went further out after the estimated part."""
+
+    def sentence(self) -> str:
+        """What this means for the stated peaks."""
+        beyond = 1e6 * (self.later - self.first)
+        return (
+            f"{self.bearing}: the rotor went {beyond:.1f} µm further out at {format_moment(self.later_time)} "
+            "than in the part of the record that was estimated; the largest force of this drop may be there, "
+            "and the stated peak is not it"
+        )
 
 
 class Parameter(Document):

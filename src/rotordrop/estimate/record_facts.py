@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.evidence import Evidence, Missing
-from rotordrop.evidence.quality import Finding, Kind, checked, refuse_unusable
+from rotordrop.evidence.quality import Finding, checked, found, refuse_unusable
 
 NO_TAIL = (
     "no settled tail: the air gap rests on its prior and on the contacts; give the readings at standstill"
@@ -48,13 +48,7 @@ def facts_of(evidence: Evidence) -> RecordFacts:
     try:
         findings = checked(evidence)
     except RecordError as error:  # a lost sensor keeps the gate from looking, but not the twin from following
-        unseen = Finding(
-            kind=Kind.NOT_LOOKED_AT,
-            message=f"the plausibility checks could not look at this record: {error}",
-            remedy="look at its channels by eye",
-            severity="warning",
-        )
-        findings = (unseen,)
+        findings = (found("not-looked-at", why=error),)
     refuse_unusable(findings, name)
     warnings = [finding.message for finding in findings if finding.severity == "warning"]
     if evidence.tail is None and isinstance(evidence.still, Missing) and not evidence.held:

@@ -13,6 +13,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.evidence.impacts import Settling
 from rotordrop.evidence.paths import Drop, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
@@ -20,14 +21,12 @@ from rotordrop.evidence.wall import Wall
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.record.axes import along_sensors
-from rotordrop.record.impacts import Settling
 from rotordrop.record.record import Record
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
-from rotordrop.spectrum.coast_down_law import fit_drag
-from rotordrop.spectrum.speed_profile import fit_speed_profile
+from rotordrop.spectrum.speed import fit_drag, fit_speed_profile
 
 
 @dataclass(frozen=True, eq=False)

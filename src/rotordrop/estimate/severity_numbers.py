@@ -13,7 +13,7 @@ from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.known import Known
-from rotordrop.severity.fatigue import fatigue_shares
+from rotordrop.severity.fatigue import fatigue_share
 
 Factor = Callable[[float], float]
 
@@ -105,16 +105,14 @@ def _over_gap(length: float, gap: Known) -> Known:
 def _fatigue(
     bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float
 ) -> Iterator[tuple[str, Known]]:
-    """Shares of the rating life as if the race turned with the rotor from the first impact on.
+    """Share of the rating life as if the race turned with the rotor from the first impact on.
 
     It turns slower, so that the number is an upper end; the lower one is nothing.
     """
     time = bearing.force.time
     spin = np.where(time >= bearing.impacts[0].start, speed, 0.0)
-    low, high = bearing.peak_force.interval_90 or (bearing.peak_force.value, bearing.peak_force.value)
-    factor = (high / bearing.peak_force.value) ** 3  # as the life goes with the load
-    names = ("fatigue_by_segments", "fatigue_by_16281", "fatigue_by_rainflow")
-    for name, share in zip(names, fatigue_shares(ratings, time, loads, spin), strict=True):
-        least = 0.0 if name != "fatigue_by_rainflow" else (low / bearing.peak_force.value) ** 3 * share
-        interval = (least, factor * share)
-        yield f"severity.{name}", Known(value=share, status="determined", interval_90=interval, unit="1")
+    _, high = bearing.peak_force.interval_90 or (0.0, bearing.peak_force.value)
+    share = fatigue_share(ratings, time, loads, spin)
+    most = (high / bearing.peak_force.value) ** 3 * share  # as the life goes with the load
+    known = Known(value=share, status="determined", interval_90=(0.0, most), unit="1")
+    yield "severity.fatigue_by_16281", known

@@ -9,7 +9,7 @@ import numpy as np
 from rotordrop.machine import Machine
 from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import CoastDownSignal
-from rotordrop.spectrum.speed_profile import exact_speed_profile
+from rotordrop.spectrum.speed import exact_speed_profile
 from rotordrop.spectrum.waterfall import PlanarSignal
 
 SPEED_STEP = 0.02

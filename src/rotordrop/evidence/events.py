@@ -13,9 +13,9 @@ from rotordrop.elements.table import parameter
 from rotordrop.errors import NoDropError, RecordError
 from rotordrop.evidence.ends import falling
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
+from rotordrop.evidence.measured_speed import require_speed
 from rotordrop.known import NINETY
 from rotordrop.record.axes import Plane, along_sensors, planar_of
-from rotordrop.record.speed import require_speed
 from rotordrop.series import curvature
 from rotordrop.units import fall_time, format_quantity, percent
 

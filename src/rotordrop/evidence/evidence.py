@@ -29,10 +29,10 @@ from rotordrop.evidence.events import (
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.measured_speed import RotorAngle, rotor_angle
 from rotordrop.evidence.rest import identify_air_gap, rest_of, resting_record
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
-from rotordrop.record.speed import RotorAngle, rotor_angle
 
 if TYPE_CHECKING:
     from rotordrop.evidence.contacts import TimedContact
@@ -370,7 +370,8 @@ class Evidence:
         """Samples that are no readings of the motion, shape (N, S)."""
         from rotordrop.evidence.quality.channels import damaged_samples
 
-        return damaged_samples(self.record.signals)
+        damaged = damaged_samples(self.record.signals)
+        return damaged if self.record.missing is None else damaged | self.record.missing
 
     @property
     def earliest_contact(self) -> float:

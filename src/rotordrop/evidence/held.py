@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.evidence.harmonic import HalfContact, half_contact
+from rotordrop.evidence.impacts import SMOOTHING, peaks, slope
 from rotordrop.known import NINETY
-from rotordrop.record.impacts import SMOOTHING, peaks, slope
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY
 
@@ -54,7 +54,7 @@ _ABOVE_USUAL = 4.0
 _ABOVE_CALM, _CALM, _CALM_SPAN = 1.5, 99.8, 2.0
 """A first contact turns the rotor this many times more sharply than all but the sharpest 0.2 % of turns in
 the nearest two seconds in which it is nowhere near a race: a scratch under a sensor is as sharp there, at
-like speed [1, %, s] (set on seeds 0, 1, 3 and 5 of `studies/look/levitated.py`)."""
+like speed [1, %, s] (set on seeds 0, 1, 3 and 5 of study `look`)."""
 
 _TURN = 4e-3
 """The turn lasts up to this long on either side of the furthest point [s] (chosen)."""
@@ -70,7 +70,7 @@ _FORM = ((0.04, 0.5), (0.06, 1.0))
 """Standard error of a velocity by the form of its fit, before a contact and after it: its share of the
 velocity, and of the square of the speed that the pull gives within the inverse frequency on the race over
 the velocity [1]. A race dampens, more so on the way out, and a rotor pressed on it hardly leaves (set with
-seeds 300000 to 300039 of `studies/look/surges.py`)."""
+seeds 300000 to 300039 of study `look`)."""
 
 _SURELY = 3.0
 """A velocity so many standard errors from zero is one [1] (chosen)."""

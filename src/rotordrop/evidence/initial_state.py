@@ -23,13 +23,13 @@ from rotordrop.evidence.events import RINGING, DropInstant, PowerOff
 from rotordrop.evidence.fall import REMANENT_TIME
 from rotordrop.evidence.free_rotor import Held, held_by, motion_of
 from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.measured_speed import RotorAngle
 from rotordrop.evidence.rest import AirGap, Rest
 from rotordrop.evidence.sensing import Sensing
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.record.axes import along_sensors
 from rotordrop.record.record import Record
-from rotordrop.record.speed import RotorAngle
 from rotordrop.rotor.parameters import DropModel, pushes
 from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.units import fall_speed

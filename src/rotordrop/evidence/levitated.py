@@ -17,8 +17,8 @@ from rotordrop.errors import NoDropError
 from rotordrop.evidence.colour import SlowNoise, slow_noise
 
 if TYPE_CHECKING:
+    from rotordrop.evidence.measured_speed import RotorAngle
     from rotordrop.record.record import Record
-    from rotordrop.record.speed import RotorAngle
 
 
 MAINS = (50.0, 60.0)
@@ -36,6 +36,10 @@ _APART = 1.5
 _FEWEST_TURNS, _FEWEST_SAMPLES = 2.0, 50
 """Levitated turns and samples that the fit needs (chosen): seven numbers of each channel come from them."""
 
+SLOW, _ORBIT = 5.0, (0.1, 1.0)
+"""Speed below which those turns are not needed, as at standstill [Hz], and turns without which a slow rotor
+shows no tone at 1X and at 2X (chosen)."""
+
 _STRETCH = 1e-3
 """Length of the stretches by which the end of the levitated part is looked at [s] (chosen)."""
 
@@ -45,7 +49,7 @@ _LEFT = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class LevitatedModel:
-    """Readings of the levitated rotor: a constant, tones at 1X and 2X, and mains hum.
+    """Readings of the levitated rotor: a constant, tones at 1X and 2X where it turned, and mains hum.
 
     The tones hold orbit and electrical runout together: one cannot tell them apart while the rotor is
     levitated. A linear rotor on a synchronous orbit has no 2X, so what is there is runout and turns on with
@@ -131,7 +135,7 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
     Raises
     ------
     NoDropError
-        When fewer than two revolutions, or hardly any samples, lie before the drop.
+        When too few revolutions or samples lie before the drop.
     """
     from scipy.optimize import minimize_scalar
 
@@ -142,7 +146,7 @@ def fit_levitated(record: Record, end: float, *, speed: float, start: float | No
     time, signals = record.time[keep], record.signals[keep]
     span = float(time[-1] - time[0]) if len(time) > 1 else 0.0
     nominal = abs(speed) / (2 * np.pi)
-    if span * nominal < _FEWEST_TURNS or len(time) < _FEWEST_SAMPLES:
+    if (span * nominal < _FEWEST_TURNS and nominal >= SLOW) or len(time) < _FEWEST_SAMPLES:
         raise NoDropError(
             record.name,
             f"{max(span, 0.0) * 1e3:.3g} ms of levitated rotor before {end:.6g} s are "
@@ -200,6 +204,8 @@ def _misfit(time: Array, signals: Array, frequency: float, hum: float | None) ->
 def _fit(time: Array, signals: Array, frequency: float, hum: float | None) -> LevitatedModel:
     tones = (frequency, 2 * frequency) + ((hum,) if hum is not None else ())
     waves = np.exp(2j * np.pi * np.outer(time, tones))
+    # what a part of a turn does not show has the amplitude zero
+    waves[:, :2] *= (time[-1] - time[0]) * frequency >= np.array(_ORBIT)
     design = np.hstack([np.ones((len(time), 1)), waves.real, -waves.imag])
     solution, noise = _solved(design, signals)
     count = len(tones)

@@ -7,15 +7,18 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from operator import attrgetter, itemgetter
+from os import PathLike
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from rotordrop.errors import NothingFallsError, RecordError, UnpairedError
+from rotordrop.errors import NothingFallsError, RecordError, UnpairedError, UsageError
 from rotordrop.evidence.events import expected_gap
 from rotordrop.evidence.evidence import Evidence, Missing, sought
+from rotordrop.evidence.given import require_drop
 from rotordrop.evidence.held import HeldContact, Level, held_contacts, level_of, masses_at
+from rotordrop.evidence.impacts import AFTER_LAST, Settling, slope
 from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.paths import (
     TOO_SLOW,
@@ -32,16 +35,16 @@ from rotordrop.evidence.paths import (
     whirls_of,
     with_impacts,
 )
-from rotordrop.evidence.quality import Finding, Kind, gate, not_seen, stops
+from rotordrop.evidence.quality import Finding, gate, not_seen, stops
 from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone
 from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.finding import ranked
+from rotordrop.evidence.quality.finding import found, ranked
 from rotordrop.evidence.quality.motion import check_fall, check_given_gap, check_slow_fall
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import STANDSTILL, standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
-from rotordrop.files import DIGEST
+from rotordrop.files import DIGEST, digest_of_file
 from rotordrop.json_schema import (
     DIALECT,
     FLAG,
@@ -56,18 +59,20 @@ from rotordrop.json_schema import (
     listed,
 )
 from rotordrop.known import NINETY
+from rotordrop.machine import Machine
 from rotordrop.record.arrangement import Arrangement
-from rotordrop.record.impacts import AFTER_LAST, Settling, slope
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
-from rotordrop.record.record import Record, open_record, sha256_of
+from rotordrop.record.record import Record, open_record
+from rotordrop.require import require
 from rotordrop.units import format_quantity, in_si
-
-if TYPE_CHECKING:
-    from rotordrop.machine import Machine
 
 RELEASE_ERROR = 2e-3
 """Half width to which a look knows the release [s]."""
+
+LARGEST_GAP, LARGEST_SPAN = 0.1, 10.0
+"""Largest length taken for an air gap, and largest span of readings that are looked at [m] (chosen): readings
+taken a thousand times too large are seen by the fall."""
 
 INDEX_WINDOW = 0.2
 """Time from the release on over which the indices are taken [s], or to the end where that comes first."""
@@ -198,13 +203,7 @@ class Look:
             if plane.touch is not None and plane.touch_interval_90 is not None:
                 half = 1e3 * 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0])
                 events.append((plane.touch, f"first touch at {plane.plane} (± {half:.2g} ms)"))
-        events += [
-            (
-                whirl.start,
-                whirl.words,
-            )
-            for whirl in self.whirls
-        ]
+        events += [(whirl.start, whirl.words) for whirl in self.whirls]
         if self.standstill is not None:
             events.append(
                 (self.standstill, f"slower than {format_quantity(STANDSTILL, 'speed')} from here on")
@@ -257,8 +256,7 @@ def look(
     Where nothing falls, the look has no drop but the contacts of a rotor that its magnets hold; where no two
     channels make a plane, it has the levels of the channels.
     """
-    gap = None if gap is None else in_si(gap, "length", "gap")
-    speed = None if speed is None else in_si(speed, "speed", "speed")
+    gap, speed = _given(record, machine, gap, speed, read_by=(*mapping, *([profile] if profile else [])))
     try:
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
@@ -315,6 +313,21 @@ def look(
         synchronous=_synchronous(fell, motion, drops[0].release),
         notes=(*guessed, *motion.notes),
     )
+
+
+def _given(
+    record: object, machine: Machine | None, gap: object, speed: object, read_by: Sequence[object]
+) -> tuple[float | None, float | None]:
+    """Refuse what cannot be looked at, or by what nothing is read; the gap [m] and the speed [rad/s]."""
+    require(record, "record", str, PathLike, Record)
+    if require(machine, "machine", Machine, none=True) is not None and isinstance(record, Record):
+        require_drop(record, machine)
+    if isinstance(record, Record) and (speed is not None or read_by):
+        raise UsageError("speed, mapping and profile tell how a file is read; expected none with a Record.")
+    gap = None if gap is None else in_si(gap, "length", "gap")
+    speed = None if speed is None else in_si(speed, "speed", "speed")
+    require(gap, "gap [m]", float, none=True, above=0.0, most=LARGEST_GAP)
+    return gap, require(speed, "speed [rad/s]", float, none=True)
 
 
 def _look_at_held(
@@ -381,7 +394,7 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
         sensors=(),
         sampling_rate=(len(time) - 1) / float(np.ptp(time)),
         path=path,
-        sha256=sha256_of(path),
+        sha256=digest_of_file(path),
         metadata=recording.metadata,
         notes=recording.notes,
         warnings=recording.warnings,
@@ -408,13 +421,13 @@ def _look_at_channels(path: FilePath, profile: Profile | str | FilePath | None, 
 
 
 def _unit_doubted(findings: Iterable[Finding]) -> bool:
-    return any(one.kind == Kind.WRONG_UNIT and one.severity == "stop" for one in findings)
+    return any(one.kind == "wrong unit factor" and one.severity == "stop" for one in findings)
 
 
 _FEWEST = 16
 """Samples a channel needs to show a level."""
 
-_UNREADABLE = (Kind.MISSING_SAMPLES, Kind.BACKWARD_TIME, Kind.WRONG_RATE)
+_UNREADABLE = ("missing samples", "non-monotonic time", "wrong sampling rate")
 
 
 def _read(
@@ -425,19 +438,29 @@ def _read(
     profile: Profile | str | FilePath | None,
 ) -> tuple[Record, Arrangement | None]:
     if isinstance(record, Record):
-        return record, None
+        return _near(record), None
     rules = rules_of(profile, mapping)
     if speed is not None:
         rules = rules.model_copy(update={"speed": SpeedSource(constant=f"{speed!r} rad/s")})
-    return open_record(record, machine, profile=rules)
+    read, arrangement = open_record(record, machine, profile=rules)
+    return _near(read), arrangement
+
+
+def _near(record: Record) -> Record:
+    """Refuse readings that are no lengths of a rotor in its bearings, before anything is fitted to them."""
+    span = float(np.fmax.reduce(record.signals, axis=None) - np.fmin.reduce(record.signals, axis=None))
+    if span > LARGEST_SPAN:
+        raise RecordError(
+            f"{record.name} cannot be looked at: its readings span {format_quantity(span, 'length')}, and no "
+            "rotor moves so far in its bearings. Give the right unit, unit='um' of arrays or [units] of a "
+            "profile"
+        )
+    return record
 
 
 def _checked(record: Record) -> tuple[Finding, ...]:
     """Pass as much of the gate as needs no machine: what single channels and the clock show."""
-    damage = [
-        Finding(kind=Kind.DAMAGE, message=words, remedy="copy or export it again", severity="warning")
-        for words in record.warnings
-    ]
+    damage = [found("damage", words=words) for words in record.warnings]
     findings = damage + check_clock(record) + check_channels(record)
     return ranked(findings if stops(findings) else findings + check_blocks(record))
 
@@ -658,8 +681,12 @@ _DOCUMENT: dict[str, Part] = {
         end_s=_read_off(NUMBER, "end"),
         turns=_read_off(NUMBER, "turns"),
         turns_interval_90=_read_off(PAIR, "turns_interval_90"),
-        frequency_Hz=_read_off(NUMBER, "frequency"),
+        frequency_Hz=(NUMBER, lambda one: abs(one.frequency)),
         frequency_interval_90_Hz=_read_off(PAIR, "frequency_interval_90"),
+        fastest_Hz=(NUMBER, lambda one: abs(one.fastest)),
+        fastest_interval_90_Hz=(PAIR, lambda one: list(one.interval_90(one.fastest))),
+        last_Hz=(NUMBER, lambda one: abs(one.last)),
+        last_interval_90_Hz=(PAIR, lambda one: list(one.interval_90(one.last))),
         sense=_read_off({"enum": ["forward", "backward"]}, "sense"),
     ),
     "synchronous": _rows(

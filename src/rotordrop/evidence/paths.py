@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
+from rotordrop.evidence.impacts import BEGUN, Settling, find_impacts
 from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import CENTRED, Wall, find_wall
 from rotordrop.known import NINETY
 from rotordrop.machine.plausibility import USUAL_GAP
-from rotordrop.physics.whirl_spells import whirl_spells
-from rotordrop.record.impacts import BEGUN, Settling, find_impacts
+from rotordrop.physics.whirl_spells import FOLLOWED_TURNS, WhirlSpell, whirl_spells
 from rotordrop.record.record import Record
 from rotordrop.series import noise_by_differences, runs_of
 from rotordrop.units import GRAVITY, fall_time
@@ -135,9 +135,12 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
             touch = crossing(radius, begin, rate, wall.gap, wall.gap_error)
             path = replace(path, wall=replace(wall, touch=touch))
         paths.append(path)
-    notes = [_gap_note(path) for path, given in zip(paths, gaps, strict=True) if given is None]
+    sought = [path for path, given in zip(paths, gaps, strict=True) if given is None]
+    notes = [_gap_note(path) for path in sought if not path.wall.determined]
+    if len(notes) < len(sought):
+        notes.append("air gap by where the rotor touched; give it where it is known")
     if not angles_known:
-        notes.append("down is where the rotor fell; counter-clockwise is how it ran before the fall")
+        notes.append("vertical and sense of rotation taken from the record")
     return Motion(
         time=record.time,
         rate=rate,
@@ -184,14 +187,11 @@ def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
 
 def _gap_note(path: Path) -> str:
     low, high = (1e6 * end for end in path.wall.interval_90)
-    if path.wall.determined:
-        told = f"between {low:.0f} and {high:.0f} µm (90 %) by where the rotor touched"
-    else:
-        told = (
-            "not determined by this record, because the rotor touched its race in too few directions and "
-            f"hardly swung: {low:.0f} to {high:.0f} µm are possible (90 %), {1e6 * path.gap:.0f} µm are taken"
-        )
-    return f"{path.name}: air gap {told}; give it where it is known"
+    return (
+        f"{path.name}: air gap not determined by this record, because the rotor touched its race in too few "
+        f"directions and hardly swung: {low:.0f} to {high:.0f} µm are possible (90 %), {1e6 * path.gap:.0f} "
+        "µm are taken; give it where it is known"
+    )
 
 
 def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
@@ -300,34 +300,31 @@ class Impact:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Whirl:
+class Whirl(WhirlSpell):
     """A spell in which the rotor runs round the bearing by two turns or more."""
 
     plane: str
     """Sensor plane."""
-    start: float
-    end: float
-    """When [s]."""
-    turns: float
-    """Turns, positive for forward whirl (with the spin), negative for backward."""
-    frequency: float
-    """Mean frequency [Hz]."""
     angle_error: float
     """Standard error of the direction at either end by that of the centre [rad]."""
+
+    def interval_90(self, frequency: float, turns: float = FOLLOWED_TURNS) -> tuple[float, float]:
+        """Interval that holds the size of a frequency over so many turns with 90 % probability [Hz]."""
+        half = NINETY * math.sqrt(2.0) * self.angle_error / math.tau
+        half *= abs(frequency) / min(abs(self.turns) - 1.0, turns)
+        return abs(frequency) - half, abs(frequency) + half
 
     @property
     def frequency_interval_90(self) -> tuple[float, float]:
         """Interval that holds the mean frequency with 90 % probability [Hz]; it is that without the run-in,
         half a turn at either end.
         """
-        half = NINETY * math.sqrt(2.0) * self.angle_error / math.tau
-        half *= self.frequency / (abs(self.turns) - 1.0)
-        return self.frequency - half, self.frequency + half
+        return self.interval_90(self.frequency, math.inf)
 
     @property
     def turns_interval_90(self) -> tuple[float, float]:
         """Interval that holds the turns with 90 % probability [1]."""
-        low, high = (self.turns * one / self.frequency for one in self.frequency_interval_90)
+        low, high = (self.turns * one / abs(self.frequency) for one in self.frequency_interval_90)
         return min(low, high), max(low, high)
 
     @property
@@ -337,21 +334,19 @@ class Whirl:
 
     @property
     def words(self) -> str:
-        """The spell in words."""
+        """The spell in words: how fast it is at most and in the end, where they are not the same."""
 
         def known(value: float, interval: tuple[float, float]) -> str:
             half = 0.5 * (interval[1] - interval[0])
             places = max(-math.floor(math.log10(half)), 0) if half > 0.0 else 2
             return f"{abs(value):.{places}f} ± {half:.{places}f}"
 
-        turns, frequency = (
-            known(value, interval)
-            for value, interval in (
-                (self.turns, self.turns_interval_90),
-                (self.frequency, self.frequency_interval_90),
-            )
-        )
-        return f"{self.sense} whirl at {self.plane}, {frequency} Hz, {turns} turns"
+        most, last = self.interval_90(self.fastest), self.interval_90(self.last)
+        frequency = f"{known(self.frequency, self.frequency_interval_90)} Hz"
+        if most[0] > last[1]:
+            frequency = f"up to {known(self.fastest, most)} Hz, {known(self.last, last)} Hz in the end"
+        turns = known(self.turns, self.turns_interval_90)
+        return f"{self.sense} whirl at {self.plane}, {frequency}, {turns} turns"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -480,17 +475,7 @@ def whirls_along(path: Path, motion: Motion, reach: float, span: tuple[float, fl
     spells = whirl_spells(motion.time[chosen], path.position[chosen], reach)
     centre = float(path.wall.centre_error.max()) / reach
     error = centre if math.isfinite(centre) else CENTRED
-    return [
-        Whirl(
-            plane=path.name,
-            start=s.start,
-            end=s.end,
-            turns=s.turns,
-            frequency=abs(s.frequency),
-            angle_error=error,
-        )
-        for s in spells
-    ]
+    return [Whirl(plane=path.name, angle_error=error, **vars(spell)) for spell in spells]
 
 
 LYING = 0.7

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.evidence.measured_speed import require_speed, speed_at_drop
 from rotordrop.known import NINETY, Known
 from rotordrop.record.record import Record
-from rotordrop.record.speed import require_speed, speed_at_drop
 
 LONGEST = 2.0
 """Part of the record after the drop that is fitted [s]; the law in time holds for about a second."""
@@ -69,7 +69,7 @@ def identify_speed(record: Record, power_off: float, *, turning: float | None = 
     since = time - power_off
     used = (since > 0.0) & (since <= LONGEST) & np.isfinite(readings)
     t, n = since[used], readings[used]
-    short = len(t) < 8 or t[-1] < 0.1
+    short = len(t) < 8 or t[-1] < 0.1 or initial == 0.0
     plain = np.inf
     if not short:
         fall = np.log(np.maximum(n, 1e-3 * initial) / initial)
@@ -85,7 +85,7 @@ def identify_speed(record: Record, power_off: float, *, turning: float | None = 
         aero_time_constant=undetermined if short else replace(undetermined, lower=plain),
         friction_loss=0.0,
         residual=0.0 if short else at_drop.scatter,
-        note="the record ends too soon to see the speed fall; it is taken as constant"
+        note="the record does not show the speed fall; it is taken as constant"
         if short
         else f"{t[-1]:.2g} s of speed do not separate air from friction: all is taken as air",
     )

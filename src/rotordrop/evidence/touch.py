@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.record.impacts import slope
+from rotordrop.evidence.impacts import slope
 from rotordrop.units import GRAVITY, fall_time
 
 _NEAREST, _FARTHEST = 0.75, 1.08

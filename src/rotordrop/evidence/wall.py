@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.evidence.impacts import Impacts, find_impacts
 from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
-from rotordrop.record.impacts import Impacts, find_impacts
 from rotordrop.series import noise_by_differences
 from rotordrop.units import GRAVITY, fall_speed
 
@@ -73,6 +73,9 @@ _INDEPENDENT = 4.0
 
 _STEPS = np.array([1e-5, 1e-5, 1e-5, 0.3, 0.3, 0.05])
 """Sizes of the unknowns of a wall: centre [m], radius [m], logarithms of ``β`` and sag, lever [1]."""
+
+_MOST_FITS, _MOST_DAMPED = 200, 40
+"""Steps of a fit, and tries of one step, at most [1]: a fit takes some ten (chosen)."""
 
 _ALL, _BUT_RADIUS = (0, 1, 2, 3, 4, 5), (0, 1, 3, 4, 5)
 """Unknowns that a fit may move."""
@@ -279,12 +282,12 @@ def _least_squares(
     """
     sought, damping, unit = np.clip(start, low, high), 1e-3, _STEPS[list(free)]
     rest = residual(sought)
-    while True:
+    for _ in range(_MOST_FITS):
         steps = 1e-4 * _STEPS * np.where(sought + 1e-4 * _STEPS > high, -1.0, 1.0)
         rows = np.diag(steps)
         slopes = np.column_stack([(residual(sought + rows[k]) - rest) / steps[k] for k in free])
         scaled = slopes * unit
-        while True:
+        for _ in range(_MOST_DAMPED):
             square = scaled.T @ scaled + damping * np.eye(len(unit))
             step = np.zeros(len(sought))
             step[list(free)] = unit * np.linalg.solve(square, scaled.T @ rest)
@@ -295,7 +298,8 @@ def _least_squares(
             damping *= 10.0
         sought, rest, damping = tried, there, max(0.1 * damping, 1e-9)
         if moved < 1e-3:
-            return sought, slopes
+            break
+    return sought, slopes
 
 
 def _robust(error: Array) -> Array:

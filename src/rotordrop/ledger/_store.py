@@ -1,116 +1,62 @@
-"""Where a log of drops is kept: a SQLite file, or a PostgreSQL data base by URL.
+"""Rows that are appended and never changed, in any data base that SQLAlchemy knows; SQLite by default.
 
-Beside the tables of version 1 stands one of seals: the version, and a digest for every drop and every
-allowance, so that what has changed, gone or come by another way is named.
-
-A SQLite log has a rollback journal and no write-ahead log: of one that a killed program left, SQLite drops
-without a word every page from the first on that fails its checksum, acknowledged drops with them.
+Each row has a digest of itself and of the row before it, and the last one stands in a table of its own: what
+was changed or is gone is named by its number.
 """
 
 from __future__ import annotations
 
-import os
+import hashlib
 import sqlite3
-import struct
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.exc import DBAPIError, IntegrityError, ProgrammingError, SQLAlchemyError
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
 from rotordrop.files import require_file, require_place
 
 WAIT = 60.0
 """How long a writer waits for others [s]; chosen, not measured."""
-PAUSE = 0.02
-"""Pause before a log that is being made is looked at again [s]; chosen, not measured."""
-VERSION = 2
-"""Of the tables; 1 had no seals."""
-
-TABLES = (
-    """CREATE TABLE IF NOT EXISTS drops (
-        id {serial},
-        machine TEXT NOT NULL, bearing_set TEXT NOT NULL,
-        record TEXT NOT NULL, sha256 TEXT NOT NULL,
-        recorded TEXT NOT NULL, added TEXT NOT NULL,
-        speed {real} NOT NULL, duration {real}, cause TEXT NOT NULL,
-        method TEXT NOT NULL, verdict TEXT NOT NULL, simulated BOOLEAN NOT NULL,
-        version TEXT NOT NULL, fingerprint TEXT NOT NULL,
-        UNIQUE (machine, bearing_set, sha256))""",
-    """CREATE TABLE IF NOT EXISTS severity (
-        drop_id INTEGER NOT NULL REFERENCES drops (id) ON DELETE CASCADE,
-        bearing TEXT NOT NULL, quantity TEXT NOT NULL, unit TEXT NOT NULL,
-        value {real}, lower {real} NOT NULL, upper {real} NOT NULL,
-        PRIMARY KEY (drop_id, bearing, quantity))""",
-    """CREATE TABLE IF NOT EXISTS allowances (
-        machine TEXT NOT NULL, bearing_set TEXT NOT NULL,
-        drops INTEGER, seconds {real}, source TEXT NOT NULL,
-        PRIMARY KEY (machine, bearing_set))""",
-    "CREATE TABLE IF NOT EXISTS seals (sealed TEXT PRIMARY KEY, digest TEXT NOT NULL)",
+TRIES = 100
+"""Attempts to append a row beside others who append one; chosen, not measured."""
+TABLES = sa.MetaData()
+ROWS = sa.Table(
+    "rotordrop_log",
+    TABLES,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("kind", sa.String(16), nullable=False),
+    sa.Column("content", sa.Text, nullable=False),  # JSON
+    sa.Column("before", sa.String(64), nullable=False),
+    sa.Column("digest", sa.String(64), nullable=False),
+)
+END = sa.Table(
+    "rotordrop_log_end",
+    TABLES,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("digest", sa.String(64), nullable=False),
 )
 
 
-class Transaction:
-    """One transaction: statements with ``?`` for values, whatever the data base calls them."""
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """What stands in a log."""
 
-    def __init__(self, cursor: Any, mark: str) -> None:
-        self._cursor = cursor
-        self._mark = mark
-        self.seals: dict[str, str] = {}
-        """Digests by what they are of, as they stand in the log."""
-        self.sealed = False
-        """Whether the log had digests when it was opened."""
-
-    def run(self, statement: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
-        """Run a statement and give its rows."""
-        self._cursor.execute(statement.replace("?", self._mark), tuple(values))
-        return [] if self._cursor.description is None else [tuple(row) for row in self._cursor.fetchall()]
-
-    def refuse_damaged(self, where: str | Path) -> None:
-        """Refuse a SQLite file whose indexes are not those of its rows: a drop may be counted twice there."""
-        if self._mark == "?" and (found := self.run("PRAGMA integrity_check(1)")[0][0]) != "ok":
-            raise DamagedFileError(
-                f"{where} is damaged: {found}. Take a copy of it; 'rotordrop log show' names a drop that is "
-                "damaged. Where none is, make its indexes anew: sqlite3 LOG REINDEX"
-            )
-
-    def seal(self, what: str, digest: str | None) -> None:
-        """Keep the digest of a drop or an allowance, or forget it."""
-        self.run("DELETE FROM seals WHERE sealed = ?", (what,))
-        if digest is not None:
-            self.run("INSERT INTO seals (sealed, digest) VALUES (?, ?)", (what, digest))
-
-    def open(self, where: str, catalogue: str, serial: str, real: str, *, writing: bool) -> None:
-        """Make the tables that are missing, where the log is written; read the seals."""
-        there = {name for (name,) in self.run(catalogue)}
-        if not writing and "drops" not in there:
-            raise UsageError(f"{where} holds no log of drops; 'rotordrop log add' makes one")
-        missing = {"drops", "severity", "allowances"} - there
-        if missing and there & {"drops", "severity", "allowances", "seals"}:
-            raise DamagedFileError(
-                f"{where} is damaged: its {' and '.join(sorted(missing))} are gone; take a copy of it"
-            )
-        self.sealed = "seals" in there
-        if self.sealed:
-            self.seals = dict(self.run("SELECT sealed, digest FROM seals"))
-            version = self.seals.pop("version", "")
-            if not (version.isascii() and version.isdigit()):
-                raise DamagedFileError(f"{where} is damaged: it has no version; take a copy of it")
-            if int(version) > VERSION:
-                raise UsageError(
-                    f"{where} was written by a later rotordrop: its tables have version {version}, and this "
-                    f"one knows 1 to {VERSION}; use that rotordrop, or export a table with it"
-                )
-        elif writing:
-            for table in TABLES:
-                self.run(table.format(serial=serial, real=real))
-            self.seal("version", str(VERSION))
+    whole: Mapping[int, tuple[str, str]]
+    """Kind and content (JSON) by number."""
+    wrong: Mapping[int, str]
+    """What was changed or is gone, by number."""
+    end: tuple[int, str]
+    """Number and digest of the last row."""
 
 
 def is_url(where: str | Path) -> bool:
-    """Whether a log lies in a PostgreSQL data base."""
-    return str(where).startswith(("postgresql://", "postgres://"))
+    """Whether a log lies in a data base of a server."""
+    return "://" in str(where)
 
 
 def name_of(where: str | Path) -> str:
@@ -118,164 +64,127 @@ def name_of(where: str | Path) -> str:
     return f"the log at {str(where).rpartition('@')[2].partition('?')[0]}" if is_url(where) else str(where)
 
 
-@contextmanager
-def transaction(where: str | Path, *, writing: bool) -> Iterator[Transaction]:
-    """Open a log for one transaction: all of it is kept, or nothing.
+def read_rows(where: str | Path) -> Rows:
+    """Every row of a log, compared with its digests."""
+    with _opened(where, writing=False) as connection:
+        if not sa.inspect(connection).has_table(ROWS.name):
+            raise UsageError(f"{name_of(where)} holds no log of drops; 'rotordrop log add' makes one")
+        return _rows(connection)
 
-    A SQLite file is made when it is written to first; a log that is only read must exist.
+
+def append(where: str | Path, made: Callable[[Rows], tuple[str, str]]) -> int:
+    """Append a row and give its number; once this returns, it is kept. The first row makes the log.
+
+    ``made`` gives kind and content of the row by what stands in the log, or refuses to.
     """
+    for _ in range(TRIES):
+        try:
+            with _opened(where, writing=True) as connection:
+                found = _rows(connection)
+                number, before = found.end[0] + 1, found.end[1]
+                kind, content = made(found)
+                digest = _digest(number, kind, content, before)
+                connection.execute(sa.insert(ROWS).values((number, kind, content, before, digest)))
+                connection.execute(sa.delete(END))
+                connection.execute(sa.insert(END).values((number, digest)))
+            return number
+        except IntegrityError:
+            continue  # somebody else appended a row of this number
+    raise OutputError(f"{name_of(where)}: others write to the log all the time; try again later")
+
+
+def _rows(connection: sa.Connection) -> Rows:
+    whole: dict[int, tuple[str, str]] = {}
+    wrong: dict[int, str] = {}
+    ends = connection.execute(sa.select(END)).all()
+    last, expected = 0, ""
+    for number, kind, content, before, digest in connection.execute(sa.select(ROWS).order_by(ROWS.c.number)):
+        wrong |= dict.fromkeys(range(last + 1, number), "is gone")
+        if digest == _digest(number, kind, content, before) and (last < number - 1 or before == expected):
+            whole[number] = (kind, content)
+        else:
+            wrong[number] = "is not what was logged"
+        last, expected = number, digest
+    end = (ends[0].number, ends[0].digest) if ends else (0, "")
+    if end != (last, expected):
+        wrong |= dict.fromkeys(range(last + 1, end[0] + 1), "is gone") or {last: "is not what was logged"}
+    return Rows(whole=whole, wrong=wrong, end=max(end, (last, expected)))
+
+
+def _digest(*values: Any) -> str:
+    return hashlib.sha256("\n".join(map(str, values)).encode(errors="backslashreplace")).hexdigest()
+
+
+@contextmanager
+def _opened(where: str | Path, *, writing: bool) -> Iterator[sa.Connection]:
+    """A transaction: all of it is kept, or nothing. A log that is written is made where there is none."""
     if not isinstance(where, str | Path):
         raise UsageError(f"{where!r} is no place for a log; expected a path, or an address postgresql://…")
     try:
-        with _postgresql(str(where), writing) if is_url(where) else _sqlite(Path(where), writing) as opened:
-            yield opened
-    except RotordropError:
-        raise
-    except ValueError as error:  # signs that no data base takes
-        raise UsageError(f"{name_of(where)!r} cannot be used: {error}") from error
-
-
-@contextmanager
-def _sqlite(file: Path, writing: bool) -> Iterator[Transaction]:
-    try:
-        with closing(_connected(file, writing)) as connection:
-            opened = Transaction(connection.cursor(), "?")
-            if writing:
-                leave_wal(connection)
-                # EXTRA: what was added survives a power cut
-                connection.execute("PRAGMA synchronous = EXTRA")
-                connection.execute("PRAGMA foreign_keys = ON")
-            opened.run("BEGIN IMMEDIATE" if writing else "BEGIN")
+        engine = _of_server(str(where)) if is_url(where) else _of_file(Path(where), writing)
+        if writing:
             try:
-                catalogue = "SELECT name FROM sqlite_master WHERE type = 'table'"
-                opened.open(str(file), catalogue, "INTEGER PRIMARY KEY", "REAL", writing=writing)
-                yield opened
-                connection.execute("COMMIT")
-            except BaseException:
-                if connection.in_transaction:
-                    connection.execute("ROLLBACK")
-                raise
-    except sqlite3.OperationalError as error:
-        left = [one.name for one in _left_by_killed(file) if one.exists()]
-        why = f"the log cannot be used: {error}"
-        if "locked" in str(error):
-            why = f"others have used the log for {WAIT:g} s; try again later"
-        elif left and not writing:
-            why = (
-                f"a program was killed while it wrote to the log. What it left, {' and '.join(left)}, is put "
-                f"right where file and folder may be written: copy both files to a folder of your own, and "
-                f"read the log there ({error})"
-            )
-        raise OutputError(f"{file}: {why}") from error
-    except sqlite3.DatabaseError as error:
-        if "malformed" in str(error):
-            raise DamagedFileError(
-                f"{file} is damaged ({error}): put back a copy of it, or begin another log and add the kept "
-                "estimates to it"
-            ) from error
-        raise UsageError(f"{file} is not a log of drops ({error}); name another file") from error
-    except OSError as error:
-        raise OutputError(f"{file}: the log cannot be used: {error.strerror}") from error
-
-
-def _left_by_killed(file: Path) -> tuple[Path, Path]:
-    """Where a killed program leaves its write-ahead log, if it is an older rotordrop, and its journal."""
-    return file.with_name(f"{file.name}-wal"), file.with_name(f"{file.name}-journal")
-
-
-def _connected(file: Path, writing: bool) -> sqlite3.Connection:
-    """Open a file; one that asks for a write-ahead log where none can be made as one that nobody changes."""
-    if "\0" in str(file):
-        raise ValueError("its name holds a NUL, where SQLite would end it")
-    if file.exists() and not file.is_file():
-        raise UsageError(f"{file} is no file; name another one for the log")
-    if not writing and not file.exists():
-        raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
-    if writing:
-        require_place(file)
-        if file.exists() and not os.access(file, os.W_OK):
-            raise OutputError(
-                f"{file} may only be read; copy it to where you may write, or ask for the right"
-            )
-    wal, journal = _left_by_killed(file)
-    for left in (wal, journal):
-        require_file(left, "remove it: no program leaves such a thing beside a log")
-    if wal.is_file() and not _is_whole(wal.read_bytes()):
-        raise DamagedFileError(
-            f"{wal} is damaged, and with it the drops that a program added last before it was killed. Take a "
-            f"copy of it and of {file.name}; to go on with what is whole: sqlite3 LOG 'PRAGMA journal_mode = "
-            "DELETE'. Then compare the drops with your estimates, and add what is missing"
-        )
-    mode = "mode=rwc" if writing else "mode=rw"
-    if not writing and not os.access(file.parent, os.W_OK) and not wal.exists():
-        with file.open("rb") as stream:
-            if stream.read(20)[18:] == b"\2\2":
-                mode = "immutable=1"
-    return sqlite3.connect(f"{file.absolute().as_uri()}?{mode}", uri=True, timeout=WAIT, isolation_level=None)
-
-
-def leave_wal(connection: sqlite3.Connection) -> None:
-    """Give a log of an older rotordrop a rollback journal; SQLite waits for nobody here by itself."""
-    until = time.monotonic() + WAIT
-    while True:
-        try:
-            if connection.execute("PRAGMA journal_mode = DELETE").fetchone()[0] == "delete":
-                return
-        except sqlite3.OperationalError as error:
-            if "locked" not in str(error):
-                raise
-        if time.monotonic() > until:
-            raise sqlite3.OperationalError("database is locked")
-        time.sleep(PAUSE)
-
-
-def _is_whole(wal: bytes) -> bool:
-    """Whether every page of a write-ahead log passes its checksum, but for one that was cut short.
-
-    Source: the file format of SQLite, section 4. What stands there from before the log was begun anew differs
-    in both of its salts.
-    """
-    if len(wal) < 32:
-        return True
-    order = ">" if wal[3] & 1 else "<"
-    size = struct.unpack(">I", wal[8:12])[0]
-
-    def summed(part: bytes, first: int, second: int) -> tuple[int, int]:
-        for one, other in struct.iter_unpack(f"{order}2I", part):
-            first = (first + one + second) & 0xFFFFFFFF
-            second = (second + other + first) & 0xFFFFFFFF
-        return first, second
-
-    sums = summed(wal[:24], 0, 0)
-    if sums != struct.unpack(">2I", wal[24:32]):
-        return False
-    for at in range(32, len(wal) - size - 23, size + 24):
-        head = wal[at : at + 24]
-        sums = summed(wal[at + 24 : at + 24 + size], *summed(head[:8], *sums))
-        if head[8:16] != wal[16:24] or sums != struct.unpack(">2I", head[16:]):
-            return head[8:12] != wal[16:20] and head[12:16] != wal[20:24]
-    return True
-
-
-@contextmanager
-def _postgresql(url: str, writing: bool) -> Iterator[Transaction]:
-    try:
-        import psycopg
+                TABLES.create_all(engine)
+            except (IntegrityError, ProgrammingError):  # somebody else made them meanwhile
+                TABLES.create_all(engine)
+        with engine.begin() as connection:
+            yield connection
+    except (RotordropError, IntegrityError):
+        raise
     except ImportError as error:
         raise UsageError(
-            "a log in PostgreSQL needs the extra 'postgres'; install it with: "
-            "pip install 'rotordrop[postgres]'"
+            f"{name_of(where)} needs a driver ({error}); for PostgreSQL: pip install 'rotordrop[postgres]'"
         ) from error
-    try:
-        with psycopg.connect(url, connect_timeout=10) as connection:
-            connection.read_only = not writing
-            with connection.cursor() as cursor:
-                opened = Transaction(cursor, "%s")
-                if writing:  # two who make the tables at once would clash inside PostgreSQL's catalogue
-                    opened.run("SELECT pg_advisory_xact_lock(7208)")
-                catalogue = "SELECT tablename FROM pg_tables WHERE schemaname = ANY (current_schemas(false))"
-                serial, real = "SERIAL PRIMARY KEY", "DOUBLE PRECISION"
-                opened.open(name_of(url), catalogue, serial, real, writing=writing)
-                yield opened
-    except psycopg.Error as error:
-        raise OutputError(f"{name_of(url)} cannot be used: {error}") from error
+    except (SQLAlchemyError, OSError, ValueError) as error:
+        raise _refusal(name_of(where), error) from error
+
+
+def _of_server(address: str) -> sa.Engine:
+    url = sa.make_url(address)
+    if url.drivername in ("postgresql", "postgres"):
+        url = url.set(drivername="postgresql+psycopg")
+    # both tables are read as they stood at one moment
+    return sa.create_engine(url, poolclass=sa.NullPool, isolation_level="REPEATABLE READ")
+
+
+def _of_file(file: Path, writing: bool) -> sa.Engine:
+    if "\0" in str(file):
+        raise UsageError(f"{str(file)!r} cannot be used: its name holds a NUL, where SQLite would end it")
+    if file.exists() and not file.is_file():
+        raise UsageError(f"{file} is no file; name another one for the log")
+    for left in ("-journal", "-wal"):
+        require_file(
+            file.with_name(file.name + left), "remove it: no program leaves such a thing beside a log"
+        )
+    if writing:
+        require_place(file)
+    elif not file.exists():
+        raise UsageError(f"{file} is not there; 'rotordrop log add' makes a log with its first drop")
+
+    def connect() -> sqlite3.Connection:
+        address = f"{file.absolute().as_uri()}?mode={'rwc' if writing else 'rw'}"
+        made = sqlite3.connect(address, uri=True, timeout=WAIT, isolation_level=None)
+        made.text_factory = lambda raw: raw.decode(errors="replace")  # its digest names a damaged row
+        if writing:
+            made.execute("PRAGMA synchronous = EXTRA")  # what was added survives a power cut
+        return made
+
+    engine = sa.create_engine("sqlite://", creator=connect, poolclass=sa.NullPool)
+    begin = "BEGIN IMMEDIATE" if writing else "BEGIN"
+    sa.event.listen(engine, "begin", lambda connection: connection.exec_driver_sql(begin))
+    return engine
+
+
+def _refusal(name: str, error: Exception) -> RotordropError:
+    """What is said of a log that cannot be used."""
+    own = error.orig if isinstance(error, DBAPIError) else error
+    said = " ".join(str(own).split())
+    if isinstance(own, sqlite3.Error) and "locked" in said:
+        return OutputError(f"{name}: others have used the log for {WAIT:g} s; try again later")
+    if type(own) is sqlite3.DatabaseError:
+        kind = UsageError if "not a database" in said else DamagedFileError
+        return kind(
+            f"{name} is damaged or is not a log of drops ({said}): name another file, put back a copy of it, "
+            "or begin another log and add the kept estimates to it"
+        )
+    return OutputError(f"{name} cannot be used: {said}")

@@ -17,6 +17,7 @@ from rotordrop.elements.mount import ELEMENTS
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
+from rotordrop.require import require
 from rotordrop.units import KINDS
 
 D = TypeVar("D", bound=Description)
@@ -48,7 +49,7 @@ def load_machine(path: str | os.PathLike[str]) -> Machine:
     MachineFileError
         When the file cannot be used; the message holds file, line, column, the value and the way out.
     """
-    file = Path(path)
+    file = Path(require(path, "path", str, os.PathLike))
     return _loaded(_text_of(file, "machine file"), file, file.parent)
 
 

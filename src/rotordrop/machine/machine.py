@@ -42,6 +42,8 @@ class Machine(Description):
 
     name: Text
     """Name of the machine."""
+    serial_number: Text = ""
+    """Serial number, which reports repeat."""
     notes: tuple[Text, ...] = ()
     """Remarks of the file's author."""
     gravity: Acceleration = default(GRAVITY, "usual value")
@@ -69,8 +71,8 @@ class Machine(Description):
     loads: tuple[Load, ...] = ()
     """Forces on the rotor beside gravity."""
     side_force: Number | None = None
-    """Steady force in +x all along the rotor over its weight [1], also that of a machine out of level by this
-    angle [rad]; none when left out."""
+    """Steady force in +x all along the rotor over its weight [1]; of a machine out of level the tangent of
+    the angle, with `gravity` times its cosine; none when left out."""
     base: Base | None = None
     """Acceleration of the ground on which the machine stands."""
     clearances: tuple[Clearance, ...] = ()
@@ -93,15 +95,20 @@ class Machine(Description):
         if isinstance(push, str) and re.search(r"[A-Za-z]\s*$", push):
             raise Misfit(
                 f"{push!r} has a unit; side_force is the steady force across over the weight of the rotor, "
-                "or the angle in rad by which the machine is out of level: side_force = 0.01",
+                "or the tangent of the angle by which the machine is out of level: side_force = 0.01",
                 ("side_force",),
             )
         return raw
 
     def check(self) -> None:
         """Refuse parts that do not fit together."""
+        keys = ("unbalances", "touchdown_bearings", "ambs", "sensors", "loads", "clearances")
+        parts = [*self.rotor.discs, *(part for key in keys for part in getattr(self, key))]
+        places = [part.position.value for part in parts if part.position is not None]
+        if len(places) == len(parts):  # no number of a node goes astray
+            self.__dict__["rotor"] = self.rotor.changed(sections=self.rotor.cut_at(places))
         nodes = self.rotor.node_positions
-        for key in ("unbalances", "touchdown_bearings", "ambs", "sensors", "loads", "clearances"):
+        for key in keys:
             place_on_nodes(getattr(self, key), nodes, key)
         self._check_names()
         first: dict[int, str] = {}
@@ -507,7 +514,7 @@ class Mention:
 
 _ENTRY = re.compile(r"(rotor\.sections|rotor\.discs|sensors|ambs)\..+\.(\w+)$")
 _SILENT = {"position", "notes", "unbalances", "node_positions", "sections", "elements", "part", "materials"}
-_PLAIN_INFERRED = {"ball_count", "ball_material"}
+_PLAIN_INFERRED = {"ball_count", "ball_count_range", "ball_material"}
 
 
 def mentions(part: Description) -> tuple[Mention, ...]:

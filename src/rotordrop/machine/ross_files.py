@@ -10,6 +10,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ _SOFT = 1e-3
 _LAYER_MODULUS = 1.0
 _COEFFICIENT = re.compile(r"[kcm](xx|xy|yx|yy|zz)|frequency")
 _DISCS = ("DiskElement", "PointMass")
+_AXES = ("xx", "xy", "yx", "yy")
+MAGNETIC = "MagneticBearingElement"
 _PASSED_OVER = ("parameters", "ross_version")
 _BUILT_IN = {
     "steel": (7810.0, 211e9, 81.2e9),
@@ -54,7 +57,11 @@ class Spring:
     cross_damping: tuple[float, float] = (0.0, 0.0)
     """Force in x against motion in y, and in y against motion in x."""
     kind: str = "BearingElement"
-    """What it is in the source; seals are held in the same way."""
+    """What it is in the source; seals and magnetic bearings are held in the same way."""
+    support: Spring | None = None
+    """What carries it from the ground; none where it ends at the ground itself."""
+    support_mass: tuple[float, float] = (0.0, 0.0)
+    """Mass of that support in x and y [kg]."""
     told: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """All coefficients of the source by its own names, over ``frequency`` [rad/s]; written back as they are.
     """
@@ -151,6 +158,12 @@ def _imported(elements: list[tuple[str, dict[str, Any]]], version: str, notes: l
             following = n + 1
             spans.setdefault(n, []).append(item | {"n": n})
     if sorted(spans) != list(range(len(spans))):
+        joined = [int(item["n"]) for kind, item in elements if kind == "CouplingElement"]
+        if joined:
+            raise ValueError(
+                f"a CouplingElement joins two shafts between nodes {joined[0]} and {joined[0] + 1}; save the "
+                "shaft that drops as a rotor of its own, its half of the coupling as a disc"
+            )
         raise ValueError("the shaft elements do not follow each other from node 0 on")
     positions, nodes = [0.0], [1]
     sections: list[dict[str, Any]] = []
@@ -163,6 +176,17 @@ def _imported(elements: list[tuple[str, dict[str, Any]]], version: str, notes: l
             else:
                 sections.append(piece | {"nodes": [len(positions) - 1, len(positions)]})
         nodes.append(len(positions))
+    beside = [(kind, item) for kind, item in elements if int(item.get("n") or 0) >= len(nodes)]
+    elements = [one for one in elements if one not in beside]
+    springs = tuple(
+        _supported(_spring(k, kind, item, nodes[int(item["n"])]), item.get("n_link"), beside)
+        for k, (kind, item) in enumerate(elements)
+        if _is_spring(kind)
+    )
+    linked = {item.get("n_link") for kind, item in elements if _is_spring(kind)}
+    for kind, item in beside:
+        if int(item["n"]) not in linked:
+            raise ValueError(f"{kind} at node {item['n']}: the shaft has nodes 0 to {len(nodes) - 1}")
     rotor = Rotor.model_validate(
         {
             "material": next(iter(materials)),
@@ -183,9 +207,7 @@ def _imported(elements: list[tuple[str, dict[str, Any]]], version: str, notes: l
     notes += [f"{others.count(kind)} {kind} left out" for kind in dict.fromkeys(others)]
     return ImportedRotor(
         rotor=rotor,
-        springs=tuple(
-            _spring(k, kind, item, nodes) for k, (kind, item) in enumerate(elements) if _is_spring(kind)
-        ),
+        springs=springs,
         source=f"ROSS {version}",
         notes=tuple(dict.fromkeys(notes)),
         nodes=tuple(nodes),
@@ -262,10 +284,10 @@ def _material(item: Mapping[str, Any]) -> tuple[str, tuple[float, float, float]]
 def _disc(kind: str, item: Mapping[str, Any], nodes: list[int]) -> dict[str, Any]:
     disc: dict[str, Any] = {"name": str(item.get("tag") or kind), "node": nodes[int(item["n"])]}
     if kind == "PointMass":
-        masses = {float(item[key]) for key in ("m", "mx", "my") if item.get(key)}
-        if len(masses) != 1:
+        x, y = _point_mass(item)
+        if x != y:
             raise ValueError(f"the point mass at node {item['n']} differs between the directions")
-        return disc | {"mass": f"{masses.pop()!r} kg"}
+        return disc | {"mass": f"{x!r} kg"}
     disc["mass"] = f"{float(item['m'])!r} kg"
     if float(item["Id"]) or float(item["Ip"]):
         disc["polar_inertia"] = f"{float(item['Ip'])!r} kg m^2"
@@ -273,11 +295,35 @@ def _disc(kind: str, item: Mapping[str, Any], nodes: list[int]) -> dict[str, Any
     return disc
 
 
+def _point_mass(item: Mapping[str, Any]) -> tuple[float, float]:
+    """Mass in x and y [kg]; one that is not given is the general one, or that of the other direction."""
+    x, y = (float(item.get(key) or item.get("m") or 0.0) for key in ("mx", "my"))
+    if not x + y:
+        raise ValueError(f"the point mass at node {item['n']} has no mass")
+    return x or y, y or x
+
+
 def _is_spring(kind: str) -> bool:
     return "Bearing" in kind or kind == "SealElement"
 
 
-def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spring:
+def _supported(spring: Spring, link: int | None, beside: list[tuple[str, dict[str, Any]]]) -> Spring:
+    """A bearing with what stands between its link node and the ground: one bearing, one point mass."""
+    if link is None:
+        return spring
+    there = [(kind, item) for kind, item in beside if int(item["n"]) == int(link)]
+    grounds = [one for one in there if _is_spring(one[0]) and one[1].get("n_link") is None]
+    masses = [item for kind, item in there if kind == "PointMass"]
+    if len(there) != 2 or len(grounds) != 1 or len(masses) != 1:
+        raise ValueError(
+            f"bearing {spring.name!r} is linked to node {link}, where one point mass and one bearing to the "
+            "ground are expected, beside the shaft"
+        )
+    below = _spring(0, *grounds[0], spring.node)
+    return replace(spring, support=below, support_mass=_point_mass(masses[0]))
+
+
+def _spring(k: int, kind: str, item: Mapping[str, Any], node: int) -> Spring:
     told: dict[str, tuple[float, ...]] = {}
     for key, value in item.items():
         key = "frequency" if key == "speed" else key  # version 3 calls the speeds of a table what they are
@@ -296,13 +342,13 @@ def _spring(k: int, kind: str, item: Mapping[str, Any], nodes: list[int]) -> Spr
         for key, values in told.items()
     )
     return Spring(
-        node=nodes[int(item["n"])],
+        node=node,
         name=str(item.get("tag") or f"bearing {k + 1}"),
         stiffness=pair("kxx", "kyy"),
         damping=pair("cxx", "cyy"),
         cross_stiffness=pair("kxy", "kyx"),
         cross_damping=pair("cxy", "cyx"),
-        kind="SealElement" if kind == "SealElement" else "BearingElement",
+        kind=kind if kind in ("SealElement", MAGNETIC) else "BearingElement",
         told=told if says_more else {},
     )
 
@@ -353,20 +399,32 @@ def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -
         inertia = {"Id": disc.diametral_inertia.value, "Ip": disc.polar_inertia.value}
         shown = {"tag": tag, "scale_factor": 1.0, "color": "Firebrick"}
         add(f"DiskElement_{tag}", {"n": disc.node - 1, "m": disc.mass.value, **inertia, **shown})
+    further = len(rotor.node_positions)
     for spring in springs:
-        told: dict[str, list[float]] = {key: list(values) for key, values in spring.told.items()}
-        for letter, matrix in (("k", spring.stiffness_matrix), ("c", spring.damping_matrix)):
-            if not spring.told:
-                (xx, xy), (yx, yy) = matrix
-                values = {"xx": xx, "xy": xy, "yx": yx, "yy": yy}
-                told |= {f"{letter}{axes}": [value] for axes, value in values.items()}
-        add(f"{spring.kind}_{spring.name}", {"n": spring.node - 1, "tag": spring.name, **told})
+        kind = "SealElement" if spring.kind == "SealElement" else "BearingElement"
+        entry = _written(spring, spring.node - 1)
+        if spring.support is not None:
+            entry["n_link"] = further
+            add(f"BearingElement_{spring.support.name}", _written(spring.support, further))
+            tag, (mx, my) = f"support of {spring.name}", spring.support_mass
+            add(f"PointMass_{tag}", {"n": further, "mx": mx, "my": my, "tag": tag})
+            further += 1
+        add(f"{kind}_{spring.name}", entry)
     if path.suffix.lower() == ".json":
         write_text(path, json.dumps(content, indent=2))
         return
     import tomlkit
 
     write_text(path, tomlkit.dumps(content))
+
+
+def _written(spring: Spring, node: int) -> dict[str, Any]:
+    """Entry of a bearing at a node of ROSS."""
+    told: dict[str, list[float]] = {key: list(values) for key, values in spring.told.items()}
+    if not spring.told:
+        for letter, matrix in (("k", spring.stiffness_matrix), ("c", spring.damping_matrix)):
+            told |= {f"{letter}{axes}": [value] for axes, value in zip(_AXES, chain(*matrix), strict=True)}
+    return {"n": node, "tag": spring.name, **told}
 
 
 TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm")

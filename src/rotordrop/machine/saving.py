@@ -14,6 +14,7 @@ from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.files import write_text
 from rotordrop.known import Known
 from rotordrop.machine.machine import Machine
+from rotordrop.require import require
 from rotordrop.units import KINDS, parse_quantity, si_unit
 
 _FILE_UNITS = {
@@ -36,11 +37,11 @@ def save_machine(machine: Machine, path: str | os.PathLike[str]) -> None:
     from a table is written into the file, which therefore stands alone. Reading the file gives an equal
     machine.
     """
-    write_text(path, machine_text(machine))
+    write_text(path, machine_text(require(machine, "machine", Machine)))
 
 
 def machine_text(machine: Machine, remarks: Mapping[str, str] | None = None) -> str:
-    """Give the TOML text of a machine, with a remark behind values by path, such as "sensors.angle"."""
+    """Give the TOML text of a machine, with remarks by path ("sensors.angle") where no source is."""
     return "\n".join(_table(_content(machine), "", remarks or {})).strip("\n") + "\n"
 
 
@@ -96,7 +97,7 @@ def _table(content: dict[str, Any], header: str, remarks: Mapping[str, str]) -> 
     """Write the lines of a table: values first, then the tables below it."""
     for key, item in content.items():
         if isinstance(item, _Written):
-            remark = remarks.get(f"{header}.{key}")
+            remark = None if "source = " in item.text else remarks.get(f"{header}.{key}")
             yield f"{_key(key)} = {item.text}" + (f"  # {remark}" if remark else "")
     for key, item in content.items():
         path = f"{header}.{_key(key)}" if header else _key(key)

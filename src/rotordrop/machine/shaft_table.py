@@ -45,7 +45,8 @@ _NUMBERS = ("ele", "element", "el", "elem", "no", "nr", "station", "sta", "sub",
 _MASS_DENSITY = 7850.0
 """Density of what a mass diameter adds where the table gives none [kg/m³]: steel."""
 _HEADING = re.compile(r"^\s*([^\[\]()]+?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*$")
-
+_NUMBER = re.compile(r"[+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
 
 SECTION_LINE = "_line"
 """Key under which a row remembers its line in the table, for error messages."""
@@ -68,6 +69,8 @@ def read_shaft_table(path: Path) -> dict[str, Any]:
         )
     separator = max(";\t,", key=rows[0][1].count)
     cells = [(number, next(csv.reader([line], delimiter=separator))) for number, line in rows]
+    if separator != ",":
+        cells = _with_points(cells)
     headings = [text.strip() for text in cells[0][1]]
     if _are_units(cells[1][1]):
         units = [*cells.pop(1)[1], *([""] * len(headings))]
@@ -84,6 +87,20 @@ def read_shaft_table(path: Path) -> dict[str, Any]:
     if "length" in table.names:
         return {"sections": described}
     raise table.error("the shaft table needs a column 'position [mm]' or 'length [mm]'", rows[0][0])
+
+
+def _with_points(cells: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """The same rows with points for decimal commas, where no number has a point and commas cannot be those of
+    thousands alone.
+    """
+    numbers = [cell.strip() for _, row in cells for cell in row if _NUMBER.fullmatch(cell.strip())]
+    with_comma = [cell for cell in numbers if "," in cell]
+    if any("." in cell for cell in numbers) or all(_THOUSANDS.fullmatch(cell) for cell in with_comma):
+        return cells
+    return [
+        (line, [cell.replace(",", ".") if _NUMBER.fullmatch(cell.strip()) else cell for cell in row])
+        for line, row in cells
+    ]
 
 
 def _bare(unit: str) -> str:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
+
+from pydantic import ValidationError
 
 from rotordrop.elements.catalog.lookup import find_bearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.support import REFERENCE_MASS
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine
+from rotordrop.machine.saving import machine_text
 from rotordrop.machine.schema import field_meanings
 from rotordrop.units import InSI, format_quantity, in_si
 
@@ -137,6 +140,31 @@ def simple_machine(known: SimpleMachine) -> Machine:
     )
 
 
+def simple_text(given: Mapping[str, str]) -> str:
+    """The machine file of twelve numbers, each a text with a unit; two planes have a comma between them.
+
+    Raises
+    ------
+    UsageError
+        If one is missing, is none of them, or they make no machine.
+    """
+    known = [name for name in EXAMPLES if name != "preload"]
+    if strange := [name for name in given if name not in EXAMPLES]:
+        raise UsageError(f"there is no number {strange[0]!r}; there are {', '.join(EXAMPLES)}")
+    said: dict[str, Any] = {name: value.strip() for name, value in given.items() if value.strip()}
+    if missing := [name for name in known if name not in said]:
+        raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
+    for name in ("bearings", "sensors"):
+        planes = said[name] = tuple(place.strip() for place in said[name].replace(";", ",").split(","))
+        if len(planes) != 2:
+            raise UsageError(f'{name} needs two planes, such as "110 mm, 980 mm"')
+    try:
+        return machine_text(simple_machine(SimpleMachine(**said)))
+    except ValidationError as error:
+        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
+        raise UsageError(f"these numbers make no machine: {reasons}") from None
+
+
 def drafted_machine(
     *,
     rotor: Rotor,
@@ -144,8 +172,9 @@ def drafted_machine(
     sensors: Sequence[tuple[str, int]],
     known: SimpleMachine,
     notes: Sequence[str],
+    supports: Mapping[int, Mapping[str, Any]] | None = None,
 ) -> Machine:
-    """A machine of a rotor with bearings and sensors at its nodes, the rest as ``known`` and guesses."""
+    """A machine of a rotor with bearings, sensors, known supports at nodes, else as ``known`` and guesses."""
     try:
         entry = find_bearing(known.designation)
     except LookupError as error:
@@ -158,7 +187,7 @@ def drafted_machine(
         "bore_radius": f"{0.5 * entry.bore!r} m",
         "bearing": bearing,
     }
-    supports = _supports(known.support, rotor.mass, len(bearings))
+    guesses = _supports(known.support, rotor.mass, len(bearings))
     degrees = math.degrees(known.sensor_angle)
     return Machine.model_validate(
         {
@@ -171,8 +200,8 @@ def drafted_machine(
                 "at_speed": f"{known.speed / (2.0 * math.pi):.12g} Hz",
             },
             "touchdown_bearings": [
-                described | {"name": name, "node": node, "support": support}
-                for (name, node), support in zip(bearings, supports, strict=True)
+                described | {"name": name, "node": node, "support": (supports or {}).get(node, guess)}
+                for (name, node), guess in zip(bearings, guesses, strict=True)
             ],
             "ambs": [{"name": name, "node": node} for name, node in sensors],
             "sensors": [

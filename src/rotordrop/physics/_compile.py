@@ -1,9 +1,8 @@
 """The one place that knows the compiler: every compiled function takes its decorator from here.
 
 Kernels are compiled under strict floating point (no ``fastmath``: it gives other trajectories cold and
-cached) and cached on disk. Numba's own cache looks only at the file of a function and not at the files of the
-functions it calls, so the cache folder is named after a digest of all kernel sources: after an update or an
-edit a stale machine code can never be loaded.
+cached) and kept on disk, in a folder named after a digest of all kernel sources and of the compiler: after an
+update or an edit a stale machine code can never be loaded. A wheel may carry such a folder.
 
 The compiler itself is loaded when a kernel is called first, so that whoever needs of a law only where its
 numbers stand, such as the description of a machine, loads no compiler.
@@ -11,73 +10,69 @@ numbers stand, such as the description of a machine, loads no compiler.
 
 from __future__ import annotations
 
-import atexit
 import hashlib
 import os
-import shutil
-import tempfile
+import sys
 from collections.abc import Callable, Iterable
-from functools import lru_cache, update_wrapper
+from dis import get_instructions
+from functools import cached_property, lru_cache, update_wrapper
 from pathlib import Path
 from threading import RLock
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
+OPTIONAL_PARTS = True
+"""Stands in kernels before what few machines have; false in their plain forms, see `plain_form`."""
+
 Function = TypeVar("Function", bound=Callable[..., Any])
+Named = TypeVar("Named", bound=type)
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _MARK = "rotordrop.physics._compile import"
-_CONSTANTS = tuple(_PACKAGE / "physics" / name for name in ("columns.py", "elementary_tables.py"))
-"""Compiled into the kernels as numbers though they have no kernel themselves."""
-
+_FURTHER = tuple(
+    _PACKAGE / "physics" / name for name in ("columns.py", "elementary_tables.py", "_compile.py", "_numba.py")
+)
+"""Compiled into the kernels, or saying how they are compiled, though they have no kernel themselves."""
 
 _FOLDERS = tuple(_PACKAGE / name for name in ("physics", "rotor", "simulate", "track"))
 """Where the kernels of this package stand."""
 
+_SHIPPED = _PACKAGE / "compiled"
+"""Where a wheel carries compiled kernels."""
+
 _MAKING = RLock()
 """Held while a kernel is handed to the compiler: two threads that call it first must get one."""
+
+_BY_REFERENCE: list[type] = []
+"""Classes of named tuples that the compiler has not been told of."""
 
 
 def _kernel_sources(folders: Iterable[Path]) -> list[Path]:
     files = (file for folder in folders for file in sorted(folder.glob("*.py")))
-    return [file for file in files if file in _CONSTANTS or _MARK in file.read_text(encoding="utf-8")]
+    return [file for file in files if file in _FURTHER or _MARK in file.read_text(encoding="utf-8")]
 
 
 @lru_cache
-def cache_folder(beside: Path | None = None) -> str:
-    """Folder of the compiled kernels, named after a digest of their sources and of the compiler's version.
+def kernel_digest(beside: Path | None = None) -> str:
+    """Digest of the kernel sources, of the compiler and of the Python version.
 
     Kernels of another package, in the folder `beside`, call those of this one: the sources of both count.
     """
+    import llvmlite
     import numba
 
-    digest = hashlib.sha256(numba.__version__.encode())
+    versions = (numba.__version__, llvmlite.__version__, sys.implementation.cache_tag)
+    digest = hashlib.sha256(repr(versions).encode())
     for file in _kernel_sources((*_FOLDERS, *([] if beside is None else [beside]))):
         digest.update(file.name.encode())
         digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder(beside: Path | None = None) -> Path:
+    """Folder of the kernels compiled on this computer; it may not be there yet, or not be writable."""
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    root = Path(os.environ.get("NUMBA_CACHE_DIR") or caches / "rotordrop")
-    return str(root / digest.hexdigest()[:16])
-
-
-def is_writable(folder: Path) -> bool:
-    """Whether compiled kernels can be kept in a folder, there or yet to be made."""
-    return os.access(next(parent for parent in (folder, *folder.parents) if parent.exists()), os.W_OK)
-
-
-@lru_cache
-def _open_folder(folder: str) -> str:
-    """The folder of compiled kernels; where it cannot be written, a copy of it for this process.
-
-    The compiler refuses to read from a folder that it cannot write, and a program in a container, or one
-    installed for all users of a computer, often has its kernels in such a one.
-    """
-    if is_writable(Path(folder)):
-        return folder
-    copy = tempfile.mkdtemp(prefix="rotordrop-kernels-")
-    atexit.register(shutil.rmtree, copy, ignore_errors=True)
-    if Path(folder).is_dir():
-        shutil.copytree(folder, copy, dirs_exist_ok=True)
-    return copy
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or caches / "rotordrop") / kernel_digest(beside)
 
 
 def kernel(function: Function) -> Function:
@@ -90,54 +85,82 @@ def lean_kernel(function: Function) -> Function:
 
     Views of arrays are allowed; new arrays and the assignment of an array to a slice of another are not.
     """
-    return _lazy(function, is_part=True, _nrt=False)
+    return _lazy(function, _nrt=False)
 
 
 def inner_kernel(function: Function) -> Function:
     """Compile a lean kernel into its callers: for what is called millions of times and does little."""
-    return _lazy(function, is_part=True, _nrt=False, forceinline=True)
+    return _lazy(function, _nrt=False, forceinline=True)
 
 
-def compile_for(function: Callable[..., Any], *examples: Any) -> None:
-    """Compile a kernel for arguments of the types of these, and put it into the cache."""
-    import numba
-
-    compiled: Any = function
-    type_of: Any = numba.typeof
-    compiled.outer.compile(tuple(type_of(one) for one in examples))
+def by_reference(named: Named) -> Named:
+    """Hand the named tuples of a class to kernels by their address, not member by member."""
+    _BY_REFERENCE.append(named)
+    return named
 
 
-def _lazy(function: Function, *, is_part: bool = False, **options: Any) -> Function:
+def plain_form(function: Function) -> Function:
+    """The form of a kernel for machines without optional parts, compiled without them."""
+    return cast(Function, function.plain) if isinstance(function, _Kernel) else function
+
+
+def _lazy(function: Function, **options: Any) -> Function:
     interpreted = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    return function if interpreted else cast(Function, _Kernel(function, is_part, options))
+    return function if interpreted else cast(Function, _Kernel(function, options))
 
 
 class _Kernel:
     """A kernel, handed to the compiler when it is called first.
 
-    Some are parts, which other kernels call, and Python seldom: the code by which Python calls a kernel takes
-    a third of its time to compile, and nobody needs it of a part. Kernels call `inner`, which has none; the
-    first call from Python compiles `outer`, which has it.
+    Kernels call `inner`, which is taken into them; the first call from Python compiles `outer`, with all
+    kernels behind it, as a whole.
     """
 
-    def __init__(self, function: Callable[..., Any], is_part: bool, options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func = function
-        self._is_part, self._options = is_part, options
-        self._made: dict[str, Any] = {}
+        self._options = options
+        self._inner: Any = None
+        self._outer: Any = None
         update_wrapper(self, function)
+
+    @cached_property
+    def plain(self) -> _Kernel:
+        """The kernel and all behind it with `OPTIONAL_PARTS` false; itself where that changes nothing."""
+        known, code = self.py_func.__globals__, self.py_func.__code__
+        names = {one.argval for one in get_instructions(code) if one.opname == "LOAD_GLOBAL"} & set(known)
+        other = {name: known[name].plain for name in names if isinstance(known[name], _Kernel)}
+        changed: dict[str, Any] = {name: one for name, one in other.items() if one is not known[name]}
+        if "OPTIONAL_PARTS" in names and known["OPTIONAL_PARTS"]:
+            changed["OPTIONAL_PARTS"] = False
+        if not changed:
+            return self
+        function = FunctionType(code, known | changed, argdefs=self.py_func.__defaults__)
+        update_wrapper(function, self.py_func)
+        function.__qualname__ = f"plain_{self.py_func.__qualname__}"
+        return _Kernel(function, self._options)
 
     @property
     def inner(self) -> Any:
         """What kernels call."""
-        if not self._is_part:
-            return self.outer
-        # A folder apart: the compiler's index of a cache does not tell the two forms of a function apart.
-        return self._compiled("parts", no_cpython_wrapper=True)
+        if self._inner is None:  # looked at again under the lock, which later calls need not take
+            with _MAKING:
+                if self._inner is None:
+                    self._inner = _compiler().part(self.py_func, **self._options)
+        return self._inner
 
     @property
     def outer(self) -> Any:
         """What Python calls."""
-        return self._compiled("")
+        if self._outer is None:
+            with _MAKING:
+                if self._outer is None:
+                    home = Path(self.py_func.__code__.co_filename).resolve().parent
+                    beside = None if home in _FOLDERS else home
+                    shipped = _SHIPPED / kernel_digest(beside)
+                    self._outer = _compiler().entry(
+                        self.py_func, cache_folder(beside), shipped, **self._options
+                    )
+        return self._outer
 
     @property
     def _numba_type_(self) -> Any:
@@ -150,32 +173,11 @@ class _Kernel:
     def __call__(self, *args: Any) -> Any:
         return self.outer(*args)
 
-    def _compiled(self, place: str, **further: Any) -> Any:
-        if place not in self._made:  # looked at again under the lock, which later calls need not take
-            with _MAKING:
-                if place not in self._made:
-                    self._made[place] = _compiled(self.py_func, place, **self._options, **further)
-        return self._made[place]
 
+def _compiler() -> Any:
+    """The compiler, told of all named tuples that go by reference."""
+    from rotordrop.physics import _numba
 
-def _compiled(function: Callable[..., Any], place: str, **options: Any) -> Any:
-    import numba
-    from numba.core import config
-
-    settings: Any = config
-    # no_cfunc_wrapper: no kernel is handed to another as a value.
-    options |= {
-        "cache": True,
-        "nogil": True,
-        "error_model": "numpy",
-        "fastmath": False,
-        "no_cfunc_wrapper": True,
-    }
-    previous = settings.CACHE_DIR
-    home = Path(function.__code__.co_filename).resolve().parent
-    folder = _open_folder(cache_folder(None if home in _FOLDERS else home))
-    settings.CACHE_DIR = str(Path(folder) / place)
-    try:
-        return numba.njit(**options)(function)
-    finally:
-        settings.CACHE_DIR = previous
+    while _BY_REFERENCE:
+        _numba.pass_by_reference(_BY_REFERENCE.pop())
+    return _numba

@@ -18,6 +18,7 @@ from rotordrop.physics import (
     thermal,
     touch,
 )
+from rotordrop.physics._compile import by_reference
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
 # set are blocks of columns that only their own modules read.
@@ -176,19 +177,18 @@ N_BEARING_PLACES = 10
 CONTACT_BEARING = 0
 CONTACT_BODY = 1
 CONTACT_SPIN = 2
-N_CONTACT_PLACES = 3
 
 # Columns of `KernelParameters.magnet_at`, one row per AMB in the loop: place of the first of its currents
 # (x+, x-, y+, y-), and of the first entry that it has in the memory, behind the clock of all.
 MAGNET_OWN = 0
 MAGNET_MEMORY = 1
-N_MAGNET_PLACES = 2
 
 # Kinds of states: they set error scale, process noise and prior.
 POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, HEAT, AUDIT = range(7)
 N_KINDS = 7
 
 
+@by_reference
 class KernelParameters(NamedTuple):
     """Everything the right-hand side reads, as flat arrays in SI units; m modes, B bearings, A magnets, Z
     balls.

@@ -16,6 +16,8 @@ TURN_BACK = 0.5 * math.pi
 """Angle by which a whirl that has ended runs back [rad]."""
 LEAST_RADIUS = 0.5
 """Share of the air gap outside of which a rotor may circle [1]; in flight through the middle it does not."""
+FOLLOWED_TURNS = 4.0
+"""Turns over which a frequency that changes is taken, or all of a shorter whirl [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,6 +29,9 @@ class WhirlSpell:
     """When it began and ended [s]."""
     frequency: float
     """Mean whirl frequency [Hz]; positive with the spin (forward), negative against it (backward)."""
+    fastest: float
+    last: float
+    """Frequencies of the fastest and the last `FOLLOWED_TURNS`, with that sign [Hz]."""
 
     @property
     def turns(self) -> float:
@@ -105,8 +110,15 @@ def _steady(time: Array, angle: Array, sense: float) -> WhirlSpell:
     finish = len(advance) - 1 - int(np.argmax(advance[-1] - advance[::-1] >= math.pi))
     rate = (angle[finish] - angle[begin]) / (time[finish] - time[begin])
     half = math.pi / abs(rate)
+    angle, clock = angle[begin : finish + 1], time[begin : finish + 1]
+    grown = np.maximum.accumulate(np.abs(angle - angle[0]))
+    since = np.arange(max(int(np.searchsorted(grown, grown[-1] - 2.0 * math.pi * FOLLOWED_TURNS)), 1))
+    until = np.minimum(np.searchsorted(grown, grown[since] + 2.0 * math.pi * FOLLOWED_TURNS), len(grown) - 1)
+    rates = sense * (angle[until] - angle[since]) / (clock[until] - clock[since]) / (2.0 * math.pi)
     return WhirlSpell(
         start=max(float(time[0]), float(time[begin]) - half),
         end=min(float(time[-1]), float(time[finish]) + half),
         frequency=float(sense * rate / (2.0 * math.pi)),
+        fastest=float(rates[np.argmax(np.abs(rates))]),
+        last=float(rates[-1]),
     )

@@ -7,13 +7,24 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rotordrop.elements.sensor import Sensor
 from rotordrop.ends import far_end_first
 from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.known import Known
+from rotordrop.record.clock import TIME_UNITS
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Channel, Recording, channels_in_words, listed
-from rotordrop.units import parse_quantity
+from rotordrop.record.recording import (
+    FULL_SCALE,
+    Channel,
+    Recording,
+    channels_in_words,
+    known_unit,
+    listed,
+    plain_name,
+)
+from rotordrop.units import is_unit, parse_quantity
 
 _LENGTHS = ("m", "mm", "um", "nm", "mil", "in", "V", "mV", FULL_SCALE, "")
 _AXES = ("XY", "HV", "UW", "VW", "LR", "+-", "AB", "12")
@@ -38,10 +49,11 @@ _COUNTER = re.compile(
 """A number of the channel in front of its tag, as in "Ch1 VE-101X", "3:NDE X", "[2] X"."""
 
 _SENSOR = re.compile(r"^(?:S|P|CH|SENSOR|PROBE)[ _-]", re.IGNORECASE)
-_ONLY_COUNTED = re.compile(
-    r"(?:channel|chan|ch|kanal|c|ai|input|in|voie|trace|column)[ _.-]*(?:\d{1,3}|[a-d])", re.IGNORECASE
-)
-"""A name that only counts channels: CH1, C2, Channel A."""
+_LONGEST_UNIT = 30
+"""Characters of a unit of displacements that is not known (chosen)."""
+
+_COUNTED = re.compile(r"(?P<word>.*?)(?P<number>\d{1,3}|(?<![^\W_])[a-d])", re.IGNORECASE)
+"""A name that may only count channels: CH1, C2, Channel A, Sensor 3, 4."""
 
 _NO_READING = re.compile(
     r"(status|state|flags?|alarm|trigger|valid|quality|counter|index|event)\b", re.IGNORECASE
@@ -80,16 +92,13 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
         pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
         planes = [(name, [(channel, None) for channel in pair]) for name, pair, _ in pairs]
-        spoken = "; ".join(f"{name}: {pair[0].label} and {pair[1].label}" for name, pair, _ in pairs)
-        notes = (f"planes by the {guessed} of the channels ({spoken}), their sensors taken as perpendicular",)
+        notes = (f"planes guessed by the {guessed} of the channels, sensors 90° apart",)
         paired = {id(channel) for _, pair, _ in pairs for channel in pair}
         left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
         left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
         if pairs and left:
-            notes += (
-                f'in no plane, and not looked at: {listed(left)}; say which look at one, as --map "PLANE: '
-                'CHANNEL 0 deg, CHANNEL 90 deg"',
-            )
+            ask = 'say which look at one, as --map "PLANE: CHANNEL 0 deg, CHANNEL 90 deg"'
+            notes += (f"in no plane, and not looked at: {listed(left)}; {ask}",)
     if not planes:
         labels = [channel.label for channel in recording.channels if _may_read(channel)]
         if len(labels) < 2:
@@ -97,7 +106,8 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
             raise UnpairedError(
                 f"the recording holds {channels_in_words(len(labels))} that can be displacements (in a unit "
                 f"of length or in volts), and a plane needs two; it has {have}",
-                "export the displacements of a plane together",
+                "export the displacements of a plane together, or say their unit where the file has another "
+                "('rotordrop profile --unit um')",
             )
         as_listed = " ".join(f'--map "{end}: {two}"' for end, two in planes_as_listed(recording).items())
         raise UnpairedError(
@@ -110,12 +120,9 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         Sensor.model_construct(
             name=channel.name,
             node=number,
-            position=None,
             angle=Known(value=place * math.pi / 2 if angle is None else angle, unit="rad"),
-            polarity=1,
             gain=Known(value=1.0),
             offset=Known(value=0.0, unit="m"),
-            sensitivity=None,
             bearing=name,
             position_error=Known(value=0.0, unit="m"),
         )
@@ -123,8 +130,6 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         for place, (channel, angle) in enumerate(entries)
     ]
     labels = [channel.label for _, entries in planes for channel, _ in entries]
-    if len({sensor.name for sensor in sensors}) < len(sensors):  # "X" of one plane and "X" of the next
-        sensors = [s.model_copy(update={"name": label}) for s, label in zip(sensors, labels, strict=True)]
     return Arrangement(
         sensors=tuple(sensors),
         channels={sensor.name: label for sensor, label in zip(sensors, labels, strict=True)},
@@ -169,18 +174,13 @@ def given_planes(
             hits = fitting(recording.channels, entry["channel"]) if entry else []
             if entry is None or len(hits) != 1 or len(entries) < 2:
                 have = listed(channel.label for channel in recording.channels)
-                what = (
-                    f"there is no channel {entry['channel']!r}" if entry and not hits else "it is not clear"
-                )
-                raise UsageError(
-                    f'the plane "{name}: {text}": {what}; write "PLANE: CHANNEL angle, CHANNEL angle", as '
-                    f'"NDE: X1 0 deg, Y1 90 deg"; there are {have}'
-                )
+                what = f"there is no channel {entry['channel']!r}" if entry and not hits else "unclear"
+                ask = 'write "PLANE: CHANNEL angle, CHANNEL angle", as "NDE: X1 0 deg, Y1 90 deg"'
+                raise UsageError(f'the plane "{name}: {text}": {what}; {ask}; there are {have}')
             if any(hits[0] is channel for _, others in (*planes, (name, found)) for channel, _ in others):
-                raise UsageError(
-                    f'the plane "{name}: {text}": {hits[0].label} was named before; every channel is of one '
-                    "sensor. Name another one, or leave the plane out: a plane needs two"
-                )
+                words = f"{hits[0].label} was named before; every channel is of one sensor"
+                ask = "Name another one, or leave the plane out: a plane needs two"
+                raise UsageError(f'the plane "{name}: {text}": {words}. {ask}')
             found.append((hits[0], parse_quantity(entry["angle"], "angle") if entry["angle"] else None))
         planes.append((name, found))
     return planes
@@ -204,11 +204,11 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
                 apart = [abs(math.remainder(angle - float(s.angle), 2 * math.pi)) for s in members]
                 sensor = members[apart.index(min(apart))]
                 if min(apart) > _SAME_ANGLE or sensor.name in mapped:
-                    raise UsageError(
-                        f"the plane {name!r}: {channel.label} at {math.degrees(angle):.4g} deg is none of "
-                        f"the sensors of the machine ({stand}); correct one of them, or leave out "
-                        "the angles where the order is the same"
+                    words = (
+                        f"at {math.degrees(angle):.4g} deg is none of the sensors of the machine ({stand})"
                     )
+                    ask = "correct one of them, or leave out the angles where the order is the same"
+                    raise UsageError(f"the plane {name!r}: {channel.label} {words}; {ask}")
             mapped[sensor.name] = channel.label
     return mapped
 
@@ -218,15 +218,10 @@ def fitting(channels: Sequence[Channel], wanted: str) -> list[Channel]:
     rules: tuple[Callable[[Channel], bool], ...] = (
         lambda channel: channel.label == wanted,
         lambda channel: channel.name == wanted,
-        lambda channel: plain(channel.name) == plain(wanted),
-        lambda channel: plain(_tag(channel.name)) == plain(_tag(wanted)),
+        lambda channel: plain_name(channel.name) == plain_name(wanted),
+        lambda channel: plain_name(_tag(channel.name)) == plain_name(_tag(wanted)),
     )
     return next((hits for rule in rules if (hits := [c for c in channels if rule(c)])), [])
-
-
-def plain(name: str) -> str:
-    """A name without signs and case."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def _tag(name: str) -> str:
@@ -235,8 +230,31 @@ def _tag(name: str) -> str:
 
 
 def _may_read(channel: Channel) -> bool:
-    """Whether a channel can be a displacement: by its unit, and no status or counter by its name."""
-    return channel.unit in _LENGTHS and not _NO_READING.match(channel.name)
+    """Whether a channel can be a displacement: by its unit, and no status, counter or switch."""
+    other = known_unit(channel.unit) or (channel.unit != "%" and is_unit(channel.unit))
+    unknown = len(channel.unit) <= _LONGEST_UNIT and not other
+    if channel.unit not in _LENGTHS and not unknown:
+        return False
+    switch = not channel.unit and bool(np.all((channel.values == 0.0) | (channel.values == 1.0)))
+    clock = not channel.unit and known_unit(channel.name) in TIME_UNITS
+    return not switch and not clock and not _NO_READING.match(channel.name)
+
+
+def _counted(channels: Sequence[Channel], called: Callable[[Channel], str]) -> list[Channel]:
+    """Channels whose names only count, in their order; none where one name says more.
+
+    Displacements go before voltages, which a keyphasor may have too.
+    """
+    lengths = [channel for channel in channels if channel.unit not in ("V", "mV", "", "%")]
+    for some in (channels, lengths):
+        found = [_COUNTED.fullmatch(called(channel)) for channel in some]
+        if len(found) < 4 or None in found or len({plain_name(one["word"]) for one in found if one}) > 1:
+            continue
+        numbers = [one["number"].lower() for one in found if one]
+        order = [int(text) if text.isdigit() else ord(text) for text in numbers]
+        if order == list(range(order[0], order[0] + len(order))):
+            return lengths if 4 <= len(lengths) < len(some) else list(some)
+    return []
 
 
 def pairs_of(
@@ -250,8 +268,8 @@ def pairs_of(
     Names that only count (CH1, CH2, …) are taken two by two.
     """
     left = [channel for channel in channels if _may_read(channel)]
-    if left and len(left) % 2 == 0 and all(_ONLY_COUNTED.fullmatch(called(channel)) for channel in left):
-        pairs = zip(left[::2], left[1::2], strict=True)
+    if counted := _counted(left, called):
+        pairs = zip(counted[::2], counted[1::2], strict=False)
         return [(f"plane {k}", pair, "") for k, pair in enumerate(pairs, start=1)], "order"
     found: list[tuple[str, tuple[Channel, Channel], str]] = []
     for strip in (False, True):

@@ -73,10 +73,8 @@ def sensor_planes(sensors: Sequence[Sensor]) -> tuple[Plane, ...]:
         if not sees_both_directions(members):
             seen = ", ".join(f"{one.name} at {math.degrees(float(one.angle)):.4g}°" for one in members)
             why = "one sensor" if len(members) < 2 else "sensors along one line"
-            raise RecordError(
-                f"the plane at node {node} has {why} ({seen}): x and y cannot be found; a second direction, "
-                "at least 3° away, is needed at this node"
-            )
+            words = f"the plane at node {node} has {why} ({seen}): x and y cannot be found"
+            raise RecordError(f"{words}; a second direction, at least 3° away, is needed at this node")
         planes.append(
             Plane(
                 node=node,

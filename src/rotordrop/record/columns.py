@@ -1,30 +1,30 @@
 """Which channel of a recording is which sensor of the machine, and what one unit of it is worth.
 
-`match_sensors` reads by it; `guess_profile` writes down what it finds for a recorder nobody described.
+`match_sensors` reads by it; `rotordrop.evidence.unsaid` writes it down for a recorder nobody described.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UnmatchedError, UsageError
-from rotordrop.record.arrangement import (
-    fitting,
-    pairs_of,
-    plain,
-    planes_as_listed,
-    seats,
-    sensors_of_planes,
+from rotordrop.record.arrangement import fitting, pairs_of, seats, sensors_of_planes
+from rotordrop.record.profile import LIKELY, Profile
+from rotordrop.record.recording import (
+    FULL_SCALE,
+    SPEED_UNITS,
+    Channel,
+    Recording,
+    listed,
+    sensitivities_in,
+    spelled,
 )
-from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, called, listed
 from rotordrop.units import format_quantity, parse_quantity
 
 _SPEED_NAMES = re.compile(
@@ -33,20 +33,6 @@ _SPEED_NAMES = re.compile(
 _VOLTS = ("V", "mV")
 _DISAGREE = 5e-3
 """Share by which sensitivities of recording and machine file may differ without a word (chosen)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Guess:
-    """A profile and what it still lacks."""
-
-    profile: Profile
-    """What was given and what could be guessed."""
-    found: tuple[str, ...]
-    """What was found, in words."""
-    missing: tuple[str, ...]
-    """What has to be said, each with the way to say it; empty when the profile is complete."""
-    likely: Mapping[str, str]
-    """What is likeliest where it has to be said: sensor -> channel, or plane -> channels without sensors."""
 
 
 def match_sensors(
@@ -60,6 +46,9 @@ def match_sensors(
     said = profile.channels | sensors_of_planes(recording, sensors, profile)
     wanted = {sensor.name: said.get(sensor.name, sensor.name) for sensor in sensors}
     hits = {name: fitting(recording.channels, channel) for name, channel in wanted.items()}
+    if profile.likely and not all(hits.values()):
+        found = likeliest(recording, sensors)
+        hits = {name: channels or [found[name]] * (name in found) for name, channels in hits.items()}
     missing = [name for name in wanted if not hits[name]]
     if missing:
         # all of them at once, with what would map them
@@ -67,24 +56,29 @@ def match_sensors(
         close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
+        left = [f"; {one}" for one in (*recording.notes, *recording.warnings) if one.startswith("left out")]
+        likely = [*likeliest(recording, sensors).values()] or [c for c in recording.channels if not c.unit]
+        bare = {} if profile.unit else {"": 'unit = "um"', FULL_SCALE: 'full_scale = "500 um"'}
+        more = "".join(
+            f"; say there too {bare[u]}" for u in dict.fromkeys(c.unit for c in likely) if u in bare
+        )
         raise UnmatchedError(
             f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}{hint}; it has "
-            f"{listed(present)}",
-            f"say which is which, {_options(recording, sensors, missing)}, or keep it in a profile with "
-            "'rotordrop profile'",
+            f"{listed(present)}{''.join(left)}",
+            f"say which is which, {options_for(recording, sensors, missing)}, or keep it in a profile with "
+            f"'rotordrop profile'{more}",
         )
     taken: list[Channel] = []
     for name, channels in hits.items():
+        wrong = ""
         if len(channels) > 1:
             labels = ", ".join(repr(channel.label) for channel in channels)
-            raise RecordError(
-                f"{place}: sensor {name} fits the channels {labels}; choose one with the channel map of a "
-                f'profile: [channels] {name} = "..."'
-            )
-        if any(channels[0] is other for other in taken):
-            raise RecordError(
-                f"{place}: channel {channels[0].label!r} is mapped to two sensors, the second is {name}"
-            )
+            wrong = f"sensor {name} fits the channels {labels}; choose one with the channel map of a "
+            wrong += f'profile: [channels] {name} = "..."'
+        elif any(channels[0] is other for other in taken):
+            wrong = f"channel {channels[0].label!r} is mapped to two sensors, the second is {name}"
+        if wrong:
+            raise RecordError(f"{place}: {wrong}")
         taken += channels
     return tuple(taken)
 
@@ -107,7 +101,7 @@ def likeliest(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Chan
     }
 
 
-def _options(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
+def options_for(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
     """Options that would map the sensors without a channel: the likeliest planes, with their angles."""
     likely = likeliest(recording, sensors)
     if not likely:
@@ -119,7 +113,7 @@ def _options(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[
         planes.setdefault(at[name].bearing or "", []).append(told)
     lacking = {at[name].bearing or "" for name in missing}
     maps = " ".join(f'--map "{plane}: {", ".join(two)}"' for plane, two in planes.items() if plane in lacking)
-    return f"likeliest {maps} ({RULE})"
+    return f"likeliest {maps} ({RULE}), or --map {LIKELY}"
 
 
 def find_speed(
@@ -127,18 +121,14 @@ def find_speed(
 ) -> Channel | None:
     """Find the channel of the shaft speed, or None when the file has none."""
     free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
-    if profile.speed.channel is not None:
+    if profile.speed.channel is not None or profile.speed.pulses is not None:
         return _named(free, profile.speed.channel, "speed channel", recording, place)
-    if profile.speed.pulses is not None:
-        return None
     in_speed_unit = [channel for channel in free if channel.unit in SPEED_UNITS]
     candidates = in_speed_unit or [channel for channel in free if _SPEED_NAMES.match(channel.name)]
     if len(candidates) > 1:
         labels = ", ".join(repr(channel.label) for channel in candidates)
-        raise RecordError(
-            f"{place}: {labels} could all be the shaft speed; choose with the profile: [speed] channel = "
-            '"..."'
-        )
+        words = "could all be the shaft speed; choose with the profile"
+        raise RecordError(f'{place}: {labels} {words}: [speed] channel = "..."')
     return candidates[0] if candidates else None
 
 
@@ -146,17 +136,27 @@ def find_pulses(
     recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
 ) -> Channel | None:
     """Find the channel of tacho pulses that the profile names, or None when it names none."""
-    if profile.speed.pulses is None:
-        return None
     free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
     return _named(free, profile.speed.pulses, "channel of pulses", recording, place)
 
 
-def _named(free: list[Channel], name: str, what: str, recording: Recording, place: str) -> Channel:
-    for channel in free:
-        if name in (channel.label, channel.name):
-            return channel
-    raise RecordError(f"{place} has no {what} {name!r}; it has {listed(c.label for c in recording.channels)}")
+def _named(
+    free: list[Channel], name: str | None, what: str, recording: Recording, place: str
+) -> Channel | None:
+    found = next((one for one in free if name in (one.label, one.name)), None)
+    if found is None and name is not None:
+        have = listed(channel.label for channel in recording.channels)
+        raise RecordError(f"{place} has no {what} {name!r}; it has {have}")
+    return found
+
+
+def worth_of(unit: str) -> tuple[float, str]:
+    """What one of a unit is in SI units and its kind, "length" or "voltage"; a unit may be "0.02 um" too."""
+    if sensitivities_in(unit):  # "V (200 mV/mil)"
+        unit = "mV" if unit.lower().startswith("mv") else "V"
+    amount = unit if unit[:1].isdigit() else f"1 {spelled(unit)}"
+    kind = "voltage" if amount.split(" ")[-1] in _VOLTS else "length"
+    return parse_quantity(amount, kind), kind
 
 
 def displacement(
@@ -164,148 +164,67 @@ def displacement(
 ) -> tuple[Array, list[str]]:
     """Give the reading of a sensor [m], shape (N,), with a word where two sensitivities disagree."""
     if channel.unit == FULL_SCALE:
-        raise RecordError(
-            f"{place} holds shares of a full scale, from -1 to 1, and does not tell it: say what it is with "
-            f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
-        )
+        ask = f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
+        what = "shares of a full scale, from -1 to 1, and does not tell it"
+        raise RecordError(f"{place} holds {what}: say what it is with {ask}")
     # a sensor may be called "S_V": the ending of its channel's name is then no unit
-    suffixed = channel.label == sensor.name and channel.name != channel.label
-    unit = profile.units.get(channel.label, "" if suffixed else channel.unit) or profile.unit or ""
-    if unit in _VOLTS:
-        volts = channel.values * parse_quantity(f"1 {unit}", "voltage") - recording.voltage_offset
-        sensitivity, words = _sensitivity(channel, sensor, recording, profile, place)
-        return volts / sensitivity, words
+    suffixed = channel.label == sensor.name != channel.name and channel.label.startswith(channel.name)
+    unit = profile.units.get(channel.label) or profile.unit or ("" if suffixed else channel.unit)
     if not unit:
-        raise RecordError(
-            f'{place}: channel {channel.label!r} has no unit; name it in the profile: unit = "um"'
-        )
+        what = f"channel {channel.label!r} has no unit"
+        raise RecordError(f'{place}: {what}; name it in the profile: unit = "um"')
     try:
-        return channel.values * parse_quantity(f"1 {unit}", "length"), []
+        factor, kind = worth_of(unit)
     except UsageError as error:
         raise RecordError(
             f"{place}: channel {channel.label!r} is in {unit!r}, which is neither a length nor a voltage; "
-            f'name its unit in the profile: [units] "{channel.label}" = "um"'
+            f'name its unit in the profile: [units] "{channel.label}" = "um", or unit = "um" for all; '
+            'one count that is worth less is a unit too, "0.02 um"'
         ) from error
+    if kind == "length":
+        return channel.values * factor, []
+    sensitivity, words = _sensitivity(
+        channel, sensor, sensitivities_in(unit) or recording.sensitivities, profile, place
+    )
+    return (channel.values * factor - recording.voltage_offset) / sensitivity, words
 
 
 def _sensitivity(
-    channel: Channel, sensor: Sensor, recording: Recording, profile: Profile, place: str
+    channel: Channel, sensor: Sensor, of_file: tuple[float, ...], profile: Profile, place: str
 ) -> tuple[float, list[str]]:
     """Volts per metre [V/m]: of the profile, else of the recording, else of the machine file."""
     kind = "voltage_sensitivity"
     if profile.sensitivity is not None:
         return parse_quantity(profile.sensitivity, kind), []
     of_machine = None if sensor.sensitivity is None else float(sensor.sensitivity)
-    of_file = recording.sensitivity
-    if of_file is None:
-        if of_machine is None:
-            raise RecordError(
-                f"{place}: channel {channel.label!r} is in volts and neither the recording nor the machine "
-                f'file gives a sensitivity; add sensitivity = "8 mV/um" to sensor {sensor.name}'
-            )
-        return of_machine, []
-    if of_machine is not None and abs(of_machine / of_file - 1.0) > _DISAGREE:
-        return of_file, [
-            f"{sensor.name}: the recording gives {format_quantity(of_file, kind)}, the machine file "
-            f"{format_quantity(of_machine, kind)}; the recording is used: correct the machine file or name "
-            "the sensitivity in the profile"
-        ]
-    return of_file, []
+    if len(of_file) > 1:
+        told = [format_quantity(one, kind) for one in of_file]
+        words = f"is in volts, the head gives several sensitivities, {listed(told)}"
+        ask = f'say in the profile whose they are: [units] "{channel.label}" = "V ({told[0]})"'
+        raise RecordError(f"{place}: {channel.label!r} {words}: {ask}")
+    found = next(iter(of_file), of_machine)
+    if found is None:
+        what = "is in volts and neither the recording nor the machine file gives a sensitivity"
+        ask = 'give sensitivity = "8 mV/um" in a profile or the machine file'
+        raise RecordError(f"{place}: channel {channel.label!r} {what}; {ask}")
+    if of_machine is None or abs(of_machine / found - 1.0) <= _DISAGREE:
+        return found, []
+    return found, [
+        f"{sensor.name}: the recording gives {format_quantity(found, kind)}, the machine file "
+        f"{format_quantity(of_machine, kind)}; the recording is used: correct the machine file or name the "
+        "sensitivity in the profile"
+    ]
 
 
 def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
     """Speed in rad/s of one unit of the speed channel."""
     unit = profile.speed.unit or profile.units.get(channel.label, channel.unit)
+    words = f"{place}: the speed channel {channel.label!r}"
     if not unit:
-        raise RecordError(
-            f"{place}: the speed channel {channel.label!r} has no unit; name it in the profile: [speed] unit "
-            '= "Hz"'
-        )
+        raise RecordError(f'{words} has no unit; name it in the profile: [speed] unit = "Hz"')
     try:
         return parse_quantity(f"1 {unit}", "speed")
     except UsageError as error:
-        raise RecordError(
-            f"{place}: the speed channel {channel.label!r} is in {unit!r}; expected Hz, rpm or rad/s, name "
-            f'it in the profile: [speed] unit = "rpm"; or, if it holds pulses of a tacho, pulses = '
-            f'"{channel.label}"'
-        ) from error
-
-
-def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:
-    """Complete a profile from a recording that was read with it, for sensors that need a channel each."""
-    mapped = given.channels | sensors_of_planes(recording, sensors, given)
-    for sensor in sensors:
-        hits = fitting(recording.channels, sensor.name) or [
-            channel for channel in recording.channels if plain(channel.label) == plain(sensor.name)
-        ]
-        if sensor.name not in mapped and len(hits) == 1:
-            mapped[sensor.name] = hits[0].label
-    unmapped = [sensor.name for sensor in sensors if sensor.name not in mapped]
-    missing: list[str] = []
-    if unmapped:
-        free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
-        options = _options(recording, sensors, unmapped)
-        missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
-    pairs = [] if sensors else pairs_of(recording.channels)[0]
-    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
-    paired = [channel.label for _, pair, _ in pairs for channel in pair]
-    used = [
-        channel
-        for channel in recording.channels
-        if (
-            not sensors
-            and channel.label in (paired or [channel.label])
-            and channel.label != given.speed.pulses
-        )
-        or channel.label in mapped.values()
-    ]
-    profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
-    profile, speed = _with_speed(recording, profile, used if sensors else [])
-    if speed is None and sensors:  # a look needs none
-        missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
-    units = {
-        channel.label: profile.units.get(channel.label) or channel.unit or profile.unit
-        for channel in used
-        if channel.label != speed and channel.unit not in SPEED_UNITS
-    }
-    bare = [label for label, unit in units.items() if not unit]
-    if bare:
-        missing.append(f"the unit of {listed(bare)}: --unit um")
-    if any(channel.unit == FULL_SCALE for channel in used):
-        missing.append('what full scale is: --full-scale "500 um"')
-    sensitive = bool(sensors) and all(sensor.sensitivity is not None for sensor in sensors)
-    in_volts = any(unit in _VOLTS for unit in units.values())
-    if in_volts and not (recording.sensitivity or profile.sensitivity or sensitive):
-        missing.append('the sensitivity of the channels in volts: --sensitivity "8 mV/um"')
-    found = []
-    for channel in recording.channels:
-        span = f"{channel.values.min():.4g} to {channel.values.max():.4g} {channel.unit or '(no unit)'}"
-        rate = (len(channel.time) - 1) / max(float(channel.time[-1] - channel.time[0]), 1e-12)
-        named = called("channel", channel.label)
-        found.append(f"{named}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
-    found += [f"sensor {name}: {called('channel', label)}" for name, label in mapped.items()]
-    found += [f"{called('plane', name)}: {text}" for name, text in planes.items() if not sensors]
-    found.append(
-        f"shaft speed: {speed or 'not known; an estimate needs --speed-channel, --pulses or --speed'}"
-    )
-    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
-    if not sensors and not planes:
-        likely = planes_as_listed(recording)
-    return Guess(profile=profile, found=tuple(found), missing=tuple(missing), likely=likely)
-
-
-def _with_speed(
-    recording: Recording, profile: Profile, taken: Sequence[Channel]
-) -> tuple[Profile, str | None]:
-    """The profile with the channel of the speed, and where the speed comes from; None where nothing tells."""
-    rules = profile.speed
-    if rules.constant is not None or rules.pulses is not None:
-        return profile, rules.constant or f"pulses of {rules.pulses}"
-    try:
-        channel = find_speed(recording, taken, profile, "the recording")
-    except RecordError:
-        channel = None
-    if channel is None:
-        return profile, None
-    speed = rules.model_copy(update={"channel": channel.label})
-    return profile.model_copy(update={"speed": speed}), channel.label
+        ask = 'expected Hz, rpm or rad/s, name it in the profile: [speed] unit = "rpm"'
+        more = f'or, if it holds pulses of a tacho, pulses = "{channel.label}"'
+        raise RecordError(f"{words} is in {unit!r}; {ask}; {more}") from error

@@ -7,24 +7,20 @@ from collections.abc import Mapping
 from datetime import date, time
 
 _KEYS = (
-    *("start", "event time", "event date", "event", "trigger time", "trigger date", "trigger"),
-    *("triggerzeit", "triggerdatum", "auslösezeit", "ausloesezeit", "auslösung", "ereignis", "ereigniszeit"),
-    *("date and time", "date time", "datetime", "datum und uhrzeit", "datum uhrzeit", "timestamp"),
-    *("zeitstempel", "zeitpunkt", "date", "datum", "recorded at", "recorded", "recording date"),
-    *("recording time", "aufgezeichnet am", "aufgezeichnet", "aufnahmedatum", "aufnahmezeit", "aufnahme"),
-    *("measurement date", "measured", "measurement", "messdatum", "messzeit", "messung", "acquisition date"),
-    *("acquisition time", "start time", "start date", "startzeit", "startdatum", "beginn", "time"),
-)
+    "start|event time|event date|event|trigger time|trigger date|trigger|triggerzeit|triggerdatum|"
+    "auslösezeit|ausloesezeit|auslösung|ereignis|ereigniszeit|date and time|date time|datetime|"
+    "datum und uhrzeit|datum uhrzeit|timestamp|zeitstempel|zeitpunkt|date|datum|recorded at|recorded|"
+    "recording date|recording time|aufgezeichnet am|aufgezeichnet|aufnahmedatum|aufnahmezeit|aufnahme|"
+    "measurement date|measured|measurement|messdatum|messzeit|messung|acquisition date|acquisition time|"
+    "start time|start date|startzeit|startdatum|beginn|time"
+).split("|")
 """Header entries of recorders that say when the drop was, the most telling first."""
 _TIMES_OF_DAY = ("time", "uhrzeit", "zeit", "trigger time", "start time")
 """Entries that hold a time of day beside a date."""
 
-_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
-_GERMAN = {"mär": "mar", "mae": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
-_WORD = (
-    r"(?:jan(?:uary|uar)?|feb(?:ruary|ruar)?|mar(?:ch)?|märz?|maerz|apr(?:il)?|may|mai|june?|juni|july?|juli|"
-    r"aug(?:ust)?|sept?(?:ember)?|o[ck]t(?:ober)?|nov(?:ember)?|de[cz](?:ember)?)\.?"
-)
+_MONTHS = dict(zip("jan feb mar apr may jun jul aug sep oct nov dec".split(), range(1, 13), strict=True))
+_MONTHS |= {"mär": 3, "mae": 3, "mai": 5, "okt": 10, "dez": 12}
+_WORD = rf"(?:{'|'.join(_MONTHS)})[a-z]{{0,6}}\.?"
 _DAY = re.compile(
     r"(?P<y>\d{4})(?P<a>[-/.])(?P<m>\d{1,2})(?P=a)(?P<d>\d{1,2})"
     r"|(?P<first>\d{1,2})(?P<b>[-/.])(?P<second>\d{1,2})(?P=b)(?P<last>\d{4})"
@@ -45,13 +41,14 @@ _LINE = re.compile(rf"({_LONGEST_FIRST})\b[\s:=,;|\"]*", re.IGNORECASE)
 
 def event_of(entries: Mapping[str, str]) -> tuple[str, str]:
     """When the drop was (ISO 8601) by header entries, and a note where a date leaves a doubt; else empty."""
-    found = {_key(key): str(value).strip() for key, value in entries.items()}
+    found = {re.sub(r"[^a-zäöüß]+", " ", k.lower()).strip(): str(v).strip() for k, v in entries.items()}
     said = [(key, found[key]) for key in _KEYS if key in found]
     for _, text in said:
-        if (moment := _moment(text)) is not None:
+        if (matched := _matched(text)) is not None:
+            moment = matched[0]
             if "T" not in moment:
-                of_day = (_time_of_day(found.get(key, "")) for key in _TIMES_OF_DAY)
-                moment += next((f"T{one}" for one in of_day if one), "")
+                of_day = (_OF_DAY.fullmatch(found.get(key, "")) for key in _TIMES_OF_DAY)
+                moment += next((f"T{clock}" for one in of_day if one and (clock := _clock(one))), "")
             return moment, ""
     for key, text in said:
         if _LIKE_A_DATE.match(text):
@@ -68,15 +65,6 @@ def dated_line(line: str) -> tuple[str, str] | None:
     if key is None or (end := _matched(line[key.end() :])) is None:
         return None
     return key[1], line[key.end() : key.end() + end[1]]
-
-
-def _key(text: str) -> str:
-    return re.sub(r"[^a-zäöüß]+", " ", text.lower()).strip()
-
-
-def _moment(text: str) -> str | None:
-    found = _matched(text)
-    return None if found is None else found[0]
 
 
 def _matched(text: str) -> tuple[str, int] | None:
@@ -103,18 +91,12 @@ def _date(found: re.Match[str]) -> str | None:
             if int(month) > 12:
                 day, month = month, day
     else:
-        word = (found["word"] or found["word2"])[:3].lower()
-        month = str(_MONTHS.index(_GERMAN.get(word, word)) + 1)
+        month = str(_MONTHS[(found["word"] or found["word2"])[:3].lower()])
         year, day = found["year"] or found["year2"], found["day"] or found["day2"]
     try:
         return date(int(year), int(month), int(day)).isoformat()
     except ValueError:
         return None
-
-
-def _time_of_day(text: str) -> str:
-    found = _OF_DAY.fullmatch(text)
-    return "" if found is None else _clock(found)
 
 
 def _clock(found: re.Match[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from difflib import get_close_matches
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,6 +19,7 @@ from rotordrop.errors import RecordError, UsageError
 from rotordrop.files import write_text
 from rotordrop.record.recording import Channel, spelled
 from rotordrop.record.tacho import Edge
+from rotordrop.require import each, require
 from rotordrop.units import parse_quantity
 
 
@@ -38,44 +40,47 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+_Time = Annotated[str, _of_kind("time")]
+
+
 class TextLayout(_Section):
     """How a text file is written, where guessing would go wrong."""
 
-    encoding: str | None = Field(default=None, description="for example utf-8 or latin-1")
-    separator: str | None = Field(
-        default=None, min_length=1, max_length=1, description="one character between columns"
-    )
-    decimal: str | None = Field(default=None, pattern=r"^[.,]$", description="point or comma")
-    first_data_line: int | None = Field(default=None, ge=1, description="counted from 1")
-    names: tuple[str, ...] | None = Field(
-        default=None, description="column names, for files without a header"
-    )
+    encoding: str | None = None
+    """For example utf-8 or latin-1."""
+    separator: str | None = Field(default=None, min_length=1, max_length=1)
+    decimal: str | None = Field(default=None, pattern=r"^[.,]$")
+    """Signs between columns and in numbers."""
+    first_data_line: int | None = Field(default=None, ge=1)
+    """Counted from 1."""
+    names: tuple[str, ...] | None = None
+    """Column names, for files without a header."""
 
 
 class Clock(_Section):
     """Where the time of the samples comes from."""
 
-    channel: str | None = Field(default=None, description="name of the time column")
-    unit: str | None = Field(default=None, description="unit of the time column")
-    step: Annotated[str, _of_kind("time")] | None = Field(
-        default=None, description='time between samples, for example "50 us"'
-    )
-    start: Annotated[str, _of_kind("time")] | None = Field(
-        default=None, description='time of the first sample, for example "-0.25 s"'
-    )
+    channel: str | None = None
+    unit: str | None = None
+    """Name and unit of the time column."""
+    step: _Time | None = None
+    start: _Time | None = None
+    """Time between samples, ``"50 us"``, and of the first one, ``"-0.25 s"``."""
 
 
 class SpeedSource(_Section):
     """Where the shaft speed comes from."""
 
-    channel: str | None = Field(default=None, description="name of the speed channel")
-    unit: str | None = Field(default=None, description="unit of the speed channel")
-    constant: Annotated[str, _of_kind("speed")] | None = Field(
-        default=None, description='speed by hand, for example "60 Hz"'
-    )
-    pulses: str | None = Field(default=None, description="name of a channel of tacho or keyphasor pulses")
-    pulses_per_turn: int = Field(default=1, ge=1, le=10_000, description="pulses in one turn of the shaft")
-    edge: Edge = Field(default="rising", description="the edge of a pulse that counts, rising or falling")
+    channel: str | None = None
+    unit: str | None = None
+    """Name and unit of the speed channel."""
+    constant: Annotated[str, _of_kind("speed")] | None = None
+    """Speed by hand, for example ``"60 Hz"``."""
+    pulses: str | None = None
+    """Name of a channel of tacho or keyphasor pulses."""
+    pulses_per_turn: int = Field(default=1, ge=1, le=10_000)
+    edge: Edge = "rising"
+    """The edge of a pulse that counts."""
 
 
 class Profile(_Section):
@@ -87,10 +92,12 @@ class Profile(_Section):
     """Sensor name of the machine file -> channel name in the recording."""
     planes: dict[str, str] = Field(default_factory=dict)
     """Plane -> its channels, with their angles where they are known: ``NDE = "X1 0 deg, Y1 90 deg"``."""
+    likely: bool = False
+    """Whether sensors whose channels no name tells take the likeliest ones."""
     units: dict[str, str] = Field(default_factory=dict)
     """Channel name in the recording -> unit."""
     unit: str | None = None
-    """Unit of all displacement channels that name none."""
+    """Unit of all displacement channels, whatever the file says; what a count is worth too, ``"0.02 um"``."""
     sensitivity: Annotated[str, _of_kind("voltage_sensitivity")] | None = None
     """Volts per length of all channels, for example ``"8 mV/um"``."""
     full_scale: str | None = None
@@ -100,15 +107,31 @@ class Profile(_Section):
     speed: SpeedSource = SpeedSource()
 
     def channel(
-        self, name: str, unit: str, values: ArrayLike, time: Array, *, label: str | None = None
+        self,
+        name: str,
+        unit: str,
+        values: ArrayLike,
+        time: Array | None,
+        *,
+        label: str | None = None,
+        clocked: bool = False,
     ) -> Channel:
-        """A channel as a file names it, in the unit that the profile says or else the file."""
-        label = name if label is None else label
+        """A channel as a file names it, with unit and clock of the profile where it has them.
+
+        The clock is even where a step was given by hand, unless the reader has made it so (`clocked`).
+        """
+        label, readings = name if label is None else label, np.asarray(values, dtype=np.float64)
+        if self.time.step is not None and not clocked:
+            begun = 0.0 if time is None else float(time[0])
+            start = begun if self.time.start is None else parse_quantity(self.time.start, "time")
+            time = np.asarray(start + parse_quantity(self.time.step, "time") * np.arange(len(readings)))
+        if time is None:
+            raise RecordError(f'{label!r} has no clock; give its step in a profile: [time] step = "50 us"')
         return Channel(
             name=name,
             label=label,
-            unit=spelled(self.units.get(label, unit)),
-            values=np.asarray(values, dtype=np.float64),
+            unit=spelled(self.units.get(label) or self.units.get(name, unit)),
+            values=readings,
             time=time,
         )
 
@@ -145,14 +168,13 @@ def _told(entry: Any) -> str:
     *sections, name = (str(part) for part in entry["loc"])
     section = sections[0] if sections and sections[0] in _SECTIONS else ""
     known = tuple((_SECTIONS[section] if section else Profile).model_fields)
-    where = f"[{section}] " if section else ""
-    if entry["type"] == "extra_forbidden":
-        close = get_close_matches(name, known, 1, 0.6)
-        hint = f"did you mean {close[0]!r}?" if close else f"it knows {', '.join(known)}"
-        what = f"the section [{section}]" if section else "a profile"
-        return f"{where}{name} = {entry['input']!r} is not known in {what}; {hint}"
-    cause = entry.get("ctx", {}).get("error")
-    return f"{where}{name} = {entry['input']!r} does not fit: {cause or _EXPECTED.get(name, entry['msg'])}"
+    told = f"{f'[{section}] ' if section else ''}{name} = {entry['input']!r}"
+    if entry["type"] != "extra_forbidden":
+        cause = entry.get("ctx", {}).get("error")
+        return f"{told} does not fit: {cause or _EXPECTED.get(name, entry['msg'])}"
+    close = get_close_matches(name, known, 1, 0.6)
+    hint = f"did you mean {close[0]!r}?" if close else f"it knows {', '.join(known)}"
+    return f"{told} is not known in {f'the section [{section}]' if section else 'a profile'}; {hint}"
 
 
 _SECTIONS: dict[str, type[BaseModel]] = {"text": TextLayout, "time": Clock, "speed": SpeedSource}
@@ -169,19 +191,24 @@ _EXPECTED = {
 }
 
 
+LIKELY = "likely"
+"""In place of a channel map: the likeliest one, where no names tell."""
+
+
 def rules_of(profile: Profile | str | Path | None, mapping: Sequence[str] = ()) -> Profile:
-    """A profile or its file, with "SENSOR=CHANNEL" and "PLANE: CHANNEL angle, CHANNEL angle" added."""
+    """A profile or its file, with "SENSOR=CHANNEL", "PLANE: CHANNEL angle, CHANNEL angle", "likely" added."""
+    require(profile, "profile", Profile, str, PathLike, none=True)
     rules = profile if isinstance(profile, Profile) else load_profile(profile) if profile else Profile()
-    channels, planes = dict(rules.channels), {} if mapping else dict(rules.planes)
-    for text in mapping:
+    said = [text for text in each(mapping, "mapping", str) if text.strip() != LIKELY]
+    channels, planes = dict(rules.channels), {} if said else dict(rules.planes)
+    likely = rules.likely or len(said) < len(mapping)
+    for text in said:
         match = _SAID.fullmatch(text)
         if match is None:
-            raise UsageError(
-                f'{text!r} is neither "SENSOR=CHANNEL" nor "PLANE: CHANNEL angle, CHANNEL angle"; write for '
-                'example "S_NDE_A=X1" or "NDE: X1 0 deg, Y1 90 deg"'
-            )
+            words = f'{text!r} is neither "SENSOR=CHANNEL" nor "PLANE: CHANNEL angle, CHANNEL angle"'
+            raise UsageError(f'{words}; write for example "S_NDE_A=X1" or "NDE: X1 0 deg, Y1 90 deg"')
         (channels if match["sign"] == "=" else planes)[match["name"]] = match["said"]
-    return rules.model_copy(update={"channels": channels, "planes": planes})
+    return rules.model_copy(update={"channels": channels, "planes": planes, "likely": likely})
 
 
 _SAID = re.compile(r"\s*(?P<name>[^:=]*[^:=\s])\s*(?P<sign>[:=])\s*(?P<said>.*\S)\s*")

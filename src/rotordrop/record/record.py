@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UsageError
+from rotordrop.examples import example_hashes
+from rotordrop.files import digest_of_file, new_hdf5
 from rotordrop.machine import Machine
 from rotordrop.record.arrangement import Arrangement, arrangement_of
 from rotordrop.record.axes import (
@@ -25,24 +27,22 @@ from rotordrop.record.axes import (
     sensor_directions,
     sensor_planes,
 )
-from rotordrop.record.clock import at_one_rate, shared_clock
+from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock
 from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.record.event_date import event_of
-from rotordrop.record.examples import example_hashes
+from rotordrop.record.missing import mended, no_values
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
-from rotordrop.record.recording import MARKS, Channel, Recording, recording_of, spelled, split_unit
-from rotordrop.record.speed import readings_of_held_signal
-from rotordrop.record.tacho import passages
-from rotordrop.record.writers import write_hdf5
+from rotordrop.record.readers.numpy_files import recording_of_arrays
+from rotordrop.record.recording import MARKS, SPEED_UNITS, Channel, Recording, spelled, split_unit, whose_time
+from rotordrop.record.tacho import passages, readings_of_held_signal
+from rotordrop.require import numbers, require
 from rotordrop.units import parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
 
-_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
-_TIME_NAMES = ("time", "t", "zeit")
-
+_TIME_UNITS = ("s", "ms", "us", "min")
 _PART = 65536
 """Samples of a long record that are resolved at a time (chosen)."""
 
@@ -67,30 +67,32 @@ class Record:
     speed_by_hand: bool = False
     """Whether somebody gave the speed: it then holds until the magnetic bearings let go, and nothing is known
     of it afterwards."""
+    missing: NDArray[np.bool_] | None = None
+    """Readings that nobody made, shape (N, S): in `signals` they lie between their neighbours, or are NaN."""
     marks: Array | None = None
     """When a mark of the shaft passed the keyphasor [s]: the rotor angle there is a whole number of turns,
     shape (M,)."""
     path: Path | None = None
-    """Where the record comes from."""
     sha256: str = ""
-    """Hash of that file."""
+    """Where the record comes from, and the hash of that file."""
     metadata: Mapping[str, str] = field(default_factory=dict)
     """Header entries of the file."""
     notes: tuple[str, ...] = ()
-    """Choices made on reading."""
     warnings: tuple[str, ...] = ()
-    """Damage worked around on reading."""
+    """Choices made on reading, and damage worked around."""
 
     def __post_init__(self) -> None:
         shape = (len(self.time), len(self.sensors))
-        if self.signals.shape != shape:
-            raise RecordError(
-                f"signals have the shape {self.signals.shape}; {shape[0]} times and {shape[1]} sensors need "
-                f"{shape}"
-            )
-        for array in (self.time, self.signals, self.speed, self.speed_time, self.speed_readings, self.marks):
-            if array is not None:
+        if np.shape(self.signals) != shape:
+            words = f"{shape[0]} times and {shape[1]} sensors need {shape}"
+            raise RecordError(f"signals have the shape {np.shape(self.signals)}; {words}")
+        readings = None if self.speed_time is None else np.shape(self.speed_time)
+        lengths = {"time": None, "signals": None, "speed": shape[:1], "speed_time": None}
+        for name, length in (lengths | {"speed_readings": readings, "marks": None}).items():
+            if getattr(self, name) is not None:
+                array = numbers(getattr(self, name), name, length)
                 array.setflags(write=False)
+                object.__setattr__(self, name, array)
 
     @classmethod
     def from_arrays(
@@ -130,21 +132,19 @@ class Record:
         >>> record.sampling_rate
         20000.0
         """
-        names = [sensor.name for sensor in machine.sensors]
+        names = [sensor.name for sensor in require(machine, "machine", Machine).sensors]
+        require(unit, "unit", str, Mapping, hint="Say it, for example unit='um'")
         columns = _columns(signals, names)
         count = len(next(iter(columns.values())))
         if isinstance(time, str):
-            rate = parse_quantity(time, "frequency")
+            rate = require(parse_quantity(time, "frequency"), "the sampling rate in time", float, above=0.0)
             clock = np.asarray(parse_quantity(start, "time") + np.arange(count) / rate)
-        elif time_unit not in _TIMES:
-            raise UsageError(f"time_unit is {time_unit!r}; expected one of {', '.join(_TIMES)}")
         else:
-            clock = np.asarray(time, dtype=np.float64) * _TIMES[time_unit]
+            unit_of_time = require(time_unit, "time_unit", str, among=_TIME_UNITS)
+            (clock,) = in_seconds([numbers(time, "time", finite=True)], [unit_of_time])
         if clock.shape != (count,):
-            raise RecordError(
-                f"time has the shape {clock.shape} and the signals have {count} samples; give one time for "
-                "each sample, or a sampling rate such as '20 kHz'"
-            )
+            words = f"time has the shape {clock.shape} and the signals have {count} samples"
+            raise RecordError(f"{words}; give one time for each sample, or a sampling rate such as '20 kHz'")
         channels = []
         for name, values in columns.items():
             given = unit.get(name, "") if isinstance(unit, Mapping) else unit
@@ -170,8 +170,7 @@ class Record:
         machine : Machine
             Names the sensors.
         frame : data frame
-            Columns named as in a recorded file, "X1 [um]"; a column "time [s]", or times as the index. A
-            column such as "speed [rpm]" is the shaft speed.
+            Columns named as in a file, "X1 [um]", "speed [rpm]"; a column "time [s]", or times as the index.
         unit : str or mapping, optional
             Unit of the columns that do not name one, of all or by column.
         speed : str, optional
@@ -179,26 +178,30 @@ class Record:
         profile : Profile, optional
             Which column is which sensor, where the names differ.
         """
-        clock, taken = _clock_of(frame)
-        channels = []
-        for column in frame.columns:
-            values = np.asarray(frame[column])
-            if column is taken or not np.issubdtype(values.dtype, np.number):
-                continue
-            name, label, own = split_unit(str(column))
-            by_name = unit if isinstance(unit, Mapping) else {}
-            given = by_name.get(name, by_name.get(str(column), own))
-            given = given if isinstance(unit, Mapping) else own or unit or ""
-            values = values.astype(np.float64)
-            channels.append(Channel(name=name, label=label, unit=spelled(given), values=values, time=clock))
-        return _record_of_channels(machine, channels, clock, speed, profile or Profile())
+        require(machine, "machine", Machine)
+        if not hasattr(frame, "columns") or not len(frame) or hasattr(frame.index, "levels"):
+            words = "Record.from_arrays takes arrays, frame.reset_index() makes columns of levels."
+            expected = "expected a data frame with rows and one level of index"
+            raise UsageError(f"frame is a {type(frame).__name__}; {expected}. {words}")
+        columns = {str(name): _plain(frame[name]) for name in frame.columns}
+        if not any(whose_time(split_unit(name)[0]) == "" for name in columns):
+            index, named = _plain(frame.index), str(frame.index.name or "")
+            if index.dtype.kind in "iu" and not named:
+                words = "no column 'time' and its index only counts rows; name the time 'time [s]'"
+                raise RecordError(f"the table has {words}")
+            columns[f"time [{split_unit(named)[2]}]"] = index
+        rules = profile or Profile()
+        given, every = (unit, "") if isinstance(unit, Mapping) else ({}, unit or "")
+        channels = [
+            replace(one, unit=spelled(given.get(one.name) or given.get(one.label) or one.unit or every))
+            for one in recording_of_arrays(columns, Path("the table"), rules).channels
+        ]
+        return _record_of_channels(machine, channels, channels[0].time, speed, rules)
 
     def __repr__(self) -> str:
         """Name, length, rate and channels."""
-        return (
-            f"<Record {self.name}: {self.duration:.4g} s at {self.sampling_rate:g} Hz, "
-            f"{', '.join(self.channel_names)}, {'with' if self.speed is not None else 'no'} speed>"
-        )
+        has = f"{', '.join(self.channel_names)}, {'with' if self.speed is not None else 'no'} speed"
+        return f"<Record {self.name}: {self.duration:.4g} s at {self.sampling_rate:g} Hz, {has}>"
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -207,30 +210,17 @@ class Record:
 
     @cached_property
     def planes(self) -> tuple[Plane, ...]:
-        """The sensor planes.
-
-        Raises
-        ------
-        RecordError
-            When the sensors of a plane do not give x and y.
-        """
+        """The sensor planes; `RecordError` where the sensors of one do not give x and y."""
         return sensor_planes(self.sensors)
 
     @cached_property
     def whole(self) -> Record:
-        """The record with those planes only whose sensors give x and y: a lost sensor takes its plane along.
-
-        Raises
-        ------
-        RecordError
-            When no plane is whole.
-        """
+        """The record with those planes only whose sensors give x and y; as it is where none does."""
         columns = [
             i
             for i, sensor in enumerate(self.sensors)
             if sees_both_directions([other for other in self.sensors if other.node == sensor.node])
         ]
-        # without a whole plane the record stays as it is: whoever asks for its planes says what is missing
         return self if len(columns) in (0, len(self.sensors)) else self.of_channels(columns)
 
     @cached_property
@@ -273,6 +263,7 @@ class Record:
         return replace(
             self,
             signals=np.ascontiguousarray(self.signals[:, chosen]),
+            missing=None if self.missing is None else self.missing[:, chosen],
             sensors=tuple(self.sensors[c] for c in chosen),
         )
 
@@ -311,22 +302,18 @@ class Record:
 
     def reading(self, channel: str) -> Array:
         """Give the readings of one sensor [m], shape (N,)."""
-        try:
-            return self.signals[:, self.channel_names.index(channel)]
-        except ValueError:
-            raise RecordError(
-                f"the record has no channel {channel!r}; it has {', '.join(self.channel_names)}"
-            ) from None
+        if channel not in self.channel_names:
+            have = ", ".join(self.channel_names)
+            raise RecordError(f"the record has no channel {channel!r}; it has {have}")
+        return self.signals[:, self.channel_names.index(channel)]
 
     def window(self, start: float, end: float) -> Self:
         """Give the samples from `start` to `end` [s], no copies of them; the speed readings stay whole."""
         slack = 1e-3 / self.sampling_rate if np.isfinite(self.sampling_rate) else 0.0
         inside = np.flatnonzero((self.time >= start - slack) & (self.time <= end + slack))
         if not len(inside):
-            raise RecordError(
-                f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s; nothing lies "
-                f"between {start:.6g} s and {end:.6g} s"
-            )
+            reaches = f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s"
+            raise RecordError(f"{reaches}; nothing lies between {start:.6g} s and {end:.6g} s")
         # a slice, unless the time goes back and forth: a copy of a minute would fill 40 MB
         first, last = int(inside[0]), int(inside[-1]) + 1
         keep = slice(first, last) if last - first == len(inside) else inside
@@ -334,13 +321,14 @@ class Record:
             self,
             time=self.time[keep],
             signals=self.signals[keep],
+            missing=None if self.missing is None else self.missing[keep],
             speed=None if self.speed is None else self.speed[keep],
         )
 
 
 def read_record(
     path: str | Path,
-    machine: Machine,
+    machine: Machine | None = None,
     *,
     profile: Profile | str | Path | None = None,
     mapping: Sequence[str] = (),
@@ -352,8 +340,8 @@ def read_record(
     ----------
     path : path-like
         The recording, in any format of `rotordrop.record.readers`.
-    machine : Machine
-        Names the sensors to look for.
+    machine : Machine, optional
+        Names the sensors to look for; without it they are those that the channels make, as in `look`.
     profile : Profile or path-like, optional
         Channel map and reading rules where the file does not speak for itself.
     mapping : sequence of str
@@ -366,6 +354,8 @@ def read_record(
     RecordError
         When the file cannot be read, or a sensor has no channel, or a channel no unit.
     """
+    require(path, "path", str, PathLike)
+    require(machine, "machine", Machine, none=True)
     return open_record(path, machine, profile=rules_of(profile, mapping), tail=tail)[0]
 
 
@@ -386,13 +376,7 @@ def open_record(
             key: None for key in ("channel", "pulses") if getattr(profile.speed, key) not in (None, *names)
         }
         profile = profile.model_copy(update={"speed": profile.speed.model_copy(update=absent)})
-    return record_of(recording, sensors, profile=profile, path=path, sha256=sha256_of(path)), arrangement
-
-
-def sha256_of(path: Path) -> str:
-    """Hash of a file."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return record_of(recording, sensors, profile=profile, path=path, sha256=digest_of_file(path)), arrangement
 
 
 def record_of(
@@ -408,12 +392,21 @@ def record_of(
     place = str(path or "the recording")
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
-    matched, notes = at_one_rate(match_sensors(recording, sensors, profile, place))
-    time, rate, rounded = shared_clock(matched, place)
+    recording = from_first_stamp(recording)
+    matched = [
+        replace(channel, values=np.where(no_values(channel.values), np.nan, channel.values))
+        for channel in match_sensors(recording, sensors, profile, place)
+    ]
+    shared, notes = on_one_clock(matched, place)
+    time, rate, rounded = even_clock(shared, place)
     signals, words = np.empty((len(time), len(sensors))), []
-    for column, (channel, sensor) in enumerate(zip(matched, sensors, strict=True)):
+    for column, (channel, sensor) in enumerate(zip(shared, sensors, strict=True)):
         signals[:, column], said = displacement(channel, sensor, recording, profile, place)
         words += said
+    even_time, signals, missing, said = mended(time, signals, [channel.label for channel in shared])
+    time, rate = (time, rate) if np.array_equal(even_time, time) else even(even_time)
+    words += said
+    signals.setflags(write=False)  # the record's own: not copied
     notes += [doubt] if (doubt := event_of(recording.metadata)[1]) else []
     marks = next((c.values for c in recording.channels if c.name == MARKS and c.unit == "s"), None)
     when: Array | None = None
@@ -432,16 +425,18 @@ def record_of(
     if profile.speed.constant is not None:
         when, readings = time[[0, -1]], np.full(2, parse_quantity(profile.speed.constant, "speed"))
         notes.append(f"speed given by hand: {profile.speed.constant}")
-    elif (channel_of_speed := find_speed(recording, matched, profile, place)) is not None:
-        when, readings = readings_of_held_signal(channel_of_speed.time, channel_of_speed.values)
-        readings = readings * speed_factor(channel_of_speed, profile, place)
-        notes.append(f"shaft speed from {channel_of_speed.label!r}")
+    elif (of_speed := find_speed(recording, matched, profile, place)) is not None:
+        known = ~no_values(of_speed.values)
+        when, readings = readings_of_held_signal(of_speed.time[known], of_speed.values[known])
+        readings = readings * speed_factor(of_speed, profile, place)
+        notes.append(f"shaft speed from {of_speed.label!r}")
     elif pulses is not None:
         when, readings = passed.time, passed.speed
         notes.append(f"shaft speed from the pulses of {profile.speed.pulses!r}")
     return Record(
         time=time,
         signals=signals,
+        missing=missing if missing.any() else None,
         sensors=sensors,
         sampling_rate=rate,
         speed=None if when is None or readings is None else np.interp(time, when, readings),
@@ -458,11 +453,7 @@ def record_of(
 
 
 def _record_of_channels(
-    machine: Machine,
-    channels: Sequence[Channel],
-    clock: Array,
-    speed: Any,
-    rules: Profile,
+    machine: Machine, channels: Sequence[Channel], clock: Array, speed: Any, rules: Profile
 ) -> Record:
     """A record of channels in memory, with the speed given by hand or as readings."""
     if isinstance(speed, str):
@@ -471,11 +462,9 @@ def _record_of_channels(
     elif speed is not None:
         if not isinstance(speed, tuple) or len(speed) != 2 or not isinstance(speed[1], str):
             what = repr(speed) if isinstance(speed, int | float) else f"a {type(speed).__name__}"
-            raise UsageError(
-                f"speed is {what}; expected a text such as '60 Hz', or readings with their unit, "
-                "(array, 'rpm')"
-            )
-        values, name = np.asarray(speed[0], dtype=np.float64), "shaft speed"
+            expected = "a text such as '60 Hz', or readings with their unit, (array, 'rpm')"
+            raise UsageError(f"speed is {what}; expected {expected}")
+        values, name = numbers(speed[0], "speed"), "shaft speed"
         if values.shape != clock.shape:
             raise RecordError(f"the speed has the shape {values.shape}; the time has {clock.shape}")
         of_speed = Channel(name=name, label=name, unit=spelled(speed[1]), values=values, time=clock)
@@ -485,43 +474,44 @@ def _record_of_channels(
 
 def _columns(signals: Mapping[str, ArrayLike] | ArrayLike, names: list[str]) -> dict[str, Array]:
     """Readings by the name of the sensor, each of shape (N,)."""
-    if isinstance(signals, Mapping):
-        columns = {str(name): np.asarray(values, dtype=np.float64) for name, values in signals.items()}
+    table: Any = signals
+    if isinstance(table, Mapping) or any(isinstance(name, str) for name in getattr(table, "columns", ())):
+        columns = {str(name): numbers(values, str(name)) for name, values in table.items()}
         lengths = {name: values.shape for name, values in columns.items()}
         shapes = set(lengths.values())
         if len(shapes) != 1 or any(len(shape) != 1 for shape in shapes):
             raise RecordError(f"signals must be arrays of one length each; they have the shapes {lengths}")
         return columns
-    table = np.asarray(signals, dtype=np.float64)
+    table = numbers(table, "signals")
     if table.ndim != 2 or table.shape[1] != len(names):
-        raise RecordError(
-            f"signals have the shape {table.shape}; expected (samples, {len(names)}), one column for each of "
-            f"{', '.join(names)}, or a mapping from the names of sensors to arrays"
-        )
+        words = f"expected (samples, {len(names)}), one column for each of {', '.join(names)}"
+        ask = "or a mapping from the names of sensors to arrays"
+        raise RecordError(f"signals have the shape {table.shape}; {words}, {ask}")
     return {name: table[:, k].copy() for k, name in enumerate(names)}
 
 
-def _clock_of(frame: Any) -> tuple[Array, Any]:
-    """Time [s] of the rows, from a column "time" or "t", else from the index; and the column taken."""
-    values, unit, where, taken = np.asarray(frame.index), "", "the index", None
-    for column in frame.columns:
-        name, _, written = split_unit(str(column))
-        if name.lower() in _TIME_NAMES:
-            values, unit, where, taken = np.asarray(frame[column]), written, str(column), column
-            break
-    else:
-        if np.issubdtype(values.dtype, np.integer) and frame.index.name is None:
-            raise RecordError(
-                "the table has no column 'time' and its index only counts rows; name the time 'time [s]'"
-            )
-        unit = split_unit(str(frame.index.name or ""))[2]
-    if np.issubdtype(values.dtype, np.datetime64):
-        values = values - values[0]
-    if np.issubdtype(values.dtype, np.timedelta64):
-        return np.asarray(values / np.timedelta64(1, "s"), dtype=np.float64), taken
-    if unit and unit not in _TIMES:
-        raise RecordError(f"{where}: {unit!r} is no unit of time; write one of {', '.join(_TIMES)}")
-    return np.asarray(values, dtype=np.float64) * _TIMES[unit or "s"], taken
+def _plain(column: Any) -> NDArray[Any]:
+    """A column of a table as numpy has it; moments with a time zone, which it does not know, in UTC."""
+    values = np.asarray(column)
+    zoned = values.dtype == object and len(values) > 0 and hasattr(values[0], "tzinfo")
+    return np.asarray(column, dtype="datetime64[ns]") if zoned else values
+
+
+def as_recording(record: Record) -> Recording:
+    """A record as a file holds it: NaN for a reading that nobody made, the speed in Hz."""
+    read = record.signals if record.missing is None else np.where(record.missing, np.nan, record.signals)
+    channels = [
+        Channel(name=name, label=name, unit="m", values=read[:, i], time=record.time)
+        for i, name in enumerate(record.channel_names)
+    ]
+    if record.speed_readings is not None and record.speed_time is not None:
+        turns = record.speed_readings / (2 * np.pi)
+        channels.append(Channel(name="speed", label="speed", unit="Hz", values=turns, time=record.speed_time))
+    if record.marks is not None:
+        channels.append(Channel(name=MARKS, label=MARKS, unit="s", values=record.marks, time=record.marks))
+    return Recording(
+        channels=tuple(channels), metadata=record.metadata, notes=record.notes, warnings=record.warnings
+    )
 
 
 def save_record(record: Record, path: str | Path) -> None:
@@ -534,15 +524,30 @@ def save_record(record: Record, path: str | Path) -> None:
         metadata |= {"source": record.path.name, "source_sha256": record.sha256}
     if record.speed_by_hand:
         metadata[SPEED_SOURCE] = BY_HAND
-    recording = recording_of(
-        record.time,
-        record.signals,
-        record.channel_names,
-        speed_time=record.speed_time,
-        speed=record.speed_readings,
-        marks=record.marks,
-        metadata=metadata,
-        notes=record.notes,
-        warnings=record.warnings,
-    )
-    write_hdf5(recording, path)
+    write_hdf5(as_recording(replace(record, metadata=metadata)), path)
+
+
+def write_hdf5(recording: Recording, path: str | Path) -> None:
+    """Write a recording as HDF5: one dataset per channel with its unit and clock in attributes."""
+    with new_hdf5(path) as file:
+        for key, value in recording.metadata.items():
+            file.attrs[key] = value
+        for key, texts in (("notes", recording.notes), ("warnings", recording.warnings)):
+            if texts:
+                file.attrs[key] = "\n".join(texts)
+        for channel in recording.channels:
+            folder = file.require_group("speed" if channel.unit in SPEED_UNITS else "displacement")
+            item = folder.create_dataset(
+                channel.name, data=channel.values, compression="gzip", shuffle=True, fletcher32=True
+            )
+            item.attrs["unit"] = channel.unit
+            steps = np.diff(channel.time)
+            usual = float(np.median(steps)) if len(steps) else 1.0
+            if len(steps) and float(np.max(np.abs(steps - usual))) > 1e-6 * usual:
+                folder.create_dataset(f"{channel.name}_time", data=channel.time, compression="gzip")
+                item.attrs["time"] = f"{channel.name}_time"
+                continue
+            # the mean step over the whole channel: the median would carry the rounding of single stamps
+            span = float(channel.time[-1] - channel.time[0]) if len(channel.time) else 0.0
+            item.attrs["t0_s"] = float(channel.time[0]) if len(channel.time) else 0.0
+            item.attrs["dt_s"] = span / max(len(steps), 1) or usual

@@ -3,28 +3,69 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from rotordrop.arrays import Array
+from rotordrop.errors import RecordError
+from rotordrop.units import parse_quantity
 
 SPEED_UNITS = ("Hz", "rpm", "rad/s")
 """Units by which a channel is known to be a shaft speed."""
 
-_UNITS = {
-    "m": "m", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "micron": "um", "microns": "um", "nm": "nm",
-    "micrometer": "um", "mikrometer": "um", "mil": "mil", "mils": "mil", "in": "in", "inch": "in",
-    "v": "V", "volt": "V", "volts": "V", "mv": "mV", "second": "s", "seconds": "s", "sekunden": "s",
-    "hz": "Hz", "hertz": "Hz", "rpm": "rpm", "1/min": "rpm", "u/min": "rpm", "r/min": "rpm", "min-1": "rpm",
-    "min^-1": "rpm", "min⁻¹": "rpm", "/min": "rpm",
-    "rad/s": "rad/s", "s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us", "min": "min",
+_SPELLINGS = {
+    "m": "m м metre meter", "mm": "mm мм 毫米", "nm": "nm нм", "mil": "mil mils thou", "in": "in inch",
+    "um": "um µm μm micron microns micrometer micrometre mikrometer мкм mkm 微米 ㎛",
+    "V": "v volt volts в 伏", "mV": "mv мв", "s": "s sec second seconds sekunden с сек 秒",
+    "ms": "ms millisecond milliseconds мс 毫秒", "us": "us µs μs microsecond microseconds мкс 微秒",
+    "ns": "ns nanosecond nanoseconds нс", "min": "min minute minutes", "h": "hour hours", "d": "day days",
+    "Hz": "hz hertz гц", "rad/s": "rad/s",
+    "rpm": "rpm 1/min u/min r/min tr/min min-1 min^-1 min⁻¹ /min об/мин 转/分",
 }  # fmt: skip
+_UNITS = {written: unit for unit, spellings in _SPELLINGS.items() for written in spellings.split()}
+_MICRO_LOST = re.compile(r"(?:[^\x00-\x7f]{1,4}|\?{1,2})m")
+"""What is left of "µm" where a text was written or read in another encoding."""
 
-_SPACED_UNIT = re.compile(r"(.*[^\s,]),?\s(µm|μm|um|mm|mil|mils|rpm|1/min|min-1|Hz|mV)", re.IGNORECASE)
+_SPACED_UNIT = re.compile(r"(?i)(.*[^\s,]),?\s([µμu]m|мкм|mm|mils?|rpm|1/min|min-1|Hz|mV|об/мин|(?<=,\s)с)")
+_SENSITIVITY = re.compile(r"((?:(?<![^\s:=;,(])[+-])?\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
+_RPM = re.compile(r"(?i)(?:[a-z]+[ _.-])?n?rpm[ _.-]?\d{0,2}")
 _LONGEST_NAME = 200
 """Characters of a column name or a unit that are looked at (chosen): damaged files hold megabytes."""
+
+TIME_NAMES = re.compile(
+    r"(?:time( ?stamps?)?|zeit(stempel)?|t|temps|tempo|tiempo|时间|время|x_value|x[- _]?axis([- _]value)?)\b",
+    re.IGNORECASE,
+)
+"""What columns of the time are called."""
+
+OWN_TIME = re.compile(
+    r"(?P<before>.*[^ _.:/-])[ _.:/-]?(?:time ?stamps?|time|zeitstempel|zeit)"
+    r"|(?:time ?stamps?|time|zeitstempel|zeit|t)[ _.:/-](?P<behind>.+)",
+    re.IGNORECASE,
+)
+"""What the time of one channel is called, "X1_time" or "time X1"."""
+
+_KEYS = {
+    "step": "dt step increment timestep sampletime sampleinterval samplinginterval samplingperiod "
+    "sampleperiod abtastintervall schrittweite deltax deltat xinc xincrement wfincrement hresolution",
+    "rate": "fs samplerate samplingrate samplingfrequency samplefrequency abtastrate abtastfrequenz rate",
+    "trigger": "triggersample triggerindex triggerposition pretriggersamples",
+    "before": "pretrigger pretriggertime vorlauf",
+    "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
+    "blocksize anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
+    "start": "t0 start starttime firstsample startoffset x0 xorg xorigin hoffset wfstartoffset",
+    "time unit": "xunit xunits xaxisunit hunit horizontalunit horizontalunits",
+    "names": "label title name names tracename channelname signalname pointname kanalname messstelle tag "
+    "tagname bezeichnung",
+    "units": "unit units einheit einheiten yunit yunits yunitlabel yaxisunit vunit verticalunit "
+    "verticalunits unitstring niunitdescription",
+    "factor": "scale scalefactor",
+    "per count": "factor faktor yinc yincrement gain slope conversionfactor calibrationfactor lsb resolution",
+    "offset": "yorg yorigin addoffset offset intercept",
+    "none": "fillvalue missingvalue",
+}
+_KINDS = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
+"""Keys of heads, attributes and variables in letters and digits only, as recorders write them."""
 
 FULL_SCALE = "of full scale"
 """Unit of readings that a file holds as shares of a full scale it does not tell."""
@@ -46,7 +87,7 @@ class Channel:
     values: Array
     """Samples, in `unit`, shape (N,)."""
     time: Array
-    """Time of each sample [s], shape (N,)."""
+    """Time of each sample by the channel's own clock [s], shape (N,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,56 +98,35 @@ class Recording:
     metadata: Mapping[str, str] = field(default_factory=dict)
     """Header entries as written."""
     notes: tuple[str, ...] = ()
-    """Choices the reader made, for the report."""
     warnings: tuple[str, ...] = ()
-    """Damage the reader worked around; each says what is missing."""
-    sensitivity: float | None = None
-    """Volts per metre [V/m] stated in the file for all channels."""
+    """Choices the reader made, and damage that it worked around; each warning says what is missing."""
+    sensitivities: tuple[float, ...] = ()
+    """Volts per metre [V/m] that the file states: one for all channels, or several and not whose they are."""
     voltage_offset: float = 0.0
-    """Voltage at zero displacement stated in the file [V]."""
+    """Voltage at zero displacement [V] that it states for all channels."""
 
 
-def recording_of(
-    time: Array,
-    signals: Array,
-    names: Sequence[str],
-    *,
-    speed_time: Array | None = None,
-    speed: Array | None = None,
-    marks: Array | None = None,
-    metadata: Mapping[str, str] | None = None,
-    notes: tuple[str, ...] = (),
-    warnings: tuple[str, ...] = (),
-) -> Recording:
-    """Make a recording of displacement readings and, where known, the shaft speed.
+def kind_of(key: str) -> str:
+    """What a key tells, by its letters and digits without a unit; empty for one that is not known."""
+    return _KINDS.get(re.sub(r"[^a-z0-9]", "", split_unit(key.rstrip(" :"))[0].lower()), "")
 
-    Parameters
-    ----------
-    time : array, shape (N,)
-        Time of the samples [s].
-    signals : array, shape (N, S)
-        Readings [m].
-    names : sequence of str, length S
-        Names of the channels.
-    speed_time, speed : array, shape (K,), optional
-        When the speed was read [s] and what was read [rad/s].
-    marks : array, shape (M,), optional
-        When a mark of the shaft passed [s].
-    metadata : mapping of str to str, optional
-        Header entries.
-    notes, warnings : tuple of str
-        Kept with the recording.
-    """
-    channels = [
-        Channel(name=name, label=name, unit="m", values=signals[:, i], time=time)
-        for i, name in enumerate(names)
-    ]
-    if speed is not None and speed_time is not None:
-        turns = np.asarray(speed) / (2 * np.pi)
-        channels.append(Channel(name="speed", label="speed", unit="Hz", values=turns, time=speed_time))
-    if marks is not None:
-        channels.append(Channel(name=MARKS, label=MARKS, unit="s", values=marks, time=marks))
-    return Recording(channels=tuple(channels), metadata=dict(metadata or {}), notes=notes, warnings=warnings)
+
+def whose_time(name: str) -> str | None:
+    """The channel whose time a column of this name holds, empty for that of all; None for no time."""
+    if TIME_NAMES.fullmatch(name):
+        return ""
+    own = OWN_TIME.fullmatch(name)
+    return ("" if TIME_NAMES.match(name) else None) if own is None else own["before"] or own["behind"]
+
+
+def plain_name(name: str) -> str:
+    """A name without signs and case."""
+    return re.sub(r"[\W_]", "", name.lower())
+
+
+def damaged(place: object, words: str) -> RecordError:
+    """A refusal of a file that is not what its recorder wrote."""
+    return RecordError(f"{place}{words}; copy or export it again")
 
 
 def channels_in_words(count: int) -> str:
@@ -131,7 +151,7 @@ def known_unit(text: str) -> str | None:
     bare = text.strip()
     if bare[:1] in ("[", "(") and bare[-1:] in ("]", ")"):
         bare = bare[1:-1].strip()
-    return _UNITS.get(bare.lower())
+    return _UNITS.get(bare.lower()) or ("um" if _MICRO_LOST.fullmatch(bare) else None)
 
 
 def spelled(unit: str) -> str:
@@ -142,6 +162,13 @@ def spelled(unit: str) -> str:
     return known_unit(unit) or (unit if len(unit) <= _LONGEST_NAME else f"{unit[:_LONGEST_NAME]}…")
 
 
+def sensitivities_in(text: str) -> tuple[float, ...]:
+    """Volts per metre [V/m] that a text gives, as "8 mV/um" or "-200 mV/mil", each once."""
+    found = _SENSITIVITY.findall(text)
+    written = (f"{number.replace(',', '.')} {volts}/{known_unit(length)}" for number, volts, length in found)
+    return tuple(dict.fromkeys(parse_quantity(one, "voltage_sensitivity") for one in written))
+
+
 def split_unit(written: str) -> tuple[str, str, str]:
     """Take a column name apart into name, label and unit (empty when there is none).
 
@@ -149,6 +176,9 @@ def split_unit(written: str) -> tuple[str, str, str]:
     unit-like ending stays in the label, as ``Probe_V`` may be a vertical probe.
     """
     written = " ".join(written[:_LONGEST_NAME].split())
+    name, mark, unit = f" {written}".rpartition(" in ")
+    if mark and known_unit(unit):  # "CH1 in V", "in s"
+        return name.strip() or "time", name.strip() or "time", spelled(unit)
     if spaced := _SPACED_UNIT.fullmatch(written):  # "VE-101X um"; a V or s there may be part of the name
         return spaced[1], spaced[1], spelled(spaced[2])
     if written.endswith((")", "]")):
@@ -159,7 +189,7 @@ def split_unit(written: str) -> tuple[str, str, str]:
     name, mark, unit = written.rpartition("/")
     if mark and name.strip() and (name[-1] == " " or unit[:1] == " ") and known_unit(unit):
         return name.strip(), name.strip(), spelled(unit)
-    name, mark, unit = written.rpartition("_")
-    if name and mark and unit.isalpha() and known_unit(unit):
-        return name, written, spelled(unit)
-    return written, written, ""
+    ending = re.fullmatch(r"(.+)[_.]([^\W\d_]+)", written)
+    if ending and known_unit(ending[2]):
+        return ending[1], written, spelled(ending[2])
+    return written, written, "rpm" if _RPM.fullmatch(written) else ""

@@ -1,10 +1,9 @@
 """Samples out of binary files, read by foreign libraries in a process of their own.
 
-Libraries that read HDF5, MAT, TDMS and Excel files end the interpreter, loop for ever or ask for all
-memory when a file is damaged in the wrong place. So one child process per file reads it, under limits on time
-and memory that grow with the size of the file, and hands the stored samples back over a pipe. The child
-imports numpy, the one library and nothing else that is heavy: the module of a format loads profiles for its
-annotations only.
+Libraries that read HDF5, MAT, TDMS and Excel files end the interpreter, loop for ever or ask for all memory
+when a file is damaged in the wrong place. So one child process per file reads it, under limits on time and
+memory that grow with the size of the file, and hands the stored samples back over a pipe. It imports numpy,
+the one library and nothing else that is heavy.
 """
 
 from __future__ import annotations
@@ -23,27 +22,18 @@ from numpy.typing import NDArray
 
 from rotordrop.child import child_command, limit
 from rotordrop.errors import RecordError
+from rotordrop.one_thread import ENVIRONMENT
+from rotordrop.record.recording import damaged
 
-CPU_S = 4.0
-"""Time on the processor that any file may take [s] (chosen): starting and importing take less than one."""
+CPU_S, CPU_S_PER_BYTE, PATIENCE = 4.0, 5e-7, 5.0
+"""Processor time that any file may take [s], what a byte of it adds, and wall time over processor time that a
+busy computer may need (chosen): two megabytes per second are slow for every format."""
 
-CPU_S_PER_BYTE = 5e-7
-"""What a byte of the file adds to it [s] (chosen): two megabytes per second are slow for every format."""
+MEMORY, MEMORY_PER_BYTE = 320 * 2**20, 16
+"""Memory that any file may take [byte], and what a byte of it adds (chosen): packed ones unpack 6-fold."""
 
-PATIENCE = 5.0
-"""Wall time over processor time that a busy computer may need (chosen)."""
-
-MEMORY = 320 * 2**20
-"""Memory that any file may take [byte]: with the program that waits for it less than 500 MB."""
-
-MEMORY_PER_BYTE = 16
-"""What a byte of the file adds to it (chosen): packed readings unpack three to six times."""
-
-UNPACKED = 64 * 2**20
-"""Samples of a file may fill this much [byte] whatever the size of the file: a fifth of `MEMORY`, and …"""
-
-UNPACKED_PER_BYTE = 200
-"""… this many times the file when it is larger (chosen): recordings are not packed more tightly."""
+UNPACKED, UNPACKED_PER_BYTE = 64 * 2**20, 200
+"""Samples of a file may fill this much [byte], or so many times the file (chosen)."""
 
 MOST_SERIES = 2000
 """Series that a recording may hold (chosen): no recorder has as many channels."""
@@ -75,17 +65,7 @@ def unpack(path: Path, kind: str) -> Content:
 
     size = path.stat().st_size
     cpu = CPU_S + CPU_S_PER_BYTE * size
-    order = {
-        "path": str(path),
-        "kind": kind,
-        "cpu_s": cpu,
-        "memory": MEMORY + MEMORY_PER_BYTE * size,
-    }
-    environment = os.environ | {
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_NUM_THREADS": "1",
-        "HDF5_USE_FILE_LOCKING": "FALSE",
-    }
+    order = {"path": str(path), "kind": kind, "cpu_s": cpu, "memory": MEMORY + MEMORY_PER_BYTE * size}
     try:
         done = subprocess.run(
             child_command(__name__, "child", order),
@@ -93,7 +73,7 @@ def unpack(path: Path, kind: str) -> Content:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=PATIENCE * cpu,
-            env=environment,
+            env=os.environ | ENVIRONMENT | {"HDF5_USE_FILE_LOCKING": "FALSE"},
             check=False,
         )
     except subprocess.TimeoutExpired:
@@ -103,18 +83,13 @@ def unpack(path: Path, kind: str) -> Content:
         raise _too_long(path, cpu)
     if code != 0:
         what = f"signal {-code}" if code < 0 else f"code {code}"
-        raise RecordError(
-            f"{path} cannot be read: the library for this format was ended by {what}; the file is damaged, "
-            "copy or export it again"
-        )
+        raise damaged(path, f" cannot be read: the library for this format was ended by {what}")
     return _content(done.stdout, path)
 
 
 def _too_long(path: Path, limit: float) -> RecordError:
-    return RecordError(
-        f"{path} cannot be read within {limit:.0f} s, a sound file of its size is read in less than one; it "
-        "is damaged: copy or export it again"
-    )
+    words = f" cannot be read within {limit:.0f} s, a sound file of its size is read in less than one"
+    return damaged(path, words)
 
 
 def _content(answer: bytes, path: Path) -> Content:
@@ -124,10 +99,8 @@ def _content(answer: bytes, path: Path) -> Content:
     if "refused" in head:
         raise RecordError(head["refused"])
     if "missing" in head:
-        raise RecordError(
-            f"{path}: reading {path.suffix} files needs the package {head['missing']}; install it with "
-            "pip install 'rotordrop[io]'"
-        )
+        lacks = f"{path}: reading {path.suffix} files needs the package {head['missing']}"
+        raise RecordError(f"{lacks}; install it with pip install 'rotordrop[io]'")
     items, at = [], len(line) + 1
     for entry in head["items"]:
         kind, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])
@@ -147,10 +120,8 @@ def child(order: dict[str, Any]) -> None:
     try:
         content = import_module(f"rotordrop.record.readers.{order['kind']}").unpacked(path)
         if len(content.items) > MOST_SERIES:
-            raise RecordError(
-                f"{path} holds {len(content.items)} series, a recording at most {MOST_SERIES}; export the "
-                "channels that are needed"
-            )
+            words = f"{path} holds {len(content.items)} series, a recording at most {MOST_SERIES}"
+            raise RecordError(f"{words}; export the channels that are needed")
         arrays = [np.ascontiguousarray(item.values) for item in content.items]
         head: dict[str, Any] = {
             "attributes": dict(content.attributes),
@@ -183,10 +154,9 @@ def refuse_bomb(
     """
     limit = max(most, most_per_byte * size)
     if 8 * samples > limit:
-        raise RecordError(
-            f"{what} claims {samples} samples in {size} bytes; it is damaged or made to exhaust memory "
-            f"({8 * samples / 1e6:.0f} MB, at most {limit / 1e6:.0f} MB are unpacked from it)"
-        )
+        words = f"{8 * samples / 1e6:.0f} MB, at most {limit / 1e6:.0f} MB are unpacked from it"
+        claims = f"{what} claims {samples} samples in {size} bytes"
+        raise RecordError(f"{claims}; it is damaged or made to exhaust memory ({words})")
 
 
 def plain(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Pulses of a tacho or keyphasor: when a mark of the shaft passed, and the speed between the passages."""
+"""Signals of a tacho: when a mark of the shaft passed and the speed between, or when a speed was read."""
 
 from __future__ import annotations
 
@@ -16,20 +16,15 @@ Edge: TypeAlias = Literal["rising", "falling"]
 LOW, HIGH = 0.35, 0.65
 """Shares of the swing between which the signal must pass for one pulse [1]; ripple below a third is none."""
 
-NEIGHBOURS = 5
-"""Turns on either side that an interval is compared with [1]; no rotor changes its speed much in them."""
-
-MISSED = 1.5
-"""Interval over the usual one from which a pulse is missing between [1]; its reciprocal for one too many."""
+NEIGHBOURS, MISSED = 5, 1.5
+"""Turns on either side that an interval is compared with, and how many times the usual one shows that a pulse
+is missing [1]; its reciprocal shows one too many."""
 
 MOST_FAULTY = 0.1
 """Share of faulty intervals above which the channel carries no pulses of this shaft [1] (chosen)."""
 
-FINENESS = 2e-3
-"""Share of a speed that the sampling of its two passages may leave open [1]; turns are joined for it."""
-
-SEVERAL = 5
-"""Samples a turn must have, for its pulses to be told apart [1] (chosen)."""
+FINENESS, SEVERAL = 2e-3, 5
+"""Share of a speed that the sampling of its passages may leave open; samples that a turn must have [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,17 +51,14 @@ def passages(
     """
     crossings = _crossings(time, values if edge == "rising" else -values)
     if len(crossings) < 2 * per_turn + 1:
-        raise RecordError(
-            f"{place} has {len(crossings)} pulses; a speed needs those of two turns or more ({per_turn} per "
-            "turn): check the channel, and pulses_per_turn in the profile"
-        )
+        words = f"pulses; a speed needs those of two turns or more ({per_turn} per turn)"
+        ask = "check the channel, and pulses_per_turn in the profile"
+        raise RecordError(f"{place} has {len(crossings)} {words}: {ask}")
     step = float(np.median(np.diff(time)))
     turn = float(np.median(crossings[per_turn:] - crossings[:-per_turn]))
     if turn < SEVERAL * per_turn * step:
-        raise RecordError(
-            f"{place}: a turn takes {turn / step:.1f} samples, too few for {per_turn} pulses; sample faster "
-            "or use a mark with fewer pulses"
-        )
+        words = f"a turn takes {turn / step:.1f} samples, too few for {per_turn} pulses"
+        raise RecordError(f"{place}: {words}; sample faster or use a mark with fewer pulses")
     crossings, warnings = _sorted_out(crossings, per_turn, place)
     turns = crossings[::per_turn]
     together = min(max(1, math.ceil(step / (FINENESS * turn))), len(turns) - 1)
@@ -108,11 +100,9 @@ def _sorted_out(crossings: Array, per_turn: int, place: str) -> tuple[Array, tup
     spare = {k + 1 for k in range(len(intervals) - 1) if short[k] and short[k + 1]}
     faulty = len(missing) + len(spare)
     if faulty > MOST_FAULTY * len(intervals):
-        raise RecordError(
-            f"{place}: {faulty} of {len(intervals)} intervals between pulses do not fit their neighbours "
-            f"(first at {crossings[int(min([*missing, *spare]))]:.4g} s); check the trigger of the tacho, "
-            "and pulses_per_turn in the profile"
-        )
+        first = f"first at {crossings[int(min([*missing, *spare]))]:.4g} s"
+        words = f"{faulty} of {len(intervals)} intervals between pulses do not fit their neighbours ({first})"
+        raise RecordError(f"{place}: {words}; check the trigger, and pulses_per_turn in the profile")
     rows: list[float] = []
     for k, when in enumerate(crossings.tolist()):
         if k in spare:
@@ -126,3 +116,21 @@ def _sorted_out(crossings: Array, per_turn: int, place: str) -> tuple[Array, tup
             told = ", ".join(f"{crossings[k]:.4g} s" for k in places[:5])
             warnings.append(f"{place}: {len(places)} pulses {what} {told}; their turns give no speed")
     return np.array(rows), tuple(warnings)
+
+
+def readings_of_held_signal(time: Array, values: Array) -> tuple[Array, Array]:
+    """When a signal that holds each reading took a new one [s] and which, (K,); others as they are."""
+    changes = np.flatnonzero(np.diff(values)) + 1
+    if len(changes) < 3 or len(changes) > 0.5 * len(values):
+        return time, values
+    # a reading equal to the one before leaves no step: longer intervals are missed steps
+    interval = int(np.percentile(np.diff(changes), 25, method="lower"))
+    first = changes[0] - interval * (1 + (changes[0] - 1) // interval)
+    at = [max(int(first), 0)]
+    for change in changes:
+        missed = round((change - at[-1]) / interval) - 1
+        at += [int(change) - interval * k for k in range(missed, 0, -1)] if len(at) > 1 else []
+        at.append(int(change))
+    at += list(range(at[-1] + interval, len(values), interval))
+    index = np.array(sorted(set(at)))
+    return time[index], values[index]

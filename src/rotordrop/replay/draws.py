@@ -19,8 +19,8 @@ from rotordrop.errors import IdentificationError
 from rotordrop.estimate.bearing_drop import LATE
 from rotordrop.evidence.initial_state import covariance_root
 from rotordrop.known import NINETY, Known
+from rotordrop.progress import Progress
 from rotordrop.replay.first_impacts import FirstImpacts, Trial, drop_parameters, start_state, with_bearing
-from rotordrop.replay.least_squares import Progress
 from rotordrop.replay.support_and_friction import WIDENING
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.certificate import refined_peak

@@ -30,14 +30,12 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.replay.least_squares import Unknowns
 from rotordrop.rotor.parameters import DropModel, sag_of_model, static_sag
 from rotordrop.rotor.unknowns import Unknown, bearing_unknowns
-from rotordrop.simulate import _loop
-from rotordrop.simulate._tableau import tsit5
-from rotordrop.simulate.drop import FIRST_STEP, error_scale
+from rotordrop.simulate._loop import Control
+from rotordrop.simulate._run import PHASE, Run, Setup, error_scale, follow
 
 TOLERANCE = 1e-7
 LARGEST_STEP = 1e-3
 MOST_STEPS = 400_000
-LOG_ROWS = 400
 LEAD = 1e-4
 """Time before the end of the free fall at which the simulation starts [s]: the fall is linear and known in
 closed form, so only what follows it has to be integrated again and again."""
@@ -201,31 +199,20 @@ class FirstImpacts:
         IdentificationError
             If the simulation does not get through, for instance with a value out of all proportion.
         """
-        times = np.concatenate([[self.start], time])
-        out = np.empty((len(times), len(state)))
-        counters = np.zeros(5)
-        outcome = _loop.integrate_drop(
-            state,
-            times,
-            with_bearing(self.model.parameters, rows)._replace(
-                unbalance_cos=unbalance[0], unbalance_sin=unbalance[1]
-            ),
-            tsit5(),
-            self.error_scale,
-            TOLERANCE,
-            FIRST_STEP,
-            LARGEST_STEP,
-            MOST_STEPS,
-            out,
-            np.zeros((LOG_ROWS, _loop.N_LOG_COLUMNS)),
-            counters,
+        p = with_bearing(self.model.parameters, rows)
+        setup = Setup(
+            parameters=p._replace(unbalance_cos=unbalance[0], unbalance_sin=unbalance[1]),
+            control=Control(self.error_scale, TOLERANCE, LARGEST_STEP, MOST_STEPS, -1.0, 0.0, 0.0, True),
         )
-        if outcome != _loop.FINISHED:
+        run = Run.begun(setup, state, len(time), self.start)
+        states = follow(setup, run, np.append(self.start, time), with_histories=False).states
+        if run.status[PHASE] < 0:
             raise IdentificationError(
-                f"a drop simulated for the fit stopped at {1e3 * counters[4]:.3g} ms (outcome {outcome}); "
-                f"expected {1e3 * times[-1]:.3g} ms. Check the machine's guesses for support and contact."
+                f"a drop simulated for the fit stopped at {1e3 * run.time:.3g} ms (outcome "
+                f"{-run.status[PHASE]:.0f}); expected {1e3 * time[-1]:.3g} ms. Check the machine's guesses "
+                "for support and contact."
             )
-        return out[1:]
+        return states[1:]
 
     def predicted(self, states: Array, fall: Array) -> Array:
         """Deviation from rest that the sensors would read [m], shape (T, S), of states (T, n)."""

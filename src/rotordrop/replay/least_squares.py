@@ -7,7 +7,7 @@ the way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import cpu_count
@@ -17,8 +17,7 @@ import numpy as np
 
 from rotordrop.arrays import Array, Mask
 from rotordrop.errors import IdentificationError
-
-Progress = Callable[[str, float], None]
+from rotordrop.progress import Progress
 
 # SciPy's least squares, with the priors as further residuals, was tried in place of `fit_window`: it has no
 # largest step per unknown, and the errors of the peak force in the study of the replay rose from 0.27 to 0.75

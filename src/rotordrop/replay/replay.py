@@ -42,6 +42,7 @@ from rotordrop.evidence.rest import AirGap as IdentifiedGap
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
+from rotordrop.progress import Progress
 from rotordrop.record.record import Record
 from rotordrop.replay.draws import (
     FEWEST_DRAWS,
@@ -53,7 +54,6 @@ from rotordrop.replay.draws import (
     with_draws,
 )
 from rotordrop.replay.first_impacts import FirstImpacts, first_impacts
-from rotordrop.replay.least_squares import Progress
 from rotordrop.replay.modal_expansion import expand_initial_state
 from rotordrop.replay.support_and_friction import (
     LONGEST_WINDOW,
@@ -187,6 +187,7 @@ def replay_drop(
             replayed.measured,
             replayed.middle,
             gap.value,
+            replayed.result.bearing_names,
             at=replayed.result.time,
             expected_horizon=None
             if draws is None

@@ -20,10 +20,10 @@ from rotordrop.arrays import Array
 from rotordrop.estimate.agreement import TENFOLD, orbit_disagreement
 from rotordrop.estimate.estimate import FrictionSweep
 from rotordrop.known import NINETY, Correlation, Known, Status
+from rotordrop.progress import Progress
 from rotordrop.replay.first_impacts import FirstImpacts, influential_directions
 from rotordrop.replay.least_squares import (
     Fit,
-    Progress,
     Schedule,
     Search,
     considered_covariance,

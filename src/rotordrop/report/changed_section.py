@@ -4,41 +4,46 @@ from __future__ import annotations
 
 from rotordrop.elements.table import row_of
 from rotordrop.errors import UsageError
-from rotordrop.estimate.changed import Change, asked_for, changes
+from rotordrop.estimate.changed import Change, Changes, asked_for, changes
 from rotordrop.estimate.document import published_drop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.published import Drop
-from rotordrop.report.content import Column, Section, Statement, table
+from rotordrop.report.content import Column, Section, Statement, Table, table
 from rotordrop.report.quantity import Quantity, written
+from rotordrop.report.restart_page import evidence_table
+from rotordrop.restart.evidence import indicators
 from rotordrop.units import format_chance
 
 HEADING = "Since the last drop"
-NOTHING_GIVEN = "No earlier estimate of this machine was given to compare with."
-NOTE = (
-    f"{asked_for()}, with the probability of at least that; "
-    "the last column is the change that shows in 19 of 20 cases."
-)
+NOTE = f"{asked_for()}, with the probability of at least that; found from: what shows in 19 of 20 cases."
 
 
-def changed_section(estimate: Estimate, since: Drop | None) -> Section:
+def changed_section(estimate: Estimate, since: Drop) -> Section:
     """Compare a drop with an earlier estimate of the machine, as published."""
-    if since is None:
-        return Section(HEADING, (NOTHING_GIVEN,))
+    drop = published_drop(estimate)
     try:
-        found = changes(since, published_drop(estimate))
+        found = changes(since, drop)
     except UsageError as error:
         return Section(HEADING, (f"{since.record}: {error}.",))
+    statement, told = told_changes(found)
+    tables = (told,) if found.found else ()
+    if of_damage := indicators(drop, [since]):
+        tables = (*tables, evidence_table(sorted(of_damage, key=lambda one: -one.ratio)))
+    return Section(HEADING, statements=(statement,), tables=tables)
+
+
+def told_changes(found: Changes) -> tuple[Statement, Table]:
+    """What changed in a sentence, and every parameter as it was, with its change by both records."""
     columns = (
         Column("parameter", lambda one: spoken_path(one.path)),
         Column("before", lambda one: Quantity.of(one.before, row_of(one.path).display_kind)),
-        Column("now", lambda one: Quantity.of(one.after, row_of(one.path).display_kind)),
-        Column("change (90 % interval)", _change),
-        Column("changed that much", lambda one: format_chance(one.probability) if one.determined else "–"),
+        Column("change (90 %)", _change),
+        Column("that much", lambda one: format_chance(one.probability)),
         Column("found from", "found_from"),
     )
-    tables = (table(found.found, columns, f"Changes since {found.first}", NOTE),) if found.found else ()
     statement = Statement(found.sentence(spoken_path), "warning" if found.named else "good")
-    return Section(HEADING, statements=(statement,), tables=tables)
+    told = [one for one in found.found if one.determined]  # the sentence names the others
+    return statement, table(told, columns, note=NOTE)
 
 
 def spoken_path(path: str) -> str:
@@ -47,8 +52,6 @@ def spoken_path(path: str) -> str:
 
 
 def _change(one: Change) -> str:
-    if not one.determined:
-        return "the records do not say"
     low, high = one.interval_90
     if one.factor:
         return f"× {one.change:.3g} ({low:.3g} to {high:.3g})"

@@ -20,9 +20,9 @@ from rotordrop.report.content import (
     fact,
     table,
 )
-from rotordrop.report.heat_section import heat_sections
-from rotordrop.report.machine_sections import machine_sections
+from rotordrop.report.machine_content import machine_sections
 from rotordrop.report.quantity import Quantity, shown, written
+from rotordrop.report.simulate_page import heat_sections
 from rotordrop.report.style import (
     BAND_FILL,
     COLOURS,
@@ -38,15 +38,19 @@ from rotordrop.report.style import (
     plain,
     upright,
 )
-from rotordrop.report.waterfall_page import frequency_sections, settling_statement
-from rotordrop.simulate.coast_down_result import QUANTILES, QUANTITIES, CoastDownResult
+from rotordrop.report.waterfall_page import frequency_sections
+from rotordrop.simulate.coast_down_result import (
+    QUANTILES,
+    QUANTITIES,
+    CoastDownResult,
+    first_window_sentence,
+)
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.simulate.coast_down_certificate import CoastDownCertificate
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
-HELD = "The first 0.2 s held the largest indentation, force and stress of every bearing."
 LARGEST_NOTE = (
     "The largest value is taken at the integrator's own steps, later ones on the output grid; their time is "
     "the middle of the second in which they came."
@@ -93,9 +97,8 @@ def coast_down_page(
             ("rotordrop", __version__),
             *samples,
         ),
-        summary=(maxima_table(result),),
         sections=(
-            Section("Second by second", figures=(seconds,)),
+            Section("Second by second", figures=(seconds,), tables=(maxima_table(result),)),
             Section("Speed", figures=(turning,)),
             *heat_sections(result.heat, result.bearing_names),
             *(() if analysis is None else frequency_sections(analysis)),
@@ -109,10 +112,11 @@ def _verdict(
     result: CoastDownResult, analysis: CoastDownAnalysis | None, certificate: CoastDownCertificate | None
 ) -> tuple[Statement, ...]:
     said = [Statement(result.outcome, "good" if result.finished else "bad")]
-    later = [maximum for maximum in result.maxima() if not maximum.in_first_window]
-    said += [Statement(maximum.sentence(), "warning") for maximum in later]
-    if result.finished and not later:
-        said.append(Statement(HELD, "good"))
+    maxima = result.maxima()
+    held = all(maximum.in_first_window for maximum in maxima)
+    if result.finished or not held:
+        text = first_window_sentence(maximum.as_json() for maximum in maxima)
+        said.append(Statement(text, "good" if held else "warning"))
     if result.heat is not None:
         said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
     missing, scale = shown(result.energy_residual, "energy", 3), shown(abs(result.energy_scale), "energy", 3)
@@ -130,8 +134,6 @@ def _verdict(
             "Runge–Kutta pair."
         )
         said.append(Statement(text))
-    if analysis is not None:
-        said += [settling_statement(f"{name} plane", plane) for name, plane in analysis.planes.items()]
     if certificate is not None:
         said.append(Statement(certificate.sentence(), "good" if certificate.agrees else "warning"))
     return tuple(said)

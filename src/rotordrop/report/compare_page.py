@@ -1,28 +1,32 @@
-"""The report on several drops: how hard each was, and how sure the ranking is."""
+"""Drops compared: their numbers and ranks, limits that somebody gives, what changed on the machine."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.errors import UsageError
-from rotordrop.report.compared_drop import ComparedDrop, left_out
-from rotordrop.report.content import Column, Figure, ReportContent, Section, Statement, Table, table
-from rotordrop.report.limits import limit_statement
-from rotordrop.report.quantity import Quantity, display_unit, shown
+from rotordrop.errors import UsageError, unknown_key
+from rotordrop.estimate.published import Drop, Value
+from rotordrop.known import NINETY
+from rotordrop.report.content import Column, Figure, Level, ReportContent, Section, Statement, Table, table
+from rotordrop.report.quantity import Quantity, display_unit, one_line, shown
 from rotordrop.report.stress_box import StressBox, stress_box_figure
 from rotordrop.report.style import axis_title, bars, curve, fit_legend, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
+from rotordrop.twin.allowances import MODEL_STRESS_SIGMA
+from rotordrop.units import format_chance, format_minute, parse_quantity, percent
 
-RANKED = tuple(number for number in NUMBERS if "fatigue" not in number.field)
-"""Numbers that rank drops; shares of a life have upper ends only."""
+RANKED = tuple(one for one in NUMBERS if not one.field.startswith(("severity.fatigue", "severity.static")))
+"""Numbers that rank drops; shares of a life have upper ends only, safety factors go with force and stress."""
 FIRST = tuple(number for number in LOADS if number.field in ("peak_force_N", "peak_stress_Pa"))
 """Those whose ranking is said in words even where it cannot be given."""
+UNKNOWN_SCATTER = "The scatter between equal drops is unknown, so nothing follows for conditions (--scatter)."
 _DRAWN = frozenset((*(n.field for n in LOADS), "severity.impulse_N_s", "severity.skid_energy_J"))
 
 Rankings = Mapping[tuple[str, str], Ranking]
@@ -51,7 +55,7 @@ def compare_page(
         subtitle=", ".join(one.name for one in drops),
         simulated=text if simulated else "",
         verdict=(*_verdict(drops, bearings, ranked), limit_statement(drops, limits or {}, allowed)),
-        summary=tuple(_number_table(drops, bearing) for bearing in bearings),
+        screen=_screen(drops, bearings),
         facts=(("rotordrop", __version__),),
         sections=(_severity_section(drops, bearings, ranked),),
     )
@@ -75,16 +79,22 @@ def rankings(
 ) -> Rankings:
     """Rank the drops by every number at every bearing, where every drop states its error.
 
-    Estimates that do not fit their record, and second estimates of one recording, take no part.
+    Estimates that do not fit their record, and second estimates of one recording, take no part. The balls of
+    a bearing are the same in all drops of a machine: what they add to the error of a stress moves no order.
     """
     found: dict[tuple[str, str], Ranking] = {}
     excluded = left_out(drops)
     taken = [one for one in drops if one.name not in excluded]
     if len(taken) < 2:
         return found
+    one_machine = len({one.drop.machine for one in taken}) == 1
     for bearing in bearings:
         for number in RANKED:
-            severities = [_severity(one.name, one.number(bearing, number)) for one in taken]
+            balls_shared = one_machine and number.kind == "pressure"
+            severities = [
+                _severity(one.name, one.drop.bearings[bearing].numbers.get(number.field), balls_shared)
+                for one in taken
+            ]
             known = [severity for severity in severities if severity is not None]
             if len(known) == len(taken):
                 scatter, more = drop_scatter.get(number.field), number.more_is_worse
@@ -93,14 +103,16 @@ def rankings(
     return found
 
 
-def _severity(name: str, quantity: Quantity) -> DropSeverity | None:
-    if not math.isfinite(quantity.value):
+def _severity(name: str, found: Value | None, balls_shared: bool) -> DropSeverity | None:
+    if found is None or (found.interval is None and found.standard_error is None):
         return None
-    if quantity.interval_90 is not None:
-        return DropSeverity.from_interval(name, quantity.value, quantity.interval_90)
-    if quantity.standard_error is None:
-        return None
-    return DropSeverity(name=name, value=quantity.value, standard_error=quantity.standard_error)
+    if found.interval is None:
+        return DropSeverity(name=name, value=found.value, standard_error=found.standard_error)
+    whole = DropSeverity.from_interval(name, found.value, found.interval)
+    if not balls_shared or found.allowance_90 is None:
+        return whole
+    record = math.sqrt(max(whole.standard_error**2 - (found.allowance_90 / NINETY) ** 2, 0.0))
+    return replace(whole, standard_error=math.hypot(record, MODEL_STRESS_SIGMA * found.value))
 
 
 def _verdict(
@@ -118,8 +130,9 @@ def _verdict(
             f"{name}: {', '.join(one.name for one in drops if one.drop.machine == name)}" for name in machines
         )
         said.append(Statement(f"These are drops of {len(machines)} machines, {whose}.", "warning"))
-    for bearing in bearings:
-        for number in FIRST:
+    texts: dict[str, list[str]] = {}
+    for number in FIRST:
+        for bearing in bearings:
             if (bearing, number.field) in ranked:
                 text = f"{ranked[bearing, number.field].statement}."
             elif len(drops) - len(excluded) < 2:
@@ -129,7 +142,10 @@ def _verdict(
                     "not every drop states an interval, so the order of the numbers says nothing about which "
                     "drop was the worst."
                 )
-            said.append(Statement(f"{bearing}, {number.label}: {text}"))
+            texts.setdefault(text, []).append(f"{bearing} {number.label}")
+    said += [Statement(f"{', '.join(places)}: {text}") for text, places in texts.items()]
+    if any(one.drop_scatter is None for one in ranked.values()):
+        said.append(Statement(UNKNOWN_SCATTER))
     said += [Statement(f"{one.name}: {text}", "warning") for one in drops for text in one.drop.warnings]
     return tuple(said)
 
@@ -141,21 +157,23 @@ def _reach(one: ComparedDrop) -> str:
     return f"; its peak force may be {', '.join(parts)}" if parts else ""
 
 
-def _number_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
-    def name(one: ComparedDrop) -> str:
-        return one.name if one.drop.consistent else f"{one.name} (not consistent with its record)"
+def _screen(drops: Sequence[ComparedDrop], bearings: Sequence[str]) -> Table:
+    """Peaks of every drop, one line a bearing."""
 
     def stated(number: Number) -> Column:
-        return Column(number.label, lambda one: one.number(bearing, number))
+        return Column(number.label, lambda row: one_line(row[0].number(row[1], number)))
 
     columns = (
-        Column("drop", name),
-        Column("recorded", lambda one: one.minute or "–"),
-        Column("speed", lambda one: 2 * math.pi * one.drop.speed_Hz, "speed", 3),
-        *map(stated, LOADS),
+        Column("drop", lambda row: _name(row[0])),
+        Column("speed", lambda row: row[0].drop.speed_Hz, "frequency", 3),
+        Column("bearing", lambda row: row[1]),
+        *map(stated, FIRST),
     )
-    note = "Below a number: its 90 % interval. Peaks are the largest value within the drop."
-    return table(drops, columns, f"{bearing} touchdown bearing", note)
+    return table([(one, bearing) for one in drops for bearing in bearings], columns)
+
+
+def _name(one: ComparedDrop) -> str:
+    return one.name if one.drop.consistent else f"{one.name} (not consistent with its record)"
 
 
 def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
@@ -219,7 +237,7 @@ def _ranking_table(caption: str, ranking: Ranking, number: Number) -> Table:
         Column("was worse than the next", lambda k: of(ranking.worse_than_next, k), "probability"),
         Column("has the worst conditions", lambda k: of(ranking.worst_condition or (), k), "probability"),
     )
-    scatter = "The scatter between equal drops is unknown, so nothing is said about conditions."
+    scatter = UNKNOWN_SCATTER
     if ranking.drop_scatter is not None:
         spread = shown(ranking.drop_scatter, number.kind)
         scatter = f"Scatter between equal drops: {spread} (standard deviation)."
@@ -250,3 +268,167 @@ def comparison_figure(drops: Sequence[str], values: Mapping[str, Sequence[Quanti
     figure.update_yaxes(title_text=axis_title(name, unit), col=1)
     figure.update_yaxes(rangemode="tozero")
     return fit_legend(figure)
+
+
+@dataclass(frozen=True)
+class ComparedDrop:
+    """One drop of a comparison."""
+
+    name: str
+    drop: Drop
+    """Its estimate."""
+
+    @property
+    def label(self) -> str:
+        """Record, date and speed, for a table."""
+        return ", ".join(
+            part for part in (self.name, self.minute, shown(self.drop.speed_Hz, "frequency", 3)) if part
+        )
+
+    @property
+    def minute(self) -> str:
+        """When the recorder says the drop was, without seconds."""
+        return format_minute(self.drop.recorded)
+
+    def number(self, bearing: str, number: Number) -> Quantity:
+        """A number at a bearing with its interval; a dash where the estimate does not state it.
+
+        Of an estimate that is not consistent with its record the interval alone is shown.
+        """
+        found = self.drop.bearings[bearing].numbers.get(number.field)
+        if found is None:
+            return Quantity(value=math.nan, kind=number.shown_as)
+        return Quantity(
+            value=found.value,
+            kind=number.shown_as,
+            places=number.places,
+            interval_90=found.interval,
+            standard_error=found.standard_error,
+            status=found.status or "",
+            range_only=not self.drop.consistent,
+        )
+
+    def hardest(self, bearing: str) -> str:
+        """Which impact gave the peak at a bearing, and which part of impulse and energy it made."""
+        impacts = self.drop.bearings[bearing].impacts
+        if not impacts:
+            return "–"
+        first = max(range(len(impacts)), key=lambda k: impacts[k].peak_force_N.value)
+        hit, parts = impacts[first], []
+        for part, all_of_it, name in (
+            (hit.impulse_N_s, [one.impulse_N_s for one in impacts], "impulse"),
+            (hit.dissipated_energy_J, [one.dissipated_energy_J for one in impacts], "energy"),
+        ):
+            whole = math.fsum(one.value for one in all_of_it)
+            if whole > 0.0:
+                parts.append(f"{percent(part.value / whole)} of the {name}")
+        moment = shown(hit.peak_time_s, "time", 3)
+        return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"
+
+
+def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
+    """Drops that a ranking must leave out, by name, and why.
+
+    Raises
+    ------
+    UsageError
+        If one recording was estimated twice in the same way.
+    """
+    reasons: dict[str, str] = {}
+    counted: dict[str, ComparedDrop] = {}
+    seen: dict[tuple[str, str], ComparedDrop] = {}
+    for one in sorted(drops, key=lambda one: not one.drop.consistent):
+        record, method = one.drop.record_sha256, one.drop.method
+        twin = counted.setdefault(record, one) if record else one
+        same = seen.setdefault((record, method), one) if record else one
+        if same is not one:
+            raise UsageError(
+                f"{same.name} and {one.name} are estimates of the same recording; expected another drop in "
+                "each. Leave one of them out."
+            )
+        if not one.drop.consistent:
+            reasons[one.name] = "its model is not consistent with its record"
+        elif twin is not one:
+            reasons[one.name] = f"the same recording as {twin.name}, estimated by {method}"
+    return reasons
+
+
+SURE = 0.95
+"""Probability from which a limit counts as kept, or as passed [1]; chosen, not measured."""
+_UNITS = ("_N_s", "_N", "_Pa", "_J")
+
+
+def _short(field: str) -> str:
+    """How a limit is called: the field without group and unit, ``"peak_stress"``."""
+    name = field.rpartition(".")[2]
+    return next((name.removesuffix(unit) for unit in _UNITS if name.endswith(unit)), name)
+
+
+def read_limits(written: Sequence[str]) -> dict[str, float]:
+    """Limits [SI] by field of an estimate document, of texts such as ``"peak_stress=2.5 GPa"``.
+
+    Raises
+    ------
+    UsageError
+        If there is no such number, or its limit has another unit.
+    """
+    known = {_short(number.field): number for number in NUMBERS}
+    found = {}
+    for text in written:
+        name, equals, limit = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise UsageError(f'limit {text!r}; expected a number and its limit, "peak_stress=2.5 GPa"')
+        if name not in known:
+            raise UsageError(f"limit: {unknown_key(name, tuple(known))}")
+        found[known[name].field] = parse_quantity(limit, known[name].kind)
+    return found
+
+
+def limit_statement(
+    drops: Sequence[ComparedDrop], limits: Mapping[str, float], allowed: int | None = None
+) -> Statement:
+    """The verdict: which limits are kept, passed or open, by the intervals of the drops."""
+    if not limits and allowed is None:
+        return Statement("No limit given: the numbers are compared with each other alone.")
+    parts: list[str] = []
+    found: list[bool | None] = []
+    if allowed is not None:
+        parts.append(f"{len(drops)} of {allowed} drops allowed")
+        found.append(len(drops) <= allowed)
+    known = {number.field: number for number in NUMBERS}
+    for field, limit in limits.items():
+        text, kept = _against(drops, known[field], limit)
+        parts.append(text)
+        found.append(kept)
+    level: Level = "bad" if False in found else "warning" if None in found else "good"
+    return Statement(f"By the limits given: {'; '.join(parts)}.", level)
+
+
+def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tuple[str, bool | None]:
+    """What to say of one limit, and whether it is kept; None while that is open."""
+    words = f"{number.label} {shown(limit, number.kind)}"
+    beyond = [
+        (probability, f"{one.name} at {bearing}")
+        for one in drops
+        for bearing in one.drop.bearings
+        if (probability := _beyond(one.number(bearing, number), limit, number)) is not None
+    ]
+    if not beyond:
+        return f"{words}: no drop states it with an interval", None
+    over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
+    if over:
+        return f"{words}: passed by {', '.join(over)}", False
+    worst, who = max(beyond)
+    if worst > 1.0 - SURE:
+        return f"{words}: open, passed by {who} with a probability of {format_chance(worst)}", None
+    return f"{words}: kept by all drops (passed by {who} with {percent(worst, 1)} at most)", True
+
+
+def _beyond(quantity: Quantity, limit: float, number: Number) -> float | None:
+    """Probability that a number lies beyond its limit, by its interval [1]; None without one."""
+    if quantity.interval_90 is None or not math.isfinite(quantity.value):
+        return None
+    low, high = quantity.interval_90
+    sigma = max((high - low) / (2.0 * NINETY), 1e-12 * max(abs(quantity.value), 1e-300))
+    above = 0.5 * math.erfc((limit - quantity.value) / (math.sqrt(2.0) * sigma))  # scipy takes longer to load
+    return above if number.more_is_worse else 1.0 - above

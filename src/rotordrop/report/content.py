@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
@@ -15,17 +17,21 @@ if TYPE_CHECKING:
 Level: TypeAlias = Literal["good", "notice", "warning", "bad"]
 Cell: TypeAlias = str | Quantity
 
-OPEN_NOTES = 6
-"""Notes that stand open on a page; chosen, not measured."""
-SIMULATED_RECORD = (
-    "This record is simulated: it comes from a program with a model of the measuring chain, "
-    "not from a machine."
-)
+SIMULATED_RECORD = "Simulated record."
 """What every report on a bundled record says."""
 
 
-SIMULATED_MACHINE = "Everything here is computed from the machine description; nothing was measured."
+SIMULATED_MACHINE = "Simulated: computed from the machine description; nothing was measured."
 """What every report on a simulation says."""
+
+
+def finite(tree: Any) -> Any:
+    """The same content with nothing in place of what is not finite, which JSON cannot hold."""
+    if isinstance(tree, dict):
+        return {key: finite(value) for key, value in tree.items()}
+    if isinstance(tree, tuple | list):
+        return [finite(value) for value in tree]
+    return None if isinstance(tree, float) and not math.isfinite(tree) else tree
 
 
 @dataclass(frozen=True)
@@ -158,29 +164,46 @@ def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", not
 
 @dataclass(frozen=True)
 class Figure:
-    """A plotly figure with the sentence that tells what is to be seen in it, and a name to ask for it by."""
+    """A plotly figure with the sentence that tells what is to be seen in it."""
 
     chart: go.Figure
     caption: str
-    name: str = ""
 
 
 @dataclass(frozen=True)
 class Section:
-    """One part of the report: heading, text, figures, tables, in this order."""
+    """One part of the report: heading, text, statements, figures, tables, facts, in this order."""
 
     heading: str
     text: tuple[str, ...] = ()
     statements: tuple[Statement, ...] = ()
     figures: tuple[Figure, ...] = ()
     tables: tuple[Table, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+    """Names and texts, last of all."""
     folded: bool = False
-    """Whether a page shows the heading alone until it is opened or printed."""
+    """Whether a page shows the heading alone until it is opened; what is closed is not printed."""
+    printed: bool = False
+    """Whether it is printed all the same."""
 
 
 def appendix(sections: Iterable[Section]) -> tuple[Section, ...]:
     """The same sections folded: what a page holds for whoever asks."""
     return tuple(replace(section, folded=True) for section in sections)
+
+
+def folded(heading: str, *sections: Section, printed: bool = False) -> Section:
+    """One folded part of a page that holds what several sections hold."""
+    return Section(
+        heading,
+        tuple(chain.from_iterable(one.text for one in sections)),
+        tuple(dict.fromkeys(chain.from_iterable(one.statements for one in sections))),
+        tuple(chain.from_iterable(one.figures for one in sections)),
+        tuple(chain.from_iterable(one.tables for one in sections)),
+        tuple(chain.from_iterable(one.facts for one in sections)),
+        folded=True,
+        printed=printed,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +220,7 @@ class ReportContent:
     verdict: tuple[Statement, ...] = ()
     """The result in sentences, warnings included, most important first."""
     to_do: Section | None = None
-    """What follows from the verdict, directly below it."""
+    """What follows from the verdict and the leading sections, after them."""
     cards: tuple[Card, ...] = ()
     """Headline numbers per bearing."""
     screen: Table | None = None
@@ -214,25 +237,11 @@ class ReportContent:
     """The instant from which the figures count time."""
 
     @property
+    def grave(self) -> tuple[Statement, ...]:
+        """Problems and warnings beside the first statement, which stand with it."""
+        return tuple(one for one in self.verdict[1:] if one.level in ("bad", "warning"))
+
+    @property
     def notes(self) -> tuple[Statement, ...]:
-        """Statements that stand open below the headline numbers: every warning, and a few notes."""
-        folded = set(map(id, self.assumptions))
-        return tuple(one for one in self.verdict[1:] if id(one) not in folded)
-
-    @property
-    def assumptions(self) -> tuple[Statement, ...]:
-        """Notes that are folded away, so that no more than a few lines stand open."""
-        rest = self.verdict[1:]
-        grave = sum(one.level in ("bad", "warning") for one in rest)
-        calm = [one for one in rest if one.level not in ("bad", "warning")]
-        return tuple(calm[max(0, OPEN_NOTES - grave) :])
-
-    @property
-    def figures(self) -> dict[str, go.Figure]:
-        """Figures by name, in the order of the page."""
-        found: dict[str, go.Figure] = {}
-        for section in self.sections:
-            for figure in section.figures:
-                name = figure.name or section.heading.lower()
-                found[f"{name} {len(found) + 1}" if name in found else name] = figure.chart
-        return found
+        """The others, which stand below the headline numbers."""
+        return tuple(one for one in self.verdict[1:] if one.level not in ("bad", "warning"))

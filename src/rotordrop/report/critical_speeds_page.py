@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +11,8 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
+from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
 from rotordrop.report.content import (
-    Card,
     Column,
     Figure,
     ReportContent,
@@ -20,11 +20,10 @@ from rotordrop.report.content import (
     Statement,
     Table,
     appendix,
-    fact,
     table,
 )
-from rotordrop.report.machine_sections import defaults_section
-from rotordrop.report.quantity import written
+from rotordrop.report.machine_content import defaults_section
+from rotordrop.report.quantity import NO_BREAK
 from rotordrop.report.style import (
     INK,
     LIMIT,
@@ -44,12 +43,11 @@ from rotordrop.rotor.campbell import (
     CampbellDiagram,
     Crossing,
     Separation,
-    StabilityMap,
     amplification_factor,
     separations,
 )
 from rotordrop.rotor.critical_speeds import CriticalSpeedMap
-from rotordrop.units import format_quantity
+from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -75,40 +73,43 @@ DIRECTIONS = {"forward": SERIES[0], "backward": SERIES[1], "mixed": SERIES[2]}
 _DASHES = {"tangent": "solid", "simple": "dash"}
 _EQUAL = 0.005
 _WORST_FIRST = ("bad", "good", "warning", "notice")
-CLEAR = "No critical speed of the held rotor is nearer to the nominal speed than API 617 asks for."
+CLEAR = "In its AMBs: no critical speed is nearer to the nominal speed than API 617 asks for."
+ASSUMED = (
+    "The machine file gives no stiffness and damping of {}: those in the AMBs hold for an assumed rigid-body "
+    f"frequency of {RIGID_FREQUENCY:g} Hz with {percent(DAMPING_RATIO)} of critical damping. Give both for "
+    "margins of API 617."
+)
 WITH_MASS = (
     "Right: the support's mass sits between bearing and support spring; it adds modes of its own and ends "
     "where the bearing alone would be softer than the equivalent stiffness."
 )
 CROSSINGS_NOTE = (
-    "Unbalance excites forward modes, and backward ones only on unequal supports. Amplification 1/(2ζ); "
-    "margin from the nominal speed as a share of it; required by API 617, part 1."
+    "Unbalance excites forward modes, and backward ones only on unequal supports. Amplification 1/(2ζ)."
 )
+MARGINS_NOTE = "Margin from the nominal speed as a share of it; required by API 617, part 1."
+Margins = Mapping[Crossing, Separation]
+"""Critical speeds that are set against the nominal speed: those in AMBs whose stiffness was given."""
 
 
 def critical_speeds_page(
-    machine: Machine,
-    maps: Mapping[str, CriticalSpeedMap],
-    diagrams: Mapping[str, CampbellDiagram],
-    stability: Sequence[StabilityMap] = (),
+    machine: Machine, maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
 ) -> ReportContent:
     """Build the report on critical speeds.
 
-    Maps by whirl ("standstill" as in the paper, "forward", "backward"), Campbell diagrams by what holds the
-    rotor, and a stability map for each suspension that has one.
+    Maps by whirl ("standstill" as in the paper, "forward", "backward"), and Campbell diagrams by what holds
+    the rotor.
     """
-    nominal = float(machine.speed.nominal)
     first, *others = sorted(maps.values(), key=lambda found: found.whirl != "forward")
+    margins = _margins(machine, diagrams)
     return ReportContent(
         title=f"Critical speeds of {machine.name}",
-        verdict=_verdict(machine, maps["standstill"], diagrams),
-        cards=critical_speeds_cards(diagrams, nominal),
+        verdict=_verdict(machine, maps["standstill"], diagrams, margins),
+        screen=_screen(machine, diagrams),
         facts=(("machine", machine.name), ("rotordrop", __version__)),
-        summary=(crossing_table(diagrams, nominal),),
         sections=(
+            Section("Damped critical speeds", tables=(crossing_table(machine, diagrams, margins),)),
             _map_section(first),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
-            *(_stability_section(machine, stability) if stability else ()),
             *appendix(
                 [
                     Section("Stiffness of the bearings", tables=(stiffness_table(first),)),
@@ -117,35 +118,45 @@ def critical_speeds_page(
                 ]
             ),
         ),
-        lead=1,
+        lead=2,
     )
 
 
+def _margins(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Margins:
+    """Margins in AMBs that were given: no standard asks for any of a free or a dropped rotor."""
+    if "AMBs" not in diagrams or _assumed(machine):
+        return {}
+    nominal = float(machine.speed.nominal)
+    return separations(diagrams["AMBs"], nominal, nominal)
+
+
+def _assumed(machine: Machine) -> list[str]:
+    """Names of the AMBs whose stiffness or damping was not given."""
+    return [amb.name for amb in machine.ambs if not amb.loop_is_given]
+
+
 def _verdict(
-    machine: Machine, found: CriticalSpeedMap, diagrams: Mapping[str, CampbellDiagram]
+    machine: Machine,
+    found: CriticalSpeedMap,
+    diagrams: Mapping[str, CampbellDiagram],
+    margins: Margins,
 ) -> tuple[Statement, ...]:
     massless, massive = (
         ", ".join(f"{frequency:.1f}" for frequency in found.at_lines[name][:4] if np.isfinite(frequency))
         for name in ("tangent", "with support mass")
     )
     text = (
-        "Settled in the touchdown bearings, with supports without mass as in the paper, the rotor has "
-        f"natural frequencies of {massless} Hz; with the mass of the supports {massive} Hz. The paper's map "
-        "leaves that mass out."
+        f"Natural frequencies settled in the touchdown bearings: {massive} Hz; on massless supports, as in "
+        f"the paper, {massless} Hz."
     )
     said = [Statement(text), *_followed(found)]
     top = float(machine.speed.nominal)
-    for name, diagram in diagrams.items():
-        forward = [c for c in diagram.crossings if c.direction != "backward" and c.speed <= top]
-        if forward:
-            speeds = ", ".join(f"{c.speed / TURN:.1f}" for c in forward)
-            text = f"{_held(name)}: forward or mixed modes meet the rotor's own speed at {speeds} Hz"
-            said.append(Statement(f"{text}, up to the nominal speed."))
-        judged = separations(diagram, top, top).items()
-        said += [_too_near(name, crossing, one, top) for crossing, one in judged if not one.met]
-    if not any(one.level == "bad" for one in said):
+    near = [_too_near(crossing, one, top) for crossing, one in margins.items() if not one.met]
+    if "AMBs" in diagrams and (assumed := _assumed(machine)):
+        said.append(Statement(ASSUMED.format(f"the AMBs {', '.join(assumed)}"), "warning"))
+    elif "AMBs" in diagrams and not near:
         said.append(Statement(CLEAR, "good"))
-    return tuple(sorted(said, key=lambda one: _WORST_FIRST.index(one.level)))
+    return tuple(sorted([*said, *near], key=lambda one: _WORST_FIRST.index(one.level)))
 
 
 def _followed(found: CriticalSpeedMap) -> Iterator[Statement]:
@@ -168,42 +179,43 @@ def _followed(found: CriticalSpeedMap) -> Iterator[Statement]:
             )
 
 
-def _too_near(name: str, crossing: Crossing, one: Separation, nominal: float) -> Statement:
+def _too_near(crossing: Crossing, one: Separation, nominal: float) -> Statement:
     """A critical speed that is nearer to the nominal speed than API 617 asks for."""
-    text = (
-        f"{_held(name)}: a {crossing.direction} mode meets the rotor's own speed at "
-        f"{_speed_text(crossing.speed)}, {100.0 * one.margin:.1f} % from the nominal speed of "
-        f"{_speed_text(nominal)}, with a damping ratio of {100.0 * crossing.damping_ratio:.2f} % and an "
-        f"amplification factor of {one.factor:.1f}; API 617 asks for {100.0 * one.required:.1f} %."
+    return Statement(
+        f"AMBs: {crossing.direction} critical speed {_speed_text(crossing.speed)}, {100.0 * one.margin:.1f} "
+        f"% from the nominal {_speed_text(nominal)} (API 617: {100.0 * one.required:.1f} %), amplification "
+        f"{one.factor:.1f}.",
+        "bad",
     )
-    return Statement(text, "warning" if name == "free-free" else "bad")
 
 
 def _speed_text(speed: float) -> str:
     return f"{speed / TURN:.1f} Hz ({60.0 * speed / TURN:.0f} rpm)"
 
 
-def _held(name: str) -> str:
-    return "Free-free" if name == "free-free" else f"In its {name}"
+def _held(machine: Machine, name: str) -> str:
+    """What holds the rotor, and whether its stiffness is our own."""
+    assumed = f", assumed {RIGID_FREQUENCY:g} Hz" if name == "AMBs" and _assumed(machine) else ""
+    return "Free-free" if name == "free-free" else f"In its {name}{assumed}"
 
 
-def critical_speeds_cards(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> tuple[Card, ...]:
-    """The lowest critical speeds of the rotor, in their order as in the table, a card for what holds it."""
-    cards = []
-    for name, diagram in diagrams.items():
-        judged = separations(diagram, nominal, nominal)
-        ordered = sorted(diagram.crossings, key=lambda one: one.speed)
-        figures = []
-        for number, crossing in enumerate(ordered[:ON_CARD], start=1):
-            one, hertz = judged.get(crossing), crossing.speed / TURN
-            margin = "" if one is None else f"; margin {100.0 * one.margin:.1f}\u00a0%, API 617 {one.verdict}"
-            note = (
-                f"{written(60.0 * hertz, 0)} rpm; damping {100.0 * crossing.damping_ratio:.2f}\u00a0%{margin}"
+def _screen(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Table:
+    """The lowest critical speeds with direction and damping, one line a number."""
+
+    def of(name: str, diagram: CampbellDiagram) -> Column:
+        ordered = sorted(diagram.crossings, key=lambda one: one.speed)[:ON_CARD]
+        told = [
+            f"{one.speed / TURN:.1f} Hz {one.direction}, {100.0 * one.damping_ratio:.2g} %".replace(
+                " ", NO_BREAK
             )
-            label = f"Critical speed {number}, {crossing.direction}"
-            figures.append(fact(label, hertz, "frequency", note=note))
-        cards.append(Card(_held(name), tuple(figures)))
-    return tuple(cards)
+            for one in ordered
+        ]
+        return Column(_held(machine, name), lambda k: told[k] if k < len(told) else "–")
+
+    rows = range(min(ON_CARD, max(len(one.crossings) for one in diagrams.values())))
+    number = Column("", lambda k: str(k + 1))
+    columns = (number, *(of(name, one) for name, one in diagrams.items()))
+    return table(rows, columns, "Critical speeds, direction, damping ratio")
 
 
 def stiffness_table(found: CriticalSpeedMap) -> Table:
@@ -235,26 +247,29 @@ def line_table(found: CriticalSpeedMap) -> Table:
     return table(AT_LINES, columns, f"Where the map meets the machine: {_WHIRL_WORDS[found.whirl]}")
 
 
-def crossing_table(diagrams: Mapping[str, CampbellDiagram], nominal: float) -> Table:
-    """Critical speeds with damping, amplification factor and margin from the nominal speed [rad/s]."""
-
-    def rows() -> Iterable[tuple[str, Crossing, Separation | None]]:
-        for name, diagram in diagrams.items():
-            judged = separations(diagram, nominal, nominal)
-            for crossing in diagram.crossings:
-                yield name, crossing, judged.get(crossing)
-
+def crossing_table(machine: Machine, diagrams: Mapping[str, CampbellDiagram], margins: Margins) -> Table:
+    """Critical speeds with damping and amplification factor, and with their margins where there are some."""
+    rows = [
+        (name, crossing, margins.get(crossing) if name == "AMBs" else None)
+        for name, diagram in diagrams.items()
+        for crossing in diagram.crossings
+    ]
     columns = (
-        Column("rotor held by", lambda row: row[0]),
+        Column("rotor", lambda row: _held(machine, row[0])),
         Column("critical speed", lambda row: row[1].speed, "speed"),
         Column("direction", lambda row: row[1].direction),
         Column("damping ratio", lambda row: f"{100.0 * row[1].damping_ratio:.2f} %"),
         Column("amplification", lambda row: f"{amplification_factor(row[1].damping_ratio):.1f}"),
+    )
+    if not margins:
+        return table(rows, columns, "Critical speeds with damping", CROSSINGS_NOTE)
+    judged = (
         Column("margin", lambda row: f"{100.0 * row[2].margin:.1f} %" if row[2] else "–"),
         Column("required", lambda row: row[2].asked if row[2] else "–"),
         Column("API 617", lambda row: row[2].verdict if row[2] else "–"),
     )
-    return table(rows(), columns, "Critical speeds with damping and separation margins", CROSSINGS_NOTE)
+    caption = "Critical speeds with damping and separation margins"
+    return table(rows, (*columns, *judged), caption, f"{CROSSINGS_NOTE} {MARGINS_NOTE}")
 
 
 def _map_section(found: CriticalSpeedMap) -> Section:
@@ -264,7 +279,7 @@ def _map_section(found: CriticalSpeedMap) -> Section:
         "bearings (Neisi 2020, Fig. 19). Vertical: the machine's own stiffness, full by the tangent of the "
         "ball forces with preload, dashed by the simple formula."
     )
-    figure = Figure(critical_speed_figure(found), caption, f"map {found.whirl}")
+    figure = Figure(critical_speed_figure(found), caption)
     return Section(
         f"Critical speed map: {words}", (WITH_MASS,), figures=(figure,), tables=(line_table(found),)
     )
@@ -277,39 +292,13 @@ def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
         campbell_figure(diagram, HIGHEST, float(machine.speed.nominal)),
         "Damped frequencies and damping ratios against the rotor speed; circles: critical speeds; dashed "
         "upright: nominal speed.",
-        f"campbell {name}",
     )
     shapes = Figure(
         mode_shape_figure(diagram, bearings, SHAPES, float(machine.speed.nominal)),
         "Shapes of the lowest forward and mixed modes at the nominal speed, in the plane of the largest "
         "deflection.",
-        f"shapes {name}",
     )
-    return Section(f"{_held(name)}: Campbell diagram and shapes", figures=(lines, shapes))
-
-
-def _stability_section(machine: Machine, stability: Sequence[StabilityMap]) -> tuple[Section, ...]:
-    text = (
-        f"A cross-coupled stiffness at node {stability[0].node}, in the middle of the bearings, stands for "
-        f"what seals and impellers do to the rotor at {_speed_text(float(machine.speed.nominal))}: so API "
-        "617, part 1, screens it. What yours do is not known here; it asks for a decrement of at least 0.1 "
-        "with them."
-    )
-    columns = (
-        Column("held by", "suspension"),
-        Column("decrement without coupling", lambda one: f"{one.decrement[0]:.3g}"),
-        Column(
-            "coupling at the limit",
-            lambda one: one.limit if math.isfinite(one.limit) else "none found",
-            "stiffness",
-        ),
-    )
-    caption = (
-        "Least logarithmic decrement against cross-coupled stiffness; below zero the rotor whirls by itself."
-    )
-    figure = Figure(stability_figure(stability), caption, "stability")
-    found = table(stability, columns, "Stability at the nominal speed")
-    return (Section("Stability map", (text,), figures=(figure,), tables=(found,)),)
+    return Section(f"{_held(machine, name)}: Campbell diagram and shapes", figures=(lines, shapes))
 
 
 def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
@@ -396,18 +385,6 @@ def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | N
     return fit_legend(figure)
 
 
-def stability_figure(found: Sequence[StabilityMap]) -> go.Figure:
-    """Draw the least logarithmic decrement against cross-coupled stiffness, a line for each suspension."""
-    figure = panels(("least logarithmic decrement of the lowest modes",), height=320)
-    for k, one in enumerate(found):
-        hover = "%{x:.4~g} N/µm: %{y:.3~g}"
-        curve(figure, 1e-6 * one.coupling, one.decrement, one.suspension, colour=SERIES[k], hover=hover)
-    figure.add_hline(y=0.0, line={"color": LIMIT, "width": 1.2, "dash": "dash"})
-    figure.update_xaxes(title_text=axis_title("cross-coupled stiffness in mid-span", "N/µm"))
-    figure.update_yaxes(title_text=axis_title("logarithmic decrement", ""))
-    return fit_legend(figure)
-
-
 def mode_shape_figure(
     diagram: CampbellDiagram, bearings: Sequence[tuple[str, float]], count: int, speed: float
 ) -> go.Figure:
@@ -453,24 +430,12 @@ def _distinct(frequency: Array) -> list[int]:
 
 
 def critical_speeds_json(
-    maps: Mapping[str, CriticalSpeedMap],
-    diagrams: Mapping[str, CampbellDiagram],
-    stability: Sequence[StabilityMap] = (),
+    maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
 ) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units; null where there is no line."""
     return {
         "maps": {name: _map_json(found) for name, found in maps.items()},
         "campbell": {name: _campbell_json(diagram) for name, diagram in diagrams.items()},
-        "stability": {
-            one.suspension: {
-                "speed_Hz": one.speed / TURN,
-                "node": one.node,
-                "coupling_N_m": one.coupling.tolist(),
-                "logarithmic_decrement": one.decrement.tolist(),
-                "limit_N_m": _finite(one.limit),
-            }
-            for one in stability
-        },
     }
 
 

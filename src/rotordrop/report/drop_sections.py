@@ -1,34 +1,134 @@
-"""The sections that every drop has, followed, replayed or simulated: all drawn from `BearingDrop`.
-
-A further figure of a drop is one function here, or one file and a line here.
-"""
+"""Sections and figures that every drop has, followed, replayed or simulated: all drawn from `BearingDrop`."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
-from rotordrop.estimate.bearing_drop import BearingDrop, BearingMotions, History
-from rotordrop.report.content import Figure, Section, Statement, Table
-from rotordrop.report.first_contact import first_contact_figure
-from rotordrop.report.impacts import impact_figure, impact_table
-from rotordrop.report.orbit import orbit_figure
-from rotordrop.report.quantity import shown
-from rotordrop.report.stress_box import StressBox, stress_box, stress_box_figure, stress_table
-from rotordrop.report.style import MICRO, TURN
-from rotordrop.report.time_panels import Panel, time_panels
+import numpy as np
+import plotly.graph_objects as go
+
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.estimate.bearing_drop import (
+    BearingDrop,
+    BearingMotions,
+    FirstContact,
+    History,
+    Impact,
+    Origin,
+    Peak,
+)
+from rotordrop.estimate.estimate import SensorMotion
+from rotordrop.evidence.impacts import HOP, shortest_flight
+from rotordrop.evidence.quality import NO_CHECK_SEES
+from rotordrop.evidence.quality.finding import Finding
+from rotordrop.known import Known
+from rotordrop.report.content import (
+    Card,
+    Column,
+    Figure,
+    KeyFigure,
+    Level,
+    Section,
+    Statement,
+    Table,
+    folded,
+    table,
+)
+from rotordrop.report.quantity import Quantity, places_of, round_steps, shown, with_interval
+from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table
+from rotordrop.report.style import (
+    GRID,
+    INK,
+    LIMIT,
+    MICRO,
+    MILLI,
+    MUTED,
+    TIME_TITLE,
+    TURN,
+    Panel,
+    add_gap_limits,
+    add_history,
+    axis_title,
+    colour_of_time,
+    compared_style,
+    curve,
+    fit_legend,
+    panels,
+    peak_indices,
+    single,
+    square,
+    time_panels,
+    upright,
+)
+from rotordrop.severity.numbers import LOADS
+from rotordrop.units import percent
 
 AROUND_PEAK = (2e-3, 4e-3)
 """Stretch before and after a peak [s] that gets a figure of its own; chosen, not measured."""
 MEGA = 1e-6
 CARRIED = (
-    "The measured motion is carried from the planes of the sensors to the bearings along the straight line "
-    "through them; the bending in between, a few micrometres, is left out."
+    "What was measured is carried from the planes of the sensors to the bearings along the straight line "
+    "through them; the bending in between is left out."
 )
 NO_DISTRIBUTION = (
     "No distribution of the stress is stated: its numbers have no ranges, and single numbers do not hold."
 )
 NO_IMPACT = "The rotor did not touch a bearing in this window."
+LEVELS: dict[str, Level] = {"stop": "bad", "warning": "warning", "note": "notice"}
+"""Levels by severity of a finding, the gravest first."""
+SOUND = "The plausibility checks found nothing wrong with the record."
+
+
+def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
+    """Headline numbers of one bearing, peaks first, each with its time, or the reason why it is missing.
+
+    Single numbers are shown where they are certain, else ranges.
+    """
+    known: dict[str, Known] = {
+        **bearing.values,
+        "peak_force_N": bearing.peak_force.known,
+        "peak_stress_Pa": bearing.peak_stress.known,
+    }
+    peaks = {"peak_force_N": bearing.peak_force, "peak_stress_Pa": bearing.peak_stress}
+    figures = []
+    for load in LOADS:
+        field, label = load.field, f"{load.label[0].upper()}{load.label[1:]}"
+        reason = bearing.missing.get(field, "")
+        if field not in known and not reason:
+            continue
+        value = Quantity.of(known.get(field), load.kind, range_only=not certain)
+        at = moment_of(peaks[field]) if field in peaks and certain else ""
+        note = "; ".join(filter(None, (at, reason)))
+        figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
+    origin = bearing.peak_force.origin
+    source = f", by the {origin.value}" if origin in (Origin.CROSS_CHECK, Origin.REPLAY) else ""
+    return Card(f"{bearing.name} touchdown bearing{source}", tuple(figures))
+
+
+def moment_of(peak: Peak) -> str:
+    """When a peak was, in words; nothing where it was estimated and its error is not known."""
+    if peak.origin is Origin.SIMULATION:
+        return f"at {shown(peak.time, 'time', 3)}"
+    if peak.time_interval_90 is None:
+        return ""
+    return f"at {with_interval(peak.time, 'time', peak.time_interval_90)}"
+
+
+def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = True) -> Statement:
+    """Set the peak stresses beside the stress of the static load rating, as information."""
+    level: Level = "notice"
+    shares = []
+    for bearing in bearings:
+        peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
+        ends = " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in peak.ends))
+        shares.append(f"{ends} % ({bearing.name})")
+        if (peak.value if certain else peak.ends[1]) >= STATIC_STRESS:
+            level = "warning"
+    rated = f"{shown(STATIC_STRESS, 'pressure')} of C0 by ISO 76"
+    return Statement(f"Peak stress is {' and '.join(shares)} of the {rated}.", level)
 
 
 def drop_sections(
@@ -38,9 +138,10 @@ def drop_sections(
     static_loads: Mapping[str, float] | None = None,
     *,
     contact_tables: tuple[Table, ...] = (),
+    at_sensors: tuple[Figure, ...] = (),
     certain: bool = True,
 ) -> tuple[Section, ...]:
-    """Force, orbit, stress, impacts, motion and first contact of a drop, in this order.
+    """Force, orbit, impacts with the first contact, motion and stress of a drop, in this order.
 
     The origin says what is drawn, as "measured and estimated"; the speed at power-off [rad/s] names the
     drop; static loads are the share of the weight by bearing [N]. Where single numbers are not certain,
@@ -50,16 +151,19 @@ def drop_sections(
         first_contact_figure(bearings),
         "Vertical displacement around the first contact: t₁ first touch, t₂ lift-off, T the time "
         "between; indentation counts from the air gap, support included (Neisi 2020, Fig. 10).",
-        "first contact",
     )
+    radial = [radial_section(bearings)] if any(bearing.at_gap_limits for bearing in bearings) else []
     return (
         _force(bearings, static_loads or {}, certain=certain),
         orbit_section(bearings),
+        folded(
+            "Impacts",
+            _impacts(bearings),
+            Section("", figures=(contact,), tables=contact_tables),
+            printed=True,
+        ),
+        folded("Displacement", motion_section(bearings, origin, at_sensors=at_sensors), *radial),
         _stress(bearings, speed, certain=certain),
-        _impacts(bearings),
-        motion_section(bearings, origin),
-        radial_section(bearings),
-        Section("First contact", figures=(contact,), tables=contact_tables),
     )
 
 
@@ -95,35 +199,28 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float], *, certa
     near = [replace(panel.around(*AROUND_PEAK), title=f"{panel.title}, around its peak") for panel in panels]
     rows = [[replace(whole, peak=None), close] for whole, close in zip(panels, near, strict=True)]
     chart = time_panels(rows, 1.0, "N", from_zero=True, from_power_off=False)
+    for axis in list(chart.select_yaxes())[1:]:
+        axis.matches = "y"
     caption = "Magnitude of the ball force on the race, instantaneous (Neisi 2020, Fig. 15), and its peak."
-    return Section("Bearing force", figures=(Figure(chart, caption, "force"),))
+    return Section("Bearing force", figures=(Figure(chart, caption),))
 
 
 def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> Section:
     history = Figure(
         time_panels([[stress_panel(bearing, certain=certain)] for bearing in bearings], MEGA, "MPa"),
         "Largest Hertz stress of all balls at the inner race, instantaneous.",
-        "stress",
     )
     if not certain:
         return Section("Hertz stress", (), (Statement(NO_DISTRIBUTION),), (history,))
-    boxes = stress_boxes(bearings, speed)
+    label = shown(speed / TURN, "frequency", 3)
+    boxes = [stress_box(label, one.name, one.stress.values, one.statistics) for one in bearings]
     box = Figure(
         stress_box_figure(boxes),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
-        "stress distribution",
     )
     # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
     tables = () if any(one.stress_band for one in bearings) else (stress_table(boxes),)
     return Section("Hertz stress", figures=(history, box), tables=tables)
-
-
-def stress_boxes(bearings: Sequence[BearingDrop], speed: float) -> tuple[StressBox, ...]:
-    """Distribution of the stress at every bearing, under the speed of the drop."""
-    label = shown(speed / TURN, "frequency", 3)
-    return tuple(
-        stress_box(label, bearing.name, bearing.stress.values, bearing.statistics) for bearing in bearings
-    )
 
 
 def _impacts(bearings: Sequence[BearingDrop]) -> Section:
@@ -140,27 +237,51 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
         impact_figure(hit, force=force),
         f"Peak {force} of every impact where it hit the race, seen from {bearings[-1].name}; −90° is "
         "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
-        "impacts",
     )
     return Section("Impacts", (), reasons, (figure,), (impact_table(hit, force=force),))
 
 
-def motion_section(bearings: Sequence[BearingMotions | BearingDrop], origin: str, *text: str) -> Section:
+def motion_section(
+    bearings: Sequence[BearingMotions | BearingDrop],
+    origin: str,
+    *text: str,
+    at_sensors: tuple[Figure, ...] = (),
+) -> Section:
     """Displacement against time: horizontal beside vertical, all bearings zooming together."""
     caption = f"Displacement of the rotor, {origin}; the panels zoom together (Neisi 2020, Figs 7, 8 and 13)."
     carried = any(isinstance(b, BearingDrop) and b.motions[0].role == "measured" for b in bearings)
-    figure = Figure(displacement_figure(bearings), caption, "displacement")
-    return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(figure,))
+    figure = Figure(displacement_figure(bearings), caption)
+    return Section("Displacement", (*text, *((CARRIED,) if carried else ())), figures=(*at_sensors, figure))
 
 
-def radial_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
-    """Distance of the rotor from the centre of every bearing against time."""
+def sensor_figure(found: SensorMotion) -> Figure:
+    """What every sensor read, and what the estimated motion gives it, with their r.m.s. difference."""
+    panels = [
+        Panel(
+            title=f"{name}, r.m.s. of the difference {shown(rms, 'length', 2)}",
+            axis="reading",
+            histories=(
+                History(label="measured", time=found.time, values=measured, role="measured"),
+                History(label="estimated", time=found.time, values=estimated, role="estimated"),
+            ),
+        )
+        for name, rms, measured, estimated in zip(
+            found.channels, found.rms, found.measured.T, found.estimated.T, strict=True
+        )
+    ]
+    rows = [panels[first : first + 2] for first in range(0, len(panels), 2)]
+    caption = "Readings of the sensors, and those that the estimated motion gives; the panels zoom together."
+    return Figure(time_panels(rows, MICRO, "µm", height=190, together=True), caption)
+
+
+def radial_section(bearings: Sequence[BearingDrop]) -> Section:
+    """Distance of the rotor from the centre against time, with both limits of the air gap."""
     rows = [
         [
             Panel(
                 title=bearing.name,
                 axis="radial displacement",
-                histories=tuple(motion.radial for motion in bearing.at_gap_limits or bearing.motions),
+                histories=tuple(motion.radial for motion in bearing.at_gap_limits),
                 air_gap=bearing.air_gap,
             )
         ]
@@ -168,11 +289,7 @@ def radial_section(bearings: Sequence[BearingMotions | BearingDrop]) -> Section:
     ]
     radial = Figure(
         time_panels(rows, MICRO, "µm", from_zero=True),
-        "Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14)."
-        if any(bearing.at_gap_limits for bearing in bearings)
-        else "Distance of the rotor from the bearing centre; above the air gap the rotor indents the race "
-        "(Neisi 2020, Fig. 14).",
-        "radial displacement",
+        "Radial displacement, simulated for both limits of the air gap (Neisi 2020, Fig. 14).",
     )
     return Section("Radial displacement", figures=(radial,))
 
@@ -205,11 +322,12 @@ def orbit_section(
     """Orbits in the clearance circle, of an early part alone where one is given."""
     # planes of sensors alone stand in the order of the record, not in that of the rotor
     seen = f", seen from {bearings[-1].name}" if isinstance(bearings[-1], BearingDrop) else ""
+    hit = any(isinstance(one, BearingDrop) and one.impacts for one in bearings)
+    numbers = " 1 to 3: the largest contacts of a bearing, 1 the hardest; their force stands under Impacts."
     orbit = Figure(
         orbit_figure(early or bearings),
         f"Path of the rotor centre against the clearance circle{until}; x to the right, y up{seen} "
-        "(Neisi 2020, Fig. 12).",
-        "orbit",
+        f"(Neisi 2020, Fig. 12).{numbers if hit else ''}",
     )
     return Section("Orbit", figures=(orbit,))
 
@@ -221,3 +339,345 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> obj
         axis = "race speed"
         row.append(Panel(title="inner races", axis=axis, histories=tuple(races), series=True))
     return time_panels([row], 1.0 / TURN, "Hz", height=250)
+
+
+def record_quality_section(findings: Sequence[Finding], *unseen: str) -> Section:
+    """Tell what the gate found, with channel, time and remedy, or that it found nothing; what it cannot."""
+    limits = tuple(map(Statement, unseen))
+    if not findings:
+        return Section("Data quality", statements=(Statement(SOUND, "good"), *limits))
+    columns = (
+        Column("finding", "kind"),
+        Column("channel", lambda found: found.channel or "all"),
+        Column("time in the record", lambda f: "whole record" if f.time is None else shown(f.time, "time")),
+        Column("what was seen", "message"),
+        Column("remedy", "remedy"),
+    )
+    return Section(
+        "Data quality",
+        statements=(*quality_statements(findings), *limits),
+        tables=(table(findings, columns),),
+    )
+
+
+def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:
+    """What the gate cannot see, among the notes of an estimate."""
+    return tuple(note for note in notes if note.startswith(NO_CHECK_SEES))
+
+
+def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:
+    """The findings as sentences, the serious ones first; what would stop an estimate with its way out."""
+    order = list(LEVELS)
+    return tuple(
+        Statement(
+            (f"Channel {found.channel}: " if found.channel else "")
+            + (f"{found.message}; {found.remedy}" if found.severity == "stop" else found.message),
+            LEVELS[found.severity],
+        )
+        for found in sorted(findings, key=lambda found: order.index(found.severity))
+    )
+
+
+LISTED = 12
+AZIMUTH = "Azimuth counter-clockwise from +x, −90° is the bottom. "
+INTERVAL, RING = "#5b6875", "#cbd4dc"
+NUMBERED = 3
+"""Contacts of a bearing that an orbit numbers."""
+
+
+def impact_rule(gaps: Sequence[float], *, seen: bool = False) -> str:
+    """The rule of an impact in words, with the shortest flight for these air gaps [m].
+
+    Where displacement alone is seen it asks for more.
+    """
+    times = dict.fromkeys(f"{1e3 * shortest_flight(gap):.2g}" for gap in sorted(gaps))
+    after = f"at least {' to '.join([*times][:: max(len(times) - 1, 1)])} ms" if times else "a time"
+    leaves, swing = "", ""
+    if seen:
+        leaves = f", in which the rotor leaves the race by {percent(0.5 * HOP, 1)} of the gap or more"
+        swing = ", and a swing along the race is none"
+    return (
+        f"An impact is a return to the race after {after} of free flight, as long as a hop of "
+        f"{percent(HOP)} of the air gap under gravity lasts{leaves}; the first touch of a fall is one too. "
+        f"Shorter hops belong to the impact before{swing}."
+    )
+
+
+def largest(bearing: BearingDrop) -> list[Impact]:
+    """The contacts that an orbit numbers, the largest force first."""
+    return sorted(bearing.impacts, key=lambda one: -one.peak_force.value)[:NUMBERED]
+
+
+def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
+    """List the strongest impacts in the order of time, with the name of the force whose peak is stated."""
+    impacts = [
+        (bearing.name, impact, after)
+        for bearing in bearings
+        for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
+    ]
+    count = sum(after for *_, after in impacts)
+    strongest = sorted(impacts, key=lambda item: -item[1].peak_force.value)[:listed]
+    left_out = len(impacts) - len(strongest)
+    gaps = [0.5 * (one.air_gap.lower + one.air_gap.upper) for one in bearings if one.air_gap is not None]
+    rest = f" {left_out} weaker ones are left out." if left_out else ""
+
+    def number(label: str, field: str, kind: str) -> Column:
+        """A number of the impacts, with as many places in every line as the largest needs."""
+        places = places_of((getattr(impact, field).value for _, impact, _ in strongest), kind)
+        return Column(label, lambda row: replace(Quantity.of(getattr(row[1], field), kind), places=places))
+
+    numbers = {id(one): str(k) for bearing in bearings for k, one in enumerate(largest(bearing), start=1)}
+    # where an impact hit, and for how long, has no known error in an estimate
+    exact = all(impact.peak_force.interval_90 is None for _, impact, _ in impacts)
+    place = Column("azimuth", lambda row: row[1].azimuth, "angle", 3)
+    lasted = Column("duration", lambda row: row[1].end - row[1].start, "time", 3)
+    columns = (
+        Column("bearing", lambda row: row[0]),
+        Column("time of peak", lambda row: row[1].peak_time, "time"),
+        *((place,) if exact else ()),
+        number(f"peak {force}", "peak_force", "force"),
+        number("impulse", "impulse", "impulse"),
+        number("dissipated energy", "dissipated_energy", "energy"),
+        *((lasted,) if exact else ()),
+        Column("impact", lambda row: "yes" if row[2] else ""),
+        Column("in the orbit", lambda row: numbers.get(id(row[1]), "")),
+    )
+    return table(
+        sorted(strongest, key=lambda item: item[1].peak_time),
+        columns,
+        f"Contacts ({len(strongest)} of {len(impacts)}), {count} of them impacts",
+        f"{AZIMUTH if exact else ''}{impact_rule(gaps)}{rest}",
+    )
+
+
+def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
+    """Draw the peak force of every impact round the race as it was hit, with known intervals.
+
+    The distance from the centre is the force, on the same scale for all bearings; the earlier the darker.
+    """
+    figure = panels([bearing.name for bearing in bearings], height=420, spacing=0.1)
+    impacts = [impact for bearing in bearings for impact in bearing.impacts]
+    latest = max(impact.peak_time for impact in impacts)
+    rings = round_steps(max(impact.peak_force.high for impact in impacts))
+    for column, bearing in enumerate(bearings, start=1):
+        _add_rings(figure, rings, column)
+        _add_impacts(figure, bearing.impacts, column)
+        square(figure, column, 1.12 * rings[-1])
+    bare = {"showticklabels": False, "ticks": "", "showgrid": False, "showline": False}
+    figure.update_xaxes(title_text=axis_title(f"peak {force}, from the centre", "N"), **bare)
+    figure.update_yaxes(**bare)
+    colour_of_time(figure, 0.0, 1e3 * latest)
+    return figure
+
+
+def _add_rings(figure: go.Figure, rings: Sequence[float], column: int) -> None:
+    """Rings of equal force with their numbers, and azimuths every 45 degrees."""
+    axes = {"xref": "x" if column == 1 else f"x{column}", "yref": "y" if column == 1 else f"y{column}"}
+    words: dict[str, Any] = {"showarrow": False}
+    line: dict[str, Any] = {"line": {"color": RING, "width": 1}, "layer": "below"}
+    at = math.radians(67.5)  # between two azimuths, where no number stands
+    for force in rings:
+        ends = {"x0": -force, "x1": force, "y0": -force, "y1": force}
+        figure.add_shape(type="circle", **ends, **line, **axes)
+        place = {"x": force * math.cos(at), "y": force * math.sin(at), "font": {"size": 11, "color": MUTED}}
+        figure.add_annotation(text=f"{force:,.6g}".replace(",", "\u202f"), **place, **words, **axes)
+    for degrees in range(0, 360, 45):
+        x, y = rings[-1] * math.cos(math.radians(degrees)), rings[-1] * math.sin(math.radians(degrees))
+        figure.add_shape(type="line", x0=0, y0=0, x1=x, y1=y, **line, **axes)
+        text = f"{degrees if degrees <= 180 else degrees - 360}°".replace("-", "−")
+        figure.add_annotation(x=1.06 * x, y=1.06 * y, text=text, font={"size": 11}, **words, **axes)
+
+
+def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> None:
+    force = np.array([impact.peak_force.value for impact in impacts])
+    azimuth = np.array([impact.azimuth for impact in impacts])
+    time = np.array([1e3 * impact.peak_time for impact in impacts])
+    bars: list[list[float]] = []
+    for impact in impacts:
+        if impact.peak_force.interval_90 is not None:
+            bars += [[limit, impact.azimuth] for limit in impact.peak_force.interval_90]
+            bars.append([math.nan, math.nan])
+    if bars:
+        limit, at = np.array(bars).T
+        x, y = limit * np.cos(at), limit * np.sin(at)
+        grey: dict[str, Any] = {"colour": INTERVAL, "width": 1.4, "legend": False, "hover": None}
+        curve(figure, x, y, "90 % interval", column=column, **grey)
+    marker = {
+        "color": time.astype(np.float32),
+        "coloraxis": "coloraxis",
+        "size": 8,
+        "line": {"color": "#ffffff", "width": 0.6},
+    }
+    curve(
+        figure,
+        force * np.cos(azimuth),
+        force * np.sin(azimuth),
+        "impacts",
+        column=column,
+        mode="markers",
+        marker=marker,
+        customdata=np.stack([force, np.degrees(azimuth), time], axis=1).astype(np.float32),
+        legend=False,
+        hover="%{customdata[0]:.0f} N at %{customdata[1]:.0f}°, %{customdata[2]:.2f} ms",
+    )
+
+
+CIRCLE = np.linspace(0.0, 2.0 * np.pi, 181)
+ORBIT_BLOCKS = 450
+ORBIT_POINTS = 4000
+"""Samples at even steps that an orbit is drawn with: 40 a turn at 200 Hz in half a second."""
+
+
+def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
+    """Draw the path of the rotor centre in each bearing inside its clearance circle (Neisi 2020, Fig. 12).
+
+    One panel per bearing in µm at one scale, x to the right and y up; the circle is the upper air gap, with
+    the lower one dashed where they differ. A single path is the darker the earlier; the largest contacts are
+    numbered.
+    """
+    figure = panels([b.name for b in bearings], height=430, spacing=0.12)
+    timed = all(len(bearing.motions) == 1 for bearing in bearings)
+    if timed:
+        times = [MILLI * bearing.motions[0].time for bearing in bearings]
+        colour_of_time(figure, float(min(map(min, times))), float(max(map(max, times))))
+    for column, bearing in enumerate(bearings, start=1):
+        for motion in sorted(bearing.motions, key=lambda one: one.role == "measured"):
+            x, y = motion.displacement[:, 0], motion.displacement[:, 1]
+            # extremes alone would join points of different turns by chords that the rotor never went
+            even = np.arange(0, len(x), -(-len(x) // ORBIT_POINTS))
+            chosen = np.union1d(peak_indices(x, y, np.hypot(x, y), blocks=ORBIT_BLOCKS), even)
+            when = single(MILLI * motion.time[chosen])
+            look: dict[str, Any] = {"line": compared_style(motion.role)}
+            if timed:
+                look = {"mode": "lines+markers", "line": {"color": GRID, "width": 1.2}}
+                look["marker"] = {"size": 3.5, "color": when, "coloraxis": "coloraxis"}
+            curve(
+                figure,
+                MICRO * x[chosen],
+                MICRO * y[chosen],
+                motion.label,
+                column=column,
+                legend=column == 1 and not timed,
+                customdata=when,
+                hover="x %{x:.1f} µm, y %{y:.1f} µm at %{customdata:.2f} ms",
+                **look,
+            )
+        _add_circles(figure, bearing, column)
+        if isinstance(bearing, BearingDrop) and bearing.impacts:
+            _add_numbers(figure, bearing, column)
+        radii = [float(np.nanmax(np.abs(motion.displacement))) for motion in bearing.motions]
+        reach = 1.08 * MICRO * max([*radii, bearing.air_gap.upper if bearing.air_gap else 0.0])
+        square(figure, column, reach)
+    figure.update_xaxes(title_text=axis_title("displacement x", "µm"))
+    figure.update_yaxes(title_text=axis_title("displacement y", "µm"), col=1)
+    return fit_legend(figure)
+
+
+def _add_circles(figure: go.Figure, bearing: BearingMotions | BearingDrop, column: int) -> None:
+    gap = bearing.air_gap
+    if gap is None:
+        return
+    circles = [(gap.upper, "clearance circle", "solid")]
+    if gap.lower < gap.upper:
+        circles = [
+            (gap.upper, "clearance circle, upper limit", "solid"),
+            (gap.lower, "clearance circle, lower limit", "dash"),
+        ]
+    for radius, name, dash in circles:
+        curve(
+            figure,
+            MICRO * radius * np.cos(CIRCLE),
+            MICRO * radius * np.sin(CIRCLE),
+            name,
+            column=column,
+            legend=column == 1,
+            line={"color": LIMIT, "width": 1.2, "dash": dash},
+            hover=f"{MICRO * radius:.1f} µm",
+        )
+
+
+def _add_numbers(figure: go.Figure, bearing: BearingDrop, column: int) -> None:
+    """Where the rotor is at the peaks of the largest contacts, numbered by force."""
+    hits, motion = largest(bearing), bearing.motion
+    times = [hit.peak_time for hit in hits]
+    x, y = (MICRO * np.interp(times, motion.time, motion.displacement[:, k]) for k in (0, 1))
+    marker = {"size": 16, "color": "#ffffff", "line": {"color": INK, "width": 1}}
+    curve(
+        figure,
+        x,
+        y,
+        "largest contacts",
+        column=column,
+        mode="markers+text",
+        marker=marker,
+        text=[str(k) for k in range(1, len(hits) + 1)],
+        textfont={"size": 11, "color": INK},
+        customdata=[[hit.peak_force.value, MILLI * hit.peak_time] for hit in hits],
+        legend=False,
+        hover="%{customdata[0]:.0f} N at %{customdata[1]:.2f} ms",
+    )
+
+
+SHOWN = 0.04
+"""Length of the window the paper shows [s]."""
+
+CONTACT_FILL = "rgba(217, 120, 10, 0.13)"
+
+
+def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOWN) -> go.Figure:
+    """Draw the vertical displacement at the first contact with t1, t2 and indentation (Neisi 2020, Fig. 10).
+
+    A bearing that was not touched is drawn without marks; the window ends at a time [s].
+    """
+    figure = panels([b.name for b in bearings])
+    for column, bearing in enumerate(bearings, start=1):
+        for motion in bearing.motions:
+            history = motion.vertical.between(0.0, until)
+            add_history(figure, history, MICRO, "µm", column=column, legend=column == 1)
+        if bearing.air_gap is not None:
+            add_gap_limits(figure, bearing.air_gap, sign=-1.0, column=column, legend=column == 1)
+        if bearing.first_contact is not None:
+            _mark_first(figure, bearing.first_contact, bearing, column)
+    figure.update_xaxes(title_text=TIME_TITLE, range=[0.0, MILLI * until])
+    figure.update_yaxes(title_text=axis_title("vertical displacement y", "µm"), col=1)
+    return fit_legend(figure)
+
+
+def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column: int) -> None:
+    start, end = MILLI * contact.start, MILLI * contact.end
+    # of an estimate lift-off has no known error, and the depth has that of the air gap
+    exact, gap = bearing.peak_force.interval_90 is None, bearing.values.get("air_gap_m")
+    beyond = (0.0,) if exact or gap is None else (gap.value - gap.high, gap.value - gap.low)
+    depths = [max(MICRO * (contact.indentation + one), 0.0) for one in beyond]
+    figure.add_vrect(x0=start, x1=end, fillcolor=CONTACT_FILL, line_width=0, row=1, col=column)
+    for value in (start, end):
+        upright(figure, value, MUTED, "dot", row=1, col=column)
+    figure.add_annotation(
+        x=end,
+        y=1.0,
+        yref="y domain" if column == 1 else f"y{column} domain",
+        text=f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂",
+        showarrow=False,
+        xanchor="left",
+        yanchor="top",
+        xshift=3,
+        font={"size": 11.5, "color": INK},
+        row=1,
+        col=column,
+    )
+    drawn = bearing.motions[0].vertical
+    depth = float(np.interp(contact.deepest_time, drawn.time, drawn.values))
+    figure.add_annotation(
+        x=MILLI * contact.deepest_time,
+        y=MICRO * depth,
+        text=f"indentation {' to '.join(f'{one:.1f}' for one in depths)} µm",
+        showarrow=True,
+        arrowhead=2,
+        arrowcolor=LIMIT,
+        ax=70,
+        ay=-4,
+        xanchor="left",
+        font={"size": 11.5, "color": INK},
+        row=1,
+        col=column,
+    )

@@ -1,17 +1,38 @@
-"""The report on one recorded drop, drawn from its estimate alone."""
+"""The report on one recorded drop, and what a terminal shows first, drawn from its estimate alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
+from textwrap import shorten, wrap
+from typing import NamedTuple
+
+import numpy as np
+import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.arrays import Array
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.elements.parameter import Role
 from rotordrop.elements.race_bearing import numbers_of
-from rotordrop.estimate.document import published_drop
-from rotordrop.estimate.estimate import CrossCheck, Estimate, FittedParameter
+from rotordrop.elements.table import published, row_of
+from rotordrop.estimate.advice import is_wide
+from rotordrop.estimate.bearing_drop import BearingDrop, History
+from rotordrop.estimate.estimate import (
+    CrossCheck,
+    Estimate,
+    FittedParameter,
+    FrictionSweep,
+    ReplaySteps,
+    TimedContact,
+)
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimate.published import Drop
+from rotordrop.estimate.published import Agreement, Drop
 from rotordrop.estimate.severity_numbers import severity_values
+from rotordrop.evidence.impacts import CONTACT_FROM
+from rotordrop.known import NINETY, Correlation, Known
 from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -22,37 +43,66 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
-    appendix,
+    folded,
     table,
     verdict_column,
 )
-from rotordrop.report.drop_sections import drop_sections
-from rotordrop.report.estimate_numbers import headline_card, identified_table, static_limit_statement
-from rotordrop.report.innovations import innovation_figures
-from rotordrop.report.inspection import assumptions_section, inspection_section, limits_section
-from rotordrop.report.machine_sections import defaults_section, drawing_section, weight_shares
-from rotordrop.report.origin import Origin
-from rotordrop.report.parameters import ParameterRow, parameter_figure, parameter_table
-from rotordrop.report.quantity import Quantity, shown, written
-from rotordrop.report.record_quality import quality_statements, record_quality_section, unseen_in
-from rotordrop.report.replay_sections import (
-    agreement_section,
-    correlation_table,
-    first_contact_table,
-    friction_section,
-    speed_section,
+from rotordrop.report.drop_sections import (
+    drop_sections,
+    headline_card,
+    quality_statements,
+    record_quality_section,
+    sensor_figure,
+    speed_figure,
+    static_limit_statement,
+    unseen_in,
 )
-from rotordrop.report.restart_page import restart_section
-from rotordrop.restart import RestartCard, restart_card
-from rotordrop.restart.assumptions import assumptions_of
-from rotordrop.restart.order import earlier_drop
-from rotordrop.severity.numbers import NOTE, SEVERITY
-from rotordrop.units import format_second
+from rotordrop.report.machine_content import drawing_section, not_given, weight_shares
+from rotordrop.report.origin import Origin
+from rotordrop.report.quantity import NO_INTERVAL, Quantity, shown, with_interval, written
+from rotordrop.report.style import (
+    BAND_FILL,
+    COLOURS,
+    LIMIT,
+    MICRO,
+    SERIES,
+    add_history,
+    axis_title,
+    bars,
+    curve,
+    fit_legend,
+    label_time,
+    panels,
+    plain,
+    upright,
+)
+from rotordrop.severity.numbers import NOTE, NUMBERS, Number
+from rotordrop.twin.allowances import MODEL_STRESS_SIGMA
+from rotordrop.twin.value_of_information import DRAWING
+from rotordrop.units import format_minute, format_second
 
 KINDS = {"N": "force", "Pa": "pressure"}
+FRONT = 2
+"""Sections of the page to send: force and orbit."""
+MAIN = 2
+"""Headline numbers of the page to send: peak force and stress."""
+WORTH = 0.7
+"""Share of an interval that is left from which it is not said what would narrow it [1] (chosen)."""
+ROW_HEIGHT = 24
+TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1, 1.2, 1.5, 2, 3, 5, 10, 20, 50, 100)
+EXPECTED = "90 % expected by the filter"
+LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
+SHOWN_SHARE = 0.995
+"""Share of the innovations inside the drawn range [1]; the first ones, before anything is known, are huge."""
+
+MEANS = (
+    "A mean force is the mean of the magnitude; the mean Hertz stress covers 0 to 200 ms, or what the record "
+    "has of them."
+)
+"""What the mean numbers of an estimate are means of."""
 PRIOR_NOTE = (
-    "A prior is a range; below an estimate stands its 90 % interval. What the record does not determine "
-    "enters the intervals of force and stress by its prior."
+    "Priors are ranges (90 %), below an estimate stands its 90 % interval. What the record does not "
+    "determine enters the intervals of force and stress by its prior."
 )
 PARAMETERS = (
     "Estimates with 90 % intervals over their priors, both relative to the prior's centre. Where the blue "
@@ -69,58 +119,64 @@ CROSS_CHECK_NOTE = (
     "that fits its record it takes sensor errors, air gaps and, for the stress, the preload; from one that "
     "does not it takes nothing."
 )
-FRONT = 2
-"""Sections of the page to send: force and orbit."""
 AGREES = "The independent cross-check agrees within its known accuracy."
+SCOPE = "No acceptance limit was given: maker and operator agree on one (ISO 14839-5:2022)."
+SETTLE_FIRST = (
+    "Before anything is concluded from force or stress: check machine file and record against each other "
+    "(data quality, sensors, air gap), and estimate again. The loads of this drop are known as ranges only."
+)
+ASSUMED = (
+    "The rotor is linear: beam elements, reduced to its lowest modes and its shapes under bearing loads.",
+    "Rotor and touchdown bearings move in the planes of the bearings; tilt of the races and axial motion are "
+    "left out.",
+    "The contact of rotor and race follows a Hertzian law with losses, friction a Stribeck law; their "
+    "parameters are among the unknowns.",
+    "The magnets carry nothing after power-off but a decaying remanent force.",
+    "Parameters the record does not determine keep their prior, inside every interval of force and stress.",
+)
+"""What every estimate takes for granted."""
 
 
 def estimate_page(
     estimate: Estimate,
     origin: Origin | None = None,
     since: Drop | None = None,
-    card: RestartCard | None = None,
 ) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
     Everything it says of the drop comes from the estimate; the origin says how it was made, and an earlier
-    estimate of the machine, as published, is compared with this one. Without a restart card it has one by the
-    assumptions of the package.
+    estimate of the machine, as published, is compared with this one.
     """
-    weighed = card or assumed_card(estimate, since)
+    summary = estimate_summary(estimate, origin)
     return replace(
-        estimate_summary(estimate, origin),
-        to_do=inspection_section(estimate, weighed),
-        sections=_sections(estimate, since, weighed),
+        summary,
+        verdict=(summary.verdict[0], *summary.grave),
+        cards=tuple(replace(card, figures=card.figures[:MAIN]) for card in summary.cards),
+        summary=(),
+        facts=(),
+        to_do=_next(estimate),
+        sections=_sections(estimate, summary, since),
         lead=FRONT,
     )
-
-
-def assumed_card(estimate: Estimate, since: Drop | None = None) -> RestartCard:
-    """The restart card of a drop by the assumptions of the package, and by an earlier drop."""
-    earlier = () if since is None else (earlier_drop(since),)
-    return restart_card(published_drop(estimate), assumptions_of({}, "the assumptions"), earlier=earlier)
 
 
 def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
     """The same without its sections: what a terminal shows, for which no figure need be drawn."""
     replayed = isinstance(estimate.method, Replay)
-    fixed = estimate.replay.fixed if estimate.replay else ""
     certain = estimate.consistent
+    machine, date = estimate.machine, format_minute(estimate.record.event_date)
+    serial = f"serial number {machine.serial_number}" if machine.serial_number else ""
+    parts = (machine.name, serial, estimate.name, date, f"from {shown(estimate.speed, 'speed')}")
     return ReportContent(
         title=f"Touchdown-bearing force and stress {'by replay of' if replayed else 'from'} a recorded drop",
-        subtitle=f"{estimate.machine.name}, {estimate.name}, from {shown(estimate.speed, 'speed')}",
+        subtitle=", ".join(filter(None, parts)),
         simulated=SIMULATED_RECORD if estimate.simulated_record else "",
         verdict=estimate_verdict(estimate),
         cards=tuple(headline_card(b, certain=certain) for b in estimate.bearings),
-        summary=(identified_table(estimate.bearings, taken_over=fixed, certain=certain),),
+        summary=(_of_bearings(estimate),),
         facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
         ends=(estimate.bearings[0].name, estimate.bearings[-1].name),
     )
-
-
-def estimate_figures(estimate: Estimate) -> dict[str, object]:
-    """Figures of the page by name."""
-    return dict(estimate_page(estimate).figures)
 
 
 def spoken(one: FittedParameter) -> str:
@@ -147,7 +203,8 @@ def estimate_verdict(estimate: Estimate) -> tuple[Statement, ...]:
         *cross_check_statements(estimate.cross_check),
         *serious,
         *(Statement(worth_knowing.get(note, note)) for note in estimate.notes),
-        *(static_limit_statement(b, certain=estimate.consistent) for b in estimate.bearings),
+        static_limit_statement(estimate.bearings, certain=estimate.consistent),
+        *map(Statement, width_advice(estimate)),
     )
 
 
@@ -162,12 +219,95 @@ def _judgement(estimate: Estimate) -> Statement:
 
 def _part(estimate: Estimate) -> Statement:
     """Which part of the record the numbers are of, and what the rest says."""
-    text = f"Peaks are the largest of the first {1e3 * estimate.until:.0f} ms after power-off"
+    text = f"Peaks: first {1e3 * estimate.until:.0f} ms after power-off"
     if not estimate.later:
         return Statement(f"{text}; the record ends there.")
     if any(one.larger for one in estimate.later):
-        return Statement(f"{text}, and the rotor went further out later on.", "warning")
-    return Statement(f"{text}; in the rest of the record the rotor went no further out.")
+        return Statement(f"{text}; the rotor went further out later on.")
+    return Statement(f"{text}; later motion is smaller.")
+
+
+def width_advice(estimate: Estimate) -> Iterator[str]:
+    """Why peak force and stress of a bearing are known no better, and what would narrow them most."""
+    found: dict[str, list[str]] = {}
+    for bearing in estimate.bearings:
+        force, stress = bearing.peak_force.known, bearing.peak_stress.known
+        if estimate.advice and estimate.consistent and is_wide(force):
+            half = 0.5 * (force.high - force.low) / force.value
+            left, best = min(
+                (one.narrowed[bearing.name] / one.half_widths[bearing.name], k)
+                for k, one in enumerate(estimate.advice)
+            )
+            causes = ", ".join(dict.fromkeys(map(_cause, estimate.advice[best].paths)))
+            told = _narrowed("Force", half, half * left, causes, estimate.advice[best].measurement)
+            found.setdefault(told, []).append(bearing.name)
+        if stress.allowance_90 and numbers_of(estimate.machine.bearing(bearing.name)).stress_sigma:
+            half, rest = 0.5 * (stress.high - stress.low) / stress.value, stress.allowance_90 / stress.value
+            left = math.hypot(math.sqrt(max(half**2 - rest**2, 0.0)), NINETY * MODEL_STRESS_SIGMA)
+            told = _narrowed(
+                "Stress", half, left, "balls inferred from the designation", "their number and diameter"
+            )
+            found.setdefault(told, []).append(bearing.name)
+    for told, names in found.items():
+        if told:
+            yield told.format(", ".join(names))
+
+
+def _cause(path: str) -> str:
+    return "the beam in place of the rotor" if path == "rotor" else row_of(path).label
+
+
+def _narrowed(load: str, half: float, left: float, cause: str, remedy: str) -> str:
+    """The sentence on one load, with a place for names; nothing where little would be gained."""
+    if left > WORTH * half:
+        return ""
+    now, then = (f"{100.0 * one:.0f}" if one > 0.01 else f"{100.0 * one:.1f}" for one in (half, left))
+    return f"{load} ({{}}) ± {now} % because of {cause}; would become ± {then} % with {remedy}."
+
+
+def inspection_section(estimate: Estimate) -> Section:
+    """Suggest the next step of inspection, the gravest reason first."""
+    said = [] if estimate.consistent else [Statement(SETTLE_FIRST, "bad")]
+    for bearing in estimate.bearings:
+        highest = bearing.peak_stress.known.high
+        if highest >= STATIC_STRESS:
+            text = (
+                f"{bearing.name}: look at balls and raceways for indentations before the next start. "
+                f"The peak stress may be as high as {shown(highest, 'pressure', 3)}; from "
+                f"{shown(STATIC_STRESS, 'pressure')} on ISO 76 expects a permanent indentation of a "
+                "ten-thousandth of the ball diameter."
+            )
+            said.append(Statement(text, "warning"))
+    for one in estimate.later:
+        if one.larger:
+            text = (
+                f"{one.bearing}: look at the rest of the record before the next start. The rotor went "
+                f"further out at {one.later_time:.3g} s than in the part that was estimated, so that the "
+                "largest load may not be among these numbers."
+            )
+            said.append(Statement(text, "warning"))
+    gaps = ", ".join(
+        f"{bearing.name} {1e6 * limits.low:.0f} to {1e6 * limits.high:.0f} µm"
+        for bearing in estimate.bearings
+        if (limits := bearing.values.get("air_gap_m")) is not None
+    )
+    text = (
+        f"Next standstill: lift check (expect {gaps}; another gap is wear or a sensor that has moved), turn "
+        "each bearing by hand."
+    )
+    return Section("What next", (), (*said, Statement(text), Statement(SCOPE)))
+
+
+def _next(estimate: Estimate) -> Section:
+    """What to do next, how far the stress is from its limit, and what the numbers rest on."""
+    advised = inspection_section(estimate)
+    assumed = ", ".join(dict.fromkeys(estimate.assumed.values()))
+    rest = (
+        *map(Statement, width_advice(estimate)),
+        static_limit_statement(estimate.bearings, certain=estimate.consistent),
+        *((Statement(f"Assumed: {assumed}."),) if assumed else ()),
+    )
+    return replace(advised, statements=(*advised.statements, *rest))
 
 
 def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
@@ -199,79 +339,100 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
     return tuple((name, text) for name, text in facts.items() if text)
 
 
-def _sections(estimate: Estimate, since: Drop | None, card: RestartCard) -> tuple[Section, ...]:
+def _sections(estimate: Estimate, summary: ReportContent, since: Drop | None) -> tuple[Section, ...]:
+    """Force and orbit, and the seven parts behind them."""
     names = [bearing.name for bearing in estimate.bearings]
     steps = estimate.replay
     tables = () if steps is None else (first_contact_table(names, steps.contacts),)
-    origin = "measured and estimated" if steps is None else "measured and simulated"
-    shares = weight_shares(estimate.machine)
-    cross_check = Section(
-        "Independent cross-check",
-        statements=cross_check_statements(estimate.cross_check),
-        tables=(cross_check_table(estimate.cross_check),),
-    )
-    force, orbit, *rest = drop_sections(
+    origin = "estimated" if steps is None else "measured and simulated"
+    at_sensors = () if estimate.at_sensors is None else (sensor_figure(estimate.at_sensors),)
+    force, orbit, impacts, motion, stress = drop_sections(
         estimate.bearings,
         origin,
         estimate.speed,
-        shares,
+        weight_shares(estimate.machine),
         contact_tables=tables,
+        at_sensors=at_sensors,
         certain=estimate.consistent,
     )
-    further = (
-        *rest,
-        _severity(estimate),
-        changed_section(estimate, since),
-        restart_section(card),
-        *(() if estimate.agreement is None else (agreement_section(estimate.agreement, names),)),
-        _parameters(estimate),
-        *(() if steps is None or steps.friction is None else (friction_section(steps.friction),)),
-        *(() if steps is None else (speed_section(estimate, steps),)),
-        *((_consistency(estimate),) if estimate.checks else ()),
-        *((cross_check,) if estimate.cross_check else ()),
-        limits_section(estimate),
-        record_quality_section(estimate.findings, *unseen_in(estimate.notes)),
-        drawing_section(estimate.machine),
-        assumptions_section(),
-        *defaults_section(estimate.machine),
+    agreement = () if estimate.agreement is None else (agreement_section(estimate.agreement),)
+    speed = () if steps is None else (speed_section(estimate, steps),)
+    friction = () if steps is None or steps.friction is None else (friction_section(steps.friction),)
+    changed = () if since is None else (changed_section(estimate, since),)
+    unseen = unseen_in(estimate.notes)
+    elsewhere = {*summary.grave, *map(Statement, unseen), *_next(estimate).statements}
+    notes = Section("", statements=tuple(one for one in summary.verdict[1:] if one not in elsewhere))
+    return (
+        force,
+        orbit,
+        impacts,
+        folded("Motion at the sensors", motion, *agreement, *speed),
+        folded("Parameters", _parameters(estimate), *friction, *changed),
+        folded("Checks", notes, _checks(estimate)),
+        folded("Severity", stress, _severity(estimate), printed=True),
+        folded(
+            "Record",
+            record_quality_section(estimate.findings, *unseen),
+            Section("", facts=summary.facts),
+        ),
+        folded(
+            "Machine",
+            drawing_section(estimate.machine),
+            Section("", statements=tuple(map(Statement, ASSUMED)), tables=not_given(estimate.machine)),
+        ),
     )
-    return (force, orbit, *appendix(further))
 
 
 def _severity(estimate: Estimate) -> Section:
-    """Safety, impulse, energy, indices, fatigue of a drop, bearing by bearing, and what they rest on."""
-    found = {bearing.name: severity_values(estimate, bearing) for bearing in estimate.bearings}
+    """Means, safety, impulse, energy, indices, fatigue of a drop by bearing, and what they rest on."""
+    found = {b.name: {**b.missing, **b.values, **severity_values(estimate, b)} for b in estimate.bearings}
     uncertain = not estimate.consistent
 
     def at(name: str) -> Column:
-        values = found[name]
-        return Column(
-            name,
-            lambda o: replace(
-                Quantity.of(values.get(o.field), o.shown_as, range_only=uncertain), places=o.places
-            ),
-        )
+        def stated(row: Number) -> Quantity | str:
+            value = found[name].get(row.field)
+            if isinstance(value, str):
+                return value
+            return replace(Quantity.of(value, row.shown_as, range_only=uncertain), places=row.places)
 
-    def rating(name: str) -> str:
-        ratings = numbers_of(estimate.machine.bearing(name)).ratings()
-        if ratings is None:
-            return f"{name}: no load ratings."
-        static, dynamic = (shown(value, "force", 3) for value in (ratings.static, ratings.dynamic))
-        return f"{name}: C0 = {static} of all rows ({ratings.rows}), C = {dynamic} of one, {ratings.source}."
+        return Column(name, stated)
 
-    rows = [one for one in SEVERITY if any(one.field in values for values in found.values())]
+    rated: dict[str, list[str]] = {}
+    for name in found:
+        if (own := numbers_of(estimate.machine.bearing(name)).ratings()) is None:
+            text = "no load ratings"
+        else:
+            static, dynamic = (shown(value, "force", 3) for value in (own.static, own.dynamic))
+            text = f"C0 = {static} of all rows ({own.rows}), C = {dynamic} of one, {own.source}"
+        rated.setdefault(text, []).append(name)
+    rows = [one for one in NUMBERS[MAIN:] if any(one.field in values for values in found.values())]
     columns = (Column("severity", "label"), *map(at, found))
-    severity = table(rows, columns, "Severity of the drop", NOTE)
-    return Section("Severity", tuple(map(rating, found)), tables=(severity,))
+    severity = table(rows, columns, "Severity of the drop", f"{MEANS} {NOTE}")
+    of_rows = tuple(f"{', '.join(names)}: {text}." for text, names in rated.items())
+    return Section("Severity", of_rows, tables=(severity,))
 
 
-def _parameters(estimate: Estimate) -> Section:
-    """Every unknown with prior, estimate, interval and verdict; first those of the machine."""
+class ParameterRow(NamedTuple):
+    """One parameter: its prior (or start and bounds), the estimate and the verdict of the identification."""
+
+    name: str
+    prior: Quantity
+    estimate: Quantity
+    verdict: str
+    bearing: str = ""
+    """The touchdown bearing that it belongs to; empty for another owner, whom the name tells then."""
+
+
+def _rows(estimate: Estimate, scope: str) -> list[ParameterRow]:
+    """The unknowns of the machine or of the drop; behind those of the machine what follows from them."""
     uncertain = not estimate.consistent
-    rows: dict[str, list[ParameterRow]] = {"machine": [], "drop": []}
+    names = [bearing.name for bearing in estimate.bearings]
+    rows = []
     for one in estimate.parameters:
+        # the amount of an unbalance stands in a table of its own
+        if one.scope != scope or (one.row.owner == "unbalance" and estimate.unbalance):
+            continue
         kind = one.row.display_kind
-        found = Quantity.of(one.estimate, kind, range_only=uncertain)
         verdict: str = one.estimate.status
         if one.row.way_of and one.estimate.lower is not None:
             verdict = (
@@ -279,11 +440,106 @@ def _parameters(estimate: Estimate) -> Section:
             )
         # a prior is a range: its middle is nobody's word; where a replay begins is a number of its own
         spread = one.prior is not None and one.prior.standard_error is not None
-        row = ParameterRow(spoken(one), Quantity.of(one.prior, kind, range_only=spread), found, verdict)
-        rows[one.scope].append(row)
-    tables = [parameter_table(rows["machine"], caption="Parameters of the machine", note=PRIOR_NOTE)]
-    if rows["drop"]:
-        tables.append(parameter_table(rows["drop"], caption="Unknowns of this drop"))
+        prior = Quantity.of(one.prior, kind, range_only=spread)
+        found = Quantity.of(one.estimate, kind, range_only=uncertain)
+        own = one.owner in names and scope == "machine"
+        name = one.row.label if own else spoken(one)
+        rows.append(ParameterRow(name, prior, found, verdict, one.owner if own else ""))
+    if scope == "drop":
+        return rows
+    told = {(row.name, row.bearing) for row in rows}
+    fixed = estimate.replay.fixed if estimate.replay else ""
+    for parameter in published().values():
+        for bearing in estimate.bearings:
+            known = bearing.values.get(parameter.field)
+            shared = parameter.role in (Role.SOUGHT, Role.DERIVED)
+            if known is None or not shared or (parameter.label, bearing.name) in told:
+                continue
+            kind = parameter.display_kind
+            found = Quantity.of(known, kind, range_only=uncertain)
+            taken = fixed and known.status == "taken over"
+            verdict = f"taken over from {Path(fixed).name}" if taken else known.status
+            none = Quantity.of(None, kind)
+            rows.append(ParameterRow(parameter.label, none, found, verdict, bearing.name))
+    return rows
+
+
+def parameter_table(
+    rows: Sequence[ParameterRow], names: Sequence[str] = (), *, caption: str = "Parameters", note: str = ""
+) -> Table:
+    """Set prior, estimate, 90 % interval and a verdict where it is not determined side by side.
+
+    Those of the bearings that are named stand in one line where their priors are the same.
+    """
+    order = list(dict.fromkeys(row.name for row in rows))
+    lines: dict[tuple[str, str], dict[str, ParameterRow]] = {}
+    for row in sorted(rows, key=lambda one: order.index(one.name)):
+        lines.setdefault((row.name, row.prior.text), {})[row.bearing] = row
+
+    def verdict(line: dict[str, ParameterRow]) -> str:
+        if len({row.verdict for row in line.values()}) == 1:
+            return next(iter(line.values())).verdict
+        open_ = (row for row in line.values() if row.verdict != "determined")
+        return "; ".join(f"{row.bearing}: {row.verdict}" for row in open_)
+
+    def of(name: str) -> Column:
+        label = name or "estimate (90 % interval)"
+        return Column(label, lambda line: line[name].estimate if name in line else "")
+
+    columns = (
+        Column("parameter", lambda line: next(iter(line.values())).name),
+        Column("prior or start", lambda line: next(iter(line.values())).prior),
+        *map(of, names or ("",)),
+        verdict_column(verdict),
+    )
+    return table(lines.values(), columns, caption, note)
+
+
+def parameter_figure(rows: Sequence[ParameterRow]) -> go.Figure:
+    """Draw every estimate with its interval relative to its prior, over the prior's own range.
+
+    A parameter without a positive prior or estimate cannot be set in relation and is left out.
+    """
+    drawn = [row for row in rows if row.prior.value > 0.0 and row.estimate.value > 0.0]
+    figure = panels(("estimate relative to prior",), height=70 + ROW_HEIGHT * len(drawn))
+    for label, colour, size, width in (("prior", "#b9c3cd", 6, 9), ("estimate", COLOURS["estimated"], 9, 3)):
+        ratios = [_ratios(getattr(row, label), row.prior.value) for row in drawn]
+        curve(
+            figure,
+            [value for value, _, _ in ratios],
+            [plain(f"{row.bearing}: {row.name}" if row.bearing else row.name) for row in drawn],
+            f"{label} with 90 % interval",
+            mode="markers",
+            marker={"color": colour, "size": size},
+            error_x=bars(ratios, 1.0, thickness=width, width=0, color=colour),
+            hover="%{x:.3f} × prior, %{y}",
+        )
+    upright(figure, 1.0, "#5b6875", "dot")
+    figure.update_xaxes(title_text=axis_title("value divided by prior", "1"), type="log", tickvals=TICKS)
+    figure.update_yaxes(autorange="reversed", type="category", showgrid=False)
+    return fit_legend(figure)
+
+
+def _ratios(quantity: Quantity, reference: float) -> tuple[float, float, float]:
+    """Value, lower and upper limit divided by the reference; limits equal the value where none are known."""
+    value, low, high = (max(x, 1e-3 * reference) / reference for x in (quantity.value, *quantity.ends))
+    return value, min(low, value), max(high, value)
+
+
+def _of_bearings(estimate: Estimate) -> Table:
+    """Parameters of the touchdown bearings side by side."""
+    rows = [one for one in _rows(estimate, "machine") if one.bearing]
+    names = [bearing.name for bearing in estimate.bearings]
+    return parameter_table(rows, names, caption="Parameters of the machine", note=PRIOR_NOTE)
+
+
+def _parameters(estimate: Estimate) -> Section:
+    """Every unknown with prior, estimate, interval and verdict; first those of the machine."""
+    uncertain = not estimate.consistent
+    machine, drop = _rows(estimate, "machine"), _rows(estimate, "drop")
+    tables = [_of_bearings(estimate)]
+    if others := [one for one in machine if not one.bearing] + drop:
+        tables.append(parameter_table(others, caption="Other unknowns"))
     if estimate.sensors:
         of_sensor = (
             Column("sensor", "sensor"),
@@ -306,11 +562,11 @@ def _parameters(estimate: Estimate) -> Section:
         tables.append(correlation_table(steps.correlations))
     fixed = "" if steps is None else steps.fixed
     text = (f"The supports were taken from {fixed}; this drop did not change them.",) if fixed else ()
-    figure = Figure(parameter_figure(rows["machine"]), PARAMETERS, "parameters")
+    figure = Figure(parameter_figure(machine), PARAMETERS)
     return Section("Parameters", text, figures=(figure,), tables=tuple(tables))
 
 
-def _consistency(estimate: Estimate) -> Section:
+def _checks(estimate: Estimate) -> Section:
     """Checks of the model against the record, and the innovations behind them."""
     name_of = names_in(estimate)
     columns = (
@@ -319,8 +575,38 @@ def _consistency(estimate: Estimate) -> Section:
         Column("numbers compared", lambda check: check.said(name_of)),
     )
     checks = table(estimate.checks, columns, "Consistency of model and record", CHECKS_NOTE)
-    figures = () if estimate.innovations is None else innovation_figures(estimate.innovations)
-    return Section("Consistency", (), (_judgement(estimate),), figures, (checks,))
+    figures: tuple[Figure, ...] = ()
+    if (found := estimate.innovations) is not None:
+        chart = innovations_figure(found.time, found.values, found.channels, found.deviation)
+        figures = (
+            Figure(chart, "What each reading says beyond the prediction from all readings before it."),
+        )
+    compared = (cross_check_table(estimate.cross_check),) if estimate.cross_check else ()
+    return Section("Checks", figures=figures, tables=(*((checks,) if estimate.checks else ()), *compared))
+
+
+def innovations_figure(
+    time: Array, innovations: Array, channels: Sequence[str], standard_deviation: Array | None = None
+) -> go.Figure:
+    """Draw the innovation of every channel (N, S) [m] with the band in which 90 % of it should lie."""
+    rows = -(-len(channels) // 2)
+    figure = panels(channels, rows=rows, columns=min(2, len(channels)), height=190)
+    for index in range(len(channels)):
+        row, column, legend = index // 2 + 1, index % 2 + 1, index == 0
+        history = History(label="innovation", time=time, values=innovations[:, index], role="measured")
+        line = {"color": "#6b7785", "width": 0.8}
+        add_history(figure, history, MICRO, "µm", row=row, column=column, legend=legend, line=line)
+        if standard_deviation is not None:
+            half = NINETY * standard_deviation[:, index]
+            for sign in (1.0, -1.0):
+                limit = History(label=EXPECTED, time=time, values=sign * half)
+                named = legend and sign > 0.0
+                add_history(figure, limit, MICRO, "µm", row=row, column=column, legend=named, line=LIMIT_LINE)
+        reach = 1.1 * MICRO * float(np.nanquantile(np.abs(innovations[:, index]), SHOWN_SHARE)) or 1.0
+        figure.update_yaxes(range=[-reach, reach], row=row, col=column)
+    label_time(figure, row=rows)
+    figure.update_yaxes(title_text=axis_title("innovation", "µm"), col=1)
+    return fit_legend(figure)
 
 
 def cross_check_statements(checks: Sequence[CrossCheck]) -> tuple[Statement, ...]:
@@ -362,8 +648,290 @@ def cross_check_table(checks: Sequence[CrossCheck]) -> Table:
 
 
 def _own(check: CrossCheck) -> Quantity:
-    return Quantity.of(check.estimate, KINDS[check.estimate.unit], 3)
+    return replace(Quantity.of(check.estimate, KINDS[check.estimate.unit], 3), allowance_90=None)
 
 
 def _other(check: CrossCheck) -> Quantity:
     return Quantity.of(check.check, KINDS[check.estimate.unit], 3)
+
+
+LONGEST_VERDICT, LONGEST = 270, 185
+"""Characters of the verdict and of another statement: three lines and two of a terminal."""
+LINES, WIDTH = 18, 100
+"""Of a terminal."""
+MORE = " … (--all)"
+MEAN = "mean_force_0p15_0p2_N"
+ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement")
+"""What is not shown where the model does not fit: there would be ranges from end to end."""
+
+
+def estimate_screen(estimate: Estimate) -> ReportContent:
+    """The first screen of an estimate: what fits, the gravest statement first; the page says the rest."""
+    judgement, _part, *others = estimate_verdict(estimate)
+    later = {one.sentence() for one in estimate.later if one.larger}
+    static = static_limit_statement(estimate.bearings, certain=estimate.consistent)
+    advice = [*width_advice(estimate)]
+    elsewhere = {*estimate.assumed, *unseen_in(estimate.notes), static.text, *advice}
+    limits = [one for one in others if one.level != "good" and one.text not in elsewhere]
+    # what hides a loss first, then what is a warning
+    limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
+    grave = [one for one in (static, *limits) if one.level in ("bad", "warning")]
+    assumed = ", ".join(dict.fromkeys(estimate.assumed.values()))
+    remedies = dict.fromkeys(_remedies(estimate))
+    told = (
+        f"to do next: {'; '.join(remedies)}" if remedies else "",
+        *advice,
+        static.text if estimate.consistent and static not in grave else "",
+        f"assumed: {assumed}" if assumed else "",
+    )
+    calm = [*(Statement(text) for text in told if text), *(one for one in limits if one not in grave)]
+    loads, verdict = _loads(estimate), _short(judgement, LONGEST_VERDICT)
+    said: list[Statement] = []
+    left = LINES - 4 - len(loads.rows) - _lines(verdict)
+    # of a model that failed the way out comes first
+    ranked = [*grave, *calm] if estimate.consistent else [*calm[:1], *grave, *calm[1:]]
+    for one in (_short(one, LONGEST) for one in ranked):
+        if _lines(one) + (len(said) + 1 < len(ranked)) <= left:
+            said.append(one)
+            left -= _lines(one)
+    if len(said) < len(ranked):
+        said.append(Statement(f"{len(ranked) - len(said)} more with --all"))
+    return ReportContent(
+        title=f"{estimate.machine.name}, {estimate.name}, dropped from {shown(estimate.speed, 'speed')}",
+        simulated=SIMULATED_RECORD if estimate.simulated_record else "",
+        verdict=(verdict, *said),
+        screen=loads,
+    )
+
+
+def _lines(one: Statement) -> int:
+    """Lines of a statement in a terminal, behind its level."""
+    return len(wrap(f"{one.level}: {one.sentence}", WIDTH))
+
+
+def _remedies(estimate: Estimate) -> Iterator[str]:
+    """What to do next, first what may well let the model fit."""
+    if estimate.machine.rotor.is_beam and not estimate.consistent:
+        yield DRAWING
+    name_of = names_in(estimate)
+    yield from (check.advised(name_of) for check in estimate.checks if check.failed and check.remedy)
+
+
+def _short(one: Statement, longest: int) -> Statement:
+    return Statement(shorten(one.text, longest, placeholder=MORE), one.level)
+
+
+def _loads(estimate: Estimate) -> Table:
+    """Loads of every bearing, one line each."""
+    certain = estimate.consistent
+
+    def number(known: Known | None, kind: str) -> str:
+        if known is None or known.interval_90 is None:
+            return NO_INTERVAL
+        one = Quantity.of(known, kind, range_only=not certain)
+        return f"{one.text} ({one.interval_text})" if one.interval_text else one.text
+
+    def load(b: BearingDrop, field: str, known: Known | None, kind: str = "force") -> str:
+        return b.missing.get(field) or number(known, kind)
+
+    lines: dict[str, Callable[[BearingDrop], str]] = {
+        "peak bearing force": lambda b: load(b, "peak_force_N", b.peak_force.known),
+        "at (from power-off)": lambda b: with_interval(
+            b.peak_force.time, "time", b.peak_force.time_interval_90
+        ),
+        "peak Hertz stress": lambda b: load(b, "peak_stress_Pa", b.peak_stress.known, "pressure"),
+        "impacts": lambda b: (
+            b.missing.get("impacts") or with_interval(len(b.touched), "count", b.count_interval_90)
+        ),
+        # the begin of the last impact is known closely, but no event: hops go on behind it
+        CONTACT_FROM: lambda b: (
+            NO_INTERVAL if b.contact_from_interval_90 is None else f"≈ {shown(b.contact_from, 'time', 2)}"
+        ),
+        "largest displacement": lambda b: number(b.largest, "length"),
+        "displacement / air gap": lambda b: _over_gap(b, certain=certain),
+        "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
+    }
+    names = [name for name in lines if certain or name not in ONLY_CERTAIN]
+    what = "90 % intervals" if certain else "90 % ranges"
+    columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
+    cells = [{name: lines[name](bearing) for name in names} for bearing in estimate.bearings]
+    columns += [Column(b.name, own.__getitem__) for b, own in zip(estimate.bearings, cells, strict=True)]
+    return table([name for name in names if any(own[name] != NO_INTERVAL for own in cells)], columns)
+
+
+def _over_gap(b: BearingDrop, *, certain: bool) -> str:
+    """The largest distance from the centre over the air gap; as a range, if not certain.
+
+    A gain error is in displacement and gap alike, and not in their ratio: of an estimate that is not certain
+    the gap alone has an error that counts, of one that is they count as independent.
+    """
+    gap = b.values.get("air_gap_m")
+    if gap is None or (certain and b.largest is None):
+        return NO_INTERVAL
+    if not certain or b.largest is None:
+        farthest = float(np.nanmax(b.motions[-1].radial.values))
+        return f"{farthest / gap.high:.2f} to {farthest / max(gap.low, 1e-9):.2f}"
+    ratio = b.largest.value / gap.value
+    doubt = ratio * math.hypot(
+        0.5 * (b.largest.high - b.largest.low) / b.largest.value, 0.5 * (gap.high - gap.low) / gap.value
+    )
+    return with_interval(ratio, "dimensionless", (ratio - doubt, ratio + doubt))
+
+
+CONFOUNDED = 0.9
+"""Correlation from which two parameters count as confounded [1]; chosen, not measured."""
+HALF_PERIOD = (
+    "Eq. (17) takes the contact for half a period; gravity lengthens it, and one contact can be two. Both "
+    "stiffnesses serve as a start of the search only."
+)
+DISTANCES = (
+    "Distances are root mean square; a bounce counts from the rest position; comparable means closer than a "
+    "tenth of the air gap."
+)
+
+
+def first_contact_table(names: Sequence[str], contacts: Sequence[TimedContact]) -> Table:
+    """State first contact and half-period stiffness of every bearing (Neisi 2020, Table 3)."""
+
+    def stiffness(row: tuple[str, TimedContact]) -> Quantity:
+        value, error = row[1].equivalent_stiffness, row[1].standard_error
+        return Quantity(value=value, kind="stiffness", standard_error=error, digits=3)
+
+    columns = (
+        Column("bearing", lambda row: row[0]),
+        Column("t₁", lambda row: row[1].start, "time"),
+        Column("t₂", lambda row: row[1].end, "time"),
+        Column("T", lambda row: row[1].duration, "time", 3),
+        Column("beyond the gap", lambda row: row[1].indentation, "length", 3),
+        Column("mass", lambda row: row[1].mass, "mass"),
+        Column("stiffness, eq. (17)", stiffness),
+        Column("gravity-corrected", lambda row: row[1].corrected_stiffness, "stiffness", 3),
+    )
+    error = max((contact.timing_error for contact in contacts), default=None)
+    timing = "" if error is None else f"Standard error of t₁ and t₂: {shown(error, 'time', 2)} or less. "
+    rows = zip(names, contacts, strict=True)
+    return table(rows, columns, "First contact (Neisi 2020, Table 3)", f"{timing}{HALF_PERIOD}")
+
+
+def correlation_table(correlations: Sequence[Correlation]) -> Table:
+    """Say which parameters the record cannot tell apart."""
+
+    def meaning(pair: Correlation) -> str:
+        apart = abs(pair.value) < CONFOUNDED
+        return "told apart" if apart else "confounded: only their combination is known"
+
+    columns = (
+        Column("parameters", lambda pair: f"{pair.first} and {pair.second}"),
+        Column("correlation", "value", "dimensionless", 2),
+        Column("meaning", meaning),
+    )
+    return table(sorted(correlations, key=lambda pair: -abs(pair.value)), columns, "Correlations")
+
+
+def agreement_section(agreement: Agreement) -> Section:
+    """How far a replay follows the record, and how long a comparison point by point means anything."""
+    horizon = min(bearing.horizon_s for bearing in agreement.bearings.values())
+    text = (
+        f"Replay and record stay within a tenth of the air gap for {1e3 * horizon:.0f} ms. A drop is "
+        "chaotic: small differences grow tenfold in about 33 ms, so later only statistics can be compared."
+    )
+    if agreement.expected_horizon_s is not None:
+        expected = 1e3 * agreement.expected_horizon_s
+        text += f" With everything that is uncertain here, {expected:.0f} ms are to be expected."
+    tables = (window_table(agreement), contact_time_table(agreement))
+    return Section("Agreement with the record", (text,), tables=tables)
+
+
+def window_table(agreement: Agreement) -> Table:
+    """State the distance of the orbits by window, the bounce heights and the horizon of every bearing."""
+    rows = [
+        (f"distance of the orbits, {window.name}", [*window.rms.values()], "length")
+        for window in agreement.windows
+    ]
+    rows += [
+        (label, [getattr(one, field) for one in agreement.bearings.values()], kind)
+        for label, field, kind in (
+            ("first bounce, measured", "measured_bounce_m", "length"),
+            ("first bounce, simulated", "simulated_bounce_m", "length"),
+            ("comparable up to", "horizon_s", "time"),
+        )
+    ]
+
+    def at(index: int, name: str) -> Column:
+        return Column(name, lambda row: Quantity.of(row[1][index], row[2], 3))
+
+    columns = (Column("agreement", lambda row: row[0]), *(at(*one) for one in enumerate(agreement.bearings)))
+    return table(rows, columns, "Agreement in windows", DISTANCES)
+
+
+def contact_time_table(agreement: Agreement) -> Table:
+    """Set begin and end of the first contacts side by side, measured and simulated."""
+    rows = [
+        (f"{name}, contact {k + 1}", k, bearing)
+        for name, bearing in agreement.bearings.items()
+        for k in range(max(len(bearing.measured_contacts_s), len(bearing.simulated_contacts_s)))
+    ]
+
+    def at(whose: str, end: str) -> Column:
+        def time(row: tuple[str, int, object]) -> float | None:
+            times = getattr(row[2], f"{whose}_contacts_s")
+            return float(times[row[1]][int(end == "end")]) if row[1] < len(times) else None
+
+        return Column(f"{whose} {end}", time, "time")
+
+    ends = (at(whose, end) for whose in ("measured", "simulated") for end in ("begin", "end"))
+    return table(rows, (Column("contact", lambda row: row[0]), *ends), "Contact times")
+
+
+def friction_section(sweep: FrictionSweep) -> Section:
+    """The sweep of the friction coefficient."""
+    value = Quantity.of(sweep.value, "dimensionless", 2)
+    start, end = (shown(t, "time", 3) for t in sweep.window)
+    caption = (
+        f"Distance of simulated and measured orbit from {start} to {end}; best {value.text} "
+        f"(90 %: {value.interval_text}). A number in place of the paper's eye."
+    )
+    return Section("Friction", figures=(Figure(friction_sweep_figure(sweep), caption),))
+
+
+def friction_sweep_figure(sweep: FrictionSweep) -> go.Figure:
+    """Draw how far the simulated orbit lies from the measured one over the dynamic friction coefficient.
+
+    The best value is marked with its 90 % interval.
+    """
+    figure = panels(("orbit agreement over friction",), height=250)
+    curve(
+        figure,
+        sweep.coefficients,
+        MICRO * sweep.disagreement,
+        "distance of the orbits",
+        mode="lines+markers",
+        marker={"size": 6},
+        hover="μ %{x:.3f}: %{y:.2f} µm",
+    )
+    line, named = {"color": SERIES[4], "width": 1.3}, {"showlegend": True}
+    figure.add_vline(x=sweep.value.value, line=line, name="best", **named)
+    if sweep.value.interval_90 is not None:
+        low, high = sweep.value.interval_90
+        figure.add_vrect(x0=low, x1=high, fillcolor=BAND_FILL, line_width=0, name="90 % interval", **named)
+    figure.update_xaxes(title_text=axis_title("dynamic friction coefficient", "1"))
+    figure.update_yaxes(title_text=axis_title("orbit distance, weighted rms", "µm"), rangemode="tozero")
+    return fit_legend(figure)
+
+
+def speed_section(estimate: Estimate, steps: ReplaySteps) -> Section:
+    """Recorded and simulated speed with the time constants found."""
+    record = estimate.record
+    histories = [History(label="simulated", time=steps.speed_time, values=steps.speed_simulated)]
+    if record.speed is not None and record.measured_speed is not None:
+        time = np.asarray(record.time) - estimate.drop_instant.value
+        measured = History(label="measured", time=time, values=np.asarray(record.speed), role="measured")
+        histories.insert(0, measured.between(0.0, float(steps.speed_time[-1])))
+    constant = Quantity.of(steps.speed.aero_time_constant, "duration")
+    text = (
+        f"Aerodynamic time constant {constant.text} ({constant.interval_text or constant.status}); "
+        "a plain exponential through the record, friction included, has "
+        f"{shown(steps.speed.profile_time_constant, 'duration', 3)}."
+    )
+    figure = Figure(speed_figure(histories), "Speed of the rotor, measured and simulated.")
+    return Section("Speed", (text,), figures=(figure,))

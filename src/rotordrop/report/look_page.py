@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
+from rotordrop.evidence.impacts import AFTER_LAST
 from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.evidence.paths import TOO_SLOW
-from rotordrop.evidence.quality import Kind
 from rotordrop.evidence.rest import STANDSTILL
-from rotordrop.record.impacts import AFTER_LAST
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Card,
@@ -24,14 +23,17 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
-    appendix,
     table,
 )
-from rotordrop.report.drop_sections import motion_section, orbit_section, radial_section
-from rotordrop.report.impacts import impact_rule
+from rotordrop.report.drop_sections import (
+    impact_rule,
+    motion_section,
+    orbit_section,
+    quality_statements,
+    record_quality_section,
+)
 from rotordrop.report.quantity import Quantity, shown
-from rotordrop.report.record_quality import quality_statements, record_quality_section
-from rotordrop.report.style import axis_title, curve, panels
+from rotordrop.report.style import TURN, axis_title, curve, panels
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
@@ -53,23 +55,19 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     if not seen.drops:
         return _page_without_drop(seen, drawn=drawn)
     record, figures = seen.record, _figures(seen) if drawn else ()
-    speed = "" if seen.speed is None else f" at {shown(seen.speed, 'speed')}"
+    speed = "" if seen.speed is None else f" at {shown(seen.speed / TURN, 'frequency', 3)}"
     notes = tuple(Statement(note) for note in seen.notes)
     facts = _facts(seen)
     given = any(plane.gap_interval_90 is None for plane in seen.planes)
     # what a gap that was given makes false stands before the numbers
-    doubted = [one for one in seen.findings if given and one.kind == Kind.WRONG_AIR_GAP]
+    doubted = [one for one in seen.findings if given and one.kind == "wrong air gap"]
     others = [one for one in seen.findings if one not in doubted]
-    read = Statement(f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}.")
-    timeline = (
-        Column("record time", lambda row: format_moment(row[0])),
-        Column("event", lambda row: row[1]),
-    )
+    read = f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}."
     return ReportContent(
         title=f"A look at {record.name}",
         # figures of a page count from the release
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}"
-        + ("" if drawn else f"; times are those of the record, which begins at {record.time[0]:.4g} s"),
+        + ("" if drawn else f", times as in the record (from {format_moment(record.time[0])})"),
         facts=facts,
         simulated=SIMULATED_RECORD if record.is_simulated else "",
         # the terminal shows neither the facts nor the sections
@@ -77,12 +75,12 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *quality_statements(doubted),
             *_verdict(seen),
             *quality_statements(others),
-            *(() if drawn else (Statement(seen.not_seen), read, *notes)),
+            *(() if drawn else (Statement(" ".join((read, *(note.sentence for note in notes)))),)),
         ),
         cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
         counted_from=RELEASE,
         lead=1 if drawn else 0,
-        summary=(table(seen.timeline(), timeline, "What happened when"),),
+        summary=(_timeline(seen),) if drawn else (),
         sections=(
             *figures[:2],
             Section("Impacts", tables=(_impacts(seen),)),
@@ -115,10 +113,6 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         Statement(f"From {format_moment(whirl.start)}: {whirl.words}.", "warning")
         for whirl in seen.whirls[:3]
     ]
-    events = (
-        Column("record time", lambda row: format_moment(row[0])),
-        Column("event", lambda row: row[1]),
-    )
     levels = (
         Column("channel", lambda row: f"{row.channel} [{_scale(row)[1]}]"),
         Column("mean", lambda row: f"{_scale(row)[0] * row.mean:.4g}"),
@@ -154,18 +148,26 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
             *(quality_statements(seen.findings) if doubted else ()),
             *said,
             *(() if doubted else quality_statements(seen.findings)),
-            *(() if drawn else (Statement(seen.not_seen), read, *notes)),
+            *(() if drawn else (read, *notes)),
         ),
         cards=(),
         counted_from="the start of the record",
         summary=tuple(summary),
         sections=(
             *(() if spectra is None else (spectra,)),
-            Section("What happened when", tables=(table(seen.timeline(), events, "What happened when"),)),
+            Section("What happened when", tables=(_timeline(seen),)),
             record_quality_section(seen.findings, seen.not_seen),
             Section("What was read and guessed", statements=notes),
         ),
     )
+
+
+def _timeline(seen: Look) -> Table:
+    columns = (
+        Column("record time", lambda row: format_moment(row[0])),
+        Column("event", lambda row: row[1]),
+    )
+    return table(seen.timeline(), columns, "What happened when")
 
 
 def _scale(level: Level) -> tuple[float, str]:
@@ -222,7 +224,7 @@ def _spectrum(level: Level) -> Figure:
     figure.update_xaxes(title_text=axis_title("frequency", "Hz"))
     figure.update_yaxes(title_text=axis_title("amplitude, zero to peak", unit), type="log")
     words = f"Spectrum of {level.channel}: Hann windows, averaged over the record."
-    return Figure(figure, words, f"spectrum {level.channel}")
+    return Figure(figure, words)
 
 
 def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
@@ -247,22 +249,19 @@ def _verdict(seen: Look) -> list[Statement]:
     ends = "."
     if contact is not None and between is not None:
         ends = (
-            f", the last at {format_moment(contact)} (90 %: {' to '.join(map(format_moment, between))}); "
-            f"{AFTER_LAST}, with hops too short for an impact at most."
+            f", the last at {format_moment(contact)} ({' to '.join(map(format_moment, between))}); "
+            f"{AFTER_LAST}."
         )
     low, high = drop.count_interval_90
-    release = f"{format_moment(drop.release)} of the record (± {1e3 * RELEASE_ERROR:g} ms)"
+    release = f"{format_moment(drop.release)} (± {1e3 * RELEASE_ERROR:g} ms)"
     count = len(seen.impacts)
     hits = f"{count} impact{'' if count == 1 else 's'} (90 %: {low} to {high})"
-    said = [f"The rotor was released at {release}; {hits} followed{ends}"]
-    if len(seen.planes) > 1:
-        first = seen.first_end
-        said.append(
-            "Which end touched first is not determined by this record: the touches are less apart than their "
-            "errors, or one does not show."
-            if first is None
-            else f"{first} touched first."
-        )
+    touched = " First end: not determined." if len(seen.planes) > 1 else ""
+    if seen.first_end is not None:
+        at = next(plane.touch for plane in seen.planes if plane.plane == seen.first_end)
+        touched = f" {seen.first_end} touched first, at {format_moment(at or 0.0)}."
+    whirl = "" if seen.whirls else " No whirl."
+    said = [f"The rotor was released at {release}; {hits} followed{ends}{touched}{whirl}"]
     said += [
         f"{plane.plane}: {shown(plane.excess, 'length', 3)} (90 %: "
         f"{' to '.join(shown(end, 'length', 3) for end in plane.excess_interval_90)}) beyond the air gap of "
@@ -273,9 +272,7 @@ def _verdict(seen: Look) -> list[Statement]:
     if seen.standstill is not None:
         slow = shown(STANDSTILL, "speed")
         said.append(f"Its speed readings stay below {slow} from {format_moment(seen.standstill)} on.")
-    if not seen.whirls:
-        said.append("It did not whirl: nowhere does it run round its race by two turns or more.")
-    elif forward := [whirl for whirl in seen.whirls if whirl.turns > 0]:
+    if forward := [whirl for whirl in seen.whirls if whirl.turns > 0]:
         said.append(f"From {format_moment(forward[0].start)}: {forward[0].words}.")
     grave = [
         f"From {format_moment(whirl.start)}: {whirl.words}." for whirl in seen.whirls if whirl.turns < 0
@@ -359,7 +356,6 @@ def _figures(seen: Look) -> tuple[Section, ...]:
     sections = (
         orbit_section(bearings, first, until),
         motion_section(bearings, "measured", SENSOR_PLANES),
-        *appendix([radial_section(bearings)]),
     )
     for figure in (figure for section in sections for figure in section.figures):
         for axis in figure.chart.select_xaxes():

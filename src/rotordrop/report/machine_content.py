@@ -1,25 +1,54 @@
-"""What ``rotordrop check`` says about a machine, for the terminal and for a page."""
+"""What is said of a machine, of an imported rotor and of a bearing found by designation."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.report.content import Card, Column, KeyFigure, ReportContent, Statement, Table, fact, table
-from rotordrop.report.machine_sections import defaults_section, drawing_section
+from rotordrop.elements.catalog.boundary import clearance_range
+from rotordrop.elements.catalog.lookup import CatalogueBearing
+from rotordrop.machine.ross_files import ImportedRotor, Spring
+from rotordrop.physics.friction import stribeck_coefficient
+from rotordrop.physics.linear_algebra import generalised_eigen
+from rotordrop.report.content import (
+    Card,
+    Column,
+    Figure,
+    KeyFigure,
+    ReportContent,
+    Section,
+    Statement,
+    Table,
+    fact,
+    table,
+)
 from rotordrop.report.quantity import Quantity
+from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, fit_legend, panels, plain
+from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rotor_fe
+from rotordrop.rotor.suspension import Support, link
+from rotordrop.rotor.whirl import matrices_of
 
 if TYPE_CHECKING:
+    from rotordrop.elements.magnet import ActiveMagneticBearing
     from rotordrop.elements.race_bearing import BearingFigure
+    from rotordrop.elements.sensor import Sensor
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE
     from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary, MachineWarning
     from rotordrop.rotor.magnet_loop import LoopStability, MagnetSummary
 
-ALL_RIGHT = "The machine can be worked with; the drop model leaves out nothing known of it."
+    Mounted: TypeAlias = ActiveMagneticBearing | Sensor | TouchdownBearing
+
+ALL_RIGHT = "Machine file OK; the drop model leaves out nothing known of it."
+ON_SPRINGS = "force_on_springs"
+FREE, RESTING = "free-free", "in touchdown bearings, massless supports"
 
 
 def machine_content(
@@ -42,8 +71,8 @@ def machine_content(
         span = float(max(sag) - min(sag))
         rotor.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
     modes = (
-        ("free-free", summary.free_free),
-        ("resting in its bearings, supports without mass", summary.settled),
+        (FREE, summary.free_free),
+        (RESTING, summary.settled),
     )
     return ReportContent(
         title=f"Machine: {machine.name}",
@@ -53,12 +82,15 @@ def machine_content(
             _verdict(warnings),
             *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
             *_remarks(machine, warnings, brief),
+            *((_rotor(rotor, modes),) if brief else ()),
         ),
         cards=(
-            *(_card(machine, rest) for rest in summary.bearings),
+            *(_card(machine, rest, brief) for rest in summary.bearings),
             *(_magnet_card(one, summary.loop) for one in summary.magnets),
         ),
-        summary=(named_values("rotor", rotor), mode_table(modes, "bending or support"), *tables),
+        summary=()
+        if brief
+        else (named_values("rotor", rotor), mode_table(modes, "bending or support"), *tables),
         sections=(drawing_section(machine), *open_values) if drawn else (),
     )
 
@@ -68,12 +100,8 @@ def _verdict(warnings: tuple[MachineWarning, ...]) -> Statement:
     doubtful = [warning for warning in warnings if warning.doubtful]
     if doubtful:
         count = "one value looks" if len(doubtful) == 1 else f"{len(doubtful)} values look"
-        text = f"The file can be read, but {count} wrong: {', '.join(_named(doubtful))}."
-        return Statement(text, "warning")
-    kinds = len({warning.kind for warning in warnings})
-    what = "one thing" if kinds == 1 else f"{kinds} things"
-    known = f"The machine can be worked with; {what} to know below."
-    return Statement(known if warnings else ALL_RIGHT, "good")
+        return Statement(f"{count} wrong: {', '.join(_named(doubtful))}.", "warning")
+    return Statement("Machine file OK." if warnings else ALL_RIGHT, "good")
 
 
 def _named(warnings: Iterable[MachineWarning]) -> list[str]:
@@ -100,15 +128,25 @@ def _remarks(machine: Machine, warnings: tuple[MachineWarning, ...], brief: bool
         return said
     limits = _named(warning for warning in warnings if not warning.doubtful)
     if limits:
-        said.append(Statement(f"To know: {'; '.join(limits)}. 'check --all' says why, with numbers."))
-    assumed, inferred = len(machine.defaults_in_use), len(machine.inferred)
-    if assumed or inferred:
-        text = f"{assumed} defaults in use, {inferred} values inferred; 'check --all' lists them."
-        said.append(Statement(text))
+        said.append(
+            Statement(f"Limits of the model here: {', '.join(limits)}; --all says why, with numbers.")
+        )
     return said
 
 
-def _card(machine: Machine, rest: BearingSummary) -> Card:
+def _rotor(values: Iterable[tuple[str, object]], modes: Iterable[tuple[str, Iterable[float]]]) -> Statement:
+    """Mass and lowest modes of a rotor in a sentence."""
+    mass, centre, *sag = (one.text for _, one in values if isinstance(one, Quantity))
+    said = [
+        f"mass {mass}",
+        f"centre of gravity {centre} from node 1",
+        *(f"levitated sag {one}" for one in sag),
+    ]
+    said += [f"{name} {', '.join(f'{one:.4g}' for one in list(found)[:4])} Hz" for name, found in modes]
+    return Statement(f"Rotor: {'; '.join(said)}.")
+
+
+def _card(machine: Machine, rest: BearingSummary, brief: bool) -> Card:
     def stated(figure: BearingFigure) -> KeyFigure:
         known = figure.value if figure.described is None else figure.described
         return fact(figure.label, known, figure.kind, note=figure.note)
@@ -118,8 +156,12 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
         (
             fact("share of the weight", rest.load, "force"),
             fact("air gap", machine.bearing(rest.name).air_gap, "length"),
-            *map(stated, rest.figures),
-            fact("pressure of rotor on race at rest", rest.contact_pressure, "pressure"),
+            *(stated(one) for one in rest.figures if not (brief and one.field == ON_SPRINGS)),
+            *(
+                ()
+                if brief
+                else (fact("pressure of rotor on race at rest", rest.contact_pressure, "pressure"),)
+            ),
             fact("tangent stiffness at rest", rest.tangent_stiffness, "stiffness"),
             fact("in series with the support", rest.equivalent_stiffness, "stiffness"),
             fact("support by itself", rest.support_frequency, "frequency"),
@@ -248,3 +290,398 @@ def inertias_json(fe: RotorFE) -> dict[str, object]:
         "polar_inertia_kg_m2": fe.polar_inertia,
         "diametral_inertia_kg_m2": fe.diametral_inertia,
     }
+
+
+POINTS = 801
+NOT_GIVEN = "These values were not in the machine file. Give them there if they are known."
+NOT_GIVEN_WHY = "The report on the machine (check) says why each was taken."
+DRAWN = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
+FRICTION = "Friction between rotor and race; a cubic replaces the jump at zero speed (Neisi 2020, Fig. 2)."
+
+
+def machine_sections(machine: Machine) -> tuple[Section, ...]:
+    """Friction law, and the values that were not given."""
+    figure = Figure(friction_curve_figure(machine), FRICTION)
+    return (Section("Friction law", figures=(figure,)), *defaults_section(machine))
+
+
+def friction_curve_figure(machine: Machine) -> go.Figure:
+    """Draw friction over the relative surface speed (Neisi 2020, Fig. 2); equal laws share one curve.
+
+    Left the whole law, right the smoothed passage through zero.
+    """
+    laws: dict[tuple[float, float, float, float], list[str]] = {}
+    for bearing in machine.touchdown_bearings:
+        rub = bearing.friction
+        numbers = (rub.static, rub.dynamic, rub.stribeck_speed, rub.smoothing_speed)
+        static, dynamic, stribeck, smoothing = map(float, numbers)
+        key = (static, dynamic, stribeck, smoothing)
+        laws.setdefault(key, []).append(bearing.name)
+    whole = 5.0 * max(stribeck for _, _, stribeck, _ in laws)
+    near = 4.0 * max(smoothing for *_, smoothing in laws)
+    figure = panels(("whole law", "near zero speed"))
+    for index, ((static, dynamic, stribeck, smoothing), names) in enumerate(laws.items()):
+        law = (static, dynamic, stribeck, max(smoothing, 1e-12))
+        for column, reach in enumerate((whole, near), start=1):
+            speed = np.linspace(-reach, reach, POINTS)
+            curve(
+                figure,
+                speed,
+                np.array([stribeck_coefficient(float(v), *law) for v in speed]),
+                ", ".join(names),
+                column=column,
+                colour=SERIES[index % len(SERIES)],
+                width=1.7,
+                legend=column == 1,
+                hover="%{x:.4~g} m/s: %{y:.3f}",
+            )
+    figure.update_xaxes(title_text=axis_title("relative surface speed", "m/s"))
+    figure.update_yaxes(title_text=axis_title("friction coefficient", "1"), col=1)
+    return fit_legend(figure)
+
+
+def drawing_section(machine: Machine) -> Section:
+    """The rotor to scale with everything that sits on it."""
+    return Section("Rotor", figures=(Figure(rotor_figure(machine), DRAWN),))
+
+
+def defaults_section(machine: Machine) -> tuple[Section, ...]:
+    """Values of the machine that were defaulted or inferred, with the reason; empty where all were given."""
+    columns = (
+        Column("value of the machine", lambda row: spoken_key(row[0])),
+        Column("used", lambda row: row[1]),
+        Column("why", lambda row: row[2]),
+    )
+    tables = tuple(
+        table(found, columns, caption)
+        for caption, found in (("Defaults in use", machine.defaults_in_use), ("Inferred", machine.inferred))
+        if found
+    )
+    return (Section("Values that were not given", (NOT_GIVEN,), tables=tables),) if tables else ()
+
+
+def not_given(machine: Machine) -> tuple[Table, ...]:
+    """What was defaulted or inferred, by whose it is; the report on the machine says why."""
+    owners: dict[str, list[str]] = {}
+    for key, used, _why in (*machine.defaults_in_use, *machine.inferred):
+        owner, _, rest = spoken_key(key).partition(", ")
+        owners.setdefault(f"{rest} {used}", []).append(owner)
+    shared: dict[str, list[str]] = {}
+    for value, of in owners.items():
+        shared.setdefault(", ".join(of), []).append(value)
+    columns = (
+        Column("not in the machine file", lambda row: row[0]),
+        Column("used", lambda row: "; ".join(row[1])),
+    )
+    return (table(shared.items(), columns, note=NOT_GIVEN_WHY),) if shared else ()
+
+
+def spoken_key(key: str) -> str:
+    """A key of the machine file in words; entries of a list count from one."""
+    words: list[str] = []
+    for part in key.replace("_", " ").split("."):
+        if part == "*" and words:
+            words[-1] = f"every one of {words[-1]}"
+        elif part.isdigit() and words:
+            words[-1] = f"{words[-1]} {int(part) + 1}"
+        else:
+            words.append(part)
+    return ", ".join(words)
+
+
+def weight_shares(machine: Machine | None) -> dict[str, float]:
+    """Share of the weight [N] by name of the bearing; empty without a machine."""
+    if machine is None:
+        return {}
+    from rotordrop.rotor.statics import bearing_load_shares
+
+    shares = bearing_load_shares(machine)
+    return {
+        bearing.name: float(share) for bearing, share in zip(machine.touchdown_bearings, shares, strict=True)
+    }
+
+
+SHAFT_COLOUR = "#9fb3c8"
+LAYER_COLOUR = "#dbe4ec"
+DRAWN_AT_LEAST = 0.02
+"""Radius [m] at which bearings are drawn when the shaft is thinner."""
+MARKS = {
+    "touchdown bearing": ("triangle-up", COLOURS["measured"]),
+    "AMB": ("square", COLOURS["simulated"]),
+    "sensor": ("triangle-down", COLOURS["cross-check"]),
+}
+
+
+def rotor_figure(machine: Machine) -> go.Figure:
+    """Draw the rotor to scale in mm from the side, NDE at the left, with everything that sits on it."""
+    figure = panels([""], height=240)
+    nodes, top = machine.rotor.node_positions, _top(machine)
+    _add_pieces(figure, _layers(machine), "layer without stiffness", LAYER_COLOUR)
+    _add_pieces(figure, _shaft(machine), "shaft", SHAFT_COLOUR)
+    for index, disc in enumerate(machine.rotor.discs):
+        z, reach = MILLI * nodes[disc.node - 1], 0.85 * MILLI * top
+        label = plain(disc.name or f"disc {index + 1}")
+        curve(
+            figure,
+            [z, z],
+            [-reach, reach],
+            "disc or point mass",
+            colour=SERIES[3],
+            width=5,
+            legend=index == 0,
+            hover=f"{label}: {float(disc.mass):.3g} kg at node {disc.node}",
+        )
+    for kind, parts, height in _mounted(machine):
+        if parts:
+            symbol, colour = MARKS[kind]
+            curve(
+                figure,
+                [MILLI * nodes[part.node - 1] for part in parts],
+                [MILLI * height] * len(parts),
+                kind,
+                mode="markers",
+                marker={"symbol": symbol, "size": 13, "color": colour},
+                customdata=[[plain(part.name), part.node] for part in parts],
+                hover="%{customdata[0]}, node %{customdata[1]}, %{x:.1f} mm",
+            )
+    figure.update_xaxes(title_text=axis_title("position from node 1", "mm"))
+    figure.update_yaxes(title_text=axis_title("radius", "mm"), scaleanchor="x", constrain="domain")
+    return figure
+
+
+def _mounted(machine: Machine) -> tuple[tuple[str, Sequence[Mounted], float], ...]:
+    """What is mounted on the rotor by kind, with the height of its marks [m]."""
+    top = _top(machine)
+    return (
+        ("touchdown bearing", machine.touchdown_bearings, -top),
+        ("AMB", machine.ambs, -1.25 * top),
+        ("sensor", machine.sensors, top),
+    )
+
+
+def _top(machine: Machine) -> float:
+    radii = [0.5 * max(e.outer_diameter, e.layer_diameter or 0.0) for e in machine.rotor.elements]
+    return 1.5 * max(*radii, DRAWN_AT_LEAST)
+
+
+Piece: TypeAlias = tuple[float, float, float, float]
+"""Left and right end, inner and outer radius [m]."""
+
+
+def _shaft(machine: Machine) -> Iterator[Piece]:
+    spans = pairwise(machine.rotor.node_positions)
+    for (left, right), element in zip(spans, machine.rotor.elements, strict=True):
+        yield left, right, 0.5 * element.inner_diameter, 0.5 * element.outer_diameter
+
+
+def _layers(machine: Machine) -> Iterator[Piece]:
+    spans = pairwise(machine.rotor.node_positions)
+    for (left, right), element in zip(spans, machine.rotor.elements, strict=True):
+        if element.layer_diameter is not None:
+            yield left, right, 0.5 * element.outer_diameter, 0.5 * element.layer_diameter
+
+
+def _add_pieces(figure: go.Figure, pieces: Iterator[Piece], name: str, colour: str) -> None:
+    """Draw rectangles above and below the axis, all in one trace."""
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for left, right, inner, outer in pieces:
+        for side in (MILLI, -MILLI):
+            x += [MILLI * left, MILLI * right, MILLI * right, MILLI * left, MILLI * left, None]
+            y += [side * inner, side * inner, side * outer, side * outer, side * inner, None]
+    if x:
+        edge = {"color": MUTED, "width": 0.7}
+        curve(figure, x, y, name, hover=None, line=edge, fill="toself", fillcolor=colour)
+
+
+SHOWN = 6
+
+
+def imported_json(imported: ImportedRotor) -> dict[str, object]:
+    """Mass, inertias and frequencies of a rotor from another program, ready for JSON [SI]."""
+    return {
+        "source": imported.source,
+        "notes": list(imported.notes),
+        "nodes": len(imported.rotor.node_positions),
+        **inertias_json(rotor_fe(imported.rotor)),
+        "free_free_Hz": _free(imported),
+        "on_source_bearings_x_Hz": _supported(imported, 0),
+        "on_source_bearings_y_Hz": _supported(imported, 1),
+        "bearings": [_bearing_json(spring) for spring in imported.springs],
+    }
+
+
+def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
+    """Show mass, inertias and frequencies of a rotor from another program."""
+    rows = [("nodes", len(imported.rotor.node_positions)), *rotor_values(rotor_fe(imported.rotor), 5)]
+    modes = [("free-free bending, at standstill", _free(imported))]
+    for k, axis in enumerate("xy"):
+        if imported.springs:
+            modes.append((f"on the bearings of the source, {axis}, undamped", _supported(imported, k)))
+    return ReportContent(
+        title=f"Rotor from {name}",
+        subtitle=imported.source,
+        verdict=tuple(Statement(note) for note in imported.notes)
+        or (Statement("All of the rotor in the file was taken over.", "good"),),
+        summary=(named_values("rotor", rows), mode_table(modes, "rotor held", SHOWN)),
+    )
+
+
+def _bearing_json(spring: Spring) -> dict[str, object]:
+    entry: dict[str, object] = {
+        "node": spring.node,
+        "name": spring.name,
+        "stiffness_N_per_m": spring.stiffness,
+        "damping_N_s_per_m": spring.damping,
+    }
+    if spring.support is not None:
+        entry["support"] = _bearing_json(spring.support) | {"mass_kg": spring.support_mass}
+    return entry
+
+
+def _free(imported: ImportedRotor) -> list[float]:
+    fe = rotor_fe(imported.rotor)
+    return [float(f) for f in free_free_modes(fe, min(fe.size, N_RIGID + SHOWN)).frequency[N_RIGID:]]
+
+
+def _supported(imported: ImportedRotor, axis: int) -> list[float]:
+    """Undamped frequencies [Hz] in x or y at standstill, on the bearings and supports of the source."""
+    if not imported.springs:
+        return []
+    fe, held = rotor_fe(imported.rotor), []
+    for spring in imported.springs:
+        links = [link(one.stiffness) for one in (spring, spring.support) if one is not None]
+        mass = () if spring.support is None else (spring.support_mass[axis],)
+        held.append(Support(node=spring.node, links=tuple(links), masses=mass))
+    system = matrices_of(fe, held)
+    n = system.plane_size
+    plane = slice(axis * n, (axis + 1) * n)
+    values, _ = generalised_eigen(system.stiffness[plane, plane], system.mass[plane, plane])
+    return [float(f) for f in np.sqrt(np.maximum(values[:SHOWN], 0.0)) / (2.0 * np.pi)]
+
+
+def bearing_content(written: str, found: Sequence[CatalogueBearing], *, whole: bool) -> ReportContent:
+    """The bearing that a designation means most likely; the whole is also the listed ones of its size."""
+    others = found if found[0].listed else found[1:]
+    columns = (
+        Column("listed bearings of this size", lambda one: f"{one.maker} {one.designation}"),
+        Column("angle", _angle),
+        Column("balls", _balls),
+        Column("preload light / medium / heavy", _forces),
+        Column("balls are", lambda one: "published" if one.maker == "GMN" else "reconstructed"),
+    )
+    said = _statements(written, found[0])
+    if others and not whole:
+        said.append(Statement(f"--all: {len(others)} listed of this size"))
+    return ReportContent(
+        title=f"Bearings: {written}",
+        verdict=tuple(said),
+        summary=(_meant(found[0]), *((table(others, columns),) if others and whole else ())),
+    )
+
+
+def bearing_json(bearing: CatalogueBearing) -> dict[str, object]:
+    """Give a bearing ready for JSON, in SI units."""
+    balls = bearing.complement
+    return {
+        "designation": bearing.designation,
+        "maker": bearing.maker,
+        "listed": bearing.listed,
+        "kind": bearing.kind,
+        "bore_m": bearing.bore,
+        "outside_diameter_m": bearing.outside_diameter,
+        "width_m": bearing.width,
+        "contact_angle_rad": bearing.contact_angle,
+        "contact_angle_range_rad": bearing.contact_angle_range,
+        "ball_material": bearing.ball_material,
+        "ball_count": balls.ball_count,
+        "ball_count_range": balls.count_range,
+        "ball_diameter_m": balls.ball_diameter,
+        "ball_diameter_range_m": balls.diameter_range,
+        "pitch_diameter_m": balls.pitch_diameter,
+        "conformity": balls.conformity,
+        "conformity_range": balls.conformity_range,
+        "basis": balls.basis,
+        "clearance_range_m": clearance_of(bearing),
+        "preload_N": bearing.preload,
+        "preload_basis": bearing.preload_basis or None,
+        "axial_rigidity_N_per_m": bearing.axial_rigidity,
+    }
+
+
+def clearance_of(bearing: CatalogueBearing) -> tuple[float, float] | None:
+    """Radial clearance [m] of the class that a deep-groove designation names, CN where it names none."""
+    if bearing.kind != "deep groove" or bearing.read is None:
+        return None
+    return clearance_range(bearing.read.clearance_class or "CN", bearing.bore)
+
+
+def _statements(written: str, first: CatalogueBearing) -> list[Statement]:
+    balls = first.complement
+    if first.listed:
+        text = f"{written} is listed: {first.maker} {first.designation}. Balls: {balls.basis}"
+        said = [Statement(text, "good")]
+    else:
+        said = [Statement(f"no list in the catalogue has {written}: size by ISO 15, balls {balls.basis}")]
+    if first.read is not None and first.read.unread:
+        said.append(
+            Statement(f"not read: {', '.join(first.read.unread)} (cage, seals, accuracy have no effect here)")
+        )
+    if first.contact_angle_range is not None:
+        low, high = (math.degrees(angle) for angle in first.contact_angle_range)
+        text = f"{written} does not say its contact angle: {low:.0f}° to {high:.0f}° are usual; give it"
+        said.append(Statement(text, "warning"))
+    if not first.preload and first.kind == "angular contact":
+        text = "no bearing of this size is listed, so no preload is known; give it as a force"
+        said.append(Statement(text, "warning"))
+    elif first.preload_basis:
+        said.append(Statement(f"the preload is {first.preload_basis}"))
+    return said
+
+
+def _meant(bearing: CatalogueBearing) -> Table:
+    balls, play = bearing.complement, clearance_of(bearing)
+    width = "" if bearing.width is None else f" × {1e3 * bearing.width:g}"
+    rows: list[tuple[str, object]] = [
+        (
+            f"{bearing.kind}, bore × outside × width",
+            f"{1e3 * bearing.bore:g} × {1e3 * bearing.outside_diameter:g}{width} mm",
+        ),
+        ("balls per row", _with_range(balls.ball_count, balls.count_range, "")),
+        ("ball diameter", _with_range(1e3 * balls.ball_diameter, _scaled(balls.diameter_range, 1e3), " mm")),
+        ("pitch diameter", f"{1e3 * balls.pitch_diameter:.4g} mm"),
+        ("conformity", _with_range(balls.conformity, balls.conformity_range, "")),
+        ("ball material", bearing.ball_material),
+    ]
+    if bearing.kind == "angular contact":
+        rows.insert(1, ("contact angle", _angle(bearing)))
+        rows.append(("preload light / medium / heavy", _forces(bearing)))
+    if play is not None:
+        rows.append(("radial clearance", f"{1e6 * play[0]:.0f} to {1e6 * play[1]:.0f} µm"))
+    return named_values(bearing.designation, rows)
+
+
+def _with_range(value: float, bounds: tuple[float, float] | None, unit: str) -> str:
+    known = "" if bounds is None else f" (inferred, 90 %: {bounds[0]:.4g} to {bounds[1]:.4g})"
+    return f"{value:.4g}{unit}{known}"
+
+
+def _scaled(bounds: tuple[float, float] | None, factor: float) -> tuple[float, float] | None:
+    return None if bounds is None else (factor * bounds[0], factor * bounds[1])
+
+
+def _angle(bearing: CatalogueBearing) -> str:
+    bounds = _scaled(bearing.contact_angle_range, 180.0 / math.pi)
+    known = "" if bounds is None else f" (not said; {bounds[0]:.0f}° to {bounds[1]:.0f}°)"
+    return f"{math.degrees(bearing.contact_angle):.0f}°{known}"
+
+
+def _forces(bearing: CatalogueBearing) -> str:
+    forces = [f"{force:.3g}" if force < 1000.0 else f"{force:.0f}" for force in bearing.preload.values()]
+    return f"{' / '.join(forces)} N" if forces else "not known"
+
+
+def _balls(bearing: CatalogueBearing) -> str:
+    balls = bearing.complement
+    material = "" if bearing.ball_material == "steel" else f", {bearing.ball_material}"
+    return f"{balls.ball_count} × {1e3 * balls.ball_diameter:.4g} mm{material}"

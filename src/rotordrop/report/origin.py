@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from rotordrop.record.record import sha256_of
+from rotordrop.files import digest_of_file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +22,7 @@ class UsedFile:
     @classmethod
     def of(cls, role: str, path: Path) -> UsedFile:
         """Take the hash of a file."""
-        return cls(role=role, name=path.name, sha256=sha256_of(path))
+        return cls(role=role, name=path.name, sha256=digest_of_file(path))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -40,7 +40,8 @@ def render_page(content: ReportContent) -> str:
     loaded from anywhere. Figures travel as JSON, which no browser executes.
     """
     numbered = _numbered_sections(content)
-    drawing = (_text("assets", "plotly-cartesian.min.js"),) if content.figures else ()
+    drawn = any(section.figures for section in content.sections)
+    drawing = (_text("assets", "plotly-cartesian.min.js"),) if drawn else ()
     scripts = (*drawing, _text("templates", "page.js"))
     html: str = (
         _environment()

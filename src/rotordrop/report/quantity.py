@@ -228,6 +228,11 @@ def shown(value: object, kind: str, digits: int = 4) -> str:
     return Quantity.of(value, kind, digits).text
 
 
+def one_line(number: Quantity) -> str:
+    """A number with its interval behind it."""
+    return f"{number.levelled} ({number.interval_text})" if number.interval_text else number.levelled
+
+
 def with_interval(value: float | None, kind: str, interval_90: tuple[float, float] | None) -> str:
     """An estimated value [SI] with its interval; one whose interval is not known is not shown."""
     if value is None or interval_90 is None:

@@ -1,11 +1,11 @@
-"""The restart card as a page: the answer, why, what to check, and on which assumptions it hangs."""
+"""What is known when a machine is to run again, as a page: changes, next drop, lift, open checks."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import plotly.graph_objects as go
 
@@ -13,210 +13,225 @@ from rotordrop.estimate.published import Drop
 from rotordrop.known import Known
 from rotordrop.report.content import (
     SIMULATED_RECORD,
-    Card,
     Column,
     Figure,
-    KeyFigure,
-    Level,
     ReportContent,
     Section,
     Statement,
     Table,
-    fact,
+    finite,
     table,
 )
-from rotordrop.report.quantity import Quantity
-from rotordrop.report.spread import finite
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
-from rotordrop.restart.card import ANSWERS, RestartCard, answer_in
-from rotordrop.units import format_amount, format_chance, format_quantity, percent
+from rotordrop.restart.card import POSITIVE, RestartCard
+from rotordrop.restart.damages import CHECKS, DAMAGES, Check
+from rotordrop.restart.evidence import Indicator
+from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop, SpeedLimit
+from rotordrop.severity.numbers import NUMBERS
+from rotordrop.units import format_amount, format_chance, format_quantity
 
-if TYPE_CHECKING:
-    from rotordrop.restart.foreseen import NextDrop
-
-_LEVELS: dict[str, Level] = {
-    "restart": "good",
-    "restart with limits": "warning",
-    "inspect first": "warning",
-    "replace": "bad",
-}
 SCOPE = (
-    "A decision by expected cost. Damage is never measured here: its chances are assumptions, moved by what "
-    "the estimate and the checks show."
+    "Whether the machine may run again is for its owner to decide; no damage is measured here, and how many "
+    "drops a set of touchdown bearings may take is for maker and operator to agree (ISO 14839-5:2022)."
 )
-RESTART = "Restart"
-NO_DROPS = "The next drop is foreseen where the machine file and a limit are given."
+RATIO_NOTE = (
+    "Likelihood ratio: how much likelier the change is with the damage than on a sound machine; the sizes of "
+    "damages and the scatter of a sound machine are assumed."
+)
+NO_DROPS = "No next drop was simulated."
 
 
 def restart_page(card: RestartCard, drop: Drop) -> ReportContent:
     """Build the page of a restart card."""
-    columns = (
-        Column("damage", "label"),
-        Column("chance by one drop", lambda one: f"{100.0 * one.prior:.3g} %"),
-        Column("risk of running on", lambda one: f"{100.0 * one.risk:.3g} %"),
-        Column("remedy", "remedy"),
-        Column("source", "source"),
-    )
-    kinds = table(card.assumptions.damages.values(), columns, "Kinds of damage as they are assumed")
     return ReportContent(
-        title=f"Restart of {drop.machine}: {card.answer}",
+        title=f"Restart of {drop.machine}",
         subtitle=f"after the drop {drop.record} at {format_quantity(2.0 * math.pi * drop.speed_Hz, 'speed')}",
         simulated=SIMULATED_RECORD if drop.simulated_record else "",
-        verdict=_said(card),
-        cards=tuple(_bearing(card, drop, name) for name in drop.bearings),
-        summary=(_answers(card), _checks(card)),
-        facts=(("assumptions", card.assumptions.source), ("estimate", drop.verdict)),
+        verdict=tuple(_said(card, drop)),
+        facts=(("estimate", drop.verdict),),
         sections=(
-            Section("What may be damaged", tables=(_suspected(card), *_evidence(card))),
-            Section("On what the answer hangs", tables=(_flips(card), _costs(card), kinds)),
-            _next(card),
+            Section("What changed", tables=(evidence_table(card.indicators),) if card.indicators else ()),
+            Section("Open checks", tables=(_checks(card.checks),)),
+            _next(card.foreseen),
         ),
     )
 
 
-def restart_section(card: RestartCard) -> Section:
-    """The card as a part of the report on its drop: answer, costs, checks, what may be damaged."""
-    tables = (_answers(card), _checks(card), _suspected(card), *_evidence(card))
-    return Section(RESTART, statements=_said(card), tables=tables)
-
-
-def _said(card: RestartCard) -> tuple[Statement, ...]:
-    first, *rest = card.statements
-    lead: list[Statement] = []
-    if card.prior_alone:
-        lead, (first, *rest) = [Statement(first, "warning")], rest
-    return (*lead, Statement(first, _LEVELS[card.answer]), *map(Statement, rest), Statement(SCOPE))
-
-
-def _bearing(card: RestartCard, drop: Drop, name: str) -> Card:
-    numbers = drop.bearings[name].numbers
-    stated = (
-        ("peak_force_N", "peak bearing force", "force"),
-        ("peak_stress_Pa", "peak Hertz stress", "pressure"),
+def _said(card: RestartCard, drop: Drop) -> Iterator[Statement]:
+    yield _of_changes(card, drop)
+    yield from (
+        Statement(f"{words}. Nothing is concluded from that drop.", "warning") for words in card.apart
     )
-    shown = [
-        KeyFigure(label, Quantity(value=found.value, kind=kind, interval_90=found.interval))
-        for key, label, kind in stated
-        if (found := numbers.get(key)) is not None
-    ]
-    here = [one for one in card.suspicions if one.bearing == name]
-    some = 1.0 - math.prod(1.0 - one.probability for one in here)
-    likeliest = f"most likely a {card.assumptions.damages[here[0].kind].label}"
-    return Card(name, (*shown, fact("chance of a damage", some, "probability", 2, likeliest)))
+    for one in card.indicators:
+        if one.smaller is not None:
+            yield Statement(
+                f"A contradiction: {one.what} since {one.since}, {one.smaller:.1f} standard errors below no "
+                "change, and a bearing only wears wider. One of the two estimates is wrong, a sensor moved, "
+                "or the bearings are not the same set; this gap is no evidence against wear.",
+                "warning",
+            )
+    for name, outcome in card.made.items():
+        if outcome == "bad":
+            yield Statement(f"{CHECKS[name].label} was bad: {_shown_by(CHECKS[name].shows)}", "warning")
+    yield from map(Statement, _of_next_drop(card.foreseen))
+    yield from map(Statement, _of_lift(card.foreseen.lift))
+    if card.checks:
+        names = (one.label + (_expected(card) if name == "lift" else "") for name, one in card.checks.items())
+        yield Statement(f"Open checks: {', '.join(names)}.")
+    yield Statement(SCOPE)
 
 
-def _answers(card: RestartCard) -> Table:
-    bounds = {
-        name: format_chance(bound) for name, bound in zip(ANSWERS, card.bounds, strict=False) if bound > 0.0
-    }
-    columns = (
-        Column("answer", lambda name: f"{name} ←" if name == card.answer else name),
-        Column(f"expected cost [{card.assumptions.unit}]", lambda name: format_amount(card.costs[name])),
-        Column("up to a chance of a damage of", lambda name: bounds.get(name, "–")),
-        Column("right if the state was known", lambda name: card.right[name], "probability", 2),
+def _of_changes(card: RestartCard, drop: Drop) -> Statement:
+    """What the changes since the earlier drops speak of."""
+    if not drop.consistent:
+        return Statement(
+            "The model is not consistent with this record: its parameters are no evidence.", "warning"
+        )
+    if not card.since:
+        return Statement("No earlier estimate to compare with: nothing is known of a change.")
+    if card.positive:
+        found = "; ".join(
+            f"{one.what} since {one.since}, {_times(one.ratio)} times likelier with a "
+            f"{DAMAGES[one.kind].label} than on a sound machine"
+            for one in card.positive
+        )
+        return Statement(f"Evidence of damage: {found}.", "warning")
+    return Statement(f"No change since {card.since[0]} speaks of damage.", "good")
+
+
+def _times(ratio: float) -> str:
+    """A likelihood ratio; how much larger than a thousand it is, the tails decide that nobody knows."""
+    return "over 1000" if ratio > 1000.0 else format_amount(ratio)
+
+
+def _expected(card: RestartCard) -> str:
+    """What a lift check would show of a sound machine."""
+    if not card.gaps:
+        return ""
+    gaps = ", ".join(
+        f"{name} {1e6 * low:.0f} to {1e6 * high:.0f} µm" for name, (low, high) in card.gaps.items()
     )
-    return table(ANSWERS, columns, "The four answers")
+    return f" (expect {gaps}; more is wear)"
 
 
-def _checks(card: RestartCard) -> Table:
-    unit = card.assumptions.unit
+def _shown_by(kinds: Sequence[str]) -> str:
+    return ", ".join(DAMAGES[kind].label for kind in kinds)
+
+
+def evidence_table(found: Sequence[Indicator]) -> Table:
+    """Each change with its likelihood ratio."""
     columns = (
-        Column("check", "label"),
-        Column(f"costs [{unit}]", lambda one: format_amount(one.cost)),
-        Column("changes the answer", "settles", "probability", 2),
-        Column(f"saves, its cost taken off [{unit}]", lambda one: format_amount(one.value)),
-    )
-    made = ", ".join(f"{card.assumptions.checks[name].label} ({how})" for name, how in card.made.items())
-    return table(card.checks, columns, f"Checks before a restart{f'; made: {made}' if made else ''}")
-
-
-def _suspected(card: RestartCard) -> Table:
-    kinds = card.assumptions.damages
-    columns = (
-        Column("damage", lambda one: kinds[one.kind].label),
-        Column("where", lambda one: one.bearing or "rotor"),
-        Column("chance before", "prior", "probability", 2),
-        Column("chance now", "probability", "probability", 2),
+        Column("change", "what"),
+        Column("since", "since"),
+        Column("damage", lambda one: DAMAGES[one.kind].label),
+        Column("likelihood ratio", lambda one: _times(one.ratio)),
     )
     return table(
-        card.suspicions, columns, "Kinds of damage", "Before: by the number of drops and the peak stress."
+        found, columns, "Changes since earlier drops", f"{RATIO_NOTE} {POSITIVE:g} is positive evidence."
     )
 
 
-def _evidence(card: RestartCard) -> tuple[Table, ...]:
-    if not card.indicators:
-        return ()
-    kinds = card.assumptions.damages
-    columns = (
-        Column("found", "what"),
-        Column("where", lambda one: one.bearing or "rotor"),
-        Column("speaks of a", lambda one: kinds[one.kind].label),
-        Column("odds times", lambda one: format_amount(one.ratio)),
+def _checks(checks: Mapping[str, Check]) -> Table:
+    columns = (Column("check", "label"), Column("would show", lambda one: _shown_by(one.shows)))
+    return table(checks.values(), columns, "Checks that were not made")
+
+
+def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
+    """What the next drop would be at full speed, and up to which speed it keeps to the limits."""
+    if not foreseen.drops:
+        return
+    full = foreseen.drops[0]
+    of = "as this estimate found the machine" if foreseen.of_estimate else "by the machine file alone"
+    count = full.peak_force[next(iter(full.peak_force))][0].drops
+    peaks = "; ".join(
+        f"{name} {format_quantity(force[1].value, 'force')} and "
+        f"{format_quantity(full.peak_stress[name][1].value, 'pressure')}"
+        for name, force in full.peak_force.items()
     )
-    return (table(card.indicators, columns, "What changed since the earlier drop"),)
-
-
-def _flips(card: RestartCard) -> Table:
-    columns = (
-        Column("assumption", "of"),
-        Column("times", lambda one: f"{one.factor:.2g}"),
-        Column("answer then", lambda one: answer_in(card, one)),
+    yield (
+        f"Next drop from {format_quantity(full.speed, 'speed')}, {of}: 95 % of {count} simulated ones stay "
+        f"below {peaks}"
     )
-    return table(card.flips, columns, "Where the answer flips")
+    if full.beyond_limit is not None:
+        yield f"It passes the limit, {_limits(foreseen)}, with {_with_ends(full.beyond_limit)}"
+    if foreseen.speed_limit is not None:
+        yield _of_speed_limit(foreseen.speed_limit, full.beyond_limit)
 
 
-def _costs(card: RestartCard) -> Table:
-    one = card.assumptions
-    rows = (
-        ("a day of standstill", one.cost(one.day_cost)),
-        ("a set of touchdown bearings", one.cost(one.bearing_set_cost)),
-        ("a damaged machine", one.cost(one.machine_cost)),
-        ("opening and looking", f"{one.inspection_days:g} d"),
-        ("exchange or repair after that", f"{one.exchange_days:g} d"),
-        ("exchange in one go", f"{one.replace_days:g} d"),
-        (
-            "running with limits",
-            f"{one.limited_days:g} d, and {percent(one.limited_risk)} of the risk is left",
-        ),
-        ("risk with sound bearings", percent(one.sound_risk, 2)),
-        ("another drop until the next planned inspection", percent(one.another_drop)),
-        ("damage allowed in a restart without limits", percent(one.most_doubt, 1)),
-        (
-            "chance to pass a limit that a speed limit brings it down to",
-            percent(one.most_beyond, 1),
-        ),
+def _limits(foreseen: Foreseen) -> str:
+    """The limits by name, value and unit, "peak Hertz stress of 2500 MPa"."""
+    return " or ".join(
+        f"{one.label} of {format_quantity(foreseen.limits[one.field], one.kind, 4)}"
+        for one in NUMBERS
+        if one.field in foreseen.limits
     )
-    columns = (Column("assumption", lambda row: row[0]), Column("value", lambda row: row[1]))
-    return table(rows, columns, "Costs and chances", f"Source: {one.source}.")
 
 
-def _next(card: RestartCard) -> Section:
-    drops = card.foreseen.drops
+def _of_speed_limit(limit: SpeedLimit, beyond: Known | None) -> str:
+    allowed = format_chance(limit.chance)
+    if limit.speed is None or limit.interval_90 is None:
+        lowest = format_quantity(limit.tried[0], "speed")
+        return f"No speed limit down to {lowest} brings the chance to pass the limit down to {allowed}"
+    speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
+    if not limit.needed:
+        ends = None if beyond is None else beyond.interval_90
+        most = 1.0 if ends is None else ends[1]
+        chance = f"{allowed} at most"
+        if most > limit.chance:
+            chance = f"about {allowed} at most, and these drops cannot rule out {format_chance(most)}"
+        return (
+            f"No speed limit was found necessary: by {limit.drops} simulated drops up to {speed} the limit "
+            f"is passed with {chance}"
+        )
+    return (
+        f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings that chance "
+        f"to about {allowed}; take the lower end to be sure"
+    )
+
+
+def _of_lift(lift: LiftNow | None) -> Iterator[str]:
+    """Whether it may be lifted now."""
+    if lift is None:
+        return
+    count = lift.probability.drops or 0
+    low, high = (format_chance(end) for end in lift.probability.interval_90 or (lift.probability.value,) * 2)
+    within = ""
+    if lift.took is not None:
+        within = " within " + " to ".join(format_quantity(one, "time", 3) for one in lift.took)
+    needs = ", ".join(
+        f"{'more than the' if amount is None else f'{amount:.3g} A of'} {lift.limit[name]:.3g} A of {name}"
+        for name, amount in lift.current.items()
+    )
+    yield (
+        f"Lift from where it rests: {round(count * lift.probability.value)} of {count} simulated lifts "
+        f"succeed{within} (90 %: {low} to {high}); the weight needs {needs}"
+    )
+
+
+def _next(foreseen: Foreseen) -> Section:
+    drops = foreseen.drops
     if not drops:
         return Section("The next drop", text=(NO_DROPS,))
 
-    def high(of: str, name: str) -> Any:
-        return lambda one: getattr(one, of)[name][1].value
+    def peak(of: str, name: str) -> Any:
+        return lambda one: " / ".join(_shown(known, of) for known in getattr(one, f"peak_{of}")[name])
 
     names = list(drops[0].peak_force)
     columns = (
         Column("speed", "speed", "speed", 3),
         *(
-            Column(f"{name}: 95 % of peak forces below", high("peak_force", name), "force", 3)
-            for name in names
-        ),
-        *(
-            Column(f"{name}: 95 % of peak stresses below", high("peak_stress", name), "pressure", 3)
+            Column(f"{name}: half / 95 % of peak {label} below", peak(of, name))
+            for of, label in (("force", "forces"), ("stress", "stresses"))
             for name in names
         ),
         Column(
-            f"passes {card.foreseen.limits_in_words}" if card.foreseen.limits else "passes a limit",
+            f"passes {_limits(foreseen)}" if foreseen.limits else "passes a limit",
             lambda one: _with_ends(one.beyond_limit) if one.beyond_limit else "no limit given",
         ),
         Column("simulated drops", lambda one: str(one.peak_force[names[0]][0].drops)),
     )
-    of = "as this estimate found it" if card.foreseen.of_estimate else "by its file alone"
-    note = f"Simulated, the machine {of}; no damage is simulated."
+    of = "as this estimate found it" if foreseen.of_estimate else "by its file alone"
+    note = f"Simulated, the machine {of}; no damage is simulated. In brackets: 90 % intervals."
     return Section(
         "The next drop",
         figures=(Figure(_by_speed(drops, names), "Half of the next drops, and 95 % of them, stay below."),),
@@ -224,10 +239,18 @@ def _next(card: RestartCard) -> Section:
     )
 
 
+def _shown(known: Known, of: str) -> str:
+    kind = "pressure" if of == "stress" else of
+    low, high = known.interval_90 or (known.value,) * 2
+    value, least = (format_quantity(number, kind) for number in (known.value, low))
+    # of few drops even the largest may lie below the quantile
+    return f"{value} ({least} {f'to {format_quantity(high, kind)}' if math.isfinite(high) else 'or more'})"
+
+
 def _with_ends(known: Known) -> str:
-    """A chance and its interval as the sentence above writes them."""
+    """A chance and its interval."""
     low, high = (format_chance(end) for end in known.interval_90 or (known.value,) * 2)
-    return f"{format_chance(known.value)} ({low} to {high})"
+    return f"{format_chance(known.value)} (90 %: {low} to {high})"
 
 
 def _by_speed(drops: Sequence[NextDrop], names: Sequence[str]) -> go.Figure:
@@ -251,8 +274,6 @@ def _by_speed(drops: Sequence[NextDrop], names: Sequence[str]) -> go.Figure:
 
 
 def restart_numbers(card: RestartCard) -> dict[str, Any]:
-    """The card ready for JSON (SI; costs in the unit of the assumptions)."""
-    content: dict[str, Any] = finite(
-        asdict(card) | {"assumptions": card.assumptions.model_dump(), "unit": card.assumptions.unit}
-    )
+    """The card ready for JSON (SI)."""
+    content: dict[str, Any] = finite(asdict(card))
     return {"format": "rotordrop restart 1"} | content

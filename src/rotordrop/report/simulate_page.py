@@ -1,25 +1,51 @@
-"""The report on one simulated drop."""
+"""The report on one simulated drop: summary, page, numbers for JSON, and how bearings warmed."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import plotly.graph_objects as go
 
-from rotordrop.estimate.bearing_drop import History, simulated_bearings
-from rotordrop.record.impacts import HOP
-from rotordrop.report.content import Column, Figure, ReportContent, Section, appendix, table
-from rotordrop.report.drop_sections import drop_sections, speed_figure
-from rotordrop.report.heat_section import heat_sections
-from rotordrop.report.machine_sections import machine_sections, weight_shares
-from rotordrop.report.simulate_summary import landing_count, simulate_summary
-from rotordrop.report.time_panels import Panel, time_panels
-from rotordrop.simulate.clearances import clearance_uses
-from rotordrop.simulate.landing import Landing, landings
+from rotordrop._version import __version__
+from rotordrop.elements.face import UNPRESSED
+from rotordrop.elements.race_bearing import THROWN, numbers_of
+from rotordrop.estimate.bearing_drop import BearingDrop, History, published_bearing, simulated_bearings
+from rotordrop.evidence.impacts import HOP, after_flights
+from rotordrop.machine.plausibility import doubts_of_speed
+from rotordrop.report.content import (
+    SIMULATED_MACHINE,
+    Card,
+    Column,
+    Figure,
+    Level,
+    ReportContent,
+    Section,
+    Statement,
+    appendix,
+    fact,
+    table,
+)
+from rotordrop.report.drop_sections import drop_sections, headline_card, speed_figure, static_limit_statement
+from rotordrop.report.machine_content import machine_sections, weight_shares
+from rotordrop.report.quantity import shown
+from rotordrop.report.style import (
+    FROM_POWER_OFF,
+    SERIES,
+    Panel,
+    axis_title,
+    curve,
+    fit_legend,
+    panels,
+    time_panels,
+)
+from rotordrop.simulate.heat import NODES, Heat
 from rotordrop.simulate.magnets import MagnetHistory
-from rotordrop.simulate.result import DropResult
-from rotordrop.simulate.ribbons import ribbon_uses
+from rotordrop.simulate.result import DropResult, stop_of
+from rotordrop.simulate.used import ClearanceUse, Landing, RibbonUse, clearance_uses, landings, ribbon_uses
 from rotordrop.units import percent
 
 if TYPE_CHECKING:
@@ -116,11 +142,10 @@ def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
         forces.append(Panel(title=name, axis="magnet force", histories=force, series=True))
         currents.append(Panel(title=name, axis="current", histories=current, series=True))
     figures = (
-        Figure(time_panels([forces], 1.0, "N"), "Force of the magnets on the rotor.", "magnet force"),
+        Figure(time_panels([forces], 1.0, "N"), "Force of the magnets on the rotor."),
         Figure(
             time_panels([currents], 1.0, "A"),
             "Currents of the coils that pull towards + and − of each axis.",
-            "current",
         ),
     )
     times = [time if np.isfinite(time) else None for time in magnets.event_time.tolist()]
@@ -137,7 +162,7 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
         simulated = History(label="simulated", time=result.time, values=force)
         rows.append([Panel(title=one.name, axis="axial force", histories=(simulated,))])
     caption = "Axial force of the rotor on the face of the race, positive towards higher nodes."
-    figure = Figure(time_panels(rows, 1.0, "N"), caption, "axial force")
+    figure = Figure(time_panels(rows, 1.0, "N"), caption)
     note = (
         "Travel of the rotor is from the middle between its axial magnets and counts for impellers; against "
         "the race it is longer than the gap by what shoulder and face give way. Contacts without a hop of "
@@ -145,3 +170,350 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
         "groove the contact of a ball reaches; the groove ends at the shoulder."
     )
     return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS, note=note),))
+
+
+TRUSTED_CHANGE = 5e-3
+"""Change of a peak at a tighter tolerance beyond which it is a warning [1]; chosen, not measured."""
+NO_INTERVAL = (
+    "One run with given parameters, no interval. A drop is chaotic: after about 50 ms compare statistics "
+    "(study run)."
+)
+NUMERICAL = "Numerical error: "
+SYMMETRIC = "All ends are equal to the last bit: a symmetric machine, which no real one is."
+BACKWARDS = "The speed is negative: the shaft turns from y towards x, clockwise seen from the DE."
+
+
+def simulate_summary(result: DropResult, machine: Machine | None = None) -> ReportContent:
+    """Give what is said of one simulated drop before any figure; the machine gives the defaults in use."""
+    bearings = simulated_bearings(result)
+    speed, duration = shown(result.initial_speed, "speed"), shown(result.time[-1], "time")
+    path = getattr(machine, "source_path", None)
+    uses = () if machine is None else clearance_uses(machine, result)
+    return ReportContent(
+        title=f"Simulated drop of {result.machine_name}",
+        subtitle=f"from {speed}, {duration} after power-off",
+        simulated=SIMULATED_MACHINE,
+        verdict=_verdict(result, bearings, machine, uses),
+        cards=tuple(_card(result, b, bearing) for b, bearing in enumerate(bearings)),
+        facts=(
+            ("machine", result.machine_name if path is None else f"{result.machine_name} ({path.name})"),
+            ("rotor basis", result.reduction),
+            ("tolerance", f"{result.tolerance:g}"),
+            ("steps", f"{result.steps} taken, {result.rejected_steps} rejected"),
+            ("numerical error", _certificate(result).text.removeprefix(NUMERICAL)),
+            ("rotordrop", __version__),
+        ),
+    )
+
+
+def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
+    card = headline_card(bearing)
+    pressure, half_width, pressed_at = result.peak_contact_pressure(index)
+    note = f"at {shown(pressed_at, 'time', 3)}, {shown(2.0 * half_width, 'length', 3)} wide"
+    figures = list(card.figures)
+    figures.insert(2, fact("Peak pressure, rotor on race", pressure, "pressure", note=note))
+    if bearing.first_contact is not None and bearing.air_gap is not None:
+        deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
+        figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
+    places = ((f"{bearing.name}.face", "Peak axial force"), (stop_of(bearing.name), "Peak force on the stop"))
+    for place, label in places:
+        there = result.contacts_at(place)
+        if there is not None and len(there):
+            force, moment = there.peak
+            figures.append(fact(label, force, "force", note=f"at {shown(moment, 'time', 3)}"))
+    lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
+    figures.append(
+        fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
+    )
+    figures.append(fact("Energy lost in contact", lost, "energy", 3))
+    return Card(card.title, tuple(figures))
+
+
+def _verdict(
+    result: DropResult,
+    bearings: tuple[BearingDrop, ...],
+    machine: Machine | None,
+    uses: tuple[ClearanceUse, ...],
+) -> tuple[Statement, ...]:
+    said = [Statement(result.outcome, "good" if result.finished else "bad")]
+    if machine is not None:
+        said += [*map(_used, uses), *map(_ribbon, ribbon_uses(machine, result))]
+    if result.initial_speed < 0.0:
+        said.append(Statement(BACKWARDS))
+    if machine is not None:
+        doubts = doubts_of_speed(machine, result.initial_speed)
+        said += [Statement(f"{doubt.message}.", "warning") for doubt in doubts]
+        said += [*_springs(result, machine), *_thrown(result, machine), *_landed(result, machine)]
+    if (lift := result.lift) is not None:
+        said.append(Statement(f"{lift.sentence()}.", "good" if lift.succeeded else "bad"))
+    if result.heat is not None:
+        said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
+    numerical = _certificate(result)
+    said += [numerical] if numerical.level == "warning" else []
+    said.append(Statement(NO_INTERVAL))
+    if len(bearings) > 1 and all(
+        np.array_equal(one.force.values, bearings[0].force.values) for one in bearings
+    ):
+        said.append(Statement(SYMMETRIC))
+    known = () if machine is None else machine.touchdown_bearings
+    unrated = [one.name for one in known if numbers_of(one).rolling_elements() is None]
+    if rated := [bearing for bearing in bearings if bearing.name not in unrated]:
+        said.append(static_limit_statement(rated))
+    # of a drop that broke off nothing is good
+    good: Level = "good" if result.finished else "notice"
+    return tuple(replace(one, level=good) if one.level == "good" else one for one in said)
+
+
+def _used(use: ClearanceUse) -> Statement:
+    """What a drop used of a clearance or of the way up to a stop, and the force there."""
+    gap, touches = shown(use.gap, "length", 3), use.share >= 1.0 if use.contacts is None else bool(use.count)
+    share = f"{shown(use.travel, 'length', 3)} of {gap} ({100.0 * use.share:.3g} %)"
+    if not touches:
+        if use.contacts is None:
+            return Statement(f"{use.name}: the rotor travels {share}.", "good")
+        never = "never reaches its stop" if use.stop else "never touches the housing"
+        moves = "the mount moves" if use.stop else "the rotor travels"
+        return Statement(f"{use.name}: {moves} {share} and {never}.", "good")
+    if use.contacts is None:
+        text = "so it touches there; no force acts in a clearance without stiffness."
+        return Statement(f"{use.name}: the rotor travels {share}, {text}", "bad")
+    times = "once" if use.count == 1 else f"{use.count} times"
+    first, force = shown(use.contacts.start[0], "time", 3), shown(use.peak_force, "force", 4)
+    hit = f"{times}, first at {first}, with {force} at most"
+    if not use.stop:
+        return Statement(f"{use.name}: the rotor travels {share} and touches the housing {hit}.", "bad")
+    pressed = shown(max(use.travel - use.gap, 0.0), "length", 3)
+    text = f"{use.name}: the mount reached its stop at {gap} {hit}; it pressed it by {pressed}."
+    return Statement(text, "warning")
+
+
+def _ribbon(use: RibbonUse) -> Statement:
+    """What a ribbon bore, whether it slipped and what that took."""
+    most, limit = shown(use.peak_force, "force", 3), shown(use.slip_force, "force", 3)
+    text = f"{use.name}: the ribbon of the mount bore at most {most} of its slip force of {limit}"
+    if use.slipped == 0.0:
+        return Statement(f"{text} ({100.0 * use.share:.3g} %) and never slipped.")
+    slipped, first = shown(use.slipped, "time", 3), shown(use.first_slip, "time", 3)
+    taken = shown(use.dissipated, "energy", 3)
+    return Statement(f"{text} and slipped for {slipped} in all, first at {first}, which took {taken}.")
+
+
+def _springs(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """How far rings that springs press on gave way."""
+    for bearing in machine.touchdown_bearings:
+        if bearing.bearing.ring_travel is None:
+            continue
+        most, room = float(np.max(result.ring_travel(bearing.name))), float(bearing.bearing.ring_travel)
+        moved, free = shown(most, "length"), shown(room, "length")
+        text = f"{bearing.name}: the outer rings gave way on their springs by {moved} of {free}"
+        yield Statement(f"{text}, up to their stop." if most > room else f"{text}.")
+
+
+def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """What the inertia of balls made of the races, or would make of them at the speeds that they reached."""
+    if result.race_stress is not None:
+        highest = np.max(result.race_stress, axis=0)
+        for name, (inner, outer) in zip(result.bearing_names, highest, strict=True):
+            if outer > 0.0:
+                one, other = shown(inner, "pressure"), shown(outer, "pressure")
+                text = f"{name}: the largest stress is {one} on the inner and {other} on the outer race."
+                yield Statement(text)
+    share = machine.rotor.mass * float(machine.gravity) / len(machine.touchdown_bearings)
+    for b, bearing in enumerate(machine.touchdown_bearings):
+        fastest = float(np.max(np.abs(result.race_speed[:, b])))
+        for excess in numbers_of(bearing).excesses(fastest, share):
+            if excess.kind == THROWN:
+                yield Statement(f"{bearing.name}: {excess.text}.", "warning")
+
+
+def landing_count(one: Landing) -> int:
+    """Number of landings on a face: contacts that no flight parts are one, by the rule of radial impacts."""
+    return int(np.sum(after_flights(one.contacts.start, one.contacts.end, one.gap, one.acceleration[1:])))
+
+
+def _landed(result: DropResult, machine: Machine) -> Iterator[Statement]:
+    """How far the rotor moved along its axis, with what force it landed, whether balls climbed too far."""
+    for one in landings(machine, result):
+        travel, gap = shown(one.travel, "length", 3), shown(one.gap, "length", 3)
+        force, moment = one.contacts.peak
+        if not any(load.along for load in machine.loads):
+            yield Statement(f"{one.name}: the rotor never lands on the face: {UNPRESSED}.")
+            continue
+        if not len(one.contacts):
+            text = f"{one.name}: the rotor travels {travel} of {gap} along its axis"
+            yield Statement(f"{text} and never lands on the face.", "good")
+            continue
+        count, moved = landing_count(one), shown(one.rotor_travel, "length", 3)
+        times = "once" if count == 1 else f"{count} times"
+        first = shown(one.contacts.start[0], "time", 3)
+        yield Statement(
+            f"{one.name}: the rotor moves {moved} along its axis (gap {gap}) and lands on the face of the "
+            f"race {times}, first at {first}, "
+            f"with {shown(force, 'force', 4)} along its axis at most, at {shown(moment, 'time', 3)}; contact "
+            f"angle up to {shown(one.contact_angle, 'angle', 3)}."
+        )
+        if one.climb.excess is not None:
+            yield Statement(f"{one.name}: {one.climb.excess.text}.", "bad")
+
+
+def _certificate(result: DropResult) -> Statement:
+    certificate = result.certificate
+    changes = [certificate.peak_change_tolerance, certificate.peak_change_truncation]
+    worst = max((float(np.max(change)) for change in changes if change is not None), default=0.0)
+    text = f"{NUMERICAL}{certificate.sentence()}"
+    if certificate.peak_change_tolerance is None:
+        return Statement(f"{text}; tolerance and truncation were not checked in this run.")
+    return Statement(f"{text}.", "warning" if worst > TRUSTED_CHANGE else "good")
+
+
+def simulation_numbers(result: DropResult, machine: Machine | None = None) -> dict[str, Any]:
+    """Give the numbers of a simulated drop: SI values under the names of the estimate's schema.
+
+    The machine that was simulated gives the use of its clearances.
+    """
+    certificate, bearings = result.certificate, {}
+    parts: dict[str, Any] = {
+        "tolerance": result.tolerance,
+        "reduction": result.reduction,
+        "energy_residual_J": certificate.energy_residual,
+        "energy_scale_J": certificate.energy_scale,
+    }
+    for name in ("peak_change_tolerance", "peak_change_truncation"):
+        change = getattr(certificate, name)
+        if change is not None:
+            parts[name] = [float(value) for value in change]
+    for index, one in enumerate(simulated_bearings(result)):
+        pressure, half_width, moment = result.peak_contact_pressure(index)
+        bearings[one.name] = {
+            **published_bearing(one).as_json(),
+            "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
+            "contact_half_width_m": {"value": half_width},
+        }
+    numbers: dict[str, Any] = {
+        "machine": result.machine_name,
+        "method": "simulation",
+        "speed_Hz": result.initial_speed / (2 * math.pi),
+        "final_speed_Hz": float(result.speed[-1]) / (2 * math.pi),
+        "duration_s": float(result.time[-1]),
+        "outcome": result.outcome,
+        "finished": result.finished,
+        "certificate": parts,
+        "bearings": bearings,
+    }
+    for use in () if machine is None else clearance_uses(machine, result):
+        entry = {
+            "node": use.node,
+            "gap_m": use.gap,
+            "largest_travel_m": use.travel,
+            "travel_over_gap": use.share,
+            "time_s": use.time,
+        }
+        if use.contacts is not None:
+            entry |= {"contacts": len(use.contacts), "peak_force_N": use.peak_force}
+            entry |= {"first_contact_s": float(use.contacts.start[0])} if len(use.contacts) else {}
+        numbers.setdefault("stops" if use.stop else "clearances", {})[use.name] = entry
+    for ribbon in () if machine is None else ribbon_uses(machine, result):
+        numbers.setdefault("ribbons", {})[ribbon.name] = {
+            "slip_force_N": ribbon.slip_force,
+            "peak_force_N": {"value": ribbon.peak_force, "time_s": ribbon.peak_time},
+            "slipped_s": ribbon.slipped,
+            "first_slip_s": ribbon.first_slip if math.isfinite(ribbon.first_slip) else None,
+            "dissipated_J": ribbon.dissipated,
+        }
+    if machine is not None and machine.axial:
+        latest = int(np.argmax(np.abs(result.axial_displacement)))
+        numbers["axial"] = {
+            "largest_travel_m": float(abs(result.axial_displacement[latest])),
+            "time_s": float(result.time[latest]),
+            "faces": {one.name: _landed_faces(one) for one in landings(machine, result)},
+        }
+    if result.heat is not None:
+        numbers["heat"] = result.heat.as_json(result.bearing_names)
+    if result.magnets is not None:
+        numbers["magnets"] = _magnets_json(result, result.magnets)
+    return numbers
+
+
+def _magnets_json(result: DropResult, magnets: MagnetHistory) -> dict[str, Any]:
+    events = zip(magnets.events, magnets.event_time.tolist(), strict=True)
+    known: dict[str, Any] = {
+        "events": [{"what": what, "time_s": time if math.isfinite(time) else None} for what, time in events],
+        "largest_current_A": dict(
+            zip(magnets.names, np.max(magnets.current, axis=(0, 2, 3)).tolist(), strict=True)
+        ),
+        "largest_force_N": dict(
+            zip(
+                magnets.names,
+                np.max(np.hypot(*np.moveaxis(magnets.force, 2, 0)), axis=0).tolist(),
+                strict=True,
+            )
+        ),
+    }
+    if (lift := result.lift) is not None:
+        known["lift"] = {
+            "begun_s": lift.begun,
+            "free_from_s": lift.free_from,
+            "succeeded": lift.succeeded,
+            "contacts": lift.contacts,
+        }
+    return known
+
+
+def _landed_faces(one: Landing) -> dict[str, Any]:
+    force, moment = one.contacts.peak
+    entry: dict[str, Any] = {
+        "gap_m": one.gap,
+        "largest_travel_m": one.travel,
+        "time_s": one.travel_time,
+        "contacts": len(one.contacts),
+        "landings": landing_count(one),
+        "peak_force_N": {"value": force, "time_s": moment if len(one.contacts) else None},
+        "contact_angle_rad": one.contact_angle,
+        "contact_edge_rad": {"value": one.edge_angle, "time_s": one.edge_time},
+        "shoulder_angle_rad": one.climb.shoulder,
+        "beyond_shoulder": one.climb.excess is not None,
+    }
+    return entry | ({"first_contact_s": float(one.contacts.start[0])} if len(one.contacts) else {})
+
+
+WARMTHS = (
+    Column("bearing", lambda row: row["name"]),
+    Column("race", lambda row: row["race_K"]["largest"], "temperature", 3),
+    Column("at", lambda row: row["race_K"]["time_s"], "duration", 3),
+    Column("preload", lambda row: row["preload_N"]["start"], "force"),
+    Column("largest", lambda row: row["preload_N"]["largest"], "force"),
+    Column("at the end", lambda row: row["preload_N"]["end"], "force"),
+    Column("air gap then", lambda row: row["air_gap_end_m"], "length", 4),
+    Column("heat", lambda row: row["heat_J"]["taken"], "energy", 3),
+    Column("gone outwards", lambda row: row["heat_J"]["gone"], "energy", 3),
+)
+
+
+def heat_sections(heat: Heat | None, names: tuple[str, ...]) -> tuple[Section, ...]:
+    """Temperatures, preload and where the heat went, of a machine whose bearings warm."""
+    if heat is None:
+        return ()
+    caption = (
+        "Temperatures above the start, and the axial force of a row of balls with the race in the middle. "
+        "Capacities and conductances are values by size unless the machine file gives them."
+    )
+    rows = [{"name": name} | one for name, one in heat.as_json(names).items()]
+    figure = Figure(heat_figure(heat, names), caption)
+    return (Section("Heat", figures=(figure,), tables=(table(rows, WARMTHS),)),)
+
+
+def heat_figure(heat: Heat, names: tuple[str, ...]) -> go.Figure:
+    """Draw the temperatures of all nodes and the preload of every bearing that warms."""
+    titles = [f"{names[b]}: {what}" for what in ("temperatures", "preload of a row") for b in heat.warmed]
+    figure = panels(titles, rows=2, columns=len(heat.warmed), height=230)
+    for column, b in enumerate(heat.warmed, start=1):
+        for node, called in enumerate(NODES):
+            colour = SERIES[node % len(SERIES)]
+            over, first = heat.temperature[:, b, node], column == 1
+            curve(figure, heat.time, over, called, column=column, colour=colour, legend=first)
+        curve(figure, heat.time, heat.preload[:, b], row=2, column=column)
+    figure.update_yaxes(title_text=axis_title("above the start", "K"), row=1, col=1)
+    figure.update_yaxes(title_text=axis_title("axial force", "N"), row=2, col=1)
+    figure.update_yaxes(rangemode="tozero")
+    figure.update_xaxes(title_text=FROM_POWER_OFF, range=[0.0, float(np.max(heat.time))], row=2)
+    return fit_legend(figure)

@@ -1,7 +1,8 @@
-"""The report on a study: how force, stress and whirl are spread over many drops, and against what varies."""
+"""The reports on many simulated drops: a study, and repeats of an estimate."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,11 +23,12 @@ from rotordrop.report.content import (
     Statement,
     Table,
     appendix,
+    finite,
     table,
 )
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
-from rotordrop.report.spread import ends, percent, study_numbers_of
+from rotordrop.report.simulate_page import SYMMETRIC
 from rotordrop.report.style import (
     MUTED,
     OVER,
@@ -39,9 +41,11 @@ from rotordrop.report.style import (
     plain,
     upright,
 )
-from rotordrop.simulate.clearances import share_column, stopped
-from rotordrop.study.plan import case_kind
+from rotordrop.simulate.fingerprint import fingerprint
+from rotordrop.simulate.used import share_column, stopped
+from rotordrop.study.plan import Study, case_kind
 from rotordrop.study.quantities import LIFT, Quantity
+from rotordrop.study.repeat import Repeat
 from rotordrop.study.sensitivity import influences
 from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
@@ -56,10 +60,7 @@ MATTERS = ("peak_force", "peak_stress")
 WHIRL = {"backward_whirl": 0.0}
 HEADLINES = ("peak_force", "peak_stress")
 """Quantities of a bearing that stand beside the verdict."""
-SCOPE = (
-    "The drops are simulated; the spread is that of the values that vary here, not of all that is unknown "
-    "about the machine."
-)
+SCOPE = "Simulated: the spread is that of the values that vary here, not of all that is unknown."
 SENSITIVITY = (
     "Drops of one block differ in one value each: intervals of quantiles, which take drops as independent, "
     "are too narrow here."
@@ -95,7 +96,7 @@ def study_page(
             ("machine", study.machine.name),
             ("design", f"{study.design}, seed {study.seed}, shards of {study.shard}"),
             ("digest", study.digest),
-            ("rotordrop", __version__),
+            ("rotordrop", results.version),
         ),
         sections=(
             *_influence_section(results),
@@ -122,8 +123,6 @@ def _what_is_missing(results: StudyResults) -> str:
 def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Statement]:
     """What qualifies every number first, then limits, loads, and whether the rotor whirled."""
     said = []
-    if results.taken_over:
-        said.append(Statement(results.taken_over, "warning"))
     failed = sum(results.failed.values())
     if failed:
         reasons = "; ".join(f"{count} ×: {reason}" for reason, count in results.failed.items())
@@ -160,16 +159,28 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         lifted = results.exceedance(LIFT, 0.5)
         text = f"The magnets lift the rotor again in {percent(lifted)} of the drops."
         said.append(Statement(text, "good" if lifted.value == 1.0 else "warning"))
+    if _is_symmetric(results, names):
+        said.append(Statement(SYMMETRIC))
     return [*said, Statement(SCOPE)]
 
 
+def _is_symmetric(results: StudyResults, names: Sequence[str]) -> bool:
+    """Whether every drop did the same to all bearings, to the last bit."""
+    peaks = [results.numbers[f"{name}.peak_force"] for name in names]
+    return len(peaks) > 1 and all(np.array_equal(one, peaks[0], equal_nan=True) for one in peaks)
+
+
 def _loads(results: StudyResults, name: str) -> str:
-    """Force and stress of a bearing that all but one in a hundred drops stay below."""
+    """Force and stress of a bearing that all but one in a hundred drops stay below, or those of the worst."""
     rare = SHARES[-1]
-    known = [
-        Shown.of(results.quantile(f"{name}.{quantity}", rare), _quantity(results, name, quantity).kind, 3)
-        for quantity in HEADLINES
-    ]
+    kinds = {f"{name}.{quantity}": _quantity(results, name, quantity).kind for quantity in HEADLINES}
+    known = [Shown.of(results.quantile(key, rare), kind, 3) for key, kind in kinds.items()]
+    if any(math.isnan(one.value) for one in known):
+        most = {key: float(np.nanmax(results.numbers[key], initial=-math.inf)) for key in kinds}
+        force, stress = (Shown.of(most[key], kind, 3).text for key, kind in kinds.items())
+        share = max(results.exceedance(key, most[key]).high for key in kinds)
+        said = f"none of {len(results)} drops exceeded {force} and {stress}"
+        return f"{name}: {said}; 90 %: at most {100 * share:.2g} % do."
     force, stress = (f"{one.text} (90 %: {one.interval_text})" for one in known)
     said = f"{100 * rare:g} % of the drops stay below a peak force of {force} and a stress of {stress}."
     return f"{name}: {said}"
@@ -182,7 +193,7 @@ def _distribution_section(results: StudyResults) -> Section:
         f"{', '.join(f'{100 * share:g}' for share in SHARES)} % of the drops lie below."
     )
     figures = tuple(
-        Figure(_distribution_figure(results, quantity), caption.format(words=words), f"spread of {words}")
+        Figure(_distribution_figure(results, quantity), caption.format(words=words))
         for quantity in MATTERS
         if (words := quantity.replace("_", " "))
     )
@@ -212,6 +223,8 @@ def _distribution_figure(results: StudyResults, quantity: str) -> go.Figure:
         curve(figure, values, below, "drops below", row=2, **drawn, line=step, hover="%{x:.4~g}: %{y:.3~g} %")
         for share in SHARES:
             at = results.quantile(shown.name, share).value / size
+            if math.isnan(at):  # fewer drops than that
+                continue
             upright(figure, at, SERIES[1], "dot", row=2, col=column)
             # at the height of its share, above the curve: at one height the labels of 90 and 99 % collide
             label = {
@@ -241,11 +254,15 @@ def _table(results: StudyResults, shares: Sequence[float], only: Sequence[str] =
 
     wanted = [q for q in results.columns if not only or q.name.rpartition(".")[2] in only]
     columns = (
-        Column("quantity", "meaning"),
+        Column("quantity", (lambda q: _in_words(q.name)) if only else "meaning"),
         *(quantile(share) for share in shares),
-        Column("drops", counted),
+        Column("drops", lambda q: "" if counted(q) == len(results) else str(counted(q)), optional=True),
     )
-    return table([q for q in wanted if counted(q)], columns, "Quantiles over the drops")
+    return table([q for q in wanted if counted(q)], columns)
+
+
+def _in_words(name: str) -> str:
+    return name.replace(".", " ").replace("_", " ")
 
 
 def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
@@ -325,7 +342,7 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
         figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
     if results.study.looped:
         caption = "Probability that the magnets lift the rotor again; bars: 90 % intervals."
-        figures.append(Figure(_lift_figure(results, name, kind), caption, "probability of a lift"))
+        figures.append(Figure(_lift_figure(results, name, kind), caption))
     return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
 
 
@@ -427,7 +444,6 @@ def study_numbers(
     return study_numbers_of(results.study) | {
         "drops": len(results),
         "failed": dict(results.failed),
-        **({"taken_over": results.taken_over} if results.taken_over else {}),
         "quantiles": {
             q.name: {
                 "unit": q.unit,
@@ -460,3 +476,170 @@ def _influences(results: StudyResults) -> dict[str, Any]:
         }
     except UsageError:
         return {}  # too few drops
+
+
+FEW = 0.05
+"""Share of drops on one side of the recorded one from which it counts as out of the ordinary [1]."""
+NOT_JOINT = (
+    "The machine file holds no joint distribution: the machine is taken as described, so the spread is that "
+    "of rotor angle and remanent lift alone, and too narrow. Calibrate it first."
+)
+REPEAT_SCOPE = "The drops are simulated by the model; what the model leaves out is not in the spread."
+NOTE = (
+    "Worst of so many: half of such sets have a worst drop below it. Intervals say how well the number of "
+    "simulated drops determines a number."
+)
+SHARE_BELOW = "Share of the simulated drops below a value; dashed: the recorded drop."
+
+
+def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent:
+    """Build the report on a virtual repeat."""
+    study = results.study
+    figures = (_figure(results, found, name) for name in ("peak_force", "peak_stress"))
+    return ReportContent(
+        title=f"{len(results)} virtual repeats at {format_quantity(study.speed, 'speed')}",
+        subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
+        verdict=_repeat_verdict(results, found),
+        summary=(_repeat_table(results, found),),
+        facts=study_facts(study),
+        sections=(Section("Distribution", figures=tuple(Figure(figure, SHARE_BELOW) for figure in figures)),),
+    )
+
+
+def _repeat_verdict(results: StudyResults, found: Sequence[Repeat]) -> tuple[Statement, ...]:
+    said = []
+    failed = sum(results.failed.values())
+    if failed:
+        said.append(Statement(f"{failed} drops could not be computed.", "warning"))
+    if results.study.joint is None:
+        said.append(Statement(NOT_JOINT, "warning"))
+    for one in found:
+        if one.recorded is None or one.place is None:
+            continue
+        odd = one.place.high < FEW or one.place.low > 1.0 - FEW
+        kind = _kind(results, one)
+        text = (
+            f"{one.column.replace('_', ' ')}: {percent(one.place)} of the drops that could have happened "
+            f"were milder than the recorded {in_words(one.recorded.value, kind)}; the worst of {one.of} "
+            f"would typically have {spread(one.worst, kind)}."
+        )
+        said.append(Statement(text, "warning" if odd else "notice"))
+    return (*said, Statement(REPEAT_SCOPE))
+
+
+def _kind(results: StudyResults, one: Repeat) -> str:
+    return next(q.kind for q in results.columns if q.name == one.column)
+
+
+def _repeat_table(results: StudyResults, found: Sequence[Repeat]) -> Table:
+    def known(of: Known | None, one: Repeat) -> str:
+        return "–" if of is None else spread(of, _kind(results, one))
+
+    def most(one: Repeat) -> str:
+        return " to ".join(in_words(end.value, _kind(results, one)) for end in (one.low, one.high))
+
+    columns = (
+        Column("quantity", lambda one: one.column.replace("_", " ")),
+        Column("recorded (90 %)", lambda one: known(one.recorded, one)),
+        Column("milder drops", lambda one: "–" if one.place is None else percent(one.place)),
+        Column("median (90 %)", lambda one: known(one.median, one)),
+        Column("nine of ten drops", most),
+        Column(f"worst of {found[0].of} (90 %)", lambda one: known(one.worst, one)),
+    )
+    return table(found, columns, "The recorded drop among those that could have happened", NOTE)
+
+
+def _figure(results: StudyResults, found: Sequence[Repeat], name: str) -> go.Figure:
+    shown = [one for one in found if one.column.endswith(f".{name}")]
+    figure = panels([one.column.partition(".")[0] for one in shown])
+    for column, one in enumerate(shown, start=1):
+        size, unit = display_unit(_kind(results, one))
+        values = sorted(value for value in results.column(one.column).tolist() if math.isfinite(value))
+        curve(
+            figure,
+            [value / size for value in values],
+            [100.0 * (k + 0.5) / len(values) for k in range(len(values))],
+            "simulated drops",
+            column=column,
+            legend=column == 1,
+            line={"color": SERIES[0], "width": 1.6, "shape": "hv"},
+        )
+        if one.recorded is not None:
+            upright(figure, one.recorded.value / size, SERIES[1], row=1, col=column)
+        figure.update_xaxes(title_text=axis_title(name.replace("_", " "), unit), col=column)
+    figure.update_yaxes(title_text=axis_title("drops below", "%"), col=1)
+    return fit_legend(figure)
+
+
+def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, Any]:
+    """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
+
+    def counted(known: Known | None) -> dict[str, Any] | None:
+        if known is None:
+            return None
+        return {"value": known.value, "lower": known.low, "upper": known.high, "drops": known.drops}
+
+    def quantity(one: Repeat) -> dict[str, Any]:
+        made: dict[str, Any] = finite(
+            {
+                "column": one.column,
+                **{name: counted(getattr(one, name)) for name in ("median", "low", "high", "worst")},
+                "of": one.of,
+                "recorded": one.recorded
+                and {"value": one.recorded.value, "interval": one.recorded.interval_90},
+                "place": counted(one.place),
+            }
+        )
+        return made
+
+    made = study_numbers_of(results.study)
+    del made["digest"]
+    return made | {
+        "drops": len(results),
+        "failed": dict(results.failed),
+        "quantities": [quantity(one) for one in found],
+    }
+
+
+def spread(known: Known, kind: str) -> str:
+    """A number with its 90 % interval in words; an end that needs more drops is open."""
+    value, low, high = (in_words(number, kind) for number in (known.value, known.low, known.high))
+    return f"{value} ({low} to {high})"
+
+
+def in_words(value: float, kind: str) -> str:
+    """A number in words; what needs more drops is open."""
+    return format_quantity(value, kind) if math.isfinite(value) else "open"
+
+
+def percent(share: Known, form: str = "{:.3g} % (90 %: {:.3g} to {:.3g} %)") -> str:
+    """A share of the drops with its 90 % interval in words."""
+    return form.format(*(100 * number for number in (share.value, share.low, share.high)))
+
+
+def ends(known: Known) -> dict[str, Any]:
+    """A number with its interval, ready for JSON."""
+    found = {"value": known.value, "interval_90": [known.low, known.high], "drops": known.drops}
+    made: dict[str, Any] = finite(found)
+    return made
+
+
+def study_facts(study: Study) -> tuple[tuple[str, str], ...]:
+    """Lines for a report on simulated drops: what makes the same ones again."""
+    return (
+        ("machine", study.machine.name),
+        ("seed", str(study.seed)),
+        ("digest", study.digest),
+        ("rotordrop", __version__),
+    )
+
+
+def study_numbers_of(study: Study) -> dict[str, Any]:
+    """What makes the same drops again, ready for JSON."""
+    return {
+        "study": study.document(),
+        "machine": study.machine.name,
+        "digest": study.digest,
+        "rotordrop": __version__,
+        "fingerprint": fingerprint(),
+    }

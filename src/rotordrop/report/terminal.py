@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from io import StringIO
 from typing import IO, TYPE_CHECKING
 from unicodedata import category
 
-from rotordrop.report.content import Card, Cell, Column, Level, ReportContent, Statement, Table, table
-from rotordrop.report.quantity import THIN_SPACE, Quantity
+from rotordrop.report.content import (
+    Card,
+    Cell,
+    Column,
+    KeyFigure,
+    Level,
+    ReportContent,
+    Statement,
+    Table,
+    table,
+)
+from rotordrop.report.quantity import THIN_SPACE, Quantity, one_line
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -30,6 +42,14 @@ def print_summary(content: ReportContent, console: Console | None = None) -> Non
         console.print(part)
 
 
+def summary_text(content: ReportContent) -> str:
+    """The same as text, 100 columns wide."""
+    console = summary_console(out := StringIO())
+    console.width = 100
+    print_summary(content, console)
+    return out.getvalue()
+
+
 def summary_console(file: IO[str] | None = None) -> Console:
     """A console that obeys ``NO_COLOR`` and writes plain text when its output is not a terminal."""
     from rich.console import Console
@@ -41,10 +61,9 @@ def _parts(content: ReportContent) -> list[RenderableType]:
     from rich.text import Text
 
     parts: list[RenderableType] = [Text(_safe(content.title), style="bold")]
-    if content.subtitle:
-        parts.append(Text(_safe(content.subtitle), style="dim"))
-    if content.simulated:
-        parts.append(Text(_safe(content.simulated), style="yellow"))
+    if content.subtitle or content.simulated:
+        below = f"{content.subtitle}. " if content.subtitle and content.simulated else content.subtitle
+        parts.append(Text.assemble((_safe(below), "dim"), (_safe(content.simulated), "yellow")))
     first = [s for s in content.verdict[:1] if s.level != "bad"]
     first += [s for s in content.verdict if s.level == "bad"]
     parts.extend(_statement(statement) for statement in first)
@@ -61,11 +80,17 @@ def _cards(content: ReportContent) -> RenderableType:
     """Headline numbers, one column per bearing."""
 
     def of(card: Card) -> Column:
-        values: dict[str, Cell] = {figure.label: figure.value for figure in card.figures}
+        values = {figure.label: _told(figure) for figure in card.figures}
         return Column(card.title, lambda label: values.get(label, ""))
 
     labels = dict.fromkeys(figure.label for card in content.cards for figure in card.figures)
     return _table(table(labels, (Column("", str), *map(of, content.cards))))
+
+
+def _told(figure: KeyFigure) -> str:
+    """A number with its interval behind it, and with its time."""
+    known = one_line(figure.value)
+    return f"{known} {figure.note}" if re.match(r"at [\d.]+ m?s$", figure.note) else known
 
 
 def _statement(statement: Statement) -> RenderableType:
@@ -85,6 +110,7 @@ def _table(table: Table) -> RenderableType:
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
+        show_edge=False,
     )
     table = table.with_units_above()
     for index, column in enumerate(table.columns):

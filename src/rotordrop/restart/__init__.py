@@ -1,8 +1,6 @@
-"""Whether a machine may run again after a drop: likely damage, expected costs, and the check that pays."""
+"""What is known when a machine is to run again after a drop: evidence of damage, next drop, lift, checks."""
 
 from __future__ import annotations
 
-from rotordrop.restart.assumptions import Assumptions as Assumptions
-from rotordrop.restart.assumptions import load_assumptions as load_assumptions
 from rotordrop.restart.card import RestartCard as RestartCard
 from rotordrop.restart.card import restart_card as restart_card

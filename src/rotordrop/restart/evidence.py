@@ -1,10 +1,11 @@
-"""What the drops of a set of bearings may have damaged: odds of every kind by drop."""
+"""What changed since earlier drops of a set of bearings, as evidence for or against each kind of damage."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 
@@ -13,54 +14,35 @@ from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
-from rotordrop.restart.assumptions import BRINELLED, Assumptions, Damage, Effect
-from rotordrop.restart.order import EarlierDrop
-from rotordrop.units import format_amount, format_chance
+from rotordrop.restart.damages import AIR_GAP, DAMAGES, UNBALANCE, Damage, Effect
+from rotordrop.units import format_amount
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 """Gauss's rule for an expectation over a standard normal number."""
 
-
-ONLY_WIDER = "air_gap"
-"""What wear only makes larger."""
 IMPOSSIBLE = 3.0
 """Standard errors from which a change that cannot be is named, one in 740 sound ones; chosen."""
-INSPECTED = "inspection"
-"""Good where the machine was inspected as the answer "inspect first" means it and left sound, its balance
-included: no drop before that has left a damage."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Indicator:
-    """One thing that is known of one kind of damage at one bearing."""
+    """One change, and what it says of one kind of damage at one bearing."""
 
     kind: str
     bearing: str
     """Empty where it belongs to the rotor."""
     what: str
-    """In words."""
+    """The change in words."""
+    since: str
+    """Record of the drop since which it is."""
     ratios: tuple[float, ...]
-    """Likelihood with the damage over that without it, for damage done by each drop in their order, the
-    present one last; one up to the first estimate, which no change goes back beyond [1]."""
+    """Likelihood with the damage over that of a sound machine, for damage done by each drop in their order,
+    the present one last; one up to the first estimate, which no change goes back beyond [1]."""
     ratio: float
     """The same on average over the drops after the first estimate [1]."""
     smaller: float | None = None
     """Standard errors by which a gap became smaller, where that is beyond chance [1]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Suspicion:
-    """One kind of damage at one bearing."""
-
-    kind: str
-    bearing: str
-    prior: float
-    """Chance before the parameters of the estimate are looked at, its peak stress counted [1]."""
-    odds: tuple[float, ...]
-    """Of each drop to have done it, over that none did, in their order, the present one last [1]."""
-    probability: float
-    """Chance after that [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,42 +60,47 @@ class _Moved:
     """Change and its standard error: of the logarithm, or [m] of a number that is no factor."""
 
 
-def indicators(drop: Drop, earlier: Sequence[EarlierDrop], assumed: Assumptions) -> tuple[Indicator, ...]:
-    """What changed since the first of the earlier estimates, as evidence for or against each kind of damage.
+def indicators(
+    drop: Drop, earlier: Sequence[Drop], damages: Mapping[str, Damage] = DAMAGES
+) -> tuple[Indicator, ...]:
+    """What changed since the earlier estimates, in their order, by likelihood ratio for each kind of damage.
 
-    Without one nothing is known of a change. A change that the records do not determine says nothing, and
-    neither does an estimate that is not consistent with its record.
+    A change that the records do not determine says nothing, and neither does an estimate that is not
+    consistent with its record.
     """
     if not drop.consistent:
         return ()
-    estimates = {k: one.estimate for k, one in enumerate(earlier) if one.estimate is not None}
     moved = {
         k: (*_parameters(one, drop), *_unbalances(one, drop))
-        for k, one in estimates.items()
+        for k, one in enumerate(earlier)
         if one.consistent
     }
     found = []
-    for kind, damage, bearing in places(drop, assumed):
-        for path, effect in damage.moves.items():
-            seen = {
-                k: one for k, of in moved.items() for one in of if (one.place, one.path) == (bearing, path)
-            }
-            if not seen:
-                continue
-            ratios = _ratios(seen, len(earlier), effect)
-            smaller = _shrunk(seen, effect) if path == ONLY_WIDER else None
-            if smaller is not None:  # what cannot be says nothing, neither for nor against
-                ratios = np.ones_like(ratios)
-            found.append(
-                Indicator(
-                    kind=kind,
-                    bearing=bearing,
-                    what=f"{seen[min(seen)].what} since then",
-                    ratios=tuple(ratios.tolist()),
-                    ratio=float(ratios[min(seen) + 1 :].mean()),
-                    smaller=smaller,
-                )
+    places = [
+        (kind, bearing, path, effect)
+        for kind, damage in damages.items()
+        for bearing in (("",) if damage.of_machine else drop.bearings)
+        for path, effect in damage.moves.items()
+    ]
+    for kind, bearing, path, effect in places:
+        seen = {k: one for k, of in moved.items() for one in of if (one.place, one.path) == (bearing, path)}
+        if not seen:
+            continue
+        ratios = _ratios(seen, len(earlier), effect)
+        smaller = _shrunk(seen, effect) if path == AIR_GAP else None
+        if smaller is not None:  # what cannot be says nothing, neither for nor against
+            ratios = np.ones_like(ratios)
+        found.append(
+            Indicator(
+                kind=kind,
+                bearing=bearing,
+                what=seen[min(seen)].what,
+                since=earlier[min(seen)].record,
+                ratios=tuple(ratios.tolist()),
+                ratio=float(ratios[min(seen) + 1 :].mean()),
+                smaller=smaller,
             )
+        )
     return tuple(found)
 
 
@@ -121,13 +108,6 @@ def _shrunk(seen: Mapping[int, _Moved], effect: Effect) -> float | None:
     """Standard errors by which something became smaller since any estimate, where that is beyond chance."""
     below = [-one.change / math.hypot(one.error, math.sqrt(2.0) * effect.healthy) for one in seen.values()]
     return max(below) if max(below) > IMPOSSIBLE else None
-
-
-def places(drop: Drop, assumed: Assumptions) -> Iterator[tuple[str, Damage, str]]:
-    """Every kind of damage at every place where it may be."""
-    for kind, damage in assumed.damages.items():
-        for bearing in ("",) if damage.of_machine else drop.bearings:
-            yield kind, damage, bearing
 
 
 def _parameters(since: Drop, drop: Drop) -> Iterator[_Moved]:
@@ -156,7 +136,7 @@ def _unbalances(since: Drop, drop: Drop) -> Iterator[_Moved]:
             change = now[0] - was[0]
             what = f"unbalance at node {one.node} × {format_amount(math.exp(change))}"
             error = math.hypot(was[1], now[1])
-            yield _Moved(place="", path="unbalance", what=what, change=change, error=error)
+            yield _Moved(place="", path=UNBALANCE, what=what, change=change, error=error)
 
 
 def _logarithm(value: Value) -> tuple[float, float] | None:
@@ -165,17 +145,6 @@ def _logarithm(value: Value) -> tuple[float, float] | None:
     if ends is None or ends[0] <= 0.0:
         return None
     return math.log(value.value), math.log(ends[1] / ends[0]) / (2.0 * NINETY)
-
-
-def contradictions(found: Sequence[Indicator]) -> Iterator[str]:
-    """What no bearing can have done: a gap became smaller, beyond errors and the scatter of a sound one."""
-    for one in found:
-        if one.smaller is not None:
-            yield (
-                f"A contradiction: {one.what}, where a bearing only wears wider: {one.smaller:.1f} standard "
-                "errors below no change. One of the two estimates is wrong, a sensor moved, or the bearings "
-                "are not the same set; this gap is no evidence against wear."
-            )
 
 
 def _ratios(seen: Mapping[int, _Moved], earlier: int, effect: Effect) -> Array:
@@ -207,75 +176,34 @@ def _ratios(seen: Mapping[int, _Moved], earlier: int, effect: Effect) -> Array:
     return np.array(found)
 
 
-def suspicions(
-    drop: Drop,
-    found: Sequence[Indicator],
-    earlier: Sequence[EarlierDrop],
-    assumed: Assumptions,
-    *,
-    inspected: bool = False,
-) -> tuple[Suspicion, ...]:
-    """Odds of every kind of damage at every bearing by drop: prior, peak stresses and what changed.
+def in_order(drop: Drop, since: Sequence[Drop]) -> list[Drop]:
+    """Earlier estimates by the dates of their records, or as they are given where one has no date.
 
-    ``inspected`` says that the machine was inspected after the present drop and left sound.
-    Source: Bayes' rule over which drop did the damage; indicators of one kind at one place count as
-    independent.
+    Raises
+    ------
+    UsageError
+        If one is later than the present drop, or of the same recording.
     """
-    cleared = [*(one.checks.get(INSPECTED) == "good" for one in earlier), inspected]
-    last = max((k for k, yes in enumerate(cleared) if yes), default=-1)
-    made = []
-    for kind, damage, bearing in places(drop, assumed):
-        kept = np.full(len(cleared), 1.0 - damage.prior)
-        if kind == BRINELLED:
-            now = {bearing: drop.bearings[bearing].numbers["peak_stress_Pa"]}
-            stresses = [*(one.stresses for one in earlier), now]
-            kept *= [1.0 - _dented(one[bearing], assumed) if bearing in one else 1.0 for one in stresses]
-        kept[: last + 1] = 1.0
-        left = np.cumprod(kept)
-        likelihood = np.ones(len(kept))
-        for one in found:
-            if (one.kind, one.bearing) == (kind, bearing):
-                likelihood = likelihood * one.ratios
-        odds = -np.diff(left, prepend=1.0) / left[-1] * likelihood
-        made.append(
-            Suspicion(
-                kind=kind,
-                bearing=bearing,
-                prior=float(1.0 - left[-1]),
-                odds=tuple(odds.tolist()),
-                probability=float(odds.sum() / (1.0 + odds.sum())),
+    now = _day(drop.recorded)
+    for one in since:
+        if one.record_sha256 and one.record_sha256 == drop.record_sha256:
+            raise UsageError(
+                f"{one.record} and {drop.record} are of one recording; name the estimate of an earlier drop"
             )
-        )
-    return tuple(made)
+        if now is not None and (day := _day(one.recorded)) is not None and day > now:
+            raise UsageError(
+                f"{one.record} is of {one.recorded}, later than {drop.record} of {drop.recorded}; "
+                "name estimates of earlier drops"
+            )
+    days = {id(one): _day(one.recorded) for one in since}
+    if None in days.values():
+        return list(since)
+    return sorted(since, key=lambda one: days[id(one)] or datetime.min)
 
 
-def _dented(stress: Value, assumed: Assumptions) -> float:
-    """Chance that the peak stress dented a race so that it matters [1].
-
-    Normal in the logarithm of the stress, whose own interval counts.
-    """
-    low, high = stress.interval or (stress.value, stress.value)
-    error = math.log(high / low) / (2.0 * NINETY) if low > 0.0 else math.inf
-    middle = stress.value if stress.interval is None else math.sqrt(low * high)
-    spread = math.hypot(error, assumed.brinelling_spread)
-    score = math.log(middle / assumed.brinelling_stress) / spread
-    return min(0.5 * math.erfc(-score / math.sqrt(2.0)), 1.0 - 1e-9)
-
-
-def require_check(name: str, outcome: str, assumed: Assumptions) -> None:
-    """Refuse a check that nobody knows, or an outcome that is neither good nor bad."""
-    if name == INSPECTED and outcome == "bad":
-        raise UsageError(
-            "check inspection = 'bad'; state inspection=good once what was found is mended, and count the "
-            "drops of exchanged bearings under a name of their own (log add --bearings)"
-        )
-    if name not in (*assumed.checks, INSPECTED):
-        raise UsageError(f"there is no check {name!r}; there are {', '.join((*assumed.checks, INSPECTED))}")
-    if outcome not in ("good", "bad"):
-        raise UsageError(f"check {name} = {outcome!r}; expected good or bad")
-
-
-def in_words(one: Suspicion, assumed: Assumptions) -> str:
-    """A suspicion as it stands in a sentence."""
-    where = f" at {one.bearing}" if one.bearing else ""
-    return f"{assumed.damages[one.kind].label}{where} ({format_chance(one.probability)})"
+def _day(text: str) -> datetime | None:
+    """A moment by the clock of the place, to compare; zones differ by less than two drops do."""
+    try:
+        return datetime.fromisoformat(text).replace(tzinfo=None)
+    except ValueError:
+        return None

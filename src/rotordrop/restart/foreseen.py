@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rotordrop.known import Known
-from rotordrop.severity.numbers import NUMBERS
-from rotordrop.units import format_quantity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,11 +19,6 @@ class NextDrop:
     """Half and 95 % of the drops stay below, by bearing [N, Pa]."""
     beyond_limit: Known | None = None
     """Share of the drops that pass a limit at any bearing [1]; None where no limit was given."""
-
-    @property
-    def beyond(self) -> float:
-        """Chance that a limit is passed [1]; zero where none was given."""
-        return 0.0 if self.beyond_limit is None else self.beyond_limit.value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,12 +69,3 @@ class Foreseen:
     """Limits that were given [SI], by the field of an estimate document."""
     of_estimate: bool = False
     """Whether the machine is the one that the estimate found, with its intervals; else that of its file."""
-
-    @property
-    def limits_in_words(self) -> str:
-        """The limits by name, value and unit, "peak Hertz stress of 2500 MPa"."""
-        return " or ".join(
-            f"{one.label} of {format_quantity(self.limits[one.field], one.kind, 4)}"
-            for one in NUMBERS
-            if one.field in self.limits
-        )

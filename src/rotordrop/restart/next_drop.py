@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -13,6 +13,7 @@ from rotordrop.estimate.published import Drop, Parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
+from rotordrop.progress import Progress
 from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop, SpeedLimit
 from rotordrop.rotor.magnet_loop import carrying_currents
 from rotordrop.rotor.parameters import build_drop_model
@@ -34,6 +35,8 @@ say what they tell."""
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 """Speeds at which drops are simulated where a speed limit is sought, over the full one [1]; chosen, not
 measured."""
+MOST_BEYOND = 0.05
+"""Chance that the next drop passes a limit, to which a speed limit brings it down [1]; chosen."""
 DRAWN_AGAIN = 400
 """Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
 
@@ -93,13 +96,13 @@ def next_drops(
     speed: float,
     limits: Mapping[str, float],
     *,
-    chance: float,
+    chance: float = MOST_BEYOND,
     drop: Drop | None = None,
     shares: Sequence[float] | None = None,
     drops: int = DROPS,
     duration: float = 0.2,
     seed: int = 1,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Foreseen:
     """Simulate the drops that could happen next, at a speed [rad/s] and at shares of it.
 
@@ -115,7 +118,7 @@ def next_drops(
         count = drops if k == 0 else max(drops // 2, 2)
         study = repeat_study(at, share * speed, duration=duration, drops=count, seed=seed)
         with TemporaryDirectory() as folder:
-            results = run_study(study, Path(folder) / "drops")
+            results = run_study(study, Path(folder) / "drops", progress=False)
         beyond = [
             results.column(f"{name}.{COMPARED[field]}") / limit
             for field, limit in limits.items()
@@ -167,7 +170,7 @@ def lift_now(
         shard=20,
     )
     with TemporaryDirectory() as folder:
-        results = run_study(study, Path(folder) / "lifts")
+        results = run_study(study, Path(folder) / "lifts", progress=False)
     took = results.column("lift_time")
     took = took[np.isfinite(took)]
     return LiftNow(

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
-from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
+from rotordrop.one_thread import one_thread
+from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
-from rotordrop.rotor.suspension import Support, spring, suspension_of
+from rotordrop.rotor.suspension import Support, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
 
 REDUCTION = Reduction(modes=16, attachment=True)
@@ -64,6 +65,7 @@ class CampbellDiagram:
         return direction_name(float(np.nanmean(self.whirl[:, line])))
 
 
+@one_thread()
 def campbell_diagram(
     machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
 ) -> CampbellDiagram:
@@ -166,7 +168,6 @@ LEAST_FACTOR = 2.5
 """Amplification factor below which a mode counts as critically damped and needs no margin [1]."""
 MOST_MARGIN = 0.16
 """Most that API 617 asks for below the operating range, reached at an amplification factor of 18.5 [1]."""
-HALF_POWER = 0.5 * math.sqrt(2.0)
 
 
 def amplification_factor(damping_ratio: float) -> float:
@@ -179,9 +180,9 @@ def required_margin(factor: float, *, above: bool) -> float:
 
     ``above``: the critical speed lies above the operating range, else below it.
     Source: API 617 (8th edition, part 1), ``17 (1 − 1/(AF − 1.5))`` % and at most 16 % below, 10 % more
-    above; none up to an amplification factor of 2.5, nor where it is not known (NaN).
+    above; none up to an amplification factor of 2.5.
     """
-    if not factor >= LEAST_FACTOR:
+    if factor < LEAST_FACTOR:
         return 0.0
     share = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MOST_MARGIN)
     return share + 0.10 if above else share
@@ -189,14 +190,14 @@ def required_margin(factor: float, *, above: bool) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Separation:
-    """A critical speed, of a mode or of a response, set against a range of operating speeds."""
+    """A critical speed set against a range of operating speeds."""
 
     factor: float
-    """Amplification factor [1]; NaN where a response does not come down to half power."""
+    """Amplification factor [1]."""
     margin: float
     """Distance from the nearer end of the range, as a share of that speed [1]; zero within the range."""
     required: float
-    """Margin that API 617 asks for [1]; zero where the factor is not known."""
+    """Margin that API 617 asks for [1]."""
 
     @classmethod
     def of(cls, speed: float, factor: float, lowest: float, highest: float) -> Separation:
@@ -214,15 +215,11 @@ class Separation:
     @property
     def asked(self) -> str:
         """The margin required, in words."""
-        if math.isnan(self.factor):
-            return "–"
         return "none" if self.factor < LEAST_FACTOR else f"{100.0 * self.required:.1f} %"
 
     @property
     def verdict(self) -> str:
         """What follows, in words."""
-        if math.isnan(self.factor):
-            return "factor not known"
         if self.factor < LEAST_FACTOR:
             return "critically damped"
         return "met" if self.met else "not met"
@@ -240,127 +237,3 @@ def separations(diagram: CampbellDiagram, lowest: float, highest: float) -> dict
         for one in diagram.crossings
         if one.direction != "backward"
     }
-
-
-@dataclass(frozen=True, kw_only=True)
-class ResponsePeak:
-    """A peak of an unbalance response: speed [rad/s], amplitude [m], amplification factor [1]."""
-
-    speed: float
-    amplitude: float
-    factor: float
-
-
-def response_peaks(speed: Array, amplitude: Array) -> tuple[ResponsePeak, ...]:
-    """Peaks of an amplitude [m], shape (S,), over the speed [rad/s], with ``N_c / (N_2 − N_1)``.
-
-    N_1 and N_2 are the speeds at which the amplitude is 0.707 of the peak; where one of them is not reached,
-    twice the other half width counts, and NaN stands where neither is. Source: API 617, figure of the
-    amplification factor.
-    """
-    inner = (amplitude[1:-1] > amplitude[:-2]) & (amplitude[1:-1] >= amplitude[2:])
-    return tuple(_peak(speed, amplitude, int(k) + 1) for k in np.flatnonzero(inner))
-
-
-def _peak(speed: Array, amplitude: Array, k: int) -> ResponsePeak:
-    """A peak between samples, on the parabola through the highest and its neighbours."""
-    bend, slope = np.polyfit(speed[k - 1 : k + 2] - speed[k], amplitude[k - 1 : k + 2] - amplitude[k], 2)[:2]
-    top = float(speed[k] - 0.5 * slope / bend)
-    highest = float(amplitude[k] - 0.25 * slope**2 / bend)
-    level = HALF_POWER * highest
-    below, above = np.flatnonzero(amplitude[:k] <= level), np.flatnonzero(amplitude[k:] <= level)
-    halves = []
-    if len(below):
-        halves.append(top - _between(speed, amplitude, int(below[-1]), level))
-    if len(above):
-        halves.append(_between(speed, amplitude, k + int(above[0]) - 1, level) - top)
-    width = 2.0 * float(np.mean(halves)) if halves else math.nan
-    return ResponsePeak(
-        speed=top,
-        amplitude=highest,
-        factor=top / width if halves else width,
-    )
-
-
-def _between(speed: Array, amplitude: Array, k: int, level: float) -> float:
-    """Speed between samples k and k + 1 at which the amplitude crosses a level."""
-    share = (level - amplitude[k]) / (amplitude[k + 1] - amplitude[k])
-    return float(speed[k] + share * (speed[k + 1] - speed[k]))
-
-
-MODES = 8
-"""Lowest modes that are looked at (chosen)."""
-LEAST, MOST = 1e2, 1e11
-"""Cross-coupled stiffness [N/m] from which, and up to which, the limit is sought."""
-POINTS, BEYOND = 26, 1.25
-"""Points of the map, and how far it goes beyond the limit."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class StabilityMap:
-    """Least logarithmic decrement of a rotor at one speed against cross-coupled stiffness."""
-
-    suspension: str
-    """What holds the rotor."""
-    speed: float
-    """Speed of the rotor [rad/s]."""
-    node: int
-    """Node where the coupling acts, counted from 1."""
-    coupling: Array
-    """Cross-coupled stiffness q [N/m]: the force is −q y horizontally, q x vertically, shape (Q,)."""
-    decrement: Array
-    """Least logarithmic decrement of the lowest modes [1]; negative where the rotor whirls by itself, shape
-    (Q,)."""
-    limit: float
-    """Coupling at which it is zero [N/m]; infinite where none is found."""
-
-
-def stability_map(machine: Machine, suspension: str = "AMBs") -> StabilityMap:
-    """Stability map of a machine at its nominal speed, coupled at the node in the middle of its bearings.
-
-    So API 617, part 1, screens a rotor (level I): what seals and impellers do to it stands as one
-    cross-coupled stiffness in mid-span. What they do is not known here, so only the limit is given.
-    """
-    supports = suspension_of(machine, suspension)
-    z, planes = machine.rotor.node_positions, machine.touchdown_bearings
-    middle = 0.5 * (z[planes[0].node - 1] + z[planes[-1].node - 1])
-    node = int(np.argmin(np.abs(np.array(z) - middle))) + 1
-    basis = reduce_rotor(build_rotor_fe(machine), REDUCTION, [*(s.node for s in supports), node])
-    return stability_of(basis, float(machine.speed.nominal), supports, node, suspension)
-
-
-def stability_of(
-    rotor: RotorFE | RotorBasis,
-    speed: float,
-    supports: Sequence[Support],
-    node: int,
-    suspension: str = "given supports",
-) -> StabilityMap:
-    """Stability map of a rotor on any supports at a speed [rad/s]; the coupling acts at a node."""
-
-    def least(coupling: float) -> float:
-        cross = spring(node, np.array([[0.0, coupling], [-coupling, 0.0]]))
-        ratio = whirl_modes(rotor, speed, [*supports, cross], MODES).damping_ratio
-        lowest = float(np.min(ratio))
-        return 2.0 * math.pi * lowest / math.sqrt(max(1.0 - lowest * lowest, 1e-300))
-
-    low, high = 0.0, LEAST
-    while least(high) > 0.0 and high < MOST:
-        low, high = high, 4.0 * high
-    if high >= MOST:
-        coupling = np.concatenate([[0.0], np.geomspace(LEAST, MOST, POINTS - 1)])
-        limit = math.inf
-    else:
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if least(middle) > 0.0 else (low, middle)
-        limit = 0.5 * (low + high)
-        coupling = np.linspace(0.0, BEYOND * limit, POINTS)
-    return StabilityMap(
-        suspension=suspension,
-        speed=speed,
-        node=node,
-        coupling=coupling,
-        decrement=np.array([least(float(q)) for q in coupling]),
-        limit=limit,
-    )

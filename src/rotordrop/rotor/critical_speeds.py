@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
+from rotordrop.one_thread import one_thread
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.reduction import RotorBasis
 from rotordrop.rotor.suspension import (
@@ -61,6 +62,7 @@ class CriticalSpeedMap:
         return any(part.branches for part in self.lines)
 
 
+@one_thread()
 def critical_speed_map(
     machine: Machine,
     stiffness: ArrayLike | None = None,

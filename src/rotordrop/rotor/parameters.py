@@ -22,6 +22,7 @@ from rotordrop.physics.contact import depth_at
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.load import load_now
+from rotordrop.require import require
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
@@ -108,7 +109,7 @@ def build_drop_model(
     UsageError
         With ``loops``, where a magnet has no coils or no controller.
     """
-    fe = build_rotor_fe(machine)
+    fe = build_rotor_fe(require(machine, "machine", Machine))
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
     if loops:  # what a few modes leave out of the planes of the loop would shift its fast modes
         nodes += tuple(node for amb in machine.looped_ambs for node in (amb.node, machine.measured_node(amb)))

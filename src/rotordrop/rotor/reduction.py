@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -144,6 +144,8 @@ def reduce_rotor(
     The shapes have ``shapesᵀ M shapes = 1`` and ``shapesᵀ K shapes = diag(eigenvalues)``.
     """
     choice = reduction_of(reduction)
+    if choice.modes is not None:  # a rotor of few nodes has fewer
+        choice = replace(choice, modes=min(choice.modes, fe.size))
     nodes = tuple(dict.fromkeys(attachment_nodes)) if choice.attachment else ()
     if choice.modes is None or not nodes:
         modes = free_free_modes(fe, choice.modes)
@@ -154,7 +156,7 @@ def reduce_rotor(
             f"{choice.modes} modes per plane are too few: the {N_RIGID} rigid modes are always needed"
         )
     everything = free_free_modes(fe)
-    kept = min(choice.modes, fe.size)
+    kept = choice.modes
     inner, eigenvalues, damping = attachment_coordinates(fe, everything, kept, nodes)
     extra = with_positive_peak(product(everything.shapes[:, kept:], inner))
     signs = np.sign(np.sum(extra * product(fe.mass, product(everything.shapes[:, kept:], inner)), axis=0))

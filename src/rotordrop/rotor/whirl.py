@@ -135,46 +135,6 @@ def _steady(system: PlanarMatrices, force: ComplexArray, omega: float) -> Comple
     return np.asarray(np.linalg.solve(dynamic, omega**2 * force))
 
 
-def unbalance_run_up(
-    rotor: RotorFE | RotorBasis,
-    speeds: Array,
-    duration: float,
-    unbalances: Mapping[int, complex],
-    supports: Sequence[Support] = (),
-) -> ComplexArray:
-    """Synchronous motion (x, y) at the nodes [m], ``Re(value · e^(jθ))``, in a run-up, shape (S, N, 2).
-
-    The speed rises evenly through speeds [rad/s] of equal distance, (S,), in a time [s], from the steady
-    motion at the first. The amplitude ``Q`` of ``q = Re(Q e^(jθ))`` obeys ``M (Q̈ + 2jω Q̇) + (C + ω G) Q̇ +
-    (K - ω² M + jα M + jω (C + ω G) + α G) Q = (ω² - jα) f``; a step takes its
-    coefficients as constant, so that steps must be short against beat and decay.
-    Not validated: an acceleration that changes.
-    """
-    from scipy.linalg import expm
-
-    system = matrices_of(rotor, supports)
-    force = _turning_force(rotor, system, unbalances)
-    size, dt = len(force), duration / (len(speeds) - 1)
-    rise = float(speeds[-1] - speeds[0]) / duration
-    inverse = np.linalg.inv(system.mass)
-    state = np.zeros(2 * size + 1, dtype=np.complex128)
-    state[:size], state[-1] = _steady(system, force, float(speeds[0])), 1.0
-    path = [state[:size].copy()]
-    A = np.zeros((len(state), len(state)), dtype=np.complex128)
-    A[:size, size:-1] = np.eye(size)
-    for omega in 0.5 * (speeds[:-1] + speeds[1:]):
-        coupling = system.damping + omega * system.gyroscopic
-        # what relaxes is taken at the speed of the step, as if that stayed
-        stiffness = system.stiffness_at(1j * omega) if system.relaxing else system.stiffness
-        held = stiffness + rise * system.gyroscopic + (1j * rise - omega**2) * system.mass
-        A[size:-1, :size] = -inverse @ (held + 1j * omega * coupling)
-        A[size:-1, size:-1] = -inverse @ coupling - 2j * omega * np.eye(size)
-        A[size:-1, -1] = (omega**2 - 1j * rise) * (inverse @ force)
-        state = expm(A * dt) @ state
-        path.append(state[:size].copy())
-    return _at_nodes(rotor, system, np.array(path).T)
-
-
 def _eigenpairs(system: PlanarMatrices, speed: float) -> tuple[ComplexArray, ComplexArray]:
     n = len(system.mass)
     try:

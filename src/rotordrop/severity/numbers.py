@@ -40,9 +40,7 @@ SEVERITY = (
     Number("severity.skid_energy_J", "energy lost in the contact", "energy"),
     Number("severity.position_index", "position index (mean distance over gap)", _PURE),
     Number("severity.velocity_index", "velocity index (velocity over speed times gap)", _PURE),
-    Number("severity.fatigue_by_segments", "share of rating life, segments", _PURE, places=_PLACES),
     Number("severity.fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE, places=_PLACES),
-    Number("severity.fatigue_by_rainflow", "share of rating life, rainflow", _PURE, places=_PLACES),
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""
 
@@ -51,9 +49,8 @@ NUMBERS = (*LOADS, *SEVERITY)
 
 NOTE = (
     "Static safety (ISO 76): by the peak stress, which counts the preload, against 4 200 MPa; by C0 over the "
-    "peak force. Shares of the basic rating life (at one a tenth of new bearings fails): finite segments of "
-    "the raceways (after Menck 2023), ISO/TS 16281 at every instant, rainflow of the most loaded ball; the "
-    "first two as if the race turned with the rotor from the first impact on, as upper ends. "
-    "Below 0.001 % it takes more than a hundred thousand such drops for one life. None is a limit."
+    "peak force. Share of the basic rating life (at one a tenth of new bearings fails): ISO/TS 16281 at "
+    "every instant, as if the race turned with the rotor from the first impact on, as an upper end. None is "
+    "a limit."
 )
 """What stands beneath a table of these numbers."""

@@ -126,7 +126,7 @@ def _statement(
 ) -> str:
     first, drop = names[0], float(worst[0])
     if drop >= CLEAR:
-        text = f"the drop {first} was the worst of those recorded ({format_chance(drop)})"
+        text = f"{first} was the worst of those recorded ({format_chance(drop)})"
     else:
         text = f"{first} shows the worst value; that it was the worst drop has a probability of "
         text += format_chance(drop)
@@ -135,7 +135,7 @@ def _statement(
             f"; it was worse than {names[1]} with {format_chance(float(worse_probability(value, error)[0]))}"
         )
     if condition is None:
-        return f"{text}; the scatter between equal drops is unknown, so nothing follows for its conditions"
+        return text
     sure = float(condition[0])
     verdict = "are the worst" if sure >= CLEAR else "cannot be called the worst"
     return f"{text}; with the scatter between equal drops its conditions {verdict} ({format_chance(sure)})"

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.physics import ball_table, departure, face, magnet, mount, ring, support, touch
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics._compile import OPTIONAL_PARTS, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
+from rotordrop.physics.elementary import magnitude
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate._loop import borne, contact_at
 from rotordrop.simulate._rhs import (
     Scratch,
@@ -69,6 +72,27 @@ def bearing_histories(times: Array, states: Array, p: KernelParameters, out: Arr
             fill_history(times[i], b, states[i], p, work, out[i, b])
 
 
+def named(model: DropModel, states: Array, histories: Array) -> dict[str, Any]:
+    """What both a drop and a coast-down keep of states (T, n) and histories (T, B, 12), by its name there."""
+    layout = model.layout
+    return {
+        "displacement": node_displacements(states, model.parameters.bearing_shape),
+        "race_displacement": layout.bore(states),
+        "indentation": histories[..., H_DELTA],
+        "contact_force": histories[..., H_CONTACT_FORCE],
+        "bearing_force": histories[..., H_BEARING_FORCE_X : H_BEARING_FORCE_Y + 1],
+        "max_stress": histories[..., H_STRESS],
+        "speed": states[:, layout.rotor_speed],
+        "race_speed": states[:, layout.race_spin],
+    }
+
+
+def peak_values(histories: Array) -> Array:
+    """Indentation [m], ball force [N] and Hertz stress [Pa] of histories (T, B, 12), shape (T, B, 3)."""
+    force = magnitude(histories[..., H_BEARING_FORCE_X], histories[..., H_BEARING_FORCE_Y])
+    return np.stack([histories[..., H_DELTA], force, histories[..., H_STRESS]], axis=-1)
+
+
 @kernel
 def face_forces(states: Array, p: KernelParameters) -> Array:
     """Axial force of the rotor on the face of every race [N], shape (T, B), from states (T, n)."""
@@ -101,7 +125,7 @@ def support_form_energy(b: int, y: Array, p: KernelParameters) -> float:
     x, z, _vx, _vz = support_deflection(b, y, p)
     energy: float = support.support_energy(form, k_x, k_y, x, z)
     energy -= 0.5 * (k_x * y[h] ** 2 + k_y * y[h + 1] ** 2)
-    if row[L.MOUNT] != 0.0:
+    if OPTIONAL_PARTS and row[L.MOUNT] != 0.0:
         first, last = mount_states(b, p)
         energy += mount.mount_energy(row[L.MOUNT : L.MOUNT_END], x, z, y[first:last])
     if own >= 0 and form[support.FOUNDATION_SHARE] > 0.0:
@@ -118,27 +142,35 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     row = p.bearing[b]
     balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
     dx, dy = race_deflection(b, y, p)
-    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
         spin = y[p.bearing_at[b, L.RACE_SPIN]]
         return departure.table_energy(p.departure[b], math.sqrt(dx * dx + dy * dy), spin)
-    if pushed_along(b, p):
+    if OPTIONAL_PARTS and pushed_along(b, p):
         s, own = departing(b, y, p)
         pressed: float = departure.ring_of_balls(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])[2]
         return pressed + departure.axial_energy(s, own, p.spin[L.ROTOR_MASS], row[L.RACE_MASS])
-    if row[L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
         grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
     axial = p.bearing_at[b, L.FACE_STATES]
-    if axial >= 0:
+    if OPTIONAL_PARTS and axial >= 0:
         loaded, relieved = rows_of(b, p)
         return ball_set_energy(balls, loaded, dx, dy, -y[axial]) + ball_set_energy(
             balls, relieved, dx, dy, y[axial]
         )
     energy: float = ball_set_energy(balls, p.balls[b], dx, dy, way)
-    if p.bearing_at[b, L.RING_STATES] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.RING_STATES] >= 0:
         speed = y[p.bearing_at[b, L.RING_STATES] + 1]
         energy += ring.ring_energy(row[L.RING : L.RING_END], balls, way, speed)
     return energy
+
+
+@lean_kernel
+def touch_energy(b: int, law: Array, delta: float, p: KernelParameters) -> float:
+    """Energy [J] in a contact of one bearing."""
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
+        return departure.energy_in_contact(p.departure[b], law, delta)
+    return contact_energy(law, delta)
 
 
 @lean_kernel
@@ -209,10 +241,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
             delta = depth_now(t, c, b, y, p)
             law = row[L.CONTACT : L.CONTACT_END]
-            if delta > 0.0 and p.bearing_at[b, L.DEPARTURE] >= 0:
-                energy += departure.energy_in_contact(p.departure[b], law, delta)
-            elif delta > 0.0:
-                energy += contact_energy(law, delta)
+            energy += touch_energy(b, law, delta, p) if delta > 0.0 else 0.0
         if r >= 0:
             energy += ball_energy(b, y, p)
             energy += row[L.RACE_WEIGHT] * y[r + 1]
@@ -220,7 +249,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         energy += (
             0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
         )
-        if p.bearing_at[b, L.DEPARTURE] >= 0:
+        if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
             s, own = departing(b, y, p)
             springs = row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1]
             energy += departure.stored_energy(s, own, springs, y[h], y[h + 1])
@@ -232,7 +261,8 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2
-    energy += rub_energy(y, p) + axial_energy(y, p) + coil_energy(y, p)
+    if OPTIONAL_PARTS:
+        energy += rub_energy(y, p) + axial_energy(y, p) + coil_energy(y, p)
     if with_rotor_spin:
         energy += 0.5 * p.spin[L.POLAR_INERTIA] * y[p.rotor_at[L.ROTOR_SPEED]] ** 2
     return energy

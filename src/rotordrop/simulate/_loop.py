@@ -1,15 +1,12 @@
 """The compiled time loop: one explicit adaptive Runge–Kutta integration of a window of time.
 
-A drop is one window, a coast-down many. Everything the loop carries from one window to the next stands in the
-arrays it is given (state, progress, running contacts, open log entries), so a run that is stopped between two
-windows and taken up again takes the very same steps.
+Everything the loop carries from one window to the next stands in the arrays it is given: state, progress,
+running contacts, open log entries.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +15,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.physics import ball_set, ball_table, departure, mount
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics._compile import OPTIONAL_PARTS, by_reference, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import atan2, cube_root, exp, ln, power
@@ -42,11 +39,6 @@ from rotordrop.simulate._rhs import (
     support_deflection,
 )
 from rotordrop.simulate._tableau import Tableau
-
-Window = tuple[float, KernelParameters]
-"""End of a window of time [s] and its parameters."""
-Stretches = Callable[[float, float, KernelParameters, Array, Array], Iterable[Window]]
-"""Windows from a time to an end [s] with parameters, given the state and the books that the loop moves on."""
 
 # Outcome of the loop.
 FINISHED = 0
@@ -101,6 +93,7 @@ ALPHA = 0.2 - 0.75 * BETA
 LOG_SMALLEST_ERROR = -9.210340371976182  # ln 1e-4, written out: a library may round it otherwise
 
 
+@by_reference
 class Control(NamedTuple):
     """How a window is stepped through; ``scale`` (s,) is the size of each state that error control looks at.
 
@@ -249,7 +242,7 @@ def watched(
 
     Those of rotor and races come first.
     """
-    if c < p.contact_at.shape[0]:
+    if not OPTIONAL_PARTS or c < p.contact_at.shape[0]:
         return contact_values(t, c, p.contact_at[c, L.CONTACT_BEARING], y, p)
     return further_values(c - p.contact_at.shape[0], y, p)
 
@@ -286,7 +279,9 @@ def crossing_fraction(
     for _ in range(30):
         middle = 0.5 * (low + high)
         dense_output(middle, h, y, k, tab, scratch)
-        if c < p.contact_at.shape[0]:  # its motion alone: the forces of thirty halvings cost a step
+        if (
+            not OPTIONAL_PARTS or c < p.contact_at.shape[0]
+        ):  # its motion alone: the forces of thirty halvings cost a step
             inside = depth_now(t + middle * h, c, b, scratch, p) > 0.0
         else:
             inside = further_values(c - p.contact_at.shape[0], scratch, p)[0] > 0.0
@@ -402,11 +397,11 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     """
     dx, dy = race_deflection(b, y, p)
     spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
-    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
         way = math.sqrt(dx * dx + dy * dy)
         load = max(departure.from_table(p.departure[b], departure.TABLE_LOAD, way, spin), 0.0)
         return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
-    if pushed_along(b, p):
+    if OPTIONAL_PARTS and pushed_along(b, p):
         s, own = departing(b, y, p)
         load = departure.hardest_ball(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])
         return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
@@ -419,11 +414,11 @@ def deflected_loads(
 ) -> tuple[float, float, float]:
     """`race_loads` of a deflected race; arguments as of `deflected_force`."""
     numbers, grid = p.bearing[b][L.ROLLING : L.ROLLING_END], p.bearing[b, L.FAST : L.FAST_END]
-    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
         inner, outer = ball_table.fast_loads(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
         stress = numbers[ball_set.STRESS_COEFFICIENT] * cube_root(inner)
         return max(inner, outer), stress, grid[ball_table.OUTER_STRESS] * cube_root(outer)
-    if p.bearing_at[b, L.FACE_STATES] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.FACE_STATES] >= 0:
         loaded, relieved = rows_of(b, p)
         load, stress = ball_set_load(numbers, loaded, dx, dy, -along)
         other, beside = ball_set_load(numbers, relieved, dx, dy, along)
@@ -451,7 +446,7 @@ def borne(
     """What one bearing bears: force on its race, x and y, and largest load of a ball [N], stress on inner and
     outer race [Pa] as of `race_loads`.
     """
-    if p.bearing_at[b, L.RACE] < 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.RACE] < 0:
         x, z, stress = borne_by_contacts(t, b, y, p)
         return x, z, 0.0, stress, 0.0
     F_x, F_y, _exchanged = ball_force(b, y, p, work)
@@ -563,7 +558,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         step = min(h, t_end - t, landing)
         runge_kutta_stages(t, step, y, p, tab, k, y_new, work, powers)
         error = scaled_error(step, y, y_new, k, tab.e, watched, control.tolerance, scratch)
-        if n > apart:
+        if OPTIONAL_PARTS and n > apart:
             scale = control.scale[apart:]
             by_others = scaled_error(
                 step, y[apart:], y_new[apart:], k[:, apart:], tab.e, scale, control.tolerance, scratch
@@ -620,68 +615,4 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     progress[PREVIOUS_ERROR] = previous
     progress[SAMPLES] = done
     progress[LOGGED] = n_log
-    return outcome
-
-
-def integrate_drop(
-    y0: Array,
-    times: Array,
-    p: KernelParameters,
-    tab: Tableau,
-    scale: Array,
-    tolerance: float,
-    first_step: float,
-    largest_step: float,
-    most_steps: int,
-    states: Array,
-    log: Array,
-    counters: Array,
-    books: Array | None = None,
-    change: tuple[float, KernelParameters] | None = None,
-    stretches: Stretches | None = None,
-    stepped: Callable[..., int] = integrate,
-) -> int:
-    """Integrate a drop; returns ``FINISHED`` or why it ended early.
-
-    A drop is one window, or two where a ``change`` says when [s] its parameters become others; ``stretches``
-    divide each once more, for parameters that follow what the loop lost. Each is ``stepped`` through by
-    `integrate`, or by what takes its place.
-
-    ``states`` (T, n) are filled on the grid ``times`` (T,) from the start state ``y0`` (n,), NaN behind an
-    early end; ``log`` (R, 9) with the contacts, ``counters`` (5,) with accepted steps, rejected steps, last
-    step [s], contacts and time reached [s], ``books`` (B + 1, 5) with the energy lost by place [J].
-    """
-    p = p._replace(memory=p.memory.copy())
-    y = np.array(y0, dtype=np.float64)
-    running = np.zeros((number_watched(p), N_RUN_COLUMNS))
-    log[:] = 0.0
-    progress = np.zeros(N_PROGRESS)
-    progress[[TIME, STEP]] = times[0], min(first_step, largest_step)
-    progress[LOGGED] = start_running(y, times[0], p, running, log)
-    states[0] = y
-    books = np.zeros((p.bearing.shape[0] + 1, N_PLACES)) if books is None else books
-    peaks = np.zeros((0, N_PEAKS))
-    windows = [(float(times[-1]), p)]
-    if change is not None and change[0] < times[-1]:
-        before = [(change[0], p)] if change[0] > times[0] else []
-        windows = [*before, (float(times[-1]), change[1]._replace(memory=p.memory))]
-    pieces: Iterable[Window] = windows
-    if stretches is not None:
-        starts = (float(times[0]), *(end for end, _ in windows))
-        divided = (stretches(t, *one, y, books) for t, one in zip(starts, windows, strict=False))
-        pieces = chain.from_iterable(divided)
-    done, outcome = 1, FINISHED
-    for end, parameters in pieces:
-        control = Control(
-            scale, float(tolerance), float(largest_step), most_steps, -1.0, float(end), 0.0, True
-        )
-        grid = times[done : int(np.searchsorted(times, end, side="right"))]
-        outcome = stepped(
-            y, grid, parameters, tab, control, states[done:], log, running, books, peaks, progress
-        )
-        done += int(progress[SAMPLES])
-        if outcome != FINISHED:
-            break
-    states[done:] = np.nan
-    counters[:] = progress[[ACCEPTED, REJECTED, STEP, LOGGED, TIME]]
     return outcome

@@ -25,7 +25,7 @@ from rotordrop.physics import (
     touch,
 )
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics._compile import OPTIONAL_PARTS, Function, inner_kernel, kernel, lean_kernel, plain_form
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import (
     ball_set_axial_force,
@@ -67,6 +67,21 @@ def scratch_of(p: KernelParameters) -> Scratch:
     """Scratch for the right-hand sides of a machine."""
     power, blend = np.zeros((p.bearing.shape[0] + 1, N_PLACES)), np.empty((3, p.ball_table.shape[4]))
     return Scratch(np.empty((2, p.balls.shape[2])), power, blend)
+
+
+def suited(function: Function, p: KernelParameters) -> Function:
+    """The kernel for a machine: its plain form where the machine has no optional part."""
+    at, row = p.bearing_at, p.bearing
+    states = (L.DEPARTURE, L.FACE_STATES, L.RING_STATES, L.MOUNT_STATES)
+    numbers = (L.FAST_SPEED_STEP, L.MOUNT)
+    optional = (
+        max(len(p.rub), len(p.stops), len(p.faces), p.flags[L.LOOPS_ACT], p.flags[L.LOADS_ACT]) > 0
+        or p.rotor_at[L.AXIAL] >= 0
+        or bool((at[:, L.RACE] < 0).any())
+        or bool((at[:, states] >= 0).any())
+        or bool((row[:, numbers] != 0.0).any())
+    )
+    return function if optional else plain_form(function)
 
 
 @lean_kernel
@@ -114,7 +129,7 @@ def true_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, f
         vx += shape[k] * sx[k]
         vy += shape[k] * sy[k]
     ux, uy, vx, vy = ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         s, own = departing(b, y, p)
         angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
         return departure.against_bore(s, own, angle, spin, ux, uy, vx, vy)
@@ -136,7 +151,7 @@ def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[floa
 def gap_at(t: float, b: int, y: Array, p: KernelParameters) -> float:
     """Air gap [m] of one bearing now."""
     gap: float = p.bearing[b, L.AIR_GAP]
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         s, own = departing(b, y, p)
         gap = departure.gap_now(s, own, t, gap)
     return gap
@@ -149,7 +164,7 @@ def depth_now(t: float, c: int, b: int, y: Array, p: KernelParameters) -> float:
     return math.sqrt(ux * ux + uy * uy) - gap_at(t, b, y, p)
 
 
-@inner_kernel
+@lean_kernel
 def contact_values(
     t: float, c: int, b: int, y: Array, p: KernelParameters
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -160,7 +175,7 @@ def contact_values(
     row, gap = p.bearing[b], gap_at(t, b, y, p)
     numbers, law = row[L.TOUCH : L.TOUCH_END], row[L.CONTACT : L.CONTACT_END]
     omega = y[p.rotor_at[L.ROTOR_SPEED]]
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         s, own = departing(b, y, p)
         at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
         law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
@@ -177,7 +192,7 @@ def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float
     """Displacement [m] of the race of one bearing relative to its support, in the axes of its balls."""
     r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
     x, z = y[r] - y[h], y[r + 1] - y[h + 1]
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
         return departure.turned(own[departure.CAGE_ANGLE], x, z)
     return x, z
@@ -187,7 +202,7 @@ def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float
 def ring_travel(b: int, y: Array, p: KernelParameters) -> float:
     """Way [m] of the sprung outer rings of one bearing from their balls; zero between rigid spacers."""
     at = p.bearing_at[b, L.RING_STATES]
-    return y[at] if at >= 0 else 0.0
+    return y[at] if OPTIONAL_PARTS and at >= 0 else 0.0
 
 
 @inner_kernel
@@ -219,7 +234,7 @@ def rises_with_travel(b: int, p: KernelParameters) -> bool:
 def race_travel(b: int, y: Array, p: KernelParameters) -> float:
     """Axial displacement [m] of the race of one bearing; zero of one that has no face."""
     at = p.bearing_at[b, L.FACE_STATES]
-    return y[at] if at >= 0 else 0.0
+    return y[at] if OPTIONAL_PARTS and at >= 0 else 0.0
 
 
 @inner_kernel
@@ -229,18 +244,18 @@ def deflected_force(
     """`ball_force` of a race deflected by (x, z) and moved by ``along`` [m], at a spin [rad/s], whose sprung
     rings have gone a ``way`` [m].
     """
-    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
         grid = p.bearing[b, L.FAST : L.FAST_END]
         return ball_table.fast_force(grid, p.ball_table[b], p.balls[b], x, z, spin, work.balls[0], work.blend)
     numbers = p.bearing[b][L.ROLLING : L.ROLLING_END]
-    if p.bearing_at[b, L.FACE_STATES] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.FACE_STATES] >= 0:
         F_x, F_y = two_row_force(numbers, rows_of(b, p), x, z, along, work.balls)
     else:
         F_x, F_y = ball_set_force(numbers, p.balls[b], x, z, work.balls, way)
     return F_x, F_y, 0.0
 
 
-@inner_kernel
+@lean_kernel
 def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
     """Force of the balls of one bearing [N] against the deflection of its race, x and y.
 
@@ -248,22 +263,22 @@ def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[fl
     """
     x, z = race_deflection(b, y, p)
     spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
-    if p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
         way = math.sqrt(x * x + z * z)
         rise = departure.from_table(p.departure[b], departure.TABLE_FORCE, way, spin) / max(way, 1e-15)
         _, own = departing(b, y, p)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
         return F_x, F_y, 0.0
-    if pushed_along(b, p):
+    if OPTIONAL_PARTS and pushed_along(b, p):
         s, own = departing(b, y, p)
         way = math.sqrt(x * x + z * z)
         rise = departure.ring_of_balls(s, way, own[departure.AXIAL + 1])[0] / max(way, 1e-15)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
         return F_x, F_y, 0.0
     F_x, F_y, by_spin = deflected_force(b, x, z, ring_travel(b, y, p), along, spin, p, work)
-    if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
         return F_x, F_y, by_spin
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         _, own = departing(b, y, p)
         F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
     return F_x, F_y, 0.0
@@ -465,7 +480,7 @@ def add_support_form(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
     form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
     F_x, F_y, dissipated = support.support_force(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
-    if row[L.MOUNT] != 0.0:
+    if OPTIONAL_PARTS and row[L.MOUNT] != 0.0:
         first, last = mount_states(b, p)
         numbers = row[L.MOUNT : L.MOUNT_END]
         beside_x, beside_y, lost = mount.mount_force(numbers, x, z, vx, vz, y[first:last], dy[first:last])
@@ -565,7 +580,7 @@ def add_race(
     wy = y[n_q + r + 1] - y[n_q + h + 1]
     numbers = row[L.ROLLING : L.ROLLING_END]
     held = 1.0
-    if p.bearing_at[b, L.DEPARTURE] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
         held = departure.held_share(p.departure[b], y[r] - y[h], y[r + 1] - y[h + 1])
     F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin], held)
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
@@ -785,7 +800,7 @@ def add_departing_support(
     )
 
 
-@inner_kernel
+@lean_kernel
 def bearing_accelerations(
     t: float, b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
 ) -> tuple[float, float]:
@@ -806,30 +821,30 @@ def bearing_accelerations(
         lost += by_law
     F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
     departs = p.bearing_at[b, L.DEPARTURE] >= 0
-    by_tilt = add_tilt(b, y, p, dy) if departs else 0.0
-    by_sleeve = sleeve_torque(b, y, p, dy) if departs else 0.0
+    by_tilt, by_sleeve = 0.0, 0.0
+    if OPTIONAL_PARTS and departs:
+        by_tilt, by_sleeve = add_tilt(b, y, p, dy), sleeve_torque(b, y, p, dy)
     if row[L.NOT_ROUND] != 0.0:
         by_sleeve += landing_torque(b, y, p, dy)
-    if p.bearing_at[b, L.RACE] >= 0:
+    if not OPTIONAL_PARTS or p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
         dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
     by_face, rubbed = 0.0, 0.0
-    if departs:
+    if OPTIONAL_PARTS and departs:
         by_face, rubbed, by_landing, by_moving, by_rolling = add_departing_thrust(t, b, y, p, dy)
         lost += by_landing
         by_balls += by_moving
         by_drag += by_rolling
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
     by_fit = 0.0
-    if sprung:
+    if OPTIONAL_PARTS and sprung:
         by_rings, by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls)
         by_balls += by_rings
     sx = y[n_q + h]
     sy = y[n_q + h + 1]
     by_support = row[L.SUPPORT_DAMPING_X] * sx * sx + row[L.SUPPORT_DAMPING_Y] * sy * sy
-    F_x += dy[n_q + h]
-    F_y += dy[n_q + h + 1]
+    F_x, F_y = F_x + dy[n_q + h], F_y + dy[n_q + h + 1]
     dy[n_q + h] = (F_x - row[L.SUPPORT_DAMPING_X] * sx - row[L.SUPPORT_STIFFNESS_X] * y[h]) / row[
         L.SUPPORT_MASS_X
     ]
@@ -838,9 +853,9 @@ def bearing_accelerations(
     ]
     if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
         by_support = add_support_form(b, y, p, dy)
-    if departs:
+    if OPTIONAL_PARTS and departs:
         by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy)
-    if sprung:
+    if OPTIONAL_PARTS and sprung:
         by_support += by_fit
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
@@ -862,7 +877,7 @@ def aerodynamic_deceleration(t: float, omega: float, p: KernelParameters) -> flo
     return 0.0
 
 
-@inner_kernel
+@lean_kernel
 def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Scratch) -> None:
     """Time derivative of the state of a drop; the power lost by place stands in ``work.power`` afterwards.
 
@@ -876,17 +891,17 @@ def drop_derivative(t: float, y: Array, p: KernelParameters, dy: Array, work: Sc
     dy[p.rotor_at[L.WORK_IN]] = 0.0
     contact_torque = 0.0
     dissipated = 0.0
-    if p.rub.shape[0] > 0:  # first, where no value of a bearing is held in a register
+    if OPTIONAL_PARTS and p.rub.shape[0] > 0:  # first, where no value of a bearing is held in a register
         contact_torque, dissipated = add_rubs(y, p, dy, work.power[p.bearing.shape[0]])
     for b in range(p.bearing.shape[0]):
         torque, lost = bearing_accelerations(t, b, y, p, dy, work)
         contact_torque += torque
         dissipated += lost
-    if p.rotor_at[L.AXIAL] >= 0:
+    if OPTIONAL_PARTS and p.rotor_at[L.AXIAL] >= 0:
         torque, lost = add_axial_motion(t, y, p, dy, work)
         contact_torque += torque
         dissipated += lost
-    if p.flags[L.LOOPS_ACT] != 0:
+    if OPTIONAL_PARTS and p.flags[L.LOOPS_ACT] != 0:
         dissipated += add_loops(y, p, dy, work.power[p.bearing.shape[0]])
     work.power[p.bearing.shape[0], BENDING] = add_rotor_rates(t, y, contact_torque, dissipated, p, dy)
 
@@ -913,7 +928,7 @@ def add_rotor_rates(
     lost, gained = add_rotor_accelerations(y, omega, omega_dot, p, dy)
     if p.flags[L.MAGNETS_ACT] != 0:
         gained += add_magnet_forces(t, y, p, dy)
-    if p.flags[L.LOADS_ACT] != 0:
+    if OPTIONAL_PARTS and p.flags[L.LOADS_ACT] != 0:
         gained += add_loads(t, y, p, dy)
     for i in range(n_q):
         rates[i] = velocities[i]

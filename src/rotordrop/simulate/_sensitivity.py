@@ -14,7 +14,7 @@ import numpy as np
 from rotordrop.arrays import Array, Integers
 from rotordrop.physics import aerodynamics, ball_table, face, landing_sleeve, mount, ring, support
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import inner_kernel, kernel, lean_kernel
+from rotordrop.physics._compile import OPTIONAL_PARTS, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import (
     ball_set_axial_gradient,
     ball_set_gradient,
@@ -135,12 +135,12 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
     row = p.bearing[b]
     dx, dy = race_deflection(b, y, p)
     w_x = w_y = 0.0
-    if row[L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
         grid = row[L.FAST : L.FAST_END]
         F_x, F_y, k_xx, k_xy, k_yy, w_x, w_y = ball_table.fast_gradient(
             grid, p.ball_table[b], p.balls[b], dx, dy, y[spin]
         )
-    elif p.bearing_at[b, L.FACE_STATES] >= 0:
+    elif OPTIONAL_PARTS and p.bearing_at[b, L.FACE_STATES] >= 0:
         entries, along = row[L.BALL_SET : L.BALL_SET_END], race_travel(b, y, p)
         loaded, relieved = rows_of(b, p)
         F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, loaded, dx, dy, -along)
@@ -166,14 +166,14 @@ def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
             along = F_x * k_xx + F_y * k_xy if j == 0 else F_x * k_xy + F_y * k_yy
             J[spin, r + j] -= by_force / row[L.RACE_INERTIA] * along / F
             J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
-    if row[L.FAST_SPEED_STEP] > 0.0:
+    if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
         for i in range(2):
             slope = w_x if i == 0 else w_y
             J[n_q + r + i, spin] -= slope / row[L.RACE_MASS]
             J[n_q + h + i, spin] += slope / row[L.SUPPORT_MASS_X + i]
         if F > 0.0:
             J[spin, spin] -= by_force / row[L.RACE_INERTIA] * (F_x * w_x + F_y * w_y) / F
-    if p.bearing_at[b, L.RING_STATES] >= 0:
+    if OPTIONAL_PARTS and p.bearing_at[b, L.RING_STATES] >= 0:
         _ring_jacobian(b, y, p, J, (F_x, F_y), k)
 
 
@@ -326,7 +326,7 @@ def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
         J[own + i, own + 2 + i] = 1.0
         J[own + 2 + i, own + i] -= speed * speed
         J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
-    if row[L.MOUNT] != 0.0:
+    if OPTIONAL_PARTS and row[L.MOUNT] != 0.0:
         _mount_jacobian(b, y, p, J)
 
 
@@ -372,7 +372,7 @@ def drop_jacobian_parts(
     for i in range(n_q):
         J[i, n_q + i] = 1.0
     for b in range(p.bearing.shape[0]):
-        if p.bearing_at[b, L.RACE] >= 0:
+        if not OPTIONAL_PARTS or p.bearing_at[b, L.RACE] >= 0:
             _race_jacobian(b, y, p, J)
         _support_jacobian(b, y, p, J)
     for c in range(p.contact_at.shape[0]):
@@ -393,7 +393,7 @@ def drop_jacobian_parts(
         J[i_w, i_w] += aerodynamics.speed_dependent_slope(
             y[i_w], p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC]
         )
-    if p.rotor_at[L.AXIAL] >= 0:
+    if OPTIONAL_PARTS and p.rotor_at[L.AXIAL] >= 0:
         _axial_jacobian(y, p, J)
     if p.flags[L.MAGNETS_ACT] != 0:
         _magnet_jacobian(t < p.spin[L.POWER_OFF_DELAY], p, J)

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.physics._compile import by_reference
 
 
+@by_reference
 class Tableau(NamedTuple):
     """Nodes (7,), stage weights (7, 7), error weights (7,) and dense-output polynomials (7, 4) [all 1].
 

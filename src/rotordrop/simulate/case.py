@@ -1,9 +1,9 @@
-"""What is simulated: speed, start, duration, accuracy."""
+"""What is simulated, of a drop and of a coast-down: speed, start, duration, accuracy."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import SimulationError
+from rotordrop.require import require
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.units import InSI
 
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
 IntegratorName: TypeAlias = Literal["tsit5", "dp5"]
+MOST_OUTPUTS, LONGEST = 1e7, 3600.0
+"""Steps of the output grid and length [s] of a drop that a memory holds (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +64,11 @@ class LevitatedStart:
     """Circular synchronous orbit at each AMB [m], ``x + jy`` at rotor angle zero, as a controller that
     follows the runout of its sensors makes it; by default the response to the unbalance alone, shape (A,)."""
 
+    def __post_init__(self) -> None:
+        require(self.rotor_angle, "rotor_angle", float)
+        require(self.delay, "delay", float, least=0.0)
+        require(self.remanence_time_constant, "remanence_time_constant", float, above=0.0)
+
 
 @dataclass(frozen=True, kw_only=True)
 class UnbalanceJump:
@@ -74,6 +82,12 @@ class UnbalanceJump:
     """Phase, counted from +y at rotor angle zero [rad]."""
     time: float
     """When it comes [s], from power-off."""
+
+    def __post_init__(self) -> None:
+        require(self.node, "node", int, least=1)
+        require(self.amount, "amount", float)
+        require(self.phase, "phase", float)
+        require(self.time, "time", float, least=0.0)
 
 
 MagnetAction: TypeAlias = Literal["off", "levitate", "hold", "lost", "bias decays"]
@@ -118,7 +132,25 @@ Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 
 @dataclass(frozen=True, kw_only=True)
-class DropCase:
+class Case:
+    """What every simulation is told."""
+
+    tolerance: float = 1e-6
+    """Relative accuracy of one step of the integrator [1]."""
+    start: Start = field(default_factory=CentredStart)
+    """How the drop starts."""
+    integrator: IntegratorName = "tsit5"
+    """Runge–Kutta pair."""
+
+    def _check(self, *positive: str) -> None:
+        for name in (*positive, "tolerance", "largest_step"):
+            require(getattr(self, name), name, float, above=0.0, error=SimulationError)
+        require(self.integrator, "integrator", str, among=get_args(IntegratorName))
+        require(self.start, "start", *get_args(Start))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DropCase(Case):
     """One drop to simulate; speed and times are floats in SI units, or texts such as ``"60 Hz"``."""
 
     speed: InSI = InSI("speed")  # noqa: RUF009 - a descriptor, read by the dataclass
@@ -127,19 +159,13 @@ class DropCase:
     """Length of the simulation [s]."""
     output_step: InSI = InSI("time", 1e-5)  # noqa: RUF009
     """Distance of the output grid [s]."""
-    tolerance: float = 1e-6
-    """Relative accuracy of one step of the integrator [1]."""
+    largest_step: InSI = InSI("time", 1e-3)  # noqa: RUF009
+    """Bound of the step [s]."""
     reduction: str | Reduction = "accurate"
     """Basis of the rotor; ignored when a ready model is simulated."""
-    start: Start = field(default_factory=CentredStart)
-    """How the drop starts."""
     spin: SpinMode = "dynamic"
     """What changes the speed: aerodynamic deceleration in time plus friction; the measured profile as it is,
     friction or not; drag as a function of speed plus friction; friction alone; nothing at all."""
-    integrator: IntegratorName = "tsit5"
-    """Runge–Kutta pair."""
-    largest_step: InSI = InSI("time", 1e-3)  # noqa: RUF009
-    """Bound of the step [s]."""
     most_steps: int = 50_000_000
     """Bound of the number of steps [1]."""
     jump: UnbalanceJump | None = None
@@ -149,21 +175,24 @@ class DropCase:
     with controllers that hold the rotor, any other with dead coils."""
 
     def __post_init__(self) -> None:
-        for name in ("duration", "output_step", "tolerance", "largest_step"):
-            value = getattr(self, name)
-            if not value > 0.0 or not np.isfinite(value):
-                raise SimulationError(
-                    f"{name} is {value!r}; expected a positive, finite number. Give another value."
-                )
-        if self.magnets is not None and isinstance(self.start, LevitatedStart):
-            self._check_loop(self.start)
+        self._check("duration", "output_step")
         if not np.isfinite(self.speed):
             raise SimulationError(
                 f"speed is {self.speed!r} rad/s; expected a finite number. Give another value."
             )
-
-    def _check_loop(self, start: LevitatedStart) -> None:
-        """Refuse what is said of magnets that are no springs and dampers."""
+        require(self.spin, "spin", str, among=get_args(SpinMode))
+        require(self.most_steps, "most_steps", int, least=1)
+        require(self.jump, "jump", UnbalanceJump, none=True)
+        count = self.duration / self.output_step
+        if not 1.0 - 1e-9 <= count <= MOST_OUTPUTS or self.duration > LONGEST:
+            raise SimulationError(
+                f"a duration of {self.duration:g} s in output steps of {self.output_step:g} s makes "
+                f"{count:.3g} of them; expected 1 to {MOST_OUTPUTS:g}, and {LONGEST:g} s at most. Give "
+                "others, or simulate a coast-down"
+            )
+        start = self.start
+        if self.magnets is None or not isinstance(start, LevitatedStart):
+            return
         if start.delay or start.remanent_force is not None or start.orbit is not None:
             raise SimulationError(
                 "the levitated start has a delay, a remanent force or an orbit, and the magnets are in the "
@@ -175,3 +204,68 @@ class DropCase:
         """Output grid [s], shape (T,), from zero to the duration."""
         count = round(self.duration / self.output_step)
         return np.arange(count + 1, dtype=np.float64) * self.output_step
+
+
+FIRST_WINDOW = 0.2
+"""End of the first window of statistics of a coast-down [s]: what the paper simulates (Neisi 2020, section
+5.4)."""
+WINDOW = 1.0
+STOP_SPEED = 0.01
+"""Below this speed [rad/s], one turn in ten minutes, the rotor counts as standing and sticks."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CoastDownCase(Case):
+    """One coast-down to simulate: a drop in windows of statistics, until the rotor stands."""
+
+    speed: float
+    """Rotor speed at power-off [rad/s]; positive from x to y."""
+    duration: float | None = None
+    """Length of the simulation [s]; None: until the rotor stands still."""
+    rest: float = 0.0
+    """Time simulated after standstill [s], in which the rotor only rocks."""
+    longest: float = 600.0
+    """A rotor that has not stopped by then [s] ends the simulation."""
+    output_step: float = 5e-5
+    """Distance of the samples [s]; a whole number of them must fit into 0.2 s."""
+    reduction: str | Reduction = "quick"
+    """Basis of the rotor; ignored when a ready model is simulated."""
+    largest_step: float = 1e-3
+    """Bound of the step [s]."""
+    stop_speed: float = STOP_SPEED
+    """The rotor stops and sticks when it turns no faster than this [rad/s]."""
+    settled_scheme: bool = True
+    """Use the cheaper scheme once every bearing has been in contact for a whole second."""
+    settled_error: float = 1e-9
+    """Difference of displacement [m] from the Runge–Kutta pair over 2 ms above which it is given up."""
+    spin: ClassVar[SpinMode] = "function of speed"
+    magnets: ClassVar[None] = None
+
+    def __post_init__(self) -> None:
+        given = () if self.duration is None else ("duration",)
+        self._check("longest", "output_step", "stop_speed", "settled_error", *given)
+        if not np.isfinite(self.rest) or self.rest < 0.0:
+            raise SimulationError(f"rest is {self.rest!r} s; expected a finite time of zero or more.")
+        if not np.isfinite(self.speed) or abs(self.speed) <= self.stop_speed:
+            raise SimulationError(
+                f"speed is {self.speed!r} rad/s; a coast-down starts above {self.stop_speed:g} rad/s. "
+                "Give another speed."
+            )
+        per_window = FIRST_WINDOW / self.output_step
+        if per_window < 1.0 or abs(per_window - round(per_window)) > 1e-6:
+            raise SimulationError(
+                f"output_step is {self.output_step:g} s; a whole number of steps must fit into "
+                f"{FIRST_WINDOW:g} s. Choose 5e-5 s (20 kHz) or 1e-4 s (10 kHz), for example."
+            )
+
+    @property
+    def last_time(self) -> float:
+        """Time [s] at which the simulation ends at the latest, rest after standstill left out."""
+        return self.longest if self.duration is None else self.duration
+
+    def window_end(self, index: int) -> int:
+        """Sample at which a window of statistics ends: 0.2 s, 1 s, 2 s, …"""
+        return round((FIRST_WINDOW if index == 0 else index * WINDOW) / self.output_step)
+
+
+Simulated: TypeAlias = DropCase | CoastDownCase

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.errors import OutputError, SimulationError
-from rotordrop.files import atomic_path, require_file
+from rotordrop.files import new_hdf5, read_hdf5, require_file
 from rotordrop.rotor.parameters import DropModel
 
 Arrays = dict[str, NDArray[np.float64]]
 
-_CHECKPOINT = "checkpoint.npz"
-_DIGEST, _SEAL = "digest", "digest of what follows"
+_CHECKPOINT = "checkpoint.h5"
 
 
 def work_folder(output: Path) -> Path:
@@ -52,6 +51,10 @@ def open_work_folder(output: Path, *, resume: bool) -> Path:
     A folder left behind by a killed run is neither overwritten nor resumed unless that was asked for.
     """
     folder = work_folder(output)
+    if not output.parent.is_dir():
+        raise OutputError(
+            f"cannot write {output}: the folder {output.parent} does not exist; create it first"
+        )
     if resume and not folder.is_dir():
         raise OutputError(
             f"there is nothing to resume: {folder} does not exist. Leave out --resume to start the run."
@@ -71,17 +74,10 @@ def open_work_folder(output: Path, *, resume: bool) -> Path:
 
 def save_checkpoint(folder: Path, digest: str, arrays: Mapping[str, NDArray[np.float64]]) -> None:
     """Write where the run stands; the checkpoint before it stays until the new one is complete."""
-    with atomic_path(folder / _CHECKPOINT) as temporary, temporary.open("wb") as file:
-        marks = {_DIGEST: np.array(digest), _SEAL: np.array(_digest_of(arrays))}
-        np.savez(file, **marks, **arrays)  # type: ignore[arg-type]
-
-
-def _digest_of(arrays: Mapping[str, NDArray[np.float64]]) -> str:
-    digest = hashlib.sha256()
-    for name, array in sorted(arrays.items()):
-        digest.update(f"{name} {array.dtype} {array.shape}\n".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+    with new_hdf5(folder / _CHECKPOINT) as file:
+        file.attrs["run"] = digest
+        for name, array in arrays.items():
+            file.create_dataset(name, data=array)
 
 
 def load_checkpoint(folder: Path, digest: str) -> Arrays | None:
@@ -89,21 +85,15 @@ def load_checkpoint(folder: Path, digest: str) -> Arrays | None:
 
     A checkpoint of another machine, other settings or another version is refused.
     """
-    path = folder / _CHECKPOINT
-    require_file(path, f"remove {folder} and start the run again")
+    path, remedy = folder / _CHECKPOINT, f"remove {folder} and start the run again"
+    require_file(path, remedy)
     if not path.exists():
         return None
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        found, seal = str(arrays.pop(_DIGEST)), str(arrays.pop(_SEAL))
-        if seal != _digest_of(arrays):
-            raise ValueError("it is not what was written")
-    except Exception as error:
-        # zipfile and numpy raise a dozen kinds of errors for a damaged file
-        raise SimulationError(
-            f"{path} cannot be read ({error}); remove {folder} and start the run again"
-        ) from error
+        with read_hdf5(path, remedy) as file:
+            found, arrays = str(file.attrs["run"]), {name: np.array(file[name]) for name in file}
+    except (OSError, KeyError) as error:
+        raise SimulationError(f"{path} cannot be read ({error}); {remedy}") from error
     if found != digest:
         raise SimulationError(
             f"{folder} belongs to another run (fingerprint {found[:8]}, this one has {digest[:8]}): machine, "

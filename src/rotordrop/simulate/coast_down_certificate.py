@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,9 +11,10 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
+from rotordrop.progress import Shown
 from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.simulate.case import FIRST_WINDOW, CoastDownCase
 from rotordrop.simulate.coast_down import simulate_coast_down
-from rotordrop.simulate.coast_down_case import FIRST_WINDOW, CoastDownCase
 from rotordrop.simulate.coast_down_result import QUANTILES, CoastDownResult
 
 TIGHTER = 0.1
@@ -78,7 +78,7 @@ def certify_coast_down(
     case: CoastDownCase,
     result: CoastDownResult,
     *,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Shown = None,
 ) -> CoastDownCertificate:
     """Repeat a coast-down with a ten times tighter tolerance and compare the statistics.
 
@@ -90,8 +90,8 @@ def certify_coast_down(
         The case of the result.
     result : CoastDownResult
         What came of it.
-    progress : callable, optional
-        Called with a stage and the fraction done.
+    progress : callable or False, optional
+        As for `simulate_coast_down`.
     """
     model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
     tighter = replace(case, tolerance=TIGHTER * case.tolerance, settled_scheme=False)

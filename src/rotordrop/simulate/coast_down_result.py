@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.errors import SimulationError
-from rotordrop.simulate.coast_down_case import FIRST_WINDOW
-from rotordrop.simulate.heat import Heat
+from rotordrop.labelled import Stored
+from rotordrop.simulate.case import FIRST_WINDOW
+from rotordrop.simulate.result import SimulationResult
 from rotordrop.units import format_quantity
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -55,6 +56,8 @@ class Maximum:
         if not np.isfinite(self.later):
             return f"{text}; nothing later was simulated."
         share = f"{100.0 * self.later / self.value:.0f} %" if self.value > 0.0 else "none"
+        if share == "100 %":
+            return f"{text}; it was equalled at {format_quantity(self.later_time, 'time')}."
         return f"{text}; the largest one after that is {share} of it."
 
     def as_json(self) -> dict[str, Any]:
@@ -71,6 +74,18 @@ class Maximum:
             "largest_later_time_s": self.later_time if finite else None,
             "statement": self.sentence(),
         }
+
+
+def first_window_sentence(maxima: Iterable[Mapping[str, Any]]) -> str:
+    """Whether the first 0.2 s held the largest values of a coast-down, as JSON, in one sentence."""
+    later = [
+        f"{one['bearing']} {one['quantity']} ({format_quantity(one['time_s'], 'time')})"
+        for one in maxima
+        if not one["within_first_0.2_s"]
+    ]
+    if later:
+        return f"Largest only after the first {FIRST_WINDOW:g} s: {', '.join(later)}."
+    return f"The first {FIRST_WINDOW:g} s held the largest indentation, force and stress of every bearing."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,32 +121,24 @@ class WindowStatistics:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CoastDownResult:
+class CoastDownResult(SimulationResult):
     """One simulated coast-down, reduced to statistics; the samples are in the file at ``path``, if any."""
 
-    machine_name: str
-    bearing_names: tuple[str, ...]
-    initial_speed: float
-    tolerance: float
-    reduction: str
     output_step: float
     end_time: float
     """Time reached [s]."""
     standstill_time: float | None
     """When the rotor stopped [s]."""
-    finished: bool
-    """Whether it came to the end that was asked for."""
-    outcome: str
-    windows: WindowStatistics
+    windows: Annotated[WindowStatistics, Stored(prefix="statistics/windows/")]
     """Statistics second by second."""
-    peak_value: Array
-    peak_time: Array
+    peak_value: Annotated[Array, Stored(name="statistics/peak_value")]
+    peak_time: Annotated[Array, Stored(name="statistics/peak_time")]
     """Largest values at the integrator's own steps [m, N, Pa] and their times [s], shape (B, 3)."""
-    whirl_time: Array
+    whirl_time: Annotated[Array, Stored(name="statistics/whirl_time")]
     """Time of forward and backward whirl, whole turns round the race only [s], shape (B, 2)."""
-    contacts: Array
+    contacts: Annotated[Array, Stored(name="statistics/contacts")]
     """Number of contacts, shape (B,)."""
-    contact_energy: Array
+    contact_energy: Annotated[Array, Stored(name="statistics/contact_energy")]
     """Energy lost in contact and friction at each bearing [J], shape (B,)."""
     dissipated: float
     air_work: float
@@ -139,17 +146,12 @@ class CoastDownResult:
     energy_residual: float
     energy_scale: float
     """Largest imbalance of energy, and the energy it is to be compared with [J]."""
-    steps: int
-    rejected_steps: int
+    sensor_nodes: Annotated[NDArray[np.int64], Stored(name="sensor_node")]
+    """Nodes of the sensor planes, counted from 1."""
+    air_gap: Array
+    """Air gaps of the bearings [m], shape (B,)."""
     path: Path | None = None
     """Where the samples are."""
-    heat: Heat | None = None
-    """How the bearings warmed; None of a machine whose bearings stay cold."""
-
-    def check_finished(self) -> None:
-        """Refuse a coast-down that ended before the rotor stood still, or before the time asked for."""
-        if not self.finished:
-            raise SimulationError(self.outcome)
 
     def maxima(self) -> tuple[Maximum, ...]:
         """When the largest indentation, force and stress of every bearing came: does 0.2 s hold them?"""

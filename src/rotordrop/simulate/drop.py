@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,33 +13,21 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
-from rotordrop.machine.plausibility import doubts
-from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import magnitude, sine_cosine
+from rotordrop.require import require
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.statics import rotor_on_race
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate import _sampled as S
-from rotordrop.simulate._rhs import N_PLACES
-from rotordrop.simulate._tableau import Tableau, dp5, tsit5
+from rotordrop.simulate._run import ENDED, PHASE, Run, Window, energies, follow, given_up, setup_of
 from rotordrop.simulate.case import DropCase, MagnetEvent, StateStart, UnbalanceJump
 from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
-from rotordrop.simulate.heat import WarmDrop, warms
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.magnets import MagnetHistory, table_of_events
 from rotordrop.simulate.result import ContactLog, DropResult, stop_of
-
-Parts = Sequence[tuple[slice, KernelParameters]]
-"""Samples of a drop and the parameters they were integrated with, in order."""
-
-TYPICAL = np.full(L.N_KINDS, np.inf)
-"""Typical size of a state by its kind, in its unit; angle and audit follow without control."""
-TYPICAL[[L.POSITION, L.VELOCITY, L.SPIN, L.INTERNAL, L.HEAT]] = 1e-4, 0.1, 10.0, 1.0, 10.0
-FIRST_STEP = 1e-6
-LOG_ROWS_PER_SECOND = 20_000
 
 
 def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool = False) -> DropResult:
@@ -65,6 +53,8 @@ def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool
     SimulationError
         If start and machine do not fit.
     """
+    require(machine, "machine", Machine, DropModel)
+    require(case, "case", DropCase)
     model = machine if isinstance(machine, DropModel) else model_for(machine, case)
     result = _simulate(model, case)
     if certify:
@@ -77,61 +67,22 @@ def model_for(machine: Machine, case: DropCase) -> DropModel:
     return build_drop_model(machine, case.reduction, loops=case.magnets is not None)
 
 
-def tableau_of(case: DropCase) -> Tableau:
-    """Coefficients of the pair a case asks for."""
-    return tsit5() if case.integrator == "tsit5" else dp5()
-
-
-def error_scale(model: DropModel) -> Array:
-    """Typical size of every state, shape (n,), in its unit; infinite where the step control does not look.
-
-    Modal amplitudes are scaled so that a mode counts by what it moves at the bearings.
-    """
-    layout = model.layout
-    reach = np.max(np.abs(model.parameters.bearing_shape), axis=0)
-    floor = 0.05 * np.max(reach)
-    modal = 1.0 / np.maximum(reach, floor)
-    scale = TYPICAL[layout.kinds]
-    for part in (layout.modal_x, layout.modal_y):
-        scale[part] *= modal
-        scale[layout.velocity_of(part)] *= modal
-    return scale
-
-
 def _simulate(model: DropModel, case: DropCase) -> DropResult:
     start, parameters = start_of_drop(model, case)
-    times = case.output_times
-    states = np.empty((len(times), model.layout.size))
-    log = np.zeros((100 + int(LOG_ROWS_PER_SECOND * case.duration), _loop.N_LOG_COLUMNS))
-    counters, books = np.zeros(5), np.zeros((model.layout.n_bearings + 1, N_PLACES))
-    stepped: Callable[..., int] = _loop.integrate
-    events = np.zeros((0, S.N_EVENT_COLUMNS))
+    times, magnets = case.output_times, None
+    more: dict[str, Any] = {}
     if case.magnets is not None:
         events = table_of_events(model, case.magnets)
-        stepped = partial(S.integrate_sampled, events)
-    warming = WarmDrop(cold=parameters) if warms(parameters).size else None
-    outcome = _loop.integrate_drop(
-        start,
-        times,
-        parameters,
-        tableau_of(case),
-        error_scale(model),
-        case.tolerance,
-        FIRST_STEP,
-        case.largest_step,
-        case.most_steps,
-        states,
-        log,
-        counters,
-        books,
-        None if case.jump is None else (case.jump.time, _with_jump(model, parameters, case.jump)),
-        None if warming is None else warming.stretches,
-        stepped,
-    )
-    parts = [(slice(None), parameters)] if warming is None else list(warming.of_times(times))
-    result = _result(model, case, parts, times, states, log[: int(counters[3])], counters, outcome)
-    magnets = None if case.magnets is None else _magnets(model, case.magnets, events, result.state)
-    return replace(result, lost=books, heat=None if warming is None else warming.heat, magnets=magnets)
+        more["stepped"] = partial(S.integrate_sampled, events)
+    if case.jump is not None:
+        more["jump"] = case.jump.time, _with_jump(model, parameters, case.jump)
+    setup = setup_of(model, case, parameters, case.most_steps, **more)
+    run = Run.begun(setup, start, len(times) - 1)
+    window = follow(setup, run, times)
+    if case.magnets is not None:
+        magnets = _magnets(model, case.magnets, events, window.states)
+    heat = None if setup.warming is None else setup.warming.heat_of(run.rows["heat"], run.memory)
+    return _result(model, case, parameters, run, window, heat=heat, magnets=magnets)
 
 
 def _magnets(
@@ -159,53 +110,33 @@ def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJu
 
 
 def _result(
-    model: DropModel,
-    case: DropCase,
-    parts: Parts,
-    times: Array,
-    states: Array,
-    log: Array,
-    counters: Array,
-    outcome: int,
+    model: DropModel, case: DropCase, p: KernelParameters, run: Run, window: Window, **parts: Any
 ) -> DropResult:
-    parameters = parts[0][1]
-    layout, n_b = model.layout, model.layout.n_bearings
-    reached = int(np.sum(times <= counters[4]))
-    times, states = times[:reached], states[:reached]
-    histories = np.empty((reached, n_b, H.N_HISTORIES))
-    for part, one in parts:
-        H.bearing_histories(times[part], states[part], one, histories[part])
-    displacement = H.node_displacements(states, parameters.bearing_shape)
-    force = histories[..., H.H_BEARING_FORCE_X : H.H_BEARING_FORCE_Y + 1]
-    owner = _loop.bearings_logged(log, parameters)
+    layout, n_b, states, histories = model.layout, model.layout.n_bearings, window.states, window.histories
+    named, log = H.named(model, states, histories), window.log[: int(run.progress[_loop.LOGGED])]
+    owner = _loop.bearings_logged(log, p)
     further = (
-        *(stop_of(model.bearing_names[b]) for b in parameters.stops),
+        *(stop_of(model.bearing_names[b]) for b in p.stops),
         *(one.name for one in model.machine.clearances if one.stiffness is not None),
-        *(f"{model.bearing_names[b]}.face" for b in parameters.faces),
+        *(f"{model.bearing_names[b]}.face" for b in p.faces),
     )
     others = log[owner < 0]
     contacts = _contact_log(log[owner >= 0], owner[owner >= 0])
     stresses = [H.H_INNER_STRESS, H.H_OUTER_STRESS]  # they differ where balls have inertia
     return DropResult(
-        time=times,
-        displacement=displacement,
-        race_displacement=layout.bore(states),
-        support_displacement=states[:, layout.support].reshape(reached, n_b, 2),
-        indentation=histories[..., H.H_DELTA],
-        contact_force=histories[..., H.H_CONTACT_FORCE],
+        time=window.times,
+        **named,
+        support_displacement=states[:, layout.support].reshape(-1, n_b, 2),
         friction_force=histories[..., H.H_FRICTION_FORCE],
-        bearing_force=force,
         max_ball_load=histories[..., H.H_BALL_LOAD],
-        max_stress=histories[..., H.H_STRESS],
-        race_stress=histories[..., stresses] if len(parameters.ball_table) else None,
-        face_force=H.face_forces(states, parameters) if layout.moves_axially else None,
+        race_stress=histories[..., stresses] if len(p.ball_table) else None,
+        face_force=H.face_forces(states, p) if layout.moves_axially else None,
         line_contacts=tuple(rotor_on_race(model.machine, b) for b in model.machine.touchdown_bearings),
-        speed=states[:, layout.rotor_speed],
-        race_speed=states[:, layout.race_spin],
         state=states,
         contacts=contacts,
+        lost=run.books,
         further_contacts=_contact_log(
-            others, others[:, _loop.LOG_CONTACT].astype(np.int64) - len(parameters.contact_at)
+            others, others[:, _loop.LOG_CONTACT].astype(np.int64) - len(p.contact_at)
         )
         if further
         else None,
@@ -217,11 +148,12 @@ def _result(
         initial_speed=case.speed,
         tolerance=case.tolerance,
         reduction=model.basis.description,
-        steps=int(counters[0]),
-        rejected_steps=int(counters[1]),
-        outcome=_sentence(model.machine, outcome, case, counters, len(contacts)),
-        finished=outcome == _loop.FINISHED,
-        certificate=_energy_certificate(model, parts, times, states, force),
+        steps=int(run.progress[_loop.ACCEPTED]),
+        rejected_steps=int(run.progress[_loop.REJECTED]),
+        outcome=_sentence(model.machine, case, run, len(contacts)),
+        finished=bool(run.status[PHASE] == ENDED),
+        certificate=_energy_certificate(window, named["bearing_force"]),
+        **parts,
     )
 
 
@@ -239,45 +171,28 @@ def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
     )
 
 
-def _sentence(machine: Machine, outcome: int, case: DropCase, counters: Array, contacts: int) -> str:
-    reached = float(counters[4])
-    if outcome == _loop.FINISHED:
-        taken = f"in {int(counters[0])} steps with {contacts} contacts"
-        return f"The drop was simulated to {reached:.6g} s {taken}."
+def _sentence(machine: Machine, case: DropCase, run: Run, contacts: int) -> str:
+    if run.status[PHASE] == ENDED:
+        taken = f"in {int(run.progress[_loop.ACCEPTED])} steps with {contacts} contacts"
+        return f"The drop was simulated to {run.time:.6g} s {taken}."
     few = f"{case.most_steps} steps were not enough", "Raise most_steps, loosen the tolerance or use"
-    return given_up(machine, outcome, reached, *few)
+    return given_up(machine, run, *few)
 
 
-def given_up(machine: Machine, outcome: int, reached: float, too_few: str, remedy: str) -> str:
-    """Why the loop gave up at the time it ``reached`` [s], and the way out; of steps as the caller says."""
-    why, way_out = {
-        _loop.STEP_TOO_SMALL: (
-            "the step fell below 1e-14 s",
-            "Check for a friction law with a tiny smoothing speed or an extreme stiffness",
-        ),
-        _loop.TOO_MANY_STEPS: (too_few, f"{remedy} a smaller reduction"),
-    }.get(outcome, ("a value became infinite", "Check the start and the machine's parameters"))
-    odd = "".join(f" {doubt.message}." for doubt in doubts(machine))
-    return f"The simulation stopped at {reached:.6g} s: {why}. {way_out}.{odd}"
-
-
-def _energy_certificate(
-    model: DropModel, parts: Parts, times: Array, states: Array, force: Array
-) -> Certificate:
-    layout = model.layout
-    chosen = np.unique(np.linspace(0, len(states) - 1, 200).astype(int))
-    stored = np.empty(len(states))
-    for part, one in parts:
-        there = chosen[np.isin(chosen, np.arange(len(states))[part])]
-        of_part = np.empty(len(there))
-        H.stored_energies(times[there], states[there], one, True, of_part)
-        stored[there] = of_part
-    stored = stored[chosen]
-    balance = stored + states[chosen, layout.dissipated] - states[chosen, layout.work_in]
+def _energy_certificate(window: Window, force: Array) -> Certificate:
+    chosen = np.unique(np.linspace(0, len(window.times) - 1, 200).astype(int))
+    stored, balance = np.concatenate(
+        [
+            energies(p, window.times[there], window.states[there])
+            for part, p in window.parts
+            if len(there := chosen[(chosen >= part.start) & (chosen < part.stop)])
+        ],
+        axis=1,
+    )
     return Certificate(
         energy_residual=float(np.max(np.abs(balance - balance[0]))),
         energy_scale=float(np.max(np.abs(stored - stored[0]))),
-        peak_force=peaks_of(times, magnitude(force[..., 0], force[..., 1])),
+        peak_force=peaks_of(window.times, magnitude(force[..., 0], force[..., 1])),
     )
 
 

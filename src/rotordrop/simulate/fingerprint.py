@@ -39,6 +39,6 @@ def probe_drop() -> DropResult:
 def history_hash(result: DropResult) -> str:
     """SHA-256 of every number of every history of a drop, in hexadecimal."""
     digest = hashlib.sha256()
-    for values in (result.time, *(getattr(result, name) for name, *_ in HISTORIES)):
+    for values in (result.time, *(getattr(result, name) for name in HISTORIES)):
         digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()

@@ -8,7 +8,7 @@ the balance of energy closes as before. Bearings that stay cold cost nothing: no
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -143,19 +143,6 @@ class Heat:
             "statement": self.sentence(b, name)[0],
         }
 
-    def write(self, file: Any) -> None:
-        """Write it to an open HDF5 file."""
-        group = file.create_group("heat")
-        for item in fields(self):
-            group.create_dataset(item.name, data=getattr(self, item.name))
-
-    @classmethod
-    def read(cls, file: Any) -> Heat | None:
-        """Read it from an open HDF5 file; None where nothing warmed."""
-        if "heat" not in file:
-            return None
-        return cls(**{item.name: file["heat"][item.name][()] for item in fields(cls)})
-
 
 def warms(p: KernelParameters) -> NDArray[np.int64]:
     """Bearings that warm, shape (H,)."""
@@ -221,6 +208,11 @@ class Warming:
         change = float(np.max(remembered(self.cold, memory)[:, thermal.CHANGE]))
         return min(max(WARMED / change, SHORTEST), LONGEST) if change else SHORTEST
 
+    def until(self, memory: Array, t: float, end: float) -> float:
+        """Until when they may, from a time on, at most to an end [s]."""
+        stop = t + self.stretch(memory)
+        return end if stop > end - 0.5 * SHORTEST else stop
+
     def take(self, memory: Array, lost: Array, time: float) -> None:
         """Warm the nodes by what a stretch of a time [s] lost by place, (B + 1, 5) [J]."""
         kept = remembered(self.cold, memory)
@@ -274,46 +266,3 @@ class Warming:
             time=table[:, 0], temperature=values[..., :n], growth=values[..., n], gap=values[..., n + 1],
             preload=values[..., n + 2], taken=books[0], gone=books[1], held=books[2],
         )  # fmt: skip
-
-
-@dataclass(kw_only=True)
-class WarmDrop(Warming):
-    """A drop in stretches: what each was integrated with, and how the bearings warmed."""
-
-    parts: list[tuple[float, KernelParameters]] = field(default_factory=list)
-    """End of every stretch [s] and its parameters."""
-    rows: list[Array] = field(default_factory=list)
-    memory: Array = field(init=False)
-
-    def stretches(
-        self, t: float, end: float, p: KernelParameters, y: Array, books: Array
-    ) -> Iterator[tuple[float, KernelParameters]]:
-        """Ends [s] and parameters of stretches from a time to an end, for a loop that moves y and books."""
-        self.memory, now = p.memory, warmed(p, p.memory, y)
-        if not self.rows:
-            self.rows.append(self.row(p.memory, t, y, now))
-        while t < end:
-            stop = t + self.stretch(p.memory)
-            stop = end if stop > end - 0.5 * SHORTEST else stop
-            lost = books.copy()
-            self.parts.append((stop, now))
-            yield stop, now
-            self.take(p.memory, books - lost, stop - t)
-            # growth changes the numbers of bearings; what the case changes of the others stays
-            now = p._replace(bearing=self.grow(p.memory, stop, y, now).bearing)
-            self.rows.append(self.row(p.memory, stop, y, now))
-            t = stop
-
-    def of_times(self, times: Array) -> Iterator[tuple[slice, KernelParameters]]:
-        """Which samples at times (T,) [s] belong to which parameters."""
-        first = 0
-        for stop, p in self.parts:
-            last = int(np.searchsorted(times, stop, side="right"))
-            if last > first:
-                yield slice(first, last), p
-            first = last
-
-    @property
-    def heat(self) -> Heat:
-        """How the bearings warmed."""
-        return self.heat_of(self.rows, self.memory)

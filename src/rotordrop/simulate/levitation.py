@@ -14,7 +14,7 @@ from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import FASTEST, DropModel, pushes
-from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, StateStart
+from rotordrop.simulate.case import CentredStart, LevitatedStart, PlacedStart, Simulated, StateStart
 from rotordrop.simulate.magnets import start_loop, with_springs_of
 from rotordrop.units import format_quantity
 
@@ -27,7 +27,7 @@ _SPIN_MODES = {
 }
 
 
-def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]:
+def start_of_drop(model: DropModel, case: Simulated) -> tuple[Array, KernelParameters]:
     """State at power-off, shape (n,), and the kernel parameters with what the case adds (speed mode,
     magnets).
     """
@@ -51,7 +51,7 @@ def start_of_drop(model: DropModel, case: DropCase) -> tuple[Array, KernelParame
     return state, parameters
 
 
-def _started(model: DropModel, case: DropCase) -> tuple[Array, KernelParameters]:
+def _started(model: DropModel, case: Simulated) -> tuple[Array, KernelParameters]:
     """State and parameters of a start, before any loop of the magnets."""
     parameters = _with_spin(model.parameters, case)
     _refuse_overspeed(model, case.speed)
@@ -86,7 +86,7 @@ def _refuse_overspeed(model: DropModel, speed: float) -> None:
         )
 
 
-def _with_spin(parameters: KernelParameters, case: DropCase) -> KernelParameters:
+def _with_spin(parameters: KernelParameters, case: Simulated) -> KernelParameters:
     spin = parameters.spin.copy()
     spin[L.INITIAL_SPEED] = case.speed
     if case.spin == "constant":

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rotordrop.arrays import Array
-from rotordrop.errors import UsageError
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate import _rhs as R
@@ -47,17 +46,7 @@ def losses(model: DropModel, result: DropResult) -> Losses:
     """Split the energy that a drop dissipated, as the time loop booked it over its accepted steps.
 
     Source: the powers of the right-hand side (Neisi 2020, eqs. 1, 9 and 11), place by place.
-
-    Raises
-    ------
-    UsageError
-        For a drop whose energies were not booked by place: one of an older file.
     """
-    if result.lost is None:
-        raise UsageError(
-            f"the drop of {result.machine_name!r} holds no energies by place: its file is older; "
-            "simulate it to get them"
-        )
     lost, spin = result.lost[:-1], result.race_speed
     gained = 0.5 * model.parameters.bearing[:, L.RACE_INERTIA] * (spin[-1] ** 2 - spin[0] ** 2)
     return Losses(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from rotordrop.physics.magnet_loop import SampledController, sampled_response
 from rotordrop.rotor.magnet_loop import growth_with, stability
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate import _sampled as S
-from rotordrop.simulate.case import DropCase, LevitatedStart, MagnetEvent
+from rotordrop.simulate.case import LevitatedStart, MagnetEvent, Simulated
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -44,28 +44,6 @@ class MagnetHistory:
     """What happened to them."""
     event_time: Array
     """When [s], shape (E,); NaN of what did not."""
-
-    def write(self, file: Any) -> None:
-        """Write it to an open HDF5 file."""
-        import h5py
-
-        group = file.create_group("magnets")
-        for item in fields(self):
-            value = getattr(self, item.name)
-            texts = isinstance(value, tuple)
-            group.create_dataset(item.name, data=np.array(value, h5py.string_dtype()) if texts else value)
-
-    @classmethod
-    def read(cls, file: Any) -> MagnetHistory | None:
-        """Read it from an open HDF5 file; None where no magnet was in the loop."""
-        if "magnets" not in file:
-            return None
-        group = file["magnets"]
-        return cls(
-            names=tuple(group["names"].asstr()[()]),
-            events=tuple(group["events"].asstr()[()]),
-            **{name: group[name][()] for name in ("current", "force", "event_time")},
-        )
 
     @property
     def lift_time(self) -> float | None:
@@ -163,7 +141,7 @@ def equivalent_springs(model: DropModel, speed: float) -> Array:
     return np.array(rows)
 
 
-def with_springs_of(model: DropModel, case: DropCase) -> DropModel:
+def with_springs_of(model: DropModel, case: Simulated) -> DropModel:
     """The model whose AMBs are, as springs and dampers, what their controllers are at the speed of a case."""
     if case.speed == 0.0:
         return model
@@ -173,7 +151,7 @@ def with_springs_of(model: DropModel, case: DropCase) -> DropModel:
 
 
 def start_loop(
-    model: DropModel, case: DropCase, holding: Array, state: Array, parameters: KernelParameters
+    model: DropModel, case: Simulated, holding: Array, state: Array, parameters: KernelParameters
 ) -> KernelParameters:
     """Parameters of a drop with magnets in the loop that have forces (A, 2) to hold [N].
 

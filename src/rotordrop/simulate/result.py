@@ -1,11 +1,14 @@
-"""The result of one simulated drop: named histories, how it ended, how far it can be trusted."""
+"""The result of a simulation: named histories, how it ended, how far it can be trusted."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +17,9 @@ from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
+from rotordrop.labelled import Stored, declared, put, read, write
 from rotordrop.physics.hertz import LineContact
+from rotordrop.require import require
 from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
@@ -22,6 +27,7 @@ from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
     from rotordrop.machine import Machine
@@ -41,7 +47,7 @@ class ContactLog:
         Largest normal force [N], when [s], and direction from race to rotor there [rad ccw from +x].
     impulse, dissipated_energy, sliding_energy : ndarray
         Normal impulse [N s], energy lost in contact and friction [J], and the part of it that sliding takes
-        [J]; NaN where it is not known.
+        [J].
     """
 
     bearing: NDArray[np.int64]
@@ -76,39 +82,12 @@ class ContactLog:
         return len(self.bearing)
 
 
-@dataclass(frozen=True, kw_only=True, repr=False)
-class DropResult:
-    """One simulated drop. Axes: time T, bearing B, last axis (x, y)."""
+@dataclass(frozen=True, kw_only=True)
+class SimulationResult:
+    """What every simulation tells of itself."""
 
-    time: Array
-    """Time from power-off [s], shape (T,)."""
-    displacement: Array
-    race_displacement: Array
-    support_displacement: Array
-    """Rotor at the bearing node, race, support [m], all from the undisturbed centre, shape (T, B, 2)."""
-    indentation: Array
-    """Indentation of the rotor in the race [m]; negative in flight, shape (T, B)."""
-    contact_force: Array
-    """Normal force between rotor and race [N], shape (T, B)."""
-    friction_force: Array
-    """Friction force [N], positive when it brakes positive spin, shape (T, B)."""
-    bearing_force: Array
-    """Elastic ball force on the race [N], shape (T, B, 2)."""
-    max_ball_load: Array
-    max_stress: Array
-    """Load of the most loaded ball [N] and Hertz stress at its inner race [Pa], shape (T, B)."""
-    speed: Array
-    """Rotor speed [rad/s], shape (T,)."""
-    race_speed: Array
-    """Spin of the races [rad/s], shape (T, B)."""
-    state: Array
-    """Complete states, in the order ``state_names``, shape (T, n)."""
-    contacts: ContactLog
-    """Every contact."""
-    bearing_names: tuple[str, ...]
-    state_names: tuple[str, ...]
-    shapes: Array = field(repr=False)
     machine_name: str
+    bearing_names: Annotated[tuple[str, ...], Stored("bearing", name="bearing")]
     initial_speed: float
     tolerance: float
     reduction: str
@@ -117,26 +96,64 @@ class DropResult:
     outcome: str
     """How the computation ended, as a sentence."""
     finished: bool
-    """Whether the whole duration was reached."""
+    """Whether it came to the end that was asked for."""
+    heat: Annotated[Heat | None, Stored(prefix="heat/")] = None
+    """How the bearings warmed; None of a machine whose bearings stay cold."""
+
+    def check_finished(self) -> None:
+        """Refuse a simulation that ended before it came to what was asked for."""
+        if not self.finished:
+            raise SimulationError(self.outcome)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DropResult(SimulationResult):
+    """One simulated drop. Axes: time T, bearing B, last axis (x, y)."""
+
+    time: Annotated[Array, Stored("time", "s", "time from power-off")]
+    displacement: Annotated[Array, Stored("time bearing axis", "m", "rotor displacement at the bearing node")]
+    race_displacement: Annotated[Array, Stored("time bearing axis", "m", "race displacement")]
+    support_displacement: Annotated[Array, Stored("time bearing axis", "m", "support displacement")]
+    """All from the undisturbed centre."""
+    indentation: Annotated[
+        Array, Stored("time bearing", "m", "indentation of the rotor in the race; negative in flight")
+    ]
+    contact_force: Annotated[Array, Stored("time bearing", "N", "normal contact force")]
+    friction_force: Annotated[Array, Stored("time bearing", "N", "friction force")]
+    """Between rotor and race; friction positive when it brakes positive spin."""
+    bearing_force: Annotated[Array, Stored("time bearing axis", "N", "ball force on the race")]
+    max_ball_load: Annotated[Array, Stored("time bearing", "N", "largest ball load")]
+    max_stress: Annotated[Array, Stored("time bearing", "Pa", "largest Hertz stress at the inner race")]
+    speed: Annotated[Array, Stored("time", "rad/s", "rotor speed")]
+    race_speed: Annotated[Array, Stored("time bearing", "rad/s", "race spin")]
+    state: Annotated[Array, Stored("time state_name", "1", "complete state in SI units, see state_names")]
+    contacts: Annotated[ContactLog, Stored("contact", prefix="contact_")]
+    """Every contact."""
+    state_names: Annotated[tuple[str, ...], Stored("state_name", name="state_name")]
+    shapes: Annotated[Array, Stored("coordinate mode", "1", "mode shapes of a plane")]
     certificate: Certificate
     line_contacts: tuple[LineContact, ...]
     """Rotor in each race, which gives the pressure there; one per bearing."""
-    lost: Array | None = field(default=None, repr=False)
-    """Energy lost by place [J], for `rotordrop.simulate.losses`; None where none were booked, shape (B + 1,
-    5)."""
-
-    race_stress: Array | None = field(default=None, repr=False)
-    """Largest Hertz stress on inner and outer race [Pa], shape (T, B, 2), of a machine with ball_inertia; a
-    bearing of it without has zero on its outer race. None where the inner race governs everywhere."""
-    face_force: Array | None = field(default=None, repr=False)
-    """Axial force of the rotor on the face of each race [N], positive towards higher nodes, shape (T, B);
-    None where the rotor does not move along its axis."""
-    heat: Heat | None = field(default=None, repr=False)
-    """How the bearings warmed; None of a machine whose bearings stay cold."""
-    magnets: MagnetHistory | None = field(default=None, repr=False)
+    lost: Annotated[
+        Array,
+        Stored("owner loss_column", "J", "energy lost by place; columns as in rotordrop.simulate.losses"),
+    ]
+    """Bearings, then rotor; shape (B + 1, 5)."""
+    race_stress: Annotated[
+        Array | None, Stored("time bearing race", "Pa", "largest Hertz stress of a ball on each race")
+    ] = None
+    """Of a machine with ball_inertia; a bearing of it without has zero on its outer race. None where the
+    inner race governs everywhere."""
+    face_force: Annotated[
+        Array | None, Stored("time bearing", "N", "axial force of the rotor on the face of the race")
+    ] = None
+    """Positive towards higher nodes; None where the rotor does not move along its axis."""
+    magnets: Annotated[MagnetHistory | None, Stored(prefix="magnets/")] = None
     """What magnets in the loop did; None where they are springs and dampers."""
-    further_names: tuple[str, ...] = ()
-    further_contacts: ContactLog | None = field(default=None, repr=False)
+    further_names: Annotated[tuple[str, ...], Stored("further_name", name="further_name")] = ()
+    further_contacts: Annotated[ContactLog | None, Stored("further_contact", prefix="further_contact_")] = (
+        None
+    )
     """Contacts of supports with their stops, such as "DE.mount.stop", of the rotor with its housing, by the
     name of the clearance, and with faces of races, "DE.face", whose azimuth is zero towards +z, else π."""
 
@@ -155,11 +172,6 @@ class DropResult:
         raise UsageError(
             f"there is no touchdown bearing {bearing!r}; there are {', '.join(self.bearing_names)}"
         )
-
-    def check_finished(self) -> None:
-        """Refuse a drop whose computation broke off."""
-        if not self.finished:
-            raise SimulationError(self.outcome)
 
     @property
     def lift(self) -> Lift | None:
@@ -234,14 +246,25 @@ class DropResult:
         rows = self.shapes[2 * (np.asarray(nodes) - 1)]
         return node_displacements(self.state, np.ascontiguousarray(rows))
 
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Histories as a table with columns (bearing, quantity) against time [s]; units in ``attrs``."""
+        import pandas
+
+        told = {name: said.unit for name, said in HISTORIES.items() if said.axes == "time bearing"}
+        histories = {"force": self.bearing_force_magnitude, **{name: getattr(self, name) for name in told}}
+        columns = {(b, n): v[:, k] for k, b in enumerate(self.bearing_names) for n, v in histories.items()}
+        table = pandas.DataFrame(columns, index=pandas.Index(self.time, name="time [s]"))
+        table.attrs["units"] = {"force": "N", **told}
+        return table
+
     def to_xarray(self) -> xarray.Dataset:
-        """The histories as a labelled data set (needs the extra ``rotordrop[xarray]``)."""
+        """The histories as a labelled data set (needs the extra ``rotordrop[tables]``)."""
         import xarray
 
-        variables = {}
-        for name, axes, unit, text in HISTORIES:
-            axes = tuple("state_name" if axis == "state" else axis for axis in axes)
-            variables[name] = (axes, getattr(self, name), {"units": unit, "long_name": text})
+        variables = {
+            name: (said.axes.split(), getattr(self, name), {"units": said.unit, "long_name": said.label})
+            for name, said in HISTORIES.items()
+        }
         coordinates = {
             "time": ("time", self.time, {"units": "s", "long_name": "time from power-off"}),
             "bearing": list(self.bearing_names),
@@ -262,159 +285,67 @@ def stop_of(bearing: str) -> str:
     return f"{bearing}.mount.stop"
 
 
-HISTORIES: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
-    ("displacement", ("time", "bearing", "axis"), "m", "rotor displacement at the bearing node"),
-    ("race_displacement", ("time", "bearing", "axis"), "m", "race displacement"),
-    ("support_displacement", ("time", "bearing", "axis"), "m", "support displacement"),
-    ("indentation", ("time", "bearing"), "m", "indentation of the rotor in the race"),
-    ("contact_force", ("time", "bearing"), "N", "normal contact force"),
-    ("friction_force", ("time", "bearing"), "N", "friction force"),
-    ("bearing_force", ("time", "bearing", "axis"), "N", "ball force on the race"),
-    ("max_ball_load", ("time", "bearing"), "N", "largest ball load"),
-    ("max_stress", ("time", "bearing"), "Pa", "largest Hertz stress at the inner race"),
-    ("speed", ("time",), "rad/s", "rotor speed"),
-    ("race_speed", ("time", "bearing"), "rad/s", "race spin"),
-    ("state", ("time", "state"), "1", "complete state in SI units, see state_names"),
-)
+HISTORIES = {
+    name: said
+    for name, _, optional, said in declared(DropResult)
+    if said.axes.startswith("time") and name != "time" and not optional
+}
+"""Histories that every drop has, by name."""
 
-_TEXTS = ("machine_name", "reduction", "outcome")
-_NUMBERS = ("initial_speed", "tolerance", "steps", "rejected_steps", "finished")
 _FORMAT = "rotordrop drop 2"
 
 
-def _scale(file: Any, name: str, values: Any) -> None:
-    file[name] = values
-    file[name].make_scale(name)
-
-
 def _write(result: DropResult, file: Any) -> None:
-    import h5py
-
     from rotordrop.simulate.fingerprint import fingerprint
 
     file.attrs["format"] = _FORMAT
     file.attrs["fingerprint"] = fingerprint()
     file.attrs["Conventions"] = "CF-1.8"
-    for name in _TEXTS + _NUMBERS:
-        value = getattr(result, name)
-        file.attrs[name] = value if isinstance(value, str) else float(value)
-    text = h5py.string_dtype()
-    _scale(file, "time", result.time)
-    file["time"].attrs["units"] = "s"
-    _scale(file, "bearing", np.array(result.bearing_names, dtype=text))
-    _scale(file, "axis", np.array(["x", "y"], dtype=text))
-    _scale(file, "state_name", np.array(result.state_names, dtype=text))
-    _scale(file, "coordinate", np.arange(result.shapes.shape[0], dtype=np.int64))
-    _scale(file, "mode", np.arange(result.shapes.shape[1], dtype=np.int64))
-    for name, axes, unit, words in HISTORIES:
-        _dataset(file, name, getattr(result, name), axes, unit, words)
-    _dataset(file, "shapes", result.shapes, ("coordinate", "mode"), "1", "mode shapes of a plane")
-    _write_log(file, "contact", result.contacts)
-    if result.further_contacts is not None:
-        _write_log(file, "further_contact", result.further_contacts)
-        _scale(file, "further_name", np.array(result.further_names, dtype=text))
+    put(file, "owner", (*result.bearing_names, "rotor"), Stored("owner"))
+    write(result, file)
     for item in fields(LineContact):
         values = np.array([getattr(line, item.name) for line in result.line_contacts])
-        _dataset(file, f"line_contact_{item.name}", values, ("bearing",), "", f"rotor on race: {item.name}")
-    if result.lost is not None:
-        _scale(file, "owner", np.array([*result.bearing_names, "rotor"], dtype=text))
-        _scale(file, "loss_column", np.arange(result.lost.shape[1], dtype=np.int64))
-        words = "energy lost by place; columns as in rotordrop.simulate.losses"
-        _dataset(file, "lost", result.lost, ("owner", "loss_column"), "J", words)
-    _write_more(result, file)
+        said = Stored("bearing", label=f"rotor on race: {item.name}")
+        put(file, f"line_contact_{item.name}", values, said)
     for item in fields(Certificate):
         value = getattr(result.certificate, item.name)
         if value is not None:
             file.attrs[f"certificate_{item.name}"] = value
 
 
-def _write_more(result: DropResult, file: Any) -> None:
-    """Write what only some machines have."""
-    import h5py
-
-    if result.race_stress is not None:
-        _scale(file, "race", np.array(["inner", "outer"], dtype=h5py.string_dtype()))
-        words = "largest Hertz stress of a ball on each race"
-        _dataset(file, "race_stress", result.race_stress, ("time", "bearing", "race"), "Pa", words)
-    if result.face_force is not None:
-        words = "axial force of the rotor on the face of the race"
-        _dataset(file, "face_force", result.face_force, ("time", "bearing"), "N", words)
-    if result.heat is not None:
-        result.heat.write(file)
-    if result.magnets is not None:
-        result.magnets.write(file)
-
-
-def _write_log(file: Any, prefix: str, log: ContactLog) -> None:
-    _scale(file, prefix, np.arange(len(log), dtype=np.int64))
-    for item in fields(ContactLog):
-        _dataset(file, f"{prefix}_{item.name}", getattr(log, item.name), (prefix,), "", item.name)
-
-
-def _dataset(file: Any, name: str, values: Any, axes: tuple[str, ...], unit: str, words: str) -> None:
-    compression = {"compression": "gzip", "shuffle": True} if np.size(values) > 1000 else {}
-    dataset = file.create_dataset(name, data=values, **compression)
-    dataset.attrs["units"] = unit
-    dataset.attrs["long_name"] = words
-    for position, axis in enumerate(axes):
-        dataset.dims[position].attach_scale(file["state_name" if axis == "state" else axis])
+@contextmanager
+def opened(path: str | Path, form: str, what: str, verb: str) -> Iterator[Any]:
+    """Open the file of a result; one of another format or a damaged one is refused."""
+    path = Path(require(path, "path", str, PathLike))
+    try:
+        with read_hdf5(path, f"simulate the {what} again") as file:
+            if file.attrs.get("format") != form:
+                raise SimulationError(
+                    f"{path} has format {file.attrs.get('format')!r}; expected {form!r}. "
+                    f"Give a file written by 'rotordrop {verb} --output'."
+                )
+            yield file
+    except (OSError, KeyError) as error:
+        raise SimulationError(
+            f"{path} cannot be read as a {what} result ({error}); expected an HDF5 file written by "
+            f"'rotordrop {verb} --output'. Write it again."
+        ) from error
 
 
 def load_result(path: str | Path) -> DropResult:
     """Read a result written by `DropResult.save`; a file of another kind or a damaged one is refused."""
-    path = Path(path)
-    try:
-        with read_hdf5(path, "simulate the drop again") as file:
-            if file.attrs.get("format") != _FORMAT:
-                raise SimulationError(
-                    f"{path} has format {file.attrs.get('format')!r}; expected {_FORMAT!r}. "
-                    "Give a file written by 'rotordrop simulate --output'."
-                )
-            return _read(file)
-    except (OSError, KeyError) as error:
-        raise SimulationError(
-            f"{path} cannot be read as a drop result ({error}); expected an HDF5 file written by "
-            "'rotordrop simulate --output'. Write it again."
-        ) from error
-
-
-def _read(file: Any) -> DropResult:
-    values: dict[str, Any] = {name: file[name][()] for name, *_ in HISTORIES}
-    values["time"] = file["time"][()]
-    values["shapes"] = file["shapes"][()]
-    values["bearing_names"] = tuple(file["bearing"].asstr()[()])
-    values["state_names"] = tuple(file["state_name"].asstr()[()])
-    for name in _TEXTS:
-        values[name] = str(file.attrs[name])
-    values["initial_speed"] = float(file.attrs["initial_speed"])
-    values["tolerance"] = float(file.attrs["tolerance"])
-    values["steps"] = int(file.attrs["steps"])
-    values["rejected_steps"] = int(file.attrs["rejected_steps"])
-    values["finished"] = bool(file.attrs["finished"])
-    values["contacts"] = _read_log(file, "contact")
-    if "further_name" in file:
-        values["further_names"] = tuple(file["further_name"].asstr()[()])
-        values["further_contacts"] = _read_log(file, "further_contact")
-    lines = {f.name: file[f"line_contact_{f.name}"][()].tolist() for f in fields(LineContact)}
-    values["line_contacts"] = tuple(
-        LineContact(**dict(zip(lines, numbers, strict=True))) for numbers in zip(*lines.values(), strict=True)
-    )
-    certificate = {
-        f.name: file.attrs[f"certificate_{f.name}"]
-        for f in fields(Certificate)
-        if f"certificate_{f.name}" in file.attrs
-    }
-    values["certificate"] = Certificate(**certificate)
-    for name in ("lost", "race_stress", "face_force"):
-        values[name] = file[name][()] if name in file else None
-    return DropResult(**values, heat=Heat.read(file), magnets=MagnetHistory.read(file))
-
-
-def _read_log(file: Any, prefix: str) -> ContactLog:
-    unknown = np.full(len(file[prefix]), np.nan)  # files of before the split of the contact's loss
-    return ContactLog(
-        **{
-            f.name: file[name][()] if (name := f"{prefix}_{f.name}") in file else unknown
-            for f in fields(ContactLog)
+    with opened(path, _FORMAT, "drop", "simulate") as file:
+        lines = {f.name: file[f"line_contact_{f.name}"][()].tolist() for f in fields(LineContact)}
+        certificate = {
+            f.name: file.attrs[f"certificate_{f.name}"]
+            for f in fields(Certificate)
+            if f"certificate_{f.name}" in file.attrs
         }
-    )
+        return DropResult(
+            **read(DropResult, file),
+            line_contacts=tuple(
+                LineContact(**dict(zip(lines, numbers, strict=True)))
+                for numbers in zip(*lines.values(), strict=True)
+            ),
+            certificate=Certificate(**certificate),
+        )

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.spectrum.frequency_path import FrequencyPath
 from rotordrop.spectrum.naming import LineKind
+from rotordrop.spectrum.speed import FrequencyPath
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

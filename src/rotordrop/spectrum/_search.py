@@ -12,22 +12,29 @@ from scipy.ndimage import label
 
 from rotordrop.arrays import Array, Mask
 from rotordrop.series import closed
-from rotordrop.spectrum._clock import BESIDE, Clock, View
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
-from rotordrop.spectrum.detection import Peak, clearest_peak, median_of_known, stretches_of
-from rotordrop.spectrum.line_extraction import (
+from rotordrop.spectrum._views import (
+    BESIDE,
+    Clock,
     Envelope,
     Near,
     Offset,
+    View,
     drift_phase,
     mean_offset,
     power_share,
     smooth,
 )
-from rotordrop.spectrum.line_settings import LineSettings
-from rotordrop.spectrum.line_spectra import frame_power
+from rotordrop.spectrum.detection import (
+    LineSettings,
+    Peak,
+    clearest_peak,
+    frame_power,
+    median_of_known,
+    stretches_of,
+)
 from rotordrop.spectrum.naming import LineKind
-from rotordrop.spectrum.speed_profile import SpeedProfile
+from rotordrop.spectrum.speed import SpeedProfile
 
 LASTING = 4
 """Fewest frames [1] in which a line must be seen (chosen)."""

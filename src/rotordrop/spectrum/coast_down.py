@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
+from rotordrop.evidence.impacts import Settling
+from rotordrop.files import new_hdf5
 from rotordrop.known import Known
-from rotordrop.record.impacts import Settling
+from rotordrop.one_thread import one_thread
+from rotordrop.progress import Progress
 from rotordrop.spectrum.candidates import Candidate
-from rotordrop.spectrum.coast_down_law import (
-    DragFit,
-    ExponentialFit,
-    find_standstill,
-    fit_drag,
-    fit_exponential,
-)
+from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.indentation import (
     DisplacementHistory,
     displacement_history,
@@ -28,11 +26,17 @@ from rotordrop.spectrum.indentation import (
     held_maximum,
     settling_words,
 )
-from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.lines import Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
 from rotordrop.spectrum.resonances import PassedResonance, find_resonances
-from rotordrop.spectrum.speed_profile import SpeedProfile
+from rotordrop.spectrum.speed import (
+    DragFit,
+    ExponentialFit,
+    SpeedProfile,
+    find_standstill,
+    fit_drag,
+    fit_exponential,
+)
 from rotordrop.spectrum.waterfall import (
     AmplitudeKind,
     Component,
@@ -42,8 +46,6 @@ from rotordrop.spectrum.waterfall import (
     settings_for,
     waterfalls,
 )
-
-Progress = Callable[[str, float], None]
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 BOUNCE_MARGIN = 0.15
@@ -57,12 +59,6 @@ SHORTEST_LAW = 3.0
 SENSOR_NOISE = 4e-7
 """Noise of a usual displacement sensor [m rms], added to a simulation before lines and orders are looked for:
 without it the search would find arithmetic, with less than a recording has what no recording shows."""
-FORCE_OF_A_RECORD = (
-    "Force and stress are not in a record of displacement; the largest indentation above dates the largest "
-    "force only roughly, as race and support give way too. An estimate of the drop finds both for the first "
-    "0.2 s; a simulated coast-down of the machine as described, with the drag of this record, says when they "
-    "are largest."
-)
 LINES_OF_A_SIMULATION = 24
 """Lines looked for at most in a simulation (chosen)."""
 _SEED = 2020
@@ -111,8 +107,10 @@ class WaterfallChoice:
     """Said in every label."""
     highest_frequency: float = 600.0
     """[Hz]."""
-    settings: WaterfallSettings | None = None
-    """Those of the paper when left out, in shorter frames for a short signal."""
+    points: int | None = None
+    """Samples per frame; the paper's when left out, less for a short signal."""
+    overlap: float = 0.5
+    """Share of a frame that is used again [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,14 +147,6 @@ class CoastDownAnalysis:
     lines: tuple[Line, ...]
     speed_law: SpeedLaw | None
 
-    def force_statements(self) -> tuple[str, ...]:
-        """What is known of when force and stress were largest, in words."""
-        if self.signal.force_and_stress:
-            return tuple(str(found["statement"]) for found in self.signal.force_and_stress)
-        if not self.signal.recorded:
-            return ()
-        return (FORCE_OF_A_RECORD,)
-
     def as_json(self) -> dict[str, Any]:
         """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
         content = {
@@ -168,11 +158,12 @@ class CoastDownAnalysis:
             "lines": [line.as_json() for line in self.lines],
             "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
             "force_and_stress": [dict(found) for found in self.signal.force_and_stress],
-            "force_and_stress_statements": list(self.force_statements()),
+            "force_and_stress_statements": [str(one["statement"]) for one in self.signal.force_and_stress],
         }
         return {key: _finite(value) for key, value in content.items()}
 
 
+@one_thread()
 def analyse_coast_down(
     signal: CoastDownSignal,
     candidates: Sequence[Candidate],
@@ -277,7 +268,8 @@ def _plane(
 def _waterfalls(
     signal: CoastDownSignal, moved: PlanarSignal, choice: WaterfallChoice
 ) -> tuple[Waterfall, ...]:
-    settings = choice.settings or settings_for(moved.shape[0])
+    points = choice.points or settings_for(moved.shape[0]).points
+    settings = WaterfallSettings(points=points, overlap=choice.overlap)
     if settings.frame_count(moved.shape[0]) == 0:
         return ()
     speed = None
@@ -380,3 +372,62 @@ def _waterfall_json(fall: Waterfall) -> dict[str, Any]:
         "frequency_hz": fall.frequency.tolist(),
         "rms_over_frames_m": fall.average().tolist(),
     }
+
+
+FORMAT = "rotordrop frequencies 1"
+
+
+def write_findings(analysis: CoastDownAnalysis, path: Path) -> None:
+    """Write waterfalls, displacement envelopes, tracked orders and speed; the file appears complete or not.
+
+    Every data set carries its ``units``, a waterfall its ``amplitude_kind``. Lines, resonances and statements
+    are in the JSON.
+    """
+    with new_hdf5(path) as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["recorded"] = analysis.signal.recorded
+        for name, plane in analysis.planes.items():
+            _write_plane(file.create_group(f"planes/{name}"), plane)
+        time, speed = analysis.signal.speed_time, analysis.signal.speed
+        if time is not None and speed is not None:
+            _put(file, "speed/time", time, "s")
+            _put(file, "speed/speed", speed, "rad/s")
+            law = analysis.speed_law
+            for name, fit in () if law is None else (("exponential", law.exponential), ("drag", law.drag)):
+                inside = (time >= fit.start) & (time <= fit.end)
+                fitted = np.full(len(time), np.nan)
+                fitted[inside] = fit.speed_at(time[inside])
+                _put(file, f"speed/{name}_fit", fitted, "rad/s")
+
+
+def _put(group: Any, name: str, values: Any, unit: str) -> None:
+    group.create_dataset(name, data=np.asarray(values)).attrs["units"] = unit
+
+
+def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
+    history, track = plane.history, plane.track
+    for name, values, unit in (
+        ("time", history.time, "s"),
+        ("smallest", history.lowest, "m"),
+        ("largest", history.highest, "m"),
+        ("smallest_xy", history.lowest_xy, "m"),
+        ("largest_xy", history.highest_xy, "m"),
+        ("air_gap", history.air_gap, "m"),
+    ):
+        _put(group, f"displacement/{name}", values, unit)
+    for fall in plane.waterfalls:
+        place = group.create_group(f"waterfall_{fall.component}")
+        place.attrs["points"], place.attrs["overlap"] = fall.settings.points, fall.settings.overlap
+        _put(place, "time", fall.time, "s")
+        _put(place, "frequency", fall.frequency, "Hz")
+        _put(place, "amplitude", fall.amplitude, "m")
+        place["amplitude"].attrs["amplitude_kind"] = fall.amplitude_kind
+        if fall.speed is not None:
+            _put(place, "speed", fall.speed, "rad/s")
+    if track is not None:
+        _put(group, "orders/time", track.time, "s")
+        _put(group, "orders/speed", track.speed, "rad/s")
+        _put(group, "orders/order", track.orders, "1")
+        _put(group, "orders/major_axis", track.major_axis, "m")
+        _put(group, "orders/separable", track.separable, "1")
+        group["orders/major_axis"].attrs["amplitude_kind"] = "zero-to-peak"

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
+from rotordrop.evidence.impacts import AFTER_LAST, Settling, find_impacts
 from rotordrop.known import NINETY
-from rotordrop.record.impacts import AFTER_LAST, Settling, find_impacts
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
 from rotordrop.units import format_moment
@@ -240,10 +240,15 @@ def _window_statement(
     second = f"later than {window:g} s at most {size(later)} (at {format_moment(later_time)})"
     if abs(largest - later) <= 2.0 * noise and time <= window:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
-    held = "held the maximum" if time <= window else "did not hold the maximum"
-    return f"{first}; {second}: the first {window:g} s {held}"
+    held = "held" if time <= window else "did not hold"
+    return f"{first}; {second}: the first {window:g} s {held} the largest displacement"
 
 
 def held_maximum(history: DisplacementHistory) -> bool:
     """True when the largest displacement fell into the first window (0.2 s in the paper)."""
     return history.largest_time <= history.window
+
+
+def held_clearly(history: DisplacementHistory) -> bool:
+    """The same where the signal goes on after the window and noise leaves no doubt."""
+    return held_maximum(history) and history.largest - history.largest_later > 2.0 * history.noise

@@ -11,12 +11,10 @@ from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
 from rotordrop.spectrum.candidates import Candidate, harmonic_candidates
-from rotordrop.spectrum.frequency_path import FrequencyPath
-from rotordrop.spectrum.line_settings import STANDARD_SETTINGS, LineSettings
+from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
-from rotordrop.spectrum.rate import reduce_rate
-from rotordrop.spectrum.speed_profile import SpeedProfile
-from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal
+from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
+from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal, reduce_rate
 
 
 @dataclass(frozen=True, kw_only=True)

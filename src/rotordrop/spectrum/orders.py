@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import RecordError, UsageError
-from rotordrop.spectrum.frequency_path import FrequencyPath
-from rotordrop.spectrum.rate import PASSED, reduce_rate
-from rotordrop.spectrum.speed_profile import SpeedProfile
-from rotordrop.spectrum.waterfall import PlanarSignal
+from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
+from rotordrop.spectrum.waterfall import PASSED, PlanarSignal, reduce_rate
 
 FEWEST_TURNS = 4.0
 """Turns of the rotor in the shortest window [1] (chosen)."""

@@ -1,4 +1,4 @@
-"""Amplitude over frequency and time: the waterfall of a coast-down (Neisi 2020, section 5.4, Fig. 18)."""
+"""Overlapping frames of a displacement, their spectra, and fewer samples where low frequencies matter."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Literal, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, UsageError
@@ -132,7 +133,7 @@ def waterfalls(
     """Cut a displacement into overlapping frames and give the amplitude of each frequency in each frame.
 
     A steady tone on a line reads its true amplitude; between two lines up to 15 % less (scalloping); a tone
-    that moves within the frame less still (see `smear_factor`). Frames are read one at a time, so that a
+    that moves within the frame less still. Frames are read one at a time, so that a
     file larger than memory can be passed.
 
     The displacement (N, 2) [m] is that of one plane, with the rotor speed (N,) [rad/s] where it is known;
@@ -177,22 +178,6 @@ def waterfalls(
     )
 
 
-def smear_factor(rate: float, sampling_rate: float, settings: WaterfallSettings = PAPER_SETTINGS) -> float:
-    """Share of its true amplitude that a sweeping tone shows in a frame, at its highest line [1].
-
-    The rate is how fast the frequency of the tone changes [Hz/s], e.g. the order times the change of rotor
-    speed per second.
-    """
-    points = 4096
-    duration = settings.points / sampling_rate
-    u = (np.arange(points) + 0.5) / points - 0.5
-    weight = 1.0 + np.cos(2.0 * np.pi * u)
-    span = abs(rate) * duration**2
-    offsets = np.linspace(0.0, 0.5 * span, 201)
-    phase = np.pi * span * u**2 - 2.0 * np.pi * offsets[:, None] * u
-    return float(np.abs(np.mean(weight * np.exp(1j * phase), axis=1)).max())
-
-
 def _lines(
     points: int, sampling_rate: float, component: Component, highest: float | None
 ) -> tuple[Array, NDArray[np.intp]]:
@@ -235,3 +220,52 @@ def _frame_speed(
     mean = np.array([np.mean(cut) for cut in cuts])
     change = np.array([np.ptp(cut) for cut in cuts])
     return mean, change
+
+
+TAPS_PER_FACTOR = 40
+BLOCK = 1024
+"""Samples that remain of what is read at a time [1]: the signal may lie in a file, or be made while read."""
+PASSED = 0.75
+"""Share of the band up to half the new rate that is left [1]: white noise is white below it only."""
+STOP_BAND = 100.0
+"""Attenuation of what would fold back [dB]."""
+
+
+def reduce_rate(
+    displacement: PlanarSignal,
+    sampling_rate: float,
+    highest_frequency: float,
+    *,
+    samples_per_turn: float = 3.6,
+) -> tuple[Array, float]:
+    """Thin out a displacement to what its highest frequency of interest needs.
+
+    Frequencies up to the highest keep their amplitude within 2e-5; what lies beyond half the new rate is gone
+    (100 dB). The first sample keeps its time. A signal that cannot be thinned out is returned as it is.
+
+    The displacement has shape (N, 2) [m], the thinned one (M, 2); the new rate comes with it. So many samples
+    per period of the highest frequency remain [1].
+    """
+    factor = int(sampling_rate // (samples_per_turn * highest_frequency))
+    if factor < 2:
+        return np.asarray(displacement[0 : displacement.shape[0]], dtype=np.float64), sampling_rate
+    beta = 0.1102 * (STOP_BAND - 8.7)
+    half = TAPS_PER_FACTOR // 2
+    taps = firwin(2 * half * factor + 1, PASSED / factor, window=("kaiser", beta))
+    samples = displacement.shape[0]
+    thin = np.empty((-(-samples // factor), displacement.shape[1]))
+    for first in range(0, len(thin), BLOCK):
+        last = min(first + BLOCK, len(thin))
+        read = _extended(displacement, (first - half) * factor, (last - 1 + half) * factor + 1)
+        thin[first:last] = upfirdn(taps, read, 1, factor, axis=0)[2 * half : 2 * half + last - first]
+    return thin, sampling_rate / factor
+
+
+def _extended(displacement: PlanarSignal, first: int, last: int) -> Array:
+    """Samples of a stretch; beyond the ends, the straight line through the first sample and the last one."""
+    samples = displacement.shape[0]
+    ends = [np.asarray(displacement[k : k + 1], dtype=np.float64) for k in (0, samples - 1)]
+    slope = (ends[1] - ends[0]) / max(samples - 1, 1)
+    before, after = np.arange(first, 0)[:, None], np.arange(1, last - samples + 1)[:, None]
+    inside = np.asarray(displacement[max(first, 0) : min(last, samples)], dtype=np.float64)
+    return np.concatenate([ends[0] + slope * before, inside, ends[1] + slope * after])

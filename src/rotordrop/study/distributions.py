@@ -10,7 +10,6 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
-from rotordrop.machine import Machine
 from rotordrop.physics.elementary import exp_each, ln, ln_each
 
 Number = Callable[[Any], float]
@@ -25,10 +24,6 @@ _MEANING = {
     "grid": "a list of values, each of them visited",
 }
 SHAPES = tuple(_MEANING)
-PART = ".bearing"
-"""End of the name of a choice among bearings, ``"DE.bearing"`` or ``"*.bearing"``."""
-AS_DESCRIBED = -1.0
-"""In place of a number of the list: the bearing of the machine file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,13 +34,6 @@ class Distribution:
     """One of `SHAPES`."""
     numbers: tuple[float, ...]
     """Its numbers, as `SHAPES` explains them [SI unit of the value, the second of a log-normal 1]."""
-    names: tuple[str, ...] = ()
-    """What the numbers stand for, where they count the items of a list."""
-
-    @property
-    def written(self) -> list[float] | list[str]:
-        """Its numbers as a plan keeps them, or what they stand for."""
-        return list(self.names) or list(self.numbers)
 
     def __call__(self, share: Array) -> Array:
         """Values [SI] at the given shares of the probability, shape as given; shares lie between 0 and 1."""
@@ -132,43 +120,3 @@ def read_distribution(name: str, table: Any, number: Number) -> Distribution:
     if shape in ("log_uniform", "log_normal") and not first > 0.0:
         raise UsageError(f"{name}: {shape} begins at {first:g} (SI); {expected}")
     return Distribution(shape=shape, numbers=numbers)
-
-
-def is_bearing(name: str) -> bool:
-    """Whether a name means a whole bearing, not a number."""
-    return name.endswith(PART) and name.count(".") == 1
-
-
-def read_bearings(machine: Machine, name: str, table: Any) -> Distribution:
-    """Read a choice such as ``{choices = ["B7014-E", "HCB7014-E"]}``; every one must fit the machine."""
-    listed = table.get("choices") if isinstance(table, Mapping) and len(table) == 1 else None
-    if not (isinstance(listed, list) and len(listed) > 1 and all(isinstance(one, str) for one in listed)):
-        raise UsageError(
-            f"{name} is chosen from {table!r}; expected designations, as in "
-            '{choices = ["XCB71914-E", "HCB71914-E"]}'
-        )
-    twice = sorted({one for one in listed if listed.count(one) > 1})
-    if twice:
-        raise UsageError(f"{name}: {', '.join(twice)} listed twice; expected each designation once")
-    spread = bearings_of(listed)
-    for number in spread.numbers:
-        with_chosen(machine, {name: spread}, {name: number})
-    return spread
-
-
-def bearings_of(designations: list[str]) -> Distribution:
-    """A choice among bearings, as likely as one another."""
-    return Distribution(
-        shape="choices", numbers=tuple(map(float, range(len(designations)))), names=tuple(designations)
-    )
-
-
-def with_chosen(machine: Machine, choose: Mapping[str, Distribution], values: Mapping[str, float]) -> Machine:
-    """The machine with the bearings that the values say; itself where none is chosen."""
-    for name, spread in choose.items():
-        if spread.names and values[name] != AS_DESCRIBED:
-            owner, designation = name.removesuffix(PART), spread.names[int(values[name])]
-            owners = [b.name for b in machine.touchdown_bearings] if owner == "*" else [owner]
-            for one in owners:
-                machine = machine.with_bearing(one, designation)
-    return machine

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -29,15 +29,9 @@ from rotordrop.simulate.case import DropCase, LevitatedStart, MagnetEvent
 from rotordrop.study import sampling
 from rotordrop.study.distributions import (
     Distribution,
-    bearings_of,
-    is_bearing,
-    read_bearings,
     read_distribution,
-    with_chosen,
 )
 from rotordrop.units import parse_quantity
-
-T = TypeVar("T")
 
 CASE_KINDS: Mapping[str, str] = {
     "speed": "speed",
@@ -64,7 +58,7 @@ TURN = Distribution(shape="uniform", numbers=(0.0, 2.0 * math.pi))
 _QUANTITIES = {"duration": "time", "output_step": "time", "speed": "speed", "tolerance": "dimensionless"}
 _QUANTITIES |= {"relevitate": "time"}
 _AS_WRITTEN = (
-    "name", "drops", "seed", "tolerance", "reduction", "design", "shard", "calibrated", "repeats"
+    "name", "drops", "seed", "tolerance", "reduction", "design", "shard", "calibrated"
 )  # fmt: skip
 
 
@@ -80,11 +74,10 @@ class Until:
     """Half width of its 90 % interval relative to its value [1]."""
 
 
-WHOLE = (TypeAdapter(Annotated[int, Field(strict=True, ge=1)]), "a whole number above zero")
+_WHOLE = (TypeAdapter(Annotated[int, Field(strict=True, ge=1)]), "a whole number above zero")
 _RULES: Mapping[str, tuple[TypeAdapter[Any], str]] = {
-    "drops": WHOLE,
-    "shard": WHOLE,
-    "repeats": WHOLE,
+    "drops": _WHOLE,
+    "shard": _WHOLE,
     "seed": (
         TypeAdapter(Annotated[int, Field(strict=True, ge=0, lt=2**64)]),
         "a whole number from 0 to 2^64 - 1",
@@ -103,15 +96,6 @@ _RULES: Mapping[str, tuple[TypeAdapter[Any], str]] = {
     ),
 }
 """What a setting of a study must be, for pydantic and in words."""
-
-
-def required(name: str, value: Any, rule: tuple[TypeAdapter[Any], str]) -> Any:
-    """A setting as its rule wants it; refuses another one with what was expected."""
-    adapter, expected = rule
-    try:
-        return adapter.validate_python(value)
-    except ValidationError:
-        raise UsageError(f"{name} = {value!r}; expected {expected}") from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,16 +135,14 @@ class Study:
     """When to end early."""
     calibrated: bool = False
     """Whether the values of a calibrated machine vary by their joint distribution."""
-    choose: Mapping[str, Distribution] = field(default_factory=dict)
-    """Values that are chosen, not left to chance, in the design ``"candidates"``."""
-    repeats: int = 1
-    """Drops of each candidate; every candidate meets the same chances."""
-    candidates: tuple[tuple[float, ...], ...] = ()
-    """Values of every candidate [SI], in the order of ``choose``; drawn over its bounds when left out."""
 
     def __post_init__(self) -> None:
-        for name, rule in _RULES.items():
-            object.__setattr__(self, name, required(name, getattr(self, name), rule))
+        for name, (adapter, expected) in _RULES.items():
+            given = getattr(self, name)
+            try:
+                object.__setattr__(self, name, adapter.validate_python(given))
+            except ValidationError:
+                raise UsageError(f"{name} = {given!r}; expected {expected}") from None
         if math.isnan(self.speed) and "speed" not in self.vary:
             raise UsageError('the study has no speed; write speed = "60 Hz", or vary it under [vary]')
         if self.levitated and not self.machine.ambs:
@@ -191,7 +173,7 @@ class Study:
         joint = (
             {} if self.joint is None else {p: self.joint.marginal(k) for k, p in enumerate(self.joint.paths)}
         )
-        spread = dict(sorted({**joint, **self.vary, **self.choose}.items()))
+        spread = dict(sorted({**joint, **self.vary}.items()))
         if self.levitated and "rotor_angle" not in spread:
             spread["rotor_angle"] = TURN
         return spread
@@ -219,8 +201,6 @@ class Study:
         names = list(self.varied)
         if self.design == "grid":
             shares = sampling.grid(self.seed, first, last, self.varied)
-        elif self.design == "candidates":
-            shares = sampling.crossed(self.seed, first, last, names, list(self.choose), self.repeats)
         elif self.design == "latin hypercube":
             shares = sampling.hypercube(self.seed, self.drops, len(names))[first:last]
         else:
@@ -230,26 +210,18 @@ class Study:
                 "sensitivity": sampling.sensitivity,
             }
             shares = draw[self.design](self.seed, first, last, len(names))
-        values = self.values_at(shares)
-        if self.candidates:
-            chosen = [list(self.varied).index(name) for name in self.choose]
-            values[:, chosen] = np.array(self.candidates)[np.arange(first, last) // self.repeats]
-        return values
-
-    def values_at(self, share: Array) -> Array:
-        """Values [SI] at independent shares of the probability, shape (n, V) as `varied` has them."""
-        columns = [spread(share[:, j]) for j, spread in enumerate(self.varied.values())]
-        values = np.column_stack(columns) if columns else np.zeros((len(share), 0))
+        columns = [spread(shares[:, j]) for j, spread in enumerate(self.varied.values())]
+        values = np.column_stack(columns) if columns else np.zeros((len(shares), 0))
         if self.joint is not None:
-            together = [list(self.varied).index(path) for path in self.joint.paths]
-            values[:, together] = self.joint.values(share[:, together])
+            together = [names.index(path) for path in self.joint.paths]
+            values[:, together] = self.joint.values(shares[:, together])
         return values
 
     def machine_values(self, values: Mapping[str, float]) -> dict[str, float]:
         """Machine values by full path [SI]; a star stands for every touchdown bearing."""
         found: dict[str, float] = {}
         for path, value in values.items():
-            if case_kind(self.machine, path) is None and not is_bearing(path):
+            if case_kind(self.machine, path) is None:
                 found |= dict.fromkeys(_starred(self.machine, path), value)
         if self.joint is not None:
             for bearing, (row, path, by) in product(self.machine.touchdown_bearings, following()):
@@ -258,8 +230,8 @@ class Study:
         return found
 
     def machine_of(self, values: Mapping[str, float]) -> Machine:
-        """The machine of a drop, with the bearings chosen for it and all varied values [SI]."""
-        return with_chosen(self.machine, self.choose, values).with_values(self.machine_values(values))
+        """The machine of a drop with all varied values [SI]."""
+        return self.machine.with_values(self.machine_values(values))
 
     def case(self, values: Mapping[str, float]) -> DropCase:
         """Case of a drop whose varied values are given [SI]."""
@@ -305,10 +277,8 @@ class Study:
             **({} if self.relevitate is None else {"relevitate_s": self.relevitate}),
             "start": self.start,
             "speed_rad_per_s": None if math.isnan(self.speed) else self.speed,
-            "vary": {name: {spread.shape: spread.written} for name, spread in self.vary.items()},
+            "vary": {name: {spread.shape: list(spread.numbers)} for name, spread in self.vary.items()},
             "until": None if self.until is None else asdict(self.until),
-            "choose": {name: {spread.shape: spread.written} for name, spread in self.choose.items()},
-            "candidates": [list(one) for one in self.candidates],
         }
 
     @cached_property
@@ -341,21 +311,13 @@ def _check_spreads(study: Study) -> None:
             continue
         for path in _starred(study.machine, name):
             kind_of_path(study.machine, path)
-    for name, spread in study.choose.items():
-        for path in () if spread.names else _starred(study.machine, name):
-            kind_of_path(study.machine, path)
-    once = [*study.vary, *study.choose, *(() if study.joint is None else study.joint.paths)]
+    once = [*study.vary, *(() if study.joint is None else study.joint.paths)]
     paths = [path for name in once for path in _starred(study.machine, name)]
     twice = {path for path in paths if paths.count(path) > 1}
     if twice:
         raise UsageError(
-            f"{', '.join(sorted(twice))}: drawn in two ways; expected each value once among [vary], [choose] "
-            "and the calibrated values. Leave one of them out"
-        )
-    if bool(study.choose) != (study.design == "candidates"):
-        raise UsageError(
-            f'design = {study.design!r} with {len(study.choose)} values under [choose]; "candidates" '
-            "needs at least one of them, and other designs none"
+            f"{', '.join(sorted(twice))}: drawn in two ways; expected each value once among [vary] and "
+            "the calibrated values. Leave one of them out"
         )
     gridded = [name for name, spread in study.vary.items() if spread.shape == "grid"]
     if bool(gridded) != (study.design == "grid"):
@@ -367,7 +329,7 @@ def _check_spreads(study: Study) -> None:
 
 def read_study(table: Mapping[str, Any], machine: Machine) -> Study:
     """Make a study of what a study file holds; ``machine`` is already read."""
-    known = ("machine", *(item.name for item in fields(Study) if item.name not in ("machine", "candidates")))
+    known = ("machine", *(item.name for item in fields(Study) if item.name != "machine"))
     for key in table:
         if key not in known:
             raise UsageError(unknown_key(key, known))
@@ -376,13 +338,9 @@ def read_study(table: Mapping[str, Any], machine: Machine) -> Study:
     settings: dict[str, Any] = {"name": machine.name, **table, "machine": machine}
     for key in _QUANTITIES.keys() & table.keys():
         settings[key] = _quantity(key, table[key], _QUANTITIES[key])
-    for part in ("vary", "choose"):
-        settings[part] = {
-            name: read_bearings(machine, name, spread)
-            if part == "choose" and is_bearing(name)
-            else _read_spread(machine, name, spread)
-            for name, spread in dict(table.get(part, {})).items()
-        }
+    settings["vary"] = {
+        name: _read_spread(machine, name, spread) for name, spread in dict(table.get("vary", {})).items()
+    }
     return Study(**settings)
 
 
@@ -400,21 +358,15 @@ def planned_study(document: Mapping[str, Any], machine: Machine) -> Study:
         output_step=document["output_step_s"],
         relevitate=document.get("relevitate_s"),
         speed=math.nan if speed is None else speed,
-        vary=_spreads(document["vary"]),
-        choose=_spreads(document["choose"]),
-        candidates=tuple(tuple(one) for one in document["candidates"]),
+        vary={
+            name: Distribution(shape=shape, numbers=tuple(numbers))
+            for name, spread in document["vary"].items()
+            for shape, numbers in spread.items()
+        },
         start=document["start"],
         until=document["until"],
         **{key: document[key] for key in _AS_WRITTEN},
     )
-
-
-def _spreads(written: Mapping[str, Any]) -> dict[str, Distribution]:
-    return {
-        name: bearings_of(numbers) if is_bearing(name) else Distribution(shape=shape, numbers=tuple(numbers))
-        for name, spread in written.items()
-        for shape, numbers in spread.items()
-    }
 
 
 def _quantity(key: str, raw: Any, kind: str) -> float:
@@ -432,17 +384,12 @@ def load_study(path: str | Path) -> Study:
     UsageError
         If the study cannot be used; the message names the file.
     """
-    return read_file(path, "study", read_study)
-
-
-def read_file(path: str | Path, what: str, read: Callable[[Mapping[str, Any], Machine], T]) -> T:
-    """Read a plan (TOML) with the machine it names; every message names the file."""
-    file, table = Path(path), read_toml(path, what)
+    table, file = read_toml(path, "study"), Path(path)
     named = table.get("machine")
     if not isinstance(named, str):
         raise UsageError(f'{file}: machine = {named!r}; expected the name of a machine file, "machine.toml"')
     machine = load_machine(file.parent / named)
     try:
-        return read(table, machine)
+        return read_study(table, machine)
     except UsageError as error:
         raise UsageError(f"{file}: {error}") from error

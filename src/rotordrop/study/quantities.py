@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.errors import UsageError, unknown_key
 from rotordrop.machine import Machine
 from rotordrop.physics.whirl_spells import whirl_spells
 from rotordrop.rotor.parameters import DropModel
-from rotordrop.simulate.clearances import clearance_uses, share_column, stopped
-from rotordrop.simulate.landing import landings
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.result import DropResult
+from rotordrop.simulate.used import clearance_uses, landings, share_column, stopped
 from rotordrop.units import si_unit
 
 LIFT = "lift"
@@ -115,14 +113,6 @@ def columns_of(machine: Machine) -> tuple[Quantity, ...]:
             ("lift_time", "time", "time from their begin until it touched nothing any more"),
         ]
     return (*_quantities(*of_parts), *DROP_QUANTITIES)
-
-
-def column_of(machine: Machine, name: str) -> Quantity:
-    """A column of a study by its name; refuses a name there is none of."""
-    columns = {q.name: q for q in columns_of(machine)}
-    if name not in columns:
-        raise UsageError(unknown_key(name, tuple(columns)))
-    return columns[name]
 
 
 def row_of(model: DropModel, result: DropResult) -> Array:

@@ -1,4 +1,4 @@
-"""Work on a study: claim a shard, compute its drops, publish it; on threads, in many processes, on Dask."""
+"""Work on a study: compute the drops of a shard and publish it, on threads or on Dask."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
 from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from os import cpu_count
@@ -20,20 +19,21 @@ import numpy as np
 
 from rotordrop.errors import RotordropError, UsageError
 from rotordrop.machine import Machine
+from rotordrop.one_thread import one_thread
+from rotordrop.progress import Progress, Shown, shown
+from rotordrop.require import each, require
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.study.folder import (
-    Claim,
     Shard,
     StudyFolder,
-    claimed,
+    alone_in,
     open_folder,
     publish,
     put_damaged_aside,
     read_plan,
     require_same_version,
     study_of,
-    tidy,
 )
 from rotordrop.study.plan import Study, read_study
 from rotordrop.study.quantities import columns_of, row_of
@@ -44,30 +44,14 @@ LOOK_EVERY, LOOK_SHARE = 0.5, 0.02
 shards takes 0.1 s."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class StudyProgress:
-    """How far a study is."""
-
-    drops: int
-    of: int
-    """Finished drops and drops in all."""
-    rate: float
-    """Drops finished per second since this run began [1/s]."""
-    left: float
-    """Time left at that rate [s]; infinite before the first shard."""
-
-
-Report = Callable[[StudyProgress], None]
-
-
+@one_thread()
 def run_study(
     study: Study,
     folder: str | Path,
     *,
     threads: int | None = None,
     dask: str | Literal["local"] | None = None,
-    wait_for_others: bool = True,
-    report: Report | None = None,
+    progress: Shown = None,
 ) -> StudyResults:
     """Compute all drops of a study that are not computed yet, and give its results.
 
@@ -82,38 +66,38 @@ def run_study(
     dask : str, optional
         Address of a Dask scheduler whose workers see the folder, or ``"local"`` for one made here (needs the
         extra ``rotordrop[cluster]``).
-    wait_for_others : bool
-        Whether to wait for shards that other processes work on (and to take over those whose worker died).
-    report : callable, optional
-        Called with a `StudyProgress` about twice a second.
+    progress : callable or False, optional
+        Called with the drops done, their rate and the fraction done, about twice a second; by default a bar
+        in a terminal or a notebook.
 
     Returns
     -------
     StudyResults
         All finished drops, in order.
 
+    Raises
+    ------
+    UsageError
+        If the folder holds another study, or another run works there.
+
     Notes
     -----
-    Several processes may run the same study in the same folder at once, on one computer or many. The numbers
-    do not depend on who computed what. A finished shard that has changed on the disk is kept under another
-    name and computed again.
+    The numbers do not depend on who computed what. A finished shard that has changed on the disk is kept
+    under another name and computed again.
     """
+    require(study, "study", Study)
+    require(threads, "threads", int, none=True, least=1)
     place = open_folder(study, folder)
-    put_damaged_aside(place, study)
-    wanted = _missing(study, place)
-    watch = _Watch(study, place, report)
-    if dask is not None:
-        _on_dask(place, wanted, dask, watch)
-    else:
-        _on_threads(place, wanted, threads or cpu_count() or 1, study, watch)
-    enough = not wait_for_others or watch.look()
-    while not enough and (missing := _missing(study, place)):
-        # others work on these; those whose worker has gone are taken over
-        worked = [work_on(place.path, shard) for shard in missing]
-        enough = watch.look()
-        if not enough and not any(worked):
-            time.sleep(LOOK_EVERY)
-    tidy(place)
+    with alone_in(place), shown(progress, study.name) as tell:
+        put_damaged_aside(place, study)
+        finished = set(place.finished())
+        wanted = [shard for shard in range(study.shards) if shard not in finished]
+        watch = _Watch(study, place, tell)
+        if wanted and dask is not None:
+            _on_dask(place, wanted, dask, watch)
+        elif wanted:
+            _on_threads(place, wanted, threads or cpu_count() or 1, study, watch)
+        watch.look()
     return load_results(place.path)
 
 
@@ -124,7 +108,7 @@ def sweep(
     repeats: int = 1,
     folder: str | Path | None = None,
     threads: int | None = None,
-    report: Report | None = None,
+    progress: Shown = None,
     **settings: Any,
 ) -> StudyResults:
     """Simulate a drop for every combination of values of a machine or of its drops.
@@ -140,7 +124,7 @@ def sweep(
         Drops of each combination; they differ in what is left to chance, above all the rotor angle.
     folder : path, optional
         Folder of the study, which can be resumed; left out, nothing is kept but the results.
-    threads, report : optional
+    threads, progress : optional
         As for `run_study`.
     **settings
         Further keys of a study file, such as ``speed="60 Hz"``, ``duration="0.1 s"`` or ``seed=2``.
@@ -150,24 +134,21 @@ def sweep(
     StudyResults
         Values and quantities of every drop; ``results.to_dataframe()`` is one table.
     """
-    spreads = {name: {"grid": list(values)} for name, values in vary.items()}
+    require(machine, "machine", Machine)
+    require(vary, "vary", Mapping, hint="Write {'speed': ['60 Hz', '90 Hz']}")
+    repeats = require(repeats, "repeats", int, least=1)
+    spreads = {name: {"grid": list(each(values, name, str, float))} for name, values in vary.items()}
     drops = repeats * math.prod(len(one["grid"]) for one in spreads.values())
     study = read_study({"drops": drops, "design": "grid", "vary": spreads} | settings, machine)
     with TemporaryDirectory() if folder is None else nullcontext(folder) as place:
         own = Path(place) / "study" if folder is None else place
-        return run_study(study, own, threads=threads, report=report)
-
-
-def _missing(study: Study, place: StudyFolder) -> list[int]:
-    finished = set(place.finished())
-    return [shard for shard in range(study.shards) if shard not in finished]
+        return run_study(study, own, threads=threads, progress=progress)
 
 
 def compute_shard(
     study: Study,
     model: DropModel,
     shard: int,
-    claim: Claim | None = None,
     stop: threading.Event | None = None,
 ) -> Shard | None:
     """Compute the drops of one shard, in order; None when ``stop`` was set before the end.
@@ -185,8 +166,6 @@ def compute_shard(
             study, model, dict(zip(study.varied, varied[row].tolist(), strict=True))
         )
         reasons.append(reason)
-        if claim is not None:
-            claim.alive()
     return Shard(first=drops.start, varied=varied, numbers=numbers, reasons=tuple(reasons))
 
 
@@ -203,15 +182,16 @@ def one_drop(study: Study, model: DropModel, values: dict[str, float]) -> tuple[
         return nothing, str(error)
 
 
-def work_on(folder: str | Path, shard: int) -> bool:
-    """Compute and publish one shard of the study in a folder, unless another one does; for Dask workers."""
+@one_thread()
+def work_on(folder: str | Path, shard: int) -> None:
+    """Compute and publish one shard of the study in a folder; for Dask workers."""
     plan = read_plan(folder)  # another study may have taken the place of the one before
     require_same_version(plan, Path(folder))
     digest = plan["digest"]
     if digest not in _OPEN:
         study = study_of(folder)
         _OPEN[digest] = (study, build_drop_model(study.machine, study.reduction, loops=study.looped))
-    return _work(*_OPEN[digest], StudyFolder(Path(folder)), shard, None)
+    _work(*_OPEN[digest], StudyFolder(Path(folder)), shard, None)
 
 
 _OPEN: dict[str, tuple[Study, DropModel]] = {}
@@ -220,22 +200,13 @@ _OPEN: dict[str, tuple[Study, DropModel]] = {}
 
 def _work(
     study: Study, model: DropModel, place: StudyFolder, shard: int, stop: threading.Event | None
-) -> bool:
-    if place.shard_path(shard).exists():
-        return False
-    with claimed(place, shard) as claim:
-        if claim is None or place.shard_path(shard).exists():
-            return False
-        found = compute_shard(study, model, shard, claim, stop)
-        if found is None:
-            return False
+) -> None:
+    found = compute_shard(study, model, shard, stop)
+    if found is not None:
         publish(place, study, shard, found)
-        return True
 
 
 def _on_threads(place: StudyFolder, wanted: list[int], threads: int, study: Study, watch: _Watch) -> None:
-    if not wanted:
-        return
     model = build_drop_model(study.machine, study.reduction, loops=study.looped)
     stop = threading.Event()
     with ThreadPoolExecutor(max_workers=threads) as pool:
@@ -263,7 +234,7 @@ def _on_dask(place: StudyFolder, wanted: list[int], address: str, watch: _Watch)
         _drive(client.get_executor(pure=False), wanted, task, watch)
 
 
-def _drive(pool: Executor, wanted: list[int], work: Callable[[int], bool], watch: _Watch) -> None:
+def _drive(pool: Executor, wanted: list[int], work: Callable[[int], None], watch: _Watch) -> None:
     """Hand out the shards in order and look at the folder until all is done or enough is known."""
     running = {pool.submit(work, shard) for shard in wanted}
     pause = LOOK_EVERY
@@ -284,18 +255,16 @@ def _drive(pool: Executor, wanted: list[int], work: Callable[[int], bool], watch
 class _Watch:
     """Looks at the folder of a study, tells how far it is, and knows whether it may end early."""
 
-    def __init__(self, study: Study, place: StudyFolder, report: Report | None) -> None:
-        self._study, self._place, self._report = study, place, report
+    def __init__(self, study: Study, place: StudyFolder, tell: Progress) -> None:
+        self._study, self._place, self._tell = study, place, tell
         self._began, self._before = time.monotonic(), _drops(study, place)
         self._end = EarlyEnd(study, place)
 
     def look(self) -> bool:
-        """Tell the progress; whether enough is known."""
-        if self._report is not None:
-            drops, of = _drops(self._study, self._place), self._study.drops
-            rate = (drops - self._before) / max(time.monotonic() - self._began, 1e-9)
-            left = (of - drops) / rate if rate > 0.0 else math.inf
-            self._report(StudyProgress(drops=drops, of=of, rate=rate, left=left))
+        """Say how far it is; whether enough is known."""
+        drops, of = _drops(self._study, self._place), self._study.drops
+        rate = (drops - self._before) / max(time.monotonic() - self._began, 1e-9)
+        self._tell(f"{drops} of {of} drops, {rate:.1f}/s", drops / of)
         return self._end.shards() is not None
 
 

@@ -7,7 +7,7 @@ threads or the order of work.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, get_args
@@ -24,14 +24,8 @@ from rotordrop.physics.elementary import exp_each, ln_each
 from rotordrop.physics.linear_algebra import product, symmetric_eigen
 from rotordrop.study.distributions import Distribution, normal_score
 
-Design = Literal["random", "latin hypercube", "sobol", "grid", "sensitivity", "candidates"]
+Design = Literal["random", "latin hypercube", "sobol", "grid", "sensitivity"]
 DESIGNS: tuple[str, ...] = get_args(Design)
-
-
-def uniform(seed: int, drop: int, width: int, stream: int = 0) -> Array:
-    """Random numbers of one drop: a block of the counter that no other drop reaches, shape (width,)."""
-    bits = np.random.Philox(key=seed, counter=[0, 0, drop & (2**64 - 1), stream])
-    return np.random.Generator(bits).random(width)
 
 
 def independent(seed: int, first: int, last: int, width: int) -> Array:
@@ -39,9 +33,8 @@ def independent(seed: int, first: int, last: int, width: int) -> Array:
     bits = np.random.Philox(key=seed, counter=0)
     generator, begin = np.random.Generator(bits), bits.state
     shares = np.empty((last - first, width))
-    for row, drop in enumerate(
-        range(first, last)
-    ):  # as `uniform`, whose new generator takes six times as long
+    # each drop has a block of the counter that no other reaches; a new generator each took six times as long
+    for row, drop in enumerate(range(first, last)):
         begin["state"]["counter"][2] = drop
         bits.state = begin
         generator.random(out=shares[row])
@@ -102,24 +95,6 @@ def sensitivity(seed: int, first: int, last: int, width: int) -> Array:
         share[row] = b if place == 1 else a
         if place > 1:
             share[row, place - 2] = b[place - 2]
-    return share
-
-
-def crossed(
-    seed: int, first: int, last: int, names: Sequence[str], chosen: Sequence[str], repeats: int
-) -> Array:
-    """Candidates that all meet the same chances, shape (n, V).
-
-    Drop ``i`` is candidate ``i // repeats``; what is left to chance depends on ``i % repeats`` alone, so that
-    two candidates differ by what was chosen and not by luck (common random numbers).
-    """
-    places = [names.index(name) for name in chosen]
-    share = np.array([uniform(seed, i % repeats, len(names), stream=1) for i in range(first, last)])
-    share = share.reshape(-1, len(names))
-    low, high = first // repeats, -(-last // repeats)
-    if places and high > low:
-        points = sobol(seed, low, high, len(places))
-        share[:, places] = points[np.arange(first, last) // repeats - low]
     return share
 
 

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
-from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, OutputError, UsageError, unknown_key
 from rotordrop.known import Known
-from rotordrop.study.folder import FORMAT, StudyFolder, read_plan, read_shards, study_of
+from rotordrop.study.folder import StudyFolder, read_plan, read_shards, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of
 
@@ -45,8 +44,8 @@ class StudyResults:
     """Why a drop failed; empty where it did not."""
     aside: tuple[str, ...] = ()
     """Files of damaged shards that were kept and computed again."""
-    taken_over: str = ""
-    """What is to be said of drops of another version, or that were given digests later; else empty."""
+    version: str = ""
+    """Version of rotordrop that computed them."""
 
     def __len__(self) -> int:
         return len(self.drop)
@@ -120,7 +119,8 @@ def cells_of(x: Array, cells: int) -> NDArray[np.int64]:
 def quantile(values: ArrayLike, share: float) -> Known:
     """Quantile with a 90 % interval from order statistics, free of any assumption about the distribution.
 
-    NaN among the values are left out; an end that the number of values cannot give is infinite.
+    NaN among the values are left out; an end that the number of values cannot give is infinite, a quantile
+    beyond the outermost of them NaN.
     Source: David and Nagaraja, Order Statistics, 2003, section 7.1: the number of values below the quantile
     is binomial.
     """
@@ -138,7 +138,8 @@ def quantile(values: ArrayLike, share: float) -> Known:
     high = int(binom.isf(tail, n, share)) + 1
     lower = float(x[low - 1]) if low >= 1 else -math.inf
     upper = float(x[high - 1]) if high <= n else math.inf
-    return _counted(float(np.quantile(x, share, method="hazen")), (lower, upper), n)
+    beyond = min(share, 1.0 - share) < 0.5 / n
+    return _counted(math.nan if beyond else float(np.quantile(x, share, method="hazen")), (lower, upper), n)
 
 
 def exceedance(values: ArrayLike, limit: float) -> Known:
@@ -171,12 +172,6 @@ def load_results(folder: str | Path) -> StudyResults:
     Of a study that ended early only the drops that ended it: which others were finished by then is chance.
     """
     study, place, plan = study_of(folder), StudyFolder(Path(folder)), read_plan(folder)
-    if plan["format"] != FORMAT:
-        raise UsageError(
-            f"{place.path} has format {plan['format']!r}, which has no digests; 'rotordrop study run "
-            f"{place.path}' gives it some, and draws the values that vary again. Whether its results are "
-            "those that were computed, nobody can tell"
-        )
     enough = EarlyEnd(study, place).shards()
     shards = place.finished() if enough is None else list(range(enough))
     found = [table for _, table in read_shards(place, study, shards)]
@@ -185,7 +180,6 @@ def load_results(folder: str | Path) -> StudyResults:
         more = f" (and {len(damaged) - 1} more)" if len(damaged) > 1 else ""
         raise DamagedFileError(f"{damaged[0]}{more}")
     tables = [table for table in found if not isinstance(table, DamagedFileError)]
-    taken_over = sum(len(study.drops_of(shard)) for shard in place.taken_over().intersection(shards))
     varied = [table["varied"] for table in tables] or [np.zeros((0, len(study.varied)))]
     columns = columns_of(study.machine)
     numbers = [table["numbers"] for table in tables] or [np.zeros((0, len(columns)))]
@@ -197,23 +191,8 @@ def load_results(folder: str | Path) -> StudyResults:
         numbers={q.name: together[:, j] for j, q in enumerate(columns)},
         reasons=tuple(text.decode() for table in tables for text in table["reason"]),
         aside=tuple(place.aside()),
-        taken_over=_told_of(plan["rotordrop"], taken_over),
+        version=plan["rotordrop"],
     )
-
-
-def _told_of(version: str, taken_over: int) -> str:
-    """What is to be said of who computed the drops, of which so many were found without digests."""
-    if taken_over:
-        return (
-            f"{taken_over} drops were computed by rotordrop {version}, which kept no digests. Their varied "
-            "values are those that are drawn for them; whether their results are those that were computed, "
-            "nobody can tell. To know, compute the study again in another folder, and compare."
-        )
-    if version != __version__:
-        return (
-            f"The drops were computed by rotordrop {version}; numbers may differ from those of {__version__}."
-        )
-    return ""
 
 
 class EarlyEnd:
@@ -254,6 +233,7 @@ class EarlyEnd:
 def save_results(results: StudyResults, path: str | Path) -> None:
     """Write all drops as one columnar file, complete or not at all: ``.parquet``, else HDF5 (NetCDF4)."""
     from rotordrop.files import new_hdf5
+    from rotordrop.labelled import Stored, put
 
     if not len(results):
         raise OutputError(f"{path}: the study has no finished drops yet; run it first")
@@ -264,18 +244,14 @@ def save_results(results: StudyResults, path: str | Path) -> None:
         file.attrs["format"] = "rotordrop study results 1"
         file.attrs["study"] = results.study.name
         file.attrs["digest"] = results.study.digest
-        if results.taken_over:
-            file.attrs["taken_over"] = results.taken_over
-        file["drop"] = results.drop
-        file["drop"].make_scale("drop")
+        file.attrs["rotordrop"] = results.version
+        put(file, "drop", results.drop, Stored("drop"))
         units = {q.name: (q.unit, q.meaning) for q in results.columns}
         for name, values in {**results.varied, **results.numbers}.items():
             unit, meaning = units.get(name, ("SI", "varied value"))
-            dataset = file.create_dataset(name, data=values, compression="gzip", shuffle=True)
-            dataset.attrs["units"], dataset.attrs["long_name"] = unit, meaning
-            dataset.dims[0].attach_scale(file["drop"])
+            put(file, name, values, Stored("drop", unit, meaning))
         reasons = np.array([reason.encode() for reason in results.reasons], dtype="S160")
-        file.create_dataset("failure", data=reasons, compression="gzip").dims[0].attach_scale(file["drop"])
+        put(file, "failure", reasons, Stored("drop"))
 
 
 def _save_parquet(results: StudyResults, path: Path) -> None:
@@ -286,7 +262,7 @@ def _save_parquet(results: StudyResults, path: Path) -> None:
 
     if find_spec("pyarrow") is None:
         raise OutputError(
-            f"{path}: Parquet needs a package that is not installed; install rotordrop[parquet], or write .h5"
+            f"{path}: Parquet needs a package that is not installed; install rotordrop[tables], or write .h5"
         )
     import pyarrow
     from pyarrow import parquet
@@ -294,7 +270,5 @@ def _save_parquet(results: StudyResults, path: Path) -> None:
     columns = {"drop": results.drop, **results.varied, **results.numbers, "failure": list(results.reasons)}
     units = {q.name: q.unit for q in results.columns}
     metadata = {"study": results.study.name, "digest": results.study.digest, "units": json.dumps(units)}
-    if results.taken_over:
-        metadata["taken_over"] = results.taken_over
     with atomic_path(path) as temporary:
         parquet.write_table(pyarrow.table(columns).replace_schema_metadata(metadata), temporary)

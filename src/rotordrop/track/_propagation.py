@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array, Integers
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics._compile import by_reference, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import PRESCRIBED_SPEED
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import exp, power
@@ -22,20 +22,24 @@ from rotordrop.simulate._rhs import (
     scratch_of,
 )
 from rotordrop.simulate._sensitivity import drop_jacobian_parts
+from rotordrop.track._arrays import copy_into, fill, fill_rows
 
 Flags = NDArray[np.bool_]
 
-# What a parameter acts on.
-ON_BEARING = 0
-ON_SPIN = 1
-ON_MAGNET = 2
-ON_UNBALANCE = 3
-SCALE_BEARING = 4
-AT_TYPICAL_DEPTH = 5
-SCALE_MODES = 6
-ON_LOAD = 7
+(
+    ON_BEARING,
+    ON_SPIN,
+    ON_MAGNET,
+    ON_UNBALANCE,
+    SCALE_BEARING,
+    AT_TYPICAL_DEPTH,
+    SCALE_MODES,
+    ON_LOAD,
+) = range(8)
+"""What a parameter acts on."""
 
 
+@by_reference
 class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
 
@@ -66,6 +70,7 @@ class ParameterTargets(NamedTuple):
     eigenvalue: Array
 
 
+@by_reference
 class FilterSettings(NamedTuple):
     """Numbers of one pass: sample distance [s], steps per sample, impulse noise [N s] and its share.
 
@@ -93,22 +98,22 @@ class FilterSettings(NamedTuple):
 @kernel
 def apply_parameters(theta: Array, targets: ParameterTargets, p: KernelParameters) -> None:
     """Write parameter values into the kernel arrays (which must be private copies)."""
-    values = np.empty(theta.shape[0])
-    for k in range(theta.shape[0]):
-        values[k] = bounded_value(k, theta[k], targets, 0.0)
-    powers = np.ones(targets.target.shape[0])
-    every = np.arange(targets.target.shape[0])
-    update_powers(every, values, targets, powers)
-    write_values(every, values, powers, targets, p)
+    values = target_values(theta, targets, 0.0)
+    write_targets(np.arange(values.shape[0]), -1, values, values, targets, p)
 
 
-@lean_kernel
-def update_powers(which: Integers, values: Array, targets: ParameterTargets, powers: Array) -> None:
-    """Factors on entries that follow a parameter as a power of a typical depth, for some of the targets."""
-    for i in which:
+@kernel
+def target_values(theta: Array, targets: ParameterTargets, steps: float) -> Array:
+    """What the targets are set to or multiplied by (R,), with every parameter some steps on."""
+    values = np.empty(targets.target.shape[0])
+    for i in range(values.shape[0]):
+        k = targets.target[i, 0]
+        value = bounded_value(k, theta[k], targets, steps * targets.step[k])
         if targets.target[i, 1] == AT_TYPICAL_DEPTH:
-            k = targets.target[i, 0]
-            powers[i] = power(targets.factor[i], exp(targets.mean[k]) - values[k])
+            values[i] = power(targets.factor[i], exp(targets.mean[k]) - value)
+        else:
+            values[i] = value * targets.factor[i]
+    return values
 
 
 @lean_kernel
@@ -120,24 +125,20 @@ def bounded_value(k: int, theta: float, targets: ParameterTargets, step: float) 
 
 
 @lean_kernel
-def write_values(
-    which: Integers, values: Array, powers: Array, targets: ParameterTargets, p: KernelParameters
+def write_targets(
+    which: Integers, k: int, moved: Array, values: Array, targets: ParameterTargets, p: KernelParameters
 ) -> None:
-    """Write some of the targets into the kernel arrays; logarithmic ones come as the values themselves."""
+    """Write some of the targets into the kernel arrays: those of ``k`` as ``moved`` (R,), else ``values``."""
     cleared = False
     for i in which:
-        kind = targets.target[i, 1]
-        row = targets.target[i, 2]
-        column = targets.target[i, 3]
-        value = values[targets.target[i, 0]] * targets.factor[i]
+        kind, row, column = targets.target[i, 1], targets.target[i, 2], targets.target[i, 3]
+        value = moved[i] if targets.target[i, 0] == k else values[i]
         if kind == ON_BEARING:
             p.bearing[row, column] = value
             if column == L.AIR_GAP:
                 p.bearing[row, L.ROTOR_RADIUS] = p.bearing[row, L.BORE_RADIUS] - value
-        elif kind == SCALE_BEARING:
+        elif kind in (SCALE_BEARING, AT_TYPICAL_DEPTH):
             p.bearing[row, column] *= value
-        elif kind == AT_TYPICAL_DEPTH:
-            p.bearing[row, column] *= powers[i]
         elif kind == ON_SPIN:
             p.spin[column] = value
         elif kind == ON_MAGNET:
@@ -149,14 +150,10 @@ def write_values(
                 p.eigenvalue[j] = value * targets.eigenvalue[j]
         else:
             if not cleared:
-                p.unbalance_cos[:] = 0.0
-                p.unbalance_sin[:] = 0.0
+                fill(p.unbalance_cos, 0.0)
+                fill(p.unbalance_sin, 0.0)
                 cleared = True
-            for j in range(p.unbalance_cos.shape[0]):
-                if column == 0:
-                    p.unbalance_cos[j] += value * targets.plane_shape[row, j]
-                else:
-                    p.unbalance_sin[j] += value * targets.plane_shape[row, j]
+            add_row(value, targets.plane_shape[row], p.unbalance_cos if column == 0 else p.unbalance_sin)
 
 
 @lean_kernel
@@ -167,12 +164,11 @@ def rates_by_owner(
 
     ``torque`` [N m] is what the bearings drive the rotor with. Returns the torque that this bearing gives.
     """
-    for i in range(out.shape[0]):
-        out[i] = 0.0
+    fill(out, 0.0)
     if owner == p.bearing.shape[0]:
         add_rotor_rates(t, y, torque, 0.0, p, out)
         return 0.0
-    driven, _lost = bearing_accelerations(t, owner, y, p, out, work)
+    driven, _losses = bearing_accelerations(t, owner, y, p, out, work)
     return driven
 
 
@@ -183,37 +179,27 @@ def parameter_jacobian(
     theta: Array,
     targets: ParameterTargets,
     p: KernelParameters,
-    base: Array,
-    other: Array,
     work: Scratch,
     B: Array,
 ) -> None:
     """Derivative of the right-hand side by the parameters, shape (s, P), by one-sided differences.
 
     A parameter of a bearing changes the forces at this bearing alone; the rest is not computed again. The
-    effect of its torque on the ω̇ terms of eq. (1) is left out, as in the derivative by the state. ``base``
-    (B + 1, n) and ``other`` (n,) are scratch.
+    effect of its torque on the ω̇ terms of eq. (1) is left out, as in the derivative by the state.
     """
     s, n_b, i_w = B.shape[0], p.bearing.shape[0], p.rotor_at[L.ROTOR_SPEED]
     free = p.flags[L.SPIN_MODE] != PRESCRIBED_SPEED
-    torques = np.empty(n_b)
-    torque = 0.0
+    base, other = np.empty((n_b + 1, y.shape[0])), np.empty(y.shape[0])
+    torques, torque = np.empty(n_b), 0.0
     for b in range(n_b):
         torques[b] = rates_by_owner(t, b, y, p, 0.0, base[b], work)
         torque += torques[b]
     rates_by_owner(t, n_b, y, p, torque, base[n_b], work)
-    values = np.empty(theta.shape[0])
-    powers = np.ones(targets.target.shape[0])
+    values, moved = target_values(theta, targets, 0.0), target_values(theta, targets, 1.0)
+    fill_rows(B, 0.0)
     for k in range(theta.shape[0]):
-        values[k] = bounded_value(k, theta[k], targets, 0.0)
-    update_powers(np.arange(targets.target.shape[0]), values, targets, powers)
-    B[:, :] = 0.0
-    for k in range(theta.shape[0]):
-        value, step = values[k], targets.step[k]
-        which = targets.together[targets.starts[k] : targets.starts[k + 1]]
-        values[k] = bounded_value(k, theta[k], targets, step)
-        update_powers(which, values, targets, powers)
-        write_values(which, values, powers, targets, p)
+        step, which = targets.step[k], targets.together[targets.starts[k] : targets.starts[k + 1]]
+        write_targets(which, k, moved, values, targets, p)
         for owner in range(n_b + 1):
             if not targets.acts[k, owner]:
                 continue
@@ -222,9 +208,7 @@ def parameter_jacobian(
                 B[i, k] += (other[i] - base[owner, i]) / step
             if free and owner < n_b:
                 B[i_w, k] += (driven - torques[owner]) / (step * p.spin[L.POLAR_INERTIA])
-        values[k] = value
-        update_powers(which, values, targets, powers)
-        write_values(which, values, powers, targets, p)
+        write_targets(which, -1, moved, values, targets, p)
     for i in range(targets.target.shape[0]):
         if targets.target[i, 1] == ON_SPIN and targets.target[i, 3] == L.CLOCK_ERROR:
             # a slow clock stretches the step: every rate acts for longer
@@ -332,7 +316,7 @@ def jacobian_product(
     moved: Array,
     out: Array,
 ) -> None:
-    """Product of the whole Jacobian, listed part and contacts, with a full matrix."""
+    """Product of the complete Jacobian, listed part and contacts, with a full matrix."""
     sparse_product(entries, columns, starts, V, out)
     for c in range(touching.shape[0]):
         if touching[c] != 0:
@@ -378,62 +362,59 @@ def propagate(
     s, columns = F.shape
     J = np.empty((s, s))
     B = np.empty((s, columns - s))
-    first = np.empty((s, columns))
-    second = np.empty((s, columns))
-    third = np.empty((s, columns))
-    fourth = np.empty((s if settings.terms > 3 else 0, columns))
+    V = np.empty((settings.terms, s, columns))  # terms of the exponential, from the first on
     entries = np.empty(s * s)
     places = np.empty(s * s, dtype=np.int64)
     starts = np.empty(s + 1, dtype=np.int64)
     k = np.zeros((5, n))  # what a sensor has got to stays: `lag_step` moves it
     trial = np.empty(n)
     work = scratch_of(p)
-    base, other = np.zeros((p.bearing.shape[0] + 1, n)), np.zeros(n)
     contact = np.empty(6)
     g = np.zeros((p.contact_at.shape[0], 3, 7))
     touching = np.zeros(p.contact_at.shape[0], dtype=np.int64)
     moved = np.empty((7, columns))
-    middle = y.copy()
+    middle = np.empty(n)
+    copy_into(y, middle)
     # What acts on the rotor alone does so evenly; in a contact position and gap must see the same, or the gap
     # looks too well known.
-    once = not np.any(targets.acts[:, :-1])
+    once = True
+    for i in range(targets.acts.shape[0]):
+        for b in range(targets.acts.shape[1] - 1):
+            once = once and not targets.acts[i, b]
     step = (1.0 + p.spin[L.CLOCK_ERROR]) * settings.dt / settings.substeps
     h = step * settings.frozen
-    F[:, :] = 0.0
+    fill_rows(F, 0.0)
     for i in range(s):
         F[i, i] = 1.0
-    impulses[:] = 0.0
-    for stretch in range(settings.substeps // settings.frozen):
-        now = t + stretch * h
-        # The Jacobian of the middle serves the whole stretch to second order, though it changes within it.
+    fill(impulses, 0.0)
+    for block in range(settings.substeps // settings.frozen):
+        now = t + block * h
+        # The Jacobian of the middle serves the block of steps to second order, though it changes within it.
         for part in range(settings.frozen):
             rk4_step(now + part * step, step, y, p, k, trial, work)
             if 2 * part + 1 == settings.frozen:
-                middle = k[4].copy()
+                copy_into(k[4], middle)
             elif 2 * (part + 1) == settings.frozen:
-                middle = y.copy()
+                copy_into(y, middle)
         drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
         gather_entries(J, entries, places, starts)
-        if columns > s and (stretch == 0 or not once):
-            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, base, other, work, B)
+        if columns > s and (block == 0 or not once):
+            parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, work, B)
         # What the contact law gets wrong is a share of what it gives; process noise is scaled by the impulse.
         for c in range(p.contact_at.shape[0]):
             contact_at(now + 0.5 * h, c, middle, p, contact)
             impulses[p.contact_at[c, L.CONTACT_BEARING]] += h * contact[1]
         # F <- exp(hJ) F + what the parameters add, to third order at least: at second light modes would grow
-        jacobian_product(entries, places, starts, touching, g, p, F, moved, first)
+        for e in range(settings.terms):
+            source = F if e == 0 else V[e - 1]
+            jacobian_product(entries, places, starts, touching, g, p, source, moved, V[e])
+            for i in range(s if e == 0 else 0):
+                add_row(1.0, B[i], V[0, i, s:])
         for i in range(s):
-            for j in range(columns - s):
-                first[i, s + j] += B[i, j]
-        jacobian_product(entries, places, starts, touching, g, p, first, moved, second)
-        jacobian_product(entries, places, starts, touching, g, p, second, moved, third)
-        if settings.terms > 3:
-            jacobian_product(entries, places, starts, touching, g, p, third, moved, fourth)
-            for i in range(s):
-                add_row(0.25 * h, fourth[i], third[i])
-        for i in range(s):
+            if settings.terms > 3:
+                add_row(0.25 * h, V[3, i], V[2, i])
             for j in range(columns):
-                F[i, j] += h * (first[i, j] + h * (0.5 * second[i, j] + h / 6.0 * third[i, j]))
+                F[i, j] += h * (V[0, i, j] + h * (0.5 * V[1, i, j] + h / 6.0 * V[2, i, j]))
 
 
 @lean_kernel
@@ -446,55 +427,58 @@ def unknown_impulses(settings: FilterSettings, impulses: Array, largest: float, 
         sigmas[b] = min(settings.impulse + settings.share * impulses[b], largest)
 
 
-@lean_kernel
-def unit_impulse(b: int, axis: int, p: KernelParameters, g: Array, place: Integers) -> None:
-    """Velocities ``g`` (m + 1,) that a unit impulse between rotor and race gives, and where they stand.
+@kernel
+def unit_impulses(p: KernelParameters) -> tuple[Array, Integers]:
+    """Velocities that unit impulses between rotor and race give, and where they stand, shape (2 B, m + 1).
 
-    It is equal and opposite; modes have unit mass.
+    They are equal and opposite, in x and y of each bearing; modes have unit mass.
     """
-    m, n_q = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES]
-    for k in range(m):
-        g[k] = -p.bearing_shape[b, k]
-        place[k] = n_q + p.rotor_at[L.MODES_X + axis] + k
-    g[m] = 1.0 / p.bearing[b, L.RACE_MASS]
-    place[m] = n_q + p.bearing_at[b, L.RACE] + axis
+    m, n_q, n_b = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.bearing.shape[0]
+    g, place = np.empty((2 * n_b, m + 1)), np.empty((2 * n_b, m + 1), dtype=np.int64)
+    for r in range(2 * n_b):
+        b, axis = r // 2, r % 2
+        for k in range(m):
+            g[r, k] = -p.bearing_shape[b, k]
+            place[r, k] = n_q + p.rotor_at[L.MODES_X + axis] + k
+        g[r, m] = 1.0 / p.bearing[b, L.RACE_MASS]
+        place[r, m] = n_q + p.bearing_at[b, L.RACE] + axis
+    return g, place
 
 
-@lean_kernel
-def spin_sigma(b: int, sigma: float, p: KernelParameters, settings: FilterSettings) -> float:
-    """Standard deviation of the spin of a race [rad/s]: friction passes on a tenth of an unknown impulse."""
-    row = p.bearing[b]
-    passed: float = settings.spin_noise + sigma * row[L.BORE_RADIUS] / row[L.RACE_INERTIA] * 0.1
-    return passed
+@kernel
+def own_noise(n: int, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array) -> Array:
+    """Variances (n,) of what enters one entry of the estimate alone: spins, rotor speed, parameters."""
+    s, i_w, q = p.rotor_at[L.N_DYNAMIC], p.rotor_at[L.ROTOR_SPEED], np.zeros(n)
+    for b in range(p.bearing.shape[0]):
+        row = p.bearing[b]
+        # friction passes on a tenth of an unknown impulse
+        spin = settings.spin_noise + sigmas[b] * row[L.BORE_RADIUS] / row[L.RACE_INERTIA] * 0.1
+        q[p.bearing_at[b, L.RACE_SPIN]] += spin * spin
+    q[i_w] = settings.speed_noise * settings.speed_noise
+    for k in range(drift.shape[0]):  # a random walk: its variance grows with time
+        q[s + k] = drift[k] * drift[k] * settings.dt
+    return q
 
 
 @kernel
 def add_process_noise(
     P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
 ) -> None:
-    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P``.
+    """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P`` (n, n).
 
     ``sigmas`` (B,) are the standard deviations of the unknown impulses [N s].
     """
-    m, i_w = p.eigenvalue.shape[0], p.rotor_at[L.ROTOR_SPEED]
     # Process noise enters where the model errs: as an impulse between rotor and race. White noise on every
     # state would let the filter explain a record by motions that nothing can cause.
-    g = np.empty(m + 1)
-    place = np.empty(m + 1, dtype=np.int64)
-    for b in range(p.bearing.shape[0]):
-        sigma = sigmas[b]
-        for axis in range(2):
-            unit_impulse(b, axis, p, g, place)
-            for i in range(m + 1):
-                for j in range(m + 1):
-                    P[place[i], place[j]] += sigma * sigma * g[i] * g[j]
-        spin = spin_sigma(b, sigma, p, settings)
-        P[p.bearing_at[b, L.RACE_SPIN], p.bearing_at[b, L.RACE_SPIN]] += spin * spin
-    P[i_w, i_w] += settings.speed_noise * settings.speed_noise
-    s = p.rotor_at[L.N_DYNAMIC]
-    # a random walk: its variance grows with time
-    for k in range(drift.shape[0]):
-        P[s + k, s + k] += drift[k] * drift[k] * settings.dt
+    g, place = unit_impulses(p)
+    for r in range(g.shape[0]):
+        sigma = sigmas[r // 2]
+        for i in range(g.shape[1]):
+            for j in range(g.shape[1]):
+                P[place[r, i], place[r, j]] += sigma * sigma * g[r, i] * g[r, j]
+    q = own_noise(P.shape[0], p, settings, sigmas, drift)
+    for i in range(q.shape[0]):
+        P[i, i] += q[i]
 
 
 @kernel
@@ -502,20 +486,13 @@ def subtract_process_noise(
     score: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array, out: Array
 ) -> None:
     """Take off ``out`` (n,) the product of what `add_process_noise` adds with ``score`` (n,)."""
-    m, i_w = p.eigenvalue.shape[0], p.rotor_at[L.ROTOR_SPEED]
-    g = np.empty(m + 1)
-    place = np.empty(m + 1, dtype=np.int64)
-    for b in range(p.bearing.shape[0]):
-        for axis in range(2):
-            unit_impulse(b, axis, p, g, place)
-            along = 0.0
-            for i in range(m + 1):
-                along += g[i] * score[place[i]]
-            for i in range(m + 1):
-                out[place[i]] -= sigmas[b] * sigmas[b] * g[i] * along
-        at, spin = p.bearing_at[b, L.RACE_SPIN], spin_sigma(b, sigmas[b], p, settings)
-        out[at] -= spin * spin * score[at]
-    out[i_w] -= settings.speed_noise * settings.speed_noise * score[i_w]
-    s = p.rotor_at[L.N_DYNAMIC]
-    for k in range(drift.shape[0]):
-        out[s + k] -= drift[k] * drift[k] * settings.dt * score[s + k]
+    g, place = unit_impulses(p)
+    for r in range(g.shape[0]):
+        sigma, along = sigmas[r // 2], 0.0
+        for i in range(g.shape[1]):
+            along += g[r, i] * score[place[r, i]]
+        for i in range(g.shape[1]):
+            out[place[r, i]] -= sigma * sigma * g[r, i] * along
+    q = own_noise(out.shape[0], p, settings, sigmas, drift)
+    for i in range(q.shape[0]):
+        out[i] -= q[i] * score[i]

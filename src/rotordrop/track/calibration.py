@@ -9,28 +9,27 @@ belongs to a drop is not.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
+from rotordrop.progress import Progress
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import (
+    REFERENCE_STEP,
     Forward,
     PassSettings,
     Smoothed,
-    Storage,
     forward,
-    pass_settings,
+    has_diverged,
     smooth,
     smooth_means,
 )
 from rotordrop.units import fall_time
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +81,12 @@ CALIBRATED_SCHEDULE: tuple[Stage, ...] = (
 QUICK_SCHEDULE: tuple[Stage, ...] = (Stage(until=0.2, force=0.07, share=0.01, passes=1, substeps=3),)
 """With a calibrated machine: one pass, linearised at the filter's own estimate."""
 
+STEP = 0.007
+"""Time over which unknown forces are alike, over the time of a free fall through the air gap [1]."""
+SPIN = 0.07
+"""Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
+LEARNING = 7.0
+"""Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
 REFERENCE_CONTACT = 0.0075
 REFERENCE_FALL = fall_time(0.25e-3)
 """First contact and time of a free fall that the windows of the schedules are written for [s]."""
@@ -90,7 +95,7 @@ WHOLE_DROP = 0.1
 FITTING_NIS = 1.25
 """Mean normalised innovation squared up to which a model fits its record [1]."""
 LOOSER = (1.0, 8.0, 32.0)
-"""Factors on the unknown impulses with which a pass is repeated that lost the drop [1]."""
+"""Factors on the unknown impulses with which a pass that diverged is repeated [1]."""
 MOST_REPEATS, SMALL_CHANGE = 6, 5.0
 """Repeats of a window, and the change of the log likelihood that ends them [1].
 
@@ -98,8 +103,8 @@ A fall does not end them: on a rotor of 6 t it fell by 48 in one pass of the who
 next three, and the peak moved by 9 %.
 """
 FIT_MEMORY = 128_000_000
-"""Memory [B] for what the passes of a fit keep of their samples, shared by its drops (chosen): two thirds
-of a whole drop at 20 kHz, 128 estimated; the rest is filtered again."""
+"""Memory [B] for the segments that the passes of a fit keep, shared by its drops (chosen): two thirds of a
+whole drop at 20 kHz, 128 estimated; the rest is filtered again."""
 THREADS = 2
 """Passes over the same drops that run side by side [1]."""
 
@@ -115,7 +120,7 @@ class TrackedDrops:
     trajectories: tuple[Array, ...]
     """Smoothed means of each drop, shape (M, n)."""
     noise_factors: tuple[float, ...]
-    """Process noise of the last pass over the usual one, as each drop needed it to be followed [1]."""
+    """Process noise of the last pass over the baseline, as each drop needed it to be followed [1]."""
 
     @property
     def nis(self) -> tuple[float, ...]:
@@ -124,8 +129,8 @@ class TrackedDrops:
 
     @property
     def diverged(self) -> tuple[bool, ...]:
-        """Drops in which the filter had to give up."""
-        return tuple(one.done < len(one.means) for one in self.filtered)
+        """Whether the filter diverged, drop by drop."""
+        return tuple(map(has_diverged, self.filtered))
 
     @property
     def negative_log_likelihood(self) -> float:
@@ -154,24 +159,12 @@ def track(
     references: Sequence[Array] | None = None,
     noise_factor: float = 1.0,
     progress: Progress | None = None,
-    storages: Sequence[Storage] = (),
 ) -> TrackedDrops:
-    """Fit the drop model to recorded drops of one machine.
+    """Fit the drop model to recorded drops of one machine; the prior of the first one holds for the machine.
 
-    Parameters
-    ----------
-    problems : sequence of DropProblem
-        The drops; the prior of the first one holds for the machine.
-    schedule : sequence of Stage
-        Windows and noise, in order.
-    references : sequence of ndarray, optional
-        Trajectory of each drop to linearise at first, shape (M, n).
-    noise_factor : float
-        Factor on the unknown impulses of every stage [1].
-    progress : callable, optional
-        Called with a sentence and the fraction done.
-    storages : sequence of Storage, optional
-        Memory of each drop that passes before have used.
+    The first pass is linearised at the ``references`` (M, n) of the drops, where there are any. The unknown
+    impulses of every stage are larger by the ``noise_factor`` [1]. ``progress`` is called with a sentence and
+    the fraction done.
     """
     # A pass from the guesses gives a place to linearise at, no estimate yet: it needs a second one.
     from_guesses = references is None and sum(stage.passes for stage in schedule) > 1
@@ -179,16 +172,15 @@ def track(
     ends = [window_end(stage, contact, fall) for stage in schedule]
     total = sum(end * stage.passes for end, stage in zip(ends, schedule, strict=True))
     done = 0.0
-    storages = storages or fit_storages(problems)
     at: Sequence[Array | None] = references or [None] * len(problems)
     for end, stage in zip(ends, schedule, strict=True):
         settings = stage_settings(problems[0], stage, noise_factor)
         for _ in range(stage.passes):
             if progress is not None:
                 progress(f"fitting the first {1e3 * end:.0f} ms", done / total)
-            eased = [_eased(*one, stage) for one in zip(problems, at, strict=True)]
-            filtered = filtered_chain(eased, settings, at, end, from_guesses=from_guesses, storages=storages)
-            at = smoothed_means_of_chain(problems, filtered, storages)
+            damped = [_damped(*one, stage) for one in zip(problems, at, strict=True)]
+            filtered = filtered_chain(damped, settings, at, end, from_guesses=from_guesses)
+            at = smoothed_means_of_chain(problems, filtered)
             from_guesses = False
             done += end
     return TrackedDrops(
@@ -210,36 +202,17 @@ def converged(
 ) -> TrackedDrops:
     """A fit after as many passes over a window as still change the likelihood, or as are allowed.
 
-    Where the likelihood falls, the next pass begins half way, unless one of the two has lost a drop.
-
-    Parameters
-    ----------
-    problems : sequence of DropProblem
-        The drops.
-    stage : Stage
-        The window; one pass of it is made at a time.
-    references : sequence of ndarray
-        Trajectory of each drop to begin with, shape (M, n).
-    passes : int
-        Passes at most.
-    noise_factor, progress
-        As for `track`.
+    Where the likelihood falls, the next pass begins half way, unless a drop has diverged in one of the two.
+    The window is that of the stage; the rest is as for `track`.
     """
-    once, storages = (replace(stage, passes=1),), fit_storages(problems)
+    once = (replace(stage, passes=1),)
 
     def passed(number: int, references: Sequence[Array]) -> TrackedDrops:
-        def told(words: str, share: float) -> None:
+        def report(words: str, share: float) -> None:
             if progress is not None:
                 progress(words, (number + share) / passes)
 
-        return track(
-            problems,
-            once,
-            references=references,
-            noise_factor=noise_factor,
-            progress=told,
-            storages=storages,
-        )
+        return track(problems, once, references=references, noise_factor=noise_factor, progress=report)
 
     fit = passed(0, references)
     at: Sequence[Array] = fit.trajectories
@@ -255,19 +228,28 @@ def converged(
     return fit
 
 
-def fit_storages(problems: Sequence[DropProblem]) -> list[Storage]:
-    """Memory for the passes of a fit, one for each drop."""
-    return [Storage(FIT_MEMORY // max(len(problems), 1)) for _ in problems]
-
-
 def stage_settings(problem: DropProblem, stage: Stage, factor: float = 1.0) -> PassSettings:
-    """Settings of the passes of a stage, with the unknown forces larger by a factor [1]."""
-    return pass_settings(
-        problem, force=factor * stage.force, share=factor * stage.share, substeps=stage.substeps
+    """Settings of the passes of a stage by the size of the machine: weight, air gap, friction of a race.
+
+    ``factor`` is that on its unknown forces [1].
+    """
+    model = problem.model
+    weight, bearings = float(np.mean(model.load_shares)), model.machine.touchdown_bearings
+    growth = math.sqrt(STEP * problem.fall_time / REFERENCE_STEP)
+    impulse = weight * REFERENCE_STEP * growth
+    race = max(float(bearing.bore_radius) / float(bearing.race.inertia) for bearing in bearings)
+    rotor = sum(float(bearing.bore_radius) for bearing in bearings) / model.fe.polar_inertia
+    return PassSettings(
+        substeps=stage.substeps,
+        impulse=factor * stage.force * impulse,
+        share=factor * stage.share * growth,
+        spin_noise=SPIN * impulse * race,
+        speed_noise=SPIN * impulse * rotor,
+        learning_end=LEARNING * problem.fall_time,
     )
 
 
-def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropProblem:
+def _damped(problem: DropProblem, reference: Array | None, stage: Stage) -> DropProblem:
     """The problem with its parameters held to a reference (M, n), as strongly as a stage says."""
     if stage.damping == 0.0:
         return problem
@@ -275,8 +257,8 @@ def _eased(problem: DropProblem, reference: Array | None, stage: Stage) -> DropP
     known = np.atleast_2d(problem.start if reference is None else reference)
     before = known[min(problem.parameter_sample, len(known) - 1)]
     mean, start = problem.mean.copy(), problem.start.copy()
-    mean[chosen] = (mean[chosen] + stage.damping * before[chosen]) / held
-    start[chosen] = (start[chosen] + stage.damping * before[chosen]) / held
+    for values in (mean, start):
+        values[chosen] = (values[chosen] + stage.damping * before[chosen]) / held
     narrower = np.ones(len(mean))
     narrower[chosen] = 1.0 / math.sqrt(held)
     return replace(
@@ -296,25 +278,34 @@ def filtered_chain(
     until: float,
     *,
     from_guesses: bool = False,
-    storages: Sequence[Storage] = (),
 ) -> list[Forward]:
-    """One forward pass through the chain of drops.
-
-    ``storages``, one for each drop if given, is memory that passes before have used.
-    """
-    storages = storages or [Storage() for _ in problems]
+    """One forward pass through the chain of drops."""
     filtered: list[Forward] = []
-    mean = problems[0].start if from_guesses else problems[0].mean
-    covariance = problems[0].covariance
-    for d, problem in enumerate(problems):
-        if d > 0:
-            mean, covariance = handed_on(filtered[-1], problem)
+    for problem, reference in zip(problems, references, strict=True):
+        mean, covariance = prior_of_next(filtered[-1] if filtered else None, problem)
+        if from_guesses and not filtered:
+            mean = problem.start
         samples = int(np.searchsorted(problem.time, until, side="right"))
-        result = _followed(problem, settings, mean, covariance, references[d], samples, storages[d])
+        passed = partial(
+            forward,
+            problem,
+            mean=mean,
+            covariance=covariance,
+            samples=samples,
+            memory=FIT_MEMORY // len(problems),
+        )
+        result = passed(settings, reference=reference)
+        # One that diverges is repeated without the reference, then more loosely.
+        for factor in LOOSER if reference is not None else LOOSER[1:]:
+            if result.done == samples:
+                break
+            result.segments.clear()
+            looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
+            result = max(result, passed(looser, reference=None), key=lambda one: one.done)
         if result.done < min(samples, 10):
             raise IdentificationError(
-                f"the filter lost the drop after {result.done} of {samples} samples; the machine's guesses "
-                "are too far from it. Check air gap, bearing nodes, sensor angles and support guesses."
+                f"the filter diverged after {result.done} of {samples} samples; the machine's guesses are "
+                "too far from the record. Check air gap, bearing nodes, sensor angles and support guesses."
             )
         filtered.append(result)
     return filtered
@@ -326,71 +317,36 @@ def smoothed_chain(problems: Sequence[DropProblem], filtered: Sequence[Forward])
     score, information = None, None
     for problem, one in zip(reversed(problems), reversed(filtered), strict=True):
         smoothed.append(smooth(one, score, information, watched=problem.watched))
-        shared, n = problem.machine_indices, len(problem.mean)
-        score, information = np.zeros(n), np.zeros((n, n))
-        score[shared] = smoothed[-1].score_0[shared]
-        information[np.ix_(shared, shared)] = smoothed[-1].information_0[np.ix_(shared, shared)]
+        score = _shared(problem, smoothed[-1].score_0)
+        information = _shared(problem, smoothed[-1].information_0)
     return smoothed[::-1]
 
 
-def smoothed_means_of_chain(
-    problems: Sequence[DropProblem], filtered: Sequence[Forward], storages: Sequence[Storage]
-) -> list[Array]:
+def smoothed_means_of_chain(problems: Sequence[DropProblem], filtered: Sequence[Forward]) -> list[Array]:
     """The smoothed means of `smoothed_chain` alone."""
     trajectories: list[Array] = []
     score = None
-    for problem, one, storage in zip(reversed(problems), reversed(filtered), reversed(storages), strict=True):
-        means, before = smooth_means(one, score, storage=storage)
+    for problem, one in zip(reversed(problems), reversed(filtered), strict=True):
+        means, before = smooth_means(one, score)
         trajectories.append(means)
-        score = np.zeros_like(before)
-        score[problem.machine_indices] = before[problem.machine_indices]
+        score = _shared(problem, before)
     return trajectories[::-1]
 
 
-def _followed(
-    problem: DropProblem,
-    settings: PassSettings,
-    mean: Array,
-    covariance: Array,
-    reference: Array | None,
-    samples: int,
-    storage: Storage,
-) -> Forward:
-    """A pass along the reference; one that loses the drop is repeated without it, then more loosely."""
-    result = forward(
-        problem,
-        settings,
-        mean=mean,
-        covariance=covariance,
-        reference=reference,
-        samples=samples,
-        keep="means",
-        storage=storage,
-    )
-    for factor in LOOSER if reference is not None else LOOSER[1:]:
-        if result.done == samples:
-            break
-        looser = replace(settings, impulse=factor * settings.impulse, share=factor * settings.share)
-        again = forward(
-            problem,
-            looser,
-            mean=mean,
-            covariance=covariance,
-            samples=samples,
-            keep="means",
-            storage=storage,
-        )
-        result = max(result, again, key=lambda one: one.done)
-    return result
+def _shared(problem: DropProblem, array: Array) -> Array:
+    """An array (n,) or (n, n) with what all drops share, and zero elsewhere."""
+    found, places = np.zeros_like(array), np.ix_(*[problem.machine_indices] * array.ndim)
+    found[places] = array[places]
+    return found
 
 
-def handed_on(before: Forward, problem: DropProblem) -> tuple[Array, Array]:
-    """Prior of the next drop: its own state, and the machine as known after the drop before."""
-    shared = problem.machine_indices
-    last = before.done - 1
+def prior_of_next(before: Forward | None, problem: DropProblem) -> tuple[Array, Array]:
+    """Prior of a drop: its own state, and the machine as known after the drop before, if there is one."""
     mean, covariance = problem.mean.copy(), problem.covariance.copy()
-    mean[shared] = before.means[last][shared]
-    covariance[shared, :] = 0.0
-    covariance[:, shared] = 0.0
-    covariance[np.ix_(shared, shared)] = before.last[np.ix_(shared, shared)]
+    if before is not None:
+        shared = problem.machine_indices
+        mean[shared] = before.means[before.done - 1][shared]
+        covariance[shared, :] = 0.0
+        covariance[:, shared] = 0.0
+        covariance += _shared(problem, before.last)
     return mean, covariance

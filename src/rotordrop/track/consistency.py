@@ -13,7 +13,7 @@ from rotordrop.elements.magnet import FORCES, REMANENCE
 from rotordrop.elements.table import STRUCTURE
 from rotordrop.track.calibration import FITTING_NIS
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, Smoothed
+from rotordrop.track.smoother import Forward, Smoothed, has_diverged
 from rotordrop.units import percent
 
 NIS_RANGE = (0.6, FITTING_NIS)
@@ -26,11 +26,11 @@ SENSORS, PARAMETERS, OF_DROP, REMANENT = (
     "remanent force",
 )
 DEPARTURES = frozenset((SENSORS, PARAMETERS, OF_DROP, REMANENT))
-"""Names of the checks of what was estimated, which says nothing where the filter lost the record."""
+"""Names of the checks of what was estimated, which says nothing where the filter diverged."""
 CORRELATION_LIMIT = 0.25
 DEPARTURE_LIMIT = 3.5
-"""Departure of a parameter or a sensor error from its prior in standard deviations, from which on it is told
-[1]: one of 40 goes so far in one of 50 drops of right models."""
+"""Departure of a parameter or a sensor error from its prior in standard deviations, from which on it is
+reported [1]: one of 40 goes so far in one of 50 drops of right models."""
 NOTED_DEPARTURE = 4.0
 """Departure up to which one of them alone is a note where the innovations are white [1]. Of hidden records
 four with one at 3.6 to 3.9 had all peaks within 1.5 %, and one with 4.0 a peak 4.5 % off."""
@@ -42,6 +42,7 @@ LARGEST_LASTING_LIFT = 0.02
 sensors looks like one, and forces have as much of it; the stated intervals allow for this much anyway."""
 THIS = "{this}"
 """Stands in a remedy for the name of the unknown that a check is about."""
+JOINT_FIT = "calibrate on two drops with their tails: a joint fit finds what one drop hides"
 LEAST_SECOND_DIRECTION = 0.05
 """Smallest singular value of the directions of a plane's sensors that still counts as two directions [1]."""
 
@@ -83,45 +84,37 @@ class Check:
         return self.remedy.replace(THIS, name_of(self.path))
 
 
-def judged_by(problem: DropProblem, likeliest: Forward, usual: Forward) -> Forward:
-    """The pass by whose innovations a model is judged: with unknown impulses of the usual size.
+def reference_pass(problem: DropProblem, likeliest: Forward, baseline: Forward) -> Forward:
+    """The pass by whose innovations a model is judged: with unknown impulses of the baseline size.
 
     A beam in place of the rotor leaves more unexplained than a described rotor does, and its loads are stated
     with that error: it is judged with the impulses that were likeliest, up to their limit.
     """
-    return likeliest if problem.model.machine.rotor.form_errs else usual
+    return likeliest if problem.model.machine.rotor.form_errs else baseline
 
 
 def consistency_checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tuple[Check, ...]:
     """Check innovations, sensor errors, parameters and process noise of a smoothed drop.
 
-    Where the filter lost the record that is said first. What passes is then not judged, and departures are no
+    Where the filter diverged that is said first. What passes is then not judged, and departures are no
     findings: all of it is of the samples before, the last of which the model no longer followed.
     """
-    followed = _followed_check(smoothed.filtered)
+    filtered = smoothed.filtered
+    followed = Check(
+        name="filter",
+        passed=not has_diverged(filtered),
+        message=f"the filter followed {filtered.done} of {len(filtered.means)} samples",
+        remedy="plan with the upper ends; calibrate on two drops with their tails; check rotor, air gaps and "
+        "sensors of the machine file against the record",
+    )
     checks = _checks(problem, smoothed, noise_factor)
     if followed.passed:
         return (*checks, followed)
     return (followed, *(one if one.name == DIRECTIONS else _of_a_part(one, followed) for one in checks))
 
 
-def _followed_check(filtered: Forward) -> Check:
-    return Check(
-        name="filter",
-        passed=not is_lost(filtered),
-        message=f"the filter followed {filtered.done} of {len(filtered.means)} samples",
-        remedy="plan with the upper ends; calibrate on two drops with their tails; check rotor, air gaps and "
-        "sensors of the machine file against the record",
-    )
-
-
-def is_lost(filtered: Forward) -> bool:
-    """Whether the filter lost the record before its end."""
-    return filtered.done < len(filtered.means)
-
-
 def _of_a_part(check: Check, followed: Check) -> Check:
-    """A check of a drop whose filter lost the record: innovations and noise that failed before, failed."""
+    """A check of a drop whose filter diverged: innovations and noise that failed before, failed."""
     if check.name not in DEPARTURES and not check.passed:
         return check
     message = f"{check.message}; not judged, {followed.message}"
@@ -133,39 +126,32 @@ def _checks(problem: DropProblem, smoothed: Smoothed, noise_factor: float) -> tu
     innovations = innovation_checks(problem, smoothed)
     white = all(check.passed for check in innovations)
     sensors, parameters = _sensor_departures(problem, smoothed), _departures(problem, smoothed, "machine")
-    beyond = [one for one in (*sensors, *parameters) if one.sigmas >= DEPARTURE_LIMIT]
-    tolerated = white and len(beyond) == 1
+    alone = sum(one.sigmas >= DEPARTURE_LIMIT for one in (*sensors, *parameters)) == 1
+    noted = f"process noise {noise_factor:.3g} × its usual size"
     return (
         *innovations,
-        _departure_check(SENSORS, sensors, tolerated=tolerated),
+        _departure_check(SENSORS, sensors, white and alone),
         direction_check(problem),
-        _departure_check(PARAMETERS, parameters, tolerated=tolerated),
+        _departure_check(PARAMETERS, parameters, white and alone),
         nuisance_check(problem, smoothed, white),
         _remanence_check(problem, smoothed, white),
         Check(
             name="process noise",
             passed=noise_factor < NOISE_FACTOR_LIMIT,
-            message=f"process noise {noise_factor:.3g} × its usual size (limit {NOISE_FACTOR_LIMIT:g} ×)",
-            note=_of_a_beam(noise_factor) if problem.model.machine.rotor.form_errs else "",
-            remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
+            message=f"{noted} (limit {NOISE_FACTOR_LIMIT:g} ×)",
+            note=f"a beam stands for the rotor: whether it follows the record is judged with {noted}, and "
+            "the error of a beam stands in every interval"
+            if problem.model.machine.rotor.form_errs
+            else "",
+            remedy=JOINT_FIT,
         ),
-    )
-
-
-def _of_a_beam(noise_factor: float) -> str:
-    return (
-        "a beam stands for the rotor: whether it follows the record is judged with process noise "
-        f"{noise_factor:.3g} × its usual size, and the error of a beam stands in every interval"
     )
 
 
 def normalised_innovations(smoothed: Smoothed) -> Array:
     """Innovations of the displacement channels over their standard deviation [1], shape (N, C)."""
-    done = smoothed.filtered.done
-    return np.asarray(
-        smoothed.filtered.innovations[:done, :-1]
-        / np.sqrt(smoothed.filtered.innovation_variances[:done, :-1])
-    )
+    filtered, done = smoothed.filtered, smoothed.filtered.done
+    return np.asarray(filtered.innovations[:done, :-1] / np.sqrt(filtered.innovation_variances[:done, :-1]))
 
 
 def innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, ...]:
@@ -187,7 +173,7 @@ def innovation_checks(problem: DropProblem, smoothed: Smoothed) -> tuple[Check, 
                 f"{names[worst]} {nis[worst]:.2f} × "
                 f"(usual {NIS_RANGE[0]:g} to {NIS_RANGE[1]:g})"
             ),
-            remedy="calibrate on two drops with their tails: a joint fit finds what one drop hides",
+            remedy=JOINT_FIT,
         ),
         Check(
             name="innovation whiteness",
@@ -210,19 +196,15 @@ def _lag_one(e: Array) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Departure:
-    """How far something went from its prior."""
+    """How far something went from its prior, in standard deviations of that [1], and what to do about it.
+
+    It is named by its path where it is an unknown, else in words.
+    """
 
     sigmas: float
-    """In standard deviations of the prior [1]."""
     what: str = ""
-    """Of a sensor, in words."""
     path: str = ""
-    """Of an unknown."""
     remedy: str = ""
-    """What to do where it went too far."""
-
-
-USUAL = Departure(sigmas=0.0, what="no unknown")
 
 
 def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departure]:
@@ -243,23 +225,35 @@ def _sensor_departures(problem: DropProblem, smoothed: Smoothed) -> list[Departu
     ]
 
 
-def _departure_check(name: str, departures: list[Departure], *, tolerated: bool) -> Check:
+def _departure_check(name: str, departures: list[Departure], noted: bool, *, widens: bool = True) -> Check:
     """What went farthest from its prior.
 
-    One alone that goes a little too far is news of the machine where the innovations are white; the intervals
-    widen with it, up to where it counts as a fault.
+    What goes too far may be ``noted`` as news of the machine; where it ``widens`` all intervals, only up to
+    where it counts as a fault.
     """
-    farthest = max(departures, key=_sigmas, default=USUAL)
-    departure, said = farthest.sigmas, f"{farthest.what} {_departs(farthest.sigmas)}".lstrip()
-    passed = departure < DEPARTURE_LIMIT
-    check = Check(name=name, passed=passed, message=said, path=farthest.path, remedy=farthest.remedy)
-    if check.passed or not tolerated or departure >= NOTED_DEPARTURE:
+    no_unknown = Departure(sigmas=0.0, what="no unknown")
+    farthest = max(departures, key=lambda one: one.sigmas, default=no_unknown)
+    sigmas = farthest.sigmas
+    message = (
+        f"{farthest.what} departs by {sigmas:.1f} prior standard deviations (limit {DEPARTURE_LIMIT:g})"
+    ).lstrip()
+    check = Check(
+        name=name,
+        passed=sigmas < DEPARTURE_LIMIT,
+        message=message,
+        path=farthest.path,
+        remedy=farthest.remedy,
+    )
+    if check.passed or not noted or (widens and sigmas >= NOTED_DEPARTURE):
         return check
+    note = f"{message}; the readings are followed all the same"
+    if not widens:
+        return replace(check, passed=True, note=note)
     return replace(
         check,
         passed=True,
-        note=f"{check.message}; the readings are followed all the same, and all intervals are wider for it",
-        widening=1.0 + (departure - DEPARTURE_LIMIT) / (NOTED_DEPARTURE - DEPARTURE_LIMIT),
+        note=f"{note}, and all intervals are wider for it",
+        widening=1.0 + (sigmas - DEPARTURE_LIMIT) / (NOTED_DEPARTURE - DEPARTURE_LIMIT),
     )
 
 
@@ -279,23 +273,12 @@ def direction_check(problem: DropProblem) -> Check:
 
 
 def nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
-    """What belongs to this drop alone (unbalance, remanent lift, drag of the air) against what is usual.
+    """What belongs to this drop alone (unbalance, remanent lift, drag of the air) against their priors.
 
     Forces do not depend on how large these are, only on whether the filter has found them: as long as the
     innovations are white it has, and an unusual value is news of the machine, not a fault of the estimate.
     """
-    farthest = max(_departures(problem, smoothed, "drop"), key=_sigmas, default=USUAL)
-    usual = farthest.sigmas < DEPARTURE_LIMIT
-    message = f"{farthest.what} {_departs(farthest.sigmas)}".lstrip()
-    note = "" if usual or not white else f"{message}; the readings are followed all the same"
-    return Check(
-        name=OF_DROP,
-        passed=usual or white,
-        message=message,
-        note=note,
-        path=farthest.path,
-        remedy=f"check {THIS} in the machine file, the planes of unbalance and magnets first",
-    )
+    return _departure_check(OF_DROP, _departures(problem, smoothed, "drop"), white, widens=False)
 
 
 def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
@@ -310,55 +293,44 @@ def _remanence_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> C
     longest = next(
         (u.value_of(values[u.parameter]) for u in problem.unknowns if u.parameter is REMANENCE), 0.0
     )
+    fades = f"the remanent force of the magnets fades in {longest:.3g} s (limit {LONGEST_REMANENCE:g} s)"
     if longest < LONGEST_REMANENCE:
-        return Check(name=REMANENT, passed=True, message=_fades(longest))
+        return Check(name=REMANENT, passed=True, message=fades)
     weight = problem.model.machine.rotor.mass * float(problem.model.machine.gravity)
     across, up = (
         math.fsum(t for t, u in zip(theta, problem.unknowns, strict=True) if u.parameter is row)
         for row in FORCES
     )
     share = abs(up) / weight
-    noted = white and share < LARGEST_LASTING_LIFT
-    return Check(
+    check = Check(
         name=REMANENT,
-        passed=noted,
-        message=(
-            f"{_fades(longest)}; one that stays looks like a gain error of all sensors, which forces and "
-            "gaps would share"
-        ),
-        note=(
-            f"a force of {across:.0f} N across and {up:.0f} N upwards stays after power-off: the machine is "
-            "not level, or something pulls at the rotor; a gain error that all sensors share would be "
-            f"{percent(share, 1)} at most, for which all intervals are wider"
-        )
-        if noted
-        else "",
-        widening=math.hypot(1.0, share / LARGEST_LASTING_LIFT) if noted else 1.0,
+        passed=False,
+        message=f"{fades}; one that stays looks like a gain error of all sensors, which forces and gaps "
+        "would share",
         remedy="check the gains of all sensors, or give them a range",
     )
-
-
-def _fades(longest: float) -> str:
-    return f"the remanent force of the magnets fades in {longest:.3g} s (limit {LONGEST_REMANENCE:g} s)"
+    if not white or share >= LARGEST_LASTING_LIFT:
+        return check
+    return replace(
+        check,
+        passed=True,
+        note=f"a force of {across:.0f} N across and {up:.0f} N upwards stays after power-off: the machine is "
+        "not level, or something pulls at the rotor; a gain error that all sensors share would be "
+        f"{percent(share, 1)} at most, for which all intervals are wider",
+        widening=math.hypot(1.0, share / LARGEST_LASTING_LIFT),
+    )
 
 
 def _departures(problem: DropProblem, smoothed: Smoothed, scope: str) -> list[Departure]:
     """Unknowns of a scope."""
     theta = smoothed.means[smoothed.filtered.parameter_sample][problem.parameter_slice]
+    remedy = (
+        f"measure {THIS}, or widen its range in the machine file"
+        if scope == "machine"
+        else f"check {THIS} in the machine file, the planes of unbalance and magnets first"
+    )
     return [
-        Departure(
-            sigmas=abs(float(t) - u.mean) / u.sigma,
-            path=u.path,
-            remedy=f"measure {THIS}, or widen its range in the machine file",
-        )
+        Departure(sigmas=abs(float(t) - u.mean) / u.sigma, path=u.path, remedy=remedy)
         for t, u in zip(theta, problem.unknowns, strict=True)
         if u.scope == scope and not u.parameter.spin_up_only and u.parameter not in STRUCTURE
     ]
-
-
-def _sigmas(one: Departure) -> float:
-    return one.sigmas
-
-
-def _departs(departure: float) -> str:
-    return f"departs by {departure:.1f} prior standard deviations (limit {DEPARTURE_LIMIT:g})"

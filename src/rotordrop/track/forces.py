@@ -19,10 +19,12 @@ from rotordrop.simulate._rhs import (
     race_travel,
     ring_travel,
     scratch_of,
+    suited,
 )
 from rotordrop.track import _propagation as P
+from rotordrop.track._arrays import copy_into
 from rotordrop.track._filter import LARGEST_DEFLECTION
-from rotordrop.track.problem import WATCHED, DropProblem, private_copy
+from rotordrop.track.problem import WATCHED, DropProblem, parameters_at, private_copy
 from rotordrop.track.smoother import Smoothed
 
 FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
@@ -79,8 +81,8 @@ def force_values(
     y = np.zeros(p.rotor_at[L.N_STATES])
     step_d = 1e-9
     for i in range(means.shape[0]):
-        P.apply_parameters(means[i, s : s + n_parameters].copy(), targets, p)
-        y[:s] = means[i, :s]
+        P.apply_parameters(means[i, s : s + n_parameters], targets, p)
+        copy_into(means[i, :s], y)
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
             described = p.bearing[b, L.SET_UNKNOWN]
@@ -130,30 +132,25 @@ class ForceHistory:
     estimated."""
 
 
+def _values_at(problem: DropProblem, times: Array, means: Array) -> tuple[Array, Array, Array]:
+    """What `force_values` fills, at ``times`` (N,) [s] and estimates (N, n)."""
+    n_b, p = problem.model.layout.n_bearings, private_copy(problem.model.parameters)
+    values, contacts = np.empty((len(means), n_b, N_VALUES)), np.empty((len(means), n_b, 6))
+    gradients, s = np.empty((len(means), n_b, N_VALUES, 3)), problem.n_dynamic
+    count = len(problem.unknowns)
+    suited(force_values, p)(times, means, s, problem.targets, p, count, values, gradients, contacts)
+    return values, gradients, contacts
+
+
 def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     """Force and stress histories of a smoothed drop with standard deviations from the smoothed covariance."""
-    means, s = smoothed.means, problem.n_dynamic
-    n_b = problem.model.layout.n_bearings
-    count = len(means)
-    values = np.empty((count, n_b, N_VALUES))
-    gradients = np.empty((count, n_b, N_VALUES, 3))
-    contacts = np.empty((count, n_b, 6))
-    force_values(
-        problem.time[:count],
-        means,
-        s,
-        problem.targets,
-        private_copy(problem.model.parameters),
-        len(problem.unknowns),
-        values,
-        gradients,
-        contacts,
-    )
+    time = problem.time[: len(smoothed.means)]
+    values, gradients, contacts = _values_at(problem, time, smoothed.means)
     sigma = _standard_deviations(smoothed, gradients)
     displacement, displacement_sigma = displacements_of(problem, smoothed)
     touching = contacts[..., 0] > 0.0
     return ForceHistory(
-        time=problem.time[:count],
+        time=time,
         force=values[..., FORCE_X : FORCE_Y + 1],
         magnitude=values[..., FORCE],
         magnitude_sigma=sigma[..., FORCE],
@@ -173,12 +170,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
 
 def force_gradient(problem: DropProblem, mean: Array, b: int) -> Array:
     """Derivative of the force [N] of bearing ``b`` by the whole estimate ``mean`` (n,), shape (n,)."""
-    n_b, count = problem.model.layout.n_bearings, len(problem.unknowns)
-    gradients = np.empty((1, n_b, N_VALUES, 3))
-    values, contacts = np.empty((1, n_b, N_VALUES)), np.empty((1, n_b, 6))
-    p = private_copy(problem.model.parameters)
-    one, s = mean[None].copy(), problem.n_dynamic
-    force_values(np.zeros(1), one, s, problem.targets, p, count, values, gradients, contacts)
+    _, gradients, _ = _values_at(problem, np.zeros(1), mean[None].copy())
     rows = problem.watched_rows(problem.model.bearing_names[b])[:3]
     return np.asarray(gradients[0, b, FORCE] @ rows)
 
@@ -190,14 +182,15 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
     """
     from scipy.optimize import brentq
 
-    p = private_copy(problem.model.parameters)
-    P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
+    p = parameters_at(problem, theta)
     size = float(np.hypot(force[0], force[1]))
     along = np.asarray(force) / max(size, 1e-300)
     work, out = scratch_of(p), np.empty(N_VALUES)
 
+    fill_values = suited(bearing_values, p)
+
     def lacking(deflection: float) -> float:
-        bearing_values(
+        fill_values(
             deflection * along[0], deflection * along[1], p.bearing[b, L.SET_UNKNOWN], b, p, work, out
         )
         return float(out[FORCE]) - size
@@ -248,6 +241,18 @@ def _friction_sigma(problem: DropProblem, smoothed: Smoothed) -> Array:
         return np.zeros(len(places))
     variances = np.diag(smoothed.covariance(smoothed.filtered.parameter_sample))
     return np.sqrt(np.maximum(variances[[entries[0] for entries in places]], 0.0))
+
+
+def predicted_readings(problem: DropProblem, smoothed: Smoothed) -> Array:
+    """Readings that the smoothed motion gives, without the noise of the sensors [m], shape (N, C)."""
+    means, form, s, n_c = smoothed.means, problem.sensor_form, problem.n_dynamic, problem.n_channels
+    seen = means[:, :s] @ problem.reading_rows.T
+    if len(form.lag) == 0:  # what a sensor lags behind of has its terms
+        for (c, unknown), row in zip(form.term, form.term_row, strict=True):
+            seen[:, c] += means[:, s + unknown] * (means[:, :s] @ row)
+    first, angle = s + len(problem.unknowns), means[:, problem.model.layout.rotor_angle, None]
+    gain, offset, cosine, sine = (means[:, first + k * n_c : first + (k + 1) * n_c] for k in range(4))
+    return np.asarray((1.0 + gain) * seen + offset + cosine * np.cos(angle) + sine * np.sin(angle))
 
 
 def displacements_of(problem: DropProblem, smoothed: Smoothed) -> tuple[Array, Array]:

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.physics import columns as L
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.forces import stress_at_force
-from rotordrop.track.problem import DropProblem
+from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
 
 GATE_MARGIN = 0.12
 """Part of the air gap by which a rotor is clear of a race, at least, where its force is held at zero [1].
 
-The straight line through the sensors does not know how far the rotor bends beside it. A gate that closes
+The straight line through the sensors does not know how far the rotor bends off it. A gate that closes
 during a contact takes force away and leaves the likelihood no contact to judge: with 0.04 one of four drops
 of a calibrated 60 kg machine read 6.5 in place of 2.7 kN; 0.08, 0.12 and 0.16 give peaks within 3 %."""
 HELD = 0.01
@@ -33,8 +34,8 @@ HELD = 0.01
 TURNED = 2.0 / math.sqrt(math.pi)
 """Root of the density of the random walk of a rate, over ``F ω^1.5`` [1]: a half sine of amplitude F and
 angular frequency ω turns its rate from ``F ω`` to ``-F ω`` within π/ω; the walk spreads by ``s √(π/ω)``."""
-USUAL_PEAK = 10.0
-"""Usual ratio of the largest force of a drop to the weight on a bearing [1], where nothing is known yet."""
+TYPICAL_PEAK = 10.0
+"""Typical ratio of the largest force of a drop to the weight on a bearing [1], where nothing is known yet."""
 LOCAL = 0.25
 """Part of the duration of a contact, π/ω, from which the local force is taken on either side [1]: on five
 drops of 13 and 60 kg a quarter made the readings likelier than a half, and a half than the whole."""
@@ -46,10 +47,10 @@ FASTEST_TURN = 0.5
 """Largest turn of a contact between two samples [rad] that is tried."""
 STRESS_POINTS = 41
 """Forces at which the stress of a bearing is computed; between them by straight lines."""
-LEAST_PEAK_ERROR, PUT_BACK_ERROR = 0.11, 3.8
+LEAST_PEAK_ERROR, REINSERTED_ERROR = 0.11, 3.8
 """Relative error of a largest peak [1], at least and over the part of it that twicing has put back, through
 which sampling rate, noise, weight and contact time act: it held 11 of the 12 peaks that set it (13, 60 kg;
-0.45, 2 µm noise) and 95 of 96 at 10 to 100 kHz (studies/cross_check).
+0.45, 2 µm noise) and 95 of 96 at 10 to 100 kHz (study cross_check).
 
 Not validated: other rotors."""
 LEAST_STRESS_ERROR, STRESS_PER_PEAK = 0.015, 0.4
@@ -73,7 +74,7 @@ class InputEstimate:
     magnitude: Array
     """Its magnitude [N], shape (N, B)."""
     peak: Array
-    put_back: Array
+    reinserted: Array
     peak_error: Array
     """Largest magnitude [N], the part of it that twicing has put back [1], and the relative error that nine
     of ten such peaks stay within [1], shape (B,)."""
@@ -91,7 +92,7 @@ class InputEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class SensorCorrections:
-    """What the cross-check has to be told; N samples, B bearings, C channels."""
+    """What the cross-check has to be given; N samples, B bearings, C channels."""
 
     gain_errors: Array
     offsets: Array
@@ -103,12 +104,22 @@ class SensorCorrections:
     theta: Array
     """Parameters of the drop model, of which the stress takes the preload, shape (P,)."""
 
+    @property
+    def closed(self) -> NDArray[np.bool_]:
+        """Whether rotor and race cannot touch, for both axes, shape (N, 2 B)."""
+        return np.repeat(self.radius < self.reach, 2, axis=1)
+
+    def of(self, problem: DropProblem) -> Array:
+        """Readings of a problem without the errors of the sensors [m], shape (N, C)."""
+        readings = (problem.readings - self.offsets) / (1.0 + self.gain_errors)
+        return np.asarray(readings[: len(self.radius)])
+
 
 def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     """What settled tail and machine file say alone: the cross-check takes nothing from the twin.
 
     The rotor counts as clear of a race only where it is so by twice the error of gap and sensors and by
-    `GATE_MARGIN` of the gap, which it may bend beside the line through its sensors: a gate that closes during
+    `GATE_MARGIN` of the gap, which it may bend off the line through its sensors: a gate that closes during
     a contact would take force away, one that opens too early only lets a little noise in.
     """
     gain_errors, offsets = problem.sensor_errors(problem.mean)
@@ -118,7 +129,9 @@ def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     zero = float(np.max(variance[first : first + problem.n_channels]))
     margin = GATE_MARGIN * problem.mean[entries] + 2.0 * np.sqrt(variance[entries] + zero)
     motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
-    reach = problem.mean[entries] - margin - _play(problem)
+    # so far may a loose race lie off its centre
+    play = [numbers_of(bearing).play for bearing in problem.model.machine.touchdown_bearings]
+    reach = problem.mean[entries] - margin - np.array(play)
     # at an end that was held, what the description of its magnet gets wrong is found as a force
     reach[list(problem.held)] = 0.0
     return SensorCorrections(
@@ -130,22 +143,11 @@ def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     )
 
 
-def _play(problem: DropProblem) -> Array:
-    """Way that a loose race may lie off its centre [m], shape (B,)."""
-    bearings = problem.model.machine.touchdown_bearings
-    return np.array([numbers_of(bearing).play for bearing in bearings])
-
-
 def at_bearings(problem: DropProblem, along: Array) -> Array:
     """Rotor at the bearings [m], shape (N, B, 2), on the straight line through its sensors.
 
-    Parameters
-    ----------
-    problem : DropProblem
-        Knows where sensors and bearings are.
-    along : ndarray, shape (N, C)
-        Displacement along every sensor [m], its gain and offset taken out; a sample that lacks a channel
-        gives NaN, a channel that is never there is left out.
+    ``along`` (N, C) is the displacement along every sensor [m], its gain and offset taken out. A sample that
+    lacks a channel gives NaN; a channel that is never there is left out.
     """
     layout, rigid = problem.model.layout, slice(0, problem.model.basis.n_rigid)
     rows = problem.sensor_rows
@@ -161,20 +163,13 @@ def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -
     """Joint estimate of motion and bearing forces from the readings, by a linear filter and smoother.
 
     No contact, friction or support enters. Both directions must be seen in two planes: with less, the rotor
-    model alone does not bound the forces.
-
-    Parameters
-    ----------
-    problem : DropProblem
-        Readings and rotor.
-    corrections : SensorCorrections
-        Sensor errors, air gaps and preload, from the twin or from the record alone.
+    model alone does not bound the forces. The corrections are those of the twin or of the record alone.
     """
     count = len(corrections.radius)
     rotor, passed, shown, variance, turn = _looked(problem, corrections)
-    force, peak, smoothed_peak = _twiced(rotor, passed, shown, _corrected(problem, corrections))
-    put_back = np.minimum(np.abs(peak - smoothed_peak) / np.maximum(peak, 1e-300), 1.0)
-    peak_error = np.hypot(LEAST_PEAK_ERROR, PUT_BACK_ERROR * put_back)
+    force, peak, smoothed_peak = _bias_corrected(rotor, passed, shown, corrections.of(problem))
+    reinserted = np.minimum(np.abs(peak - smoothed_peak) / np.maximum(peak, 1e-300), 1.0)
+    peak_error = np.hypot(LEAST_PEAK_ERROR, REINSERTED_ERROR * reinserted)
     force, variance = force.reshape(count, -1, 2), np.maximum(variance, 0.0).reshape(count, -1, 2)
     time = problem.time[:count]
     magnitude = np.hypot(force[..., 0], force[..., 1])
@@ -192,7 +187,7 @@ def input_state_estimate(problem: DropProblem, corrections: SensorCorrections) -
         sigma=np.sqrt(variance),
         magnitude=magnitude,
         peak=peak,
-        put_back=put_back,
+        reinserted=reinserted,
         peak_error=peak_error,
         stress=stress,
         peak_stress=stress.max(axis=0),
@@ -209,54 +204,57 @@ def peaks_shown(problem: DropProblem, corrections: SensorCorrections, force: Arr
     these forces is read without noise, and estimated as the readings are.
     """
     rotor, passed, shown, _, _ = _looked(problem, corrections)
-    readings = _readings_under(rotor, force.reshape(len(force), -1)[: len(shown)])
+    force = force.reshape(len(force), -1)[: len(shown)]
+    states = states_under(rotor.F, rotor.forces.start, force, rotor.dt)
+    readings = np.array([rotor.H @ x for x in states])
     shown = pass_again(rotor, passed, readings)
-    return _twiced(rotor, passed, shown, readings)[1]
-
-
-def _readings_under(rotor: ForcedRotor, force: Array) -> Array:
-    """What the sensors see of the rotor under forces (N, K) [N], from rest, without weight, shape (N, C)."""
-    f = rotor.forces
-    rates = np.diff(force, axis=0) / rotor.dt
-    x, readings = np.zeros(len(rotor.A)), np.zeros((len(force), len(rotor.C)))
-    for i, rate in enumerate(rates):
-        x[f], x[f.stop : f.stop + len(rate)] = force[i], rate
-        x = rotor.A @ x
-        readings[i + 1] = rotor.C @ x
-    return readings
-
-
-def _corrected(problem: DropProblem, corrections: SensorCorrections) -> Array:
-    """Readings without the errors of the sensors [m], shape (N, C)."""
-    readings = (problem.readings - corrections.offsets) / (1.0 + corrections.gain_errors)
-    return np.asarray(readings[: len(corrections.radius)])
+    return _bias_corrected(rotor, passed, shown, readings)[1]
 
 
 def _looked(
     problem: DropProblem, corrections: SensorCorrections
 ) -> tuple[ForcedRotor, Passed, Array, Array, float]:
     """The rotor, the last pass, what it shows, the variances of its forces, and how fast contacts turn."""
-    closed = np.repeat(corrections.radius < corrections.reach, 2, axis=1)
-    readings, rotor = _corrected(problem, corrections), rotor_of(problem)
+    closed, readings, rotor = corrections.closed, corrections.of(problem), rotor_of(problem)
     early = slice(0, int(np.searchsorted(problem.time[: len(readings)], SEARCHED * problem.fall_time)))
-    # falling and rebounding as fast: twice its momentum under a half sine
-    turn = USUAL_PEAK / problem.fall_time
-    local = np.broadcast_to(USUAL_PEAK * rotor.weight, closed.shape)
+    local, turn = _typical(problem, rotor, closed)
     for look in range(LOOKS):
         if look == 1:
             turn = _likeliest_turn(rotor, readings[early], closed[early], local[early], turn)
         passed = forward_pass(rotor, readings, closed, local, turn)
-        shown, variance = backward_pass(rotor, passed, variances=look == LOOKS - 1)
+        shown, variance, _ = backward_pass(rotor, passed, variances=look == LOOKS - 1)
         force = shown[:, : closed.shape[1]]
         local = _local_force(force, max(1, round(LOCAL * math.pi / (turn * rotor.dt))))
     return rotor, passed, shown, variance, turn
 
 
-def _twiced(rotor: ForcedRotor, passed: Passed, shown: Array, readings: Array) -> tuple[Array, Array, Array]:
+def _typical(problem: DropProblem, rotor: ForcedRotor, closed: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Forces (N, K) [N] and how fast contacts turn [rad/s], where nothing is known of them yet.
+
+    Falling and rebounding as fast, a rotor has twice its momentum under a half sine.
+    """
+    return np.broadcast_to(TYPICAL_PEAK * rotor.weight, closed.shape), TYPICAL_PEAK / problem.fall_time
+
+
+def rotor_likelihood_of(model: DropModel, drop: RecordedDrop, corrections: SensorCorrections) -> float:
+    """Negative logarithm of the likelihood of readings with a rotor under any forces at its bearings [1].
+
+    No contact law enters: the touchdown bearings of the model only say where forces act. A tail in what the
+    record says costs time and changes nothing here; ``corrections`` are those of a like model.
+    """
+    problem = build_problem(model, replace(drop, tail_level=None), until=float(drop.time[-1]))
+    rotor, closed = rotor_of(problem), corrections.closed
+    local, turn = _typical(problem, rotor, closed)
+    return forward_pass(rotor, corrections.of(problem), closed, local, turn).negative_log_likelihood
+
+
+def _bias_corrected(
+    rotor: ForcedRotor, passed: Passed, shown: Array, readings: Array
+) -> tuple[Array, Array, Array]:
     """Forces (N, K) [N], their peaks (B,) [N], and the peaks before.
 
     What smoothing took from the peaks is in what is left of the readings: found there in the same way, it is
-    put back ("twicing").
+    put back: bias correction by twicing.
     """
     k = rotor.forces.stop - rotor.forces.start
     smoothed, fitted = shown[:, :k], shown[:, k:]
@@ -311,6 +309,18 @@ def transition(
     return E[:-1, :-1], E[:-1, -1], n
 
 
+def states_under(F: Array, first: int, force: Array, dt: float) -> Array:
+    """States (N, n) of a `transition` from rest, under forces (N, K) [N] that stand at ``first`` among them.
+
+    Between samples ``dt`` [s] apart the forces run along a straight line.
+    """
+    states, of_force = np.zeros((len(force), len(F))), slice(first, first + 2 * force.shape[1])
+    for i, rate in enumerate(np.diff(force, axis=0) / dt):
+        states[i, of_force] = *force[i], *rate
+        states[i + 1] = F @ states[i]
+    return states
+
+
 @dataclass(frozen=True, kw_only=True)
 class ForcedRotor:
     """The rotor under unknown forces, in samples: N readings, C channels, K force components, n states.
@@ -320,10 +330,10 @@ class ForcedRotor:
     """
 
     dt: float
-    A: Array
+    F: Array
     gravity: Array
     forces: slice
-    C: Array
+    H: Array
     start: Array
     start_covariance: Array
     variances: Array
@@ -331,14 +341,14 @@ class ForcedRotor:
     fresh: Array = field(default_factory=lambda: np.zeros(0))
     """Variance that a sample adds to each part of the slow noise [m²], shape (M,)."""
     places: Array | None = None
-    """Rows of displacements that are wanted beside the readings, shape (D, n)."""
+    """Rows of displacements that are wanted besides the readings, shape (D, n)."""
 
     @property
     def watched(self) -> Array:
         """Rows of forces, readings without slow noise and wanted displacements (K + C + D, n)."""
         wanted = [] if self.places is None else [self.places]
-        moves = np.arange(len(self.A)) < len(self.A) - len(self.fresh)
-        return np.concatenate([np.eye(len(self.A))[self.forces], self.C * moves, *wanted])
+        moves = np.arange(len(self.F)) < len(self.F) - len(self.fresh)
+        return np.concatenate([np.eye(len(self.F))[self.forces], self.H * moves, *wanted])
 
 
 def rotor_of(problem: DropProblem) -> ForcedRotor:
@@ -363,26 +373,26 @@ def rotor_of(problem: DropProblem) -> ForcedRotor:
             place = float(problem.mean[entry].sum())
             force = row[L.HOLDING_X + axis] + row[L.AMB_STIFFNESS] * place
             weight[axis * m : (axis + 1) * m] += force * shape
-    A, gravity, n = transition(stiffness, damping, push, weight, dt)
-    C = np.zeros((problem.n_channels, len(A)))
-    C[:, : 2 * m] = problem.sensor_rows[:, : 2 * m]
-    start, variance = np.zeros(len(A)), np.zeros(len(A))
+    F, gravity, n = transition(stiffness, damping, push, weight, dt)
+    H = np.zeros((problem.n_channels, len(F)))
+    H[:, : 2 * m] = problem.sensor_rows[:, : 2 * m]
+    start, variance = np.zeros(len(F)), np.zeros(len(F))
     known = np.diag(problem.covariance)
     start[: 2 * m] = problem.mean[: 2 * m]
     variance[: 2 * m] = known[: 2 * m]
     variance[2 * m : n] = known[model.layout.velocity_of(slice(0, 2 * m))]
     form = problem.sensor_form
-    none, last = np.zeros(len(form.noisy)), len(A) + np.arange(len(form.noisy))
-    A = np.pad(A, (0, len(none)))
-    A[last, last] = form.noise_decay
-    C = np.pad(C, ((0, 0), (0, len(none))))
-    C[form.noisy, last] = 1.0
+    none, last = np.zeros(len(form.noisy)), len(F) + np.arange(len(form.noisy))
+    F = np.pad(F, (0, len(none)))
+    F[last, last] = form.noise_decay
+    H = np.pad(H, ((0, 0), (0, len(none))))
+    H[form.noisy, last] = 1.0
     return ForcedRotor(
         dt=dt,
-        A=A,
+        F=F,
         gravity=np.append(gravity, none),
         forces=slice(n, n + k),
-        C=C,
+        H=H,
         start=np.append(start, none),
         start_covariance=np.diag(np.append(variance, form.noise_variance)),
         variances=problem.white_variances,
@@ -439,6 +449,13 @@ class Passed:
     negative_log_likelihood: float
 
 
+def _walk(dt: float) -> tuple[float, float, float]:
+    """Variance of the force, covariance with its rate and variance of the rate after a sample [s], where the
+    rate is a random walk of density one.
+    """
+    return dt**3 / 3.0, dt**2 / 2.0, dt
+
+
 def forward_pass(
     rotor: ForcedRotor, readings: Array, closed: NDArray[np.bool_], local: Array, turn: float
 ) -> Passed:
@@ -446,11 +463,10 @@ def forward_pass(
     dt, f = rotor.dt, rotor.forces
     k = f.stop - f.start
     at, rate = np.arange(f.start, f.stop), np.arange(f.stop, f.stop + k)
-    count, size = len(readings), len(rotor.A)
+    count, size = len(readings), len(rotor.F)
     noise = np.arange(size - len(rotor.fresh), size)
     strength = TURNED * turn**1.5 * np.maximum(local, rotor.weight)
-    # A rate that is a random walk of density s² moves rate and force together over a sample.
-    of_force, of_both, of_rate = (strength**2 * x for x in (dt**3 / 3.0, dt**2 / 2.0, dt))
+    of_force, of_both, of_rate = (strength**2 * x for x in _walk(dt))
     held = (HELD * rotor.weight) ** 2 / (turn * dt)
     identity = np.eye(size)
     x, P = rotor.start, rotor.start_covariance
@@ -459,8 +475,8 @@ def forward_pass(
     shown, rows = np.empty((count, len(watched))), np.empty((count, len(watched), size))
     for i in range(count):
         if i > 0:
-            x = rotor.A @ x + rotor.gravity
-            P = rotor.A @ P @ rotor.A.T
+            x = rotor.F @ x + rotor.gravity
+            P = rotor.F @ P @ rotor.F.T
             P[at, at] += of_force[i]
             P[at, rate] += of_both[i]
             P[rate, at] += of_both[i]
@@ -471,7 +487,7 @@ def forward_pass(
         done = []
         for H, z, R, channels in (
             (identity[at[shut]], np.zeros(len(shut)), held[shut], None),
-            (rotor.C[live], readings[i, live], rotor.variances[live], live),
+            (rotor.H[live], readings[i, live], rotor.variances[live], live),
         ):
             if len(z) == 0:
                 continue
@@ -491,11 +507,23 @@ def forward_pass(
     return Passed(updates=updates, shown=shown, rows=rows, negative_log_likelihood=negative_log_likelihood)
 
 
-def backward_pass(rotor: ForcedRotor, passed: Passed, *, variances: bool = True) -> tuple[Array, Array]:
-    """Smoothed forces and readings (N, K + C), variances of the forces (N, K): modified Bryson–Frazier."""
-    size, f = len(rotor.A), rotor.forces
+def backward_pass(
+    rotor: ForcedRotor, passed: Passed, *, variances: bool = True
+) -> tuple[Array, Array, Array]:
+    """Smoothed forces and readings (N, K + C), variances of the forces (N, K): modified Bryson–Frazier.
+
+    Last, what the readings say of the random walks of density s² at every sample, shape (2, N, K), with the
+    variances only: ``s²`` times the first is the square of the smoothed step over its variance, ``s²`` times
+    the second its expectation. Where the first is larger, s² is too small.
+
+    Source: Koopman and Shephard 1992, exact score for time series models in state space form.
+    """
+    size, f = len(rotor.F), rotor.forces
     k = f.stop - f.start
+    at, rate = np.arange(f.start, f.stop), np.arange(f.stop, f.stop + k)
+    of_force, of_both, of_rate = _walk(rotor.dt)
     shown, variance = passed.shown.copy(), np.empty((len(passed.shown), k))
+    evidence = np.zeros((2, *variance.shape))
     score, information = np.zeros(size), np.zeros((size, size))
     for i in range(len(shown) - 1, -1, -1):
         shown[i] -= passed.rows[i] @ score
@@ -508,10 +536,14 @@ def backward_pass(rotor: ForcedRotor, passed: Passed, *, variances: bool = True)
             if variances:
                 information = information - H.T @ (K.T @ information)
                 information = information - (information @ K) @ H + H.T @ update.inverse @ H
-        score = rotor.A.T @ score
+        if variances and i > 0:
+            for entry, square in zip(evidence, (np.outer(score, score), information), strict=True):
+                both = 2.0 * of_both * square[at, rate]
+                entry[i] = of_force * square[at, at] + both + of_rate * square[rate, rate]
+        score = rotor.F.T @ score
         if variances:
-            information = rotor.A.T @ information @ rotor.A
-    return shown, variance
+            information = rotor.F.T @ information @ rotor.F
+    return shown, variance, evidence
 
 
 def pass_again(rotor: ForcedRotor, passed: Passed, left: Array) -> Array:
@@ -519,9 +551,9 @@ def pass_again(rotor: ForcedRotor, passed: Passed, left: Array) -> Array:
 
     Gains do not depend on readings, so that this is a fraction of the work of a pass.
     """
-    x, shown, updates = np.zeros(len(rotor.A)), np.empty_like(passed.shown), []
+    x, shown, updates = np.zeros(len(rotor.F)), np.empty_like(passed.shown), []
     for i, before in enumerate(passed.updates):
-        x = rotor.A @ x
+        x = rotor.F @ x
         done = []
         for update in before:
             z = 0.0 if update.channels is None else left[i, update.channels]

@@ -16,14 +16,14 @@ from rotordrop.track.calibration import (
     THREADS,
     Stage,
     TrackedDrops,
-    handed_on,
+    prior_of_next,
     stage_settings,
 )
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, forward
+from rotordrop.track.smoother import Forward, forward, has_diverged
 
 SMALLEST, LARGEST = 0.125, 64.0
-"""Limits of the size, over the usual one [1]. Below the smaller one the sensors' noise and the machine's
+"""Limits of the size, over the baseline [1]. Below the smaller one the sensors' noise and the machine's
 values decide: the interval of a peak shrank by less than 6 % from there to a quarter of it (two rotors)."""
 
 STEP = 4.0
@@ -31,16 +31,10 @@ STEP = 4.0
 
 
 def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
-    """Size of the process noise, over the usual one, that makes the readings of all drops likeliest [1].
+    """Size of the process noise, over that of a stage, that makes the readings of all drops likeliest [1].
 
-    It is no smaller than a size without which the filter had lost a drop.
-
-    Parameters
-    ----------
-    fit : TrackedDrops
-        Drops that were followed, to linearise at.
-    stage : Stage
-        Says what is usual.
+    The passes are linearised at a fit of the drops. It is no smaller than a size without which the filter
+    diverged.
     """
     needed = max(1.0, *fit.noise_factors)
 
@@ -53,8 +47,8 @@ def likeliest_noise(fit: TrackedDrops, stage: Stage) -> float:
 
 
 def likelihood_of(one: Forward) -> float:
-    """Negative log likelihood of the readings of a pass [1]; infinite where the filter lost the drop."""
-    return one.negative_log_likelihood if one.done == len(one.means) else math.inf
+    """Negative log likelihood of the readings of a pass [1]; infinite where the filter diverged."""
+    return math.inf if has_diverged(one) else one.negative_log_likelihood
 
 
 def forward_passes(
@@ -67,19 +61,10 @@ def forward_passes(
     settings = stage_settings(problems[0], stage, factor)
     passes: list[Forward] = []
     for problem, reference in zip(problems, references, strict=True):
-        mean, covariance = problem.mean, problem.covariance
-        if passes:
-            mean, covariance = handed_on(passes[-1], problem)
+        mean, covariance = prior_of_next(passes[-1] if passes else None, problem)
+        count = len(reference)
         passes.append(
-            forward(
-                problem,
-                settings,
-                mean=mean,
-                covariance=covariance,
-                reference=reference,
-                samples=len(reference),
-                keep="nothing",
-            )
+            forward(problem, settings, mean=mean, covariance=covariance, reference=reference, samples=count)
         )
     return passes
 

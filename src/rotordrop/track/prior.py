@@ -27,7 +27,7 @@ START_ORBIT_SIGMA = 0.03
 RACE_SPIN_SIGMA = 0.3
 """Spin of a race at power-off [rad/s]."""
 SPEED_SIGMA = 0.5
-"""Rotor speed at power-off beside its standard error [rad/s]."""
+"""Error of the rotor speed at power-off, besides its standard error [rad/s]."""
 OWN_SIGMA = (0.3e-6, 0.3e-6, 1e-4, 1e-4)
 """How far a foundation may be from rest at power-off, displacement [m] and velocity [m/s], x and y."""
 AXIAL_SIGMA = (1e-6, 1e-4)
@@ -51,20 +51,9 @@ def prior_at_power_off(
 ) -> tuple[Array, Array]:
     """Prior mean (n,) and covariance (n, n) of the whole estimate at power-off.
 
-    Parameters
-    ----------
-    model : DropModel
-        Drop model of the machine.
-    unknowns : tuple of Unknown
-        The parameters to estimate.
-    rows : ndarray, shape (C, s)
-        Displacement along each sensor's direction from the dynamic state.
-    level : ndarray, shape (C,)
-        First readings of every channel [m]; NaN where there is none.
-    speed : tuple of float
-        Rotor speed at power-off and its standard error [rad/s].
-    noise : SlowNoise
-        Slow noise of the sensors, of which one part is as likely as another at power-off.
+    ``rows`` (C, s) are the displacements along the sensors by the dynamic state, ``level`` (C,) the first
+    readings [m], NaN where there is none; ``speed`` is that of the rotor and its standard error [rad/s]. One
+    part of the slow noise of the sensors is as likely as another at power-off.
     """
     layout = model.layout
     s, n_p, n_c = layout.n_dynamic, len(unknowns), rows.shape[0]
@@ -81,27 +70,23 @@ def prior_at_power_off(
     sigma[layout.rotor_speed] = math.hypot(SPEED_SIGMA, speed[1])
     for i, unknown in enumerate(unknowns):
         mean[s + i], sigma[s + i] = unknown.mean, unknown.sigma
-    for c, sensor in enumerate(model.machine.sensors):
-        gain, offset = s + n_p + c, s + n_p + n_c + c
+    for c, sensor in enumerate(model.machine.sensors, start=s + n_p):
         known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
-        mean[gain], sigma[gain] = 1.0 / known.mean - 1.0, known.sigma
+        mean[c], sigma[c] = 1.0 / known.mean - 1.0, known.sigma
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
-        mean[offset], sigma[offset] = known.mean, known.sigma
+        mean[n_c + c], sigma[n_c + c] = known.mean, known.sigma
     sigma[s + n_p + 2 * n_c : s + n_p + 4 * n_c] = RUNOUT_SIGMA
     sigma[s + n_p + 4 * n_c :] = np.sqrt(noise.variance)
     sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap
-    rings = layout.further_at(L.RING_STATES)
-    sigma[rings] = np.resize(RING_SIGMA, rings.stop - rings.start)
-    axial = layout.further_at(L.FACE_STATES)
-    sigma[axial] = np.resize(AXIAL_SIGMA, axial.stop - axial.start)
+    own = ((L.RING_STATES, RING_SIGMA), (L.FACE_STATES, AXIAL_SIGMA), (L.BEARING_OWN, OWN_SIGMA))
+    for place, sigmas in own:
+        at = layout.further_at(place)
+        sigma[at] = np.resize(sigmas, at.stop - at.start)
     if layout.moves_axially:
         sigma[layout.axial : layout.axial + 2] = AXIAL_SIGMA
-    own = layout.further_at(L.BEARING_OWN)
-    sigma[own] = np.resize(OWN_SIGMA, own.stop - own.start)
     covariance = np.diag(sigma**2)
-    share_in_groups(model, unknowns, covariance[s : s + n_p, s : s + n_p])
-    inferred_together(model, unknowns, covariance[s : s + n_p, s : s + n_p])
-    correlate(model, unknowns, covariance[s : s + n_p, s : s + n_p])
+    for related in (share_in_groups, inferred_together, correlate):
+        related(model, unknowns, covariance[s : s + n_p, s : s + n_p])
     _hold(model, unknowns, mean, covariance)
     if layout.sensor_own:
         begin_caught_up(layout, rows, mean, covariance)

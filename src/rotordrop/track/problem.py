@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.elements.parameter import Rule
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.ends import held_bearings
@@ -17,13 +18,12 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.load import load_now
 from rotordrop.rotor.parameters import DropModel, race_sag, static_sag
 from rotordrop.rotor.statics import rest_on, settled_sag
-from rotordrop.rotor.unknowns import Unknown, all_unknowns, smallest_gap
+from rotordrop.rotor.unknowns import Target, Unknown, all_unknowns, smallest_gap
 from rotordrop.series import noise_by_differences
 from rotordrop.simulate.levitation import levitated_static
 from rotordrop.track import _propagation as P
 from rotordrop.track.prior import fall_time, prior_at_power_off, start_of
 from rotordrop.track.sensor_form import SensorForm, rest_terms, sensor_form
-from rotordrop.track.unknowns import parameter_targets
 
 FIRST_READINGS = 0.07
 """Time after power-off whose mean reading says where the rotor is, over the time of a free fall [1]."""
@@ -37,7 +37,7 @@ AFTER_FALL = 1.4
 FEWEST_DIFFERENCES = 50
 """Differences from which their median is a noise [1]."""
 NOISE_FLOOR = 0.1e-6
-USUAL_NOISE = 1e-6
+DEFAULT_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
 """How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
 WATCHED = 8
@@ -100,7 +100,7 @@ class DropProblem:
     """When the rotor first touched a race [s]; the windows of a schedule lie around it."""
     impulse_in_fall: float = math.inf
     """Largest unknown impulse per 50 µs before it [N s], where the lift of the magnets may last longer than
-    usual: larger ones would explain that."""
+    in most drops: larger ones would explain that."""
 
     @property
     def reading_rows(self) -> Array:
@@ -125,18 +125,13 @@ class DropProblem:
         return self.model.layout.n_dynamic
 
     @property
-    def parameter_time(self) -> float:
-        """Time from power-off [s] at which parameters are read: shortly after the first contacts.
+    def parameter_sample(self) -> int:
+        """Sample at which parameters are read: shortly after the first contacts, or behind the last.
 
         Later in a drop friction and race drift with what their laws get wrong.
         """
         gap = max(float(bearing.air_gap) for bearing in self.model.machine.touchdown_bearings)
-        return AFTER_FALL * fall_time(self.model.machine, gap)
-
-    @property
-    def parameter_sample(self) -> int:
-        """First sample at that time, or behind the last where the window ends before."""
-        return int(np.searchsorted(self.time, self.parameter_time))
+        return int(np.searchsorted(self.time, AFTER_FALL * fall_time(self.model.machine, gap)))
 
     @property
     def fall_time(self) -> float:
@@ -222,18 +217,9 @@ def build_problem(
     until: float = 0.2,
     unknowns: tuple[Unknown, ...] | None = None,
 ) -> DropProblem:
-    """Put a recorded drop as an estimation problem.
+    """Put a recorded drop as an estimation problem, up to a time [s]; by default with all unknowns.
 
-    Parameters
-    ----------
-    model : DropModel
-        Drop model of the machine; its sensors define the channels.
-    drop : RecordedDrop
-        What the record says.
-    until : float
-        End of the window [s].
-    unknowns : tuple of Unknown, optional
-        The parameters to estimate; all by default.
+    The sensors of the model define the channels.
 
     Raises
     ------
@@ -286,18 +272,14 @@ def _refuse_unloaded(model: DropModel) -> None:
 
 
 def _prepared(model: DropModel, omega: float) -> DropModel:
-    p = model.parameters
-    spin, flags = p.spin.copy(), p.flags.copy()
-    spin[L.INITIAL_SPEED] = omega
-    spin[L.POWER_OFF_DELAY] = 0.0
-    flags[L.SPIN_MODE] = aerodynamics.EXPONENTIAL_IN_TIME
-    flags[L.MAGNETS_ACT] = 1
-    bearing = p.bearing.copy()
-    bearing[:, L.SMOOTHING_SPEED] = np.maximum(bearing[:, L.SMOOTHING_SPEED], SMOOTHED_FRICTION_SPEED)
-    magnet = p.magnet.copy()
-    if np.any(magnet[:, L.AMB_STAYS] != 0.0):
-        magnet[:, L.HOLDING_X : L.HOLDING_Y + 1] = levitated_static(model, None, omega)[1]
-    return replace(model, parameters=p._replace(spin=spin, flags=flags, bearing=bearing, magnet=magnet))
+    p = private_copy(model.parameters)
+    p.spin[L.INITIAL_SPEED], p.spin[L.POWER_OFF_DELAY] = omega, 0.0
+    p.flags[L.SPIN_MODE], p.flags[L.MAGNETS_ACT] = aerodynamics.EXPONENTIAL_IN_TIME, 1
+    smoothing = p.bearing[:, L.SMOOTHING_SPEED]
+    np.maximum(smoothing, SMOOTHED_FRICTION_SPEED, out=smoothing)
+    if np.any(p.magnet[:, L.AMB_STAYS] != 0.0):
+        p.magnet[:, L.HOLDING_X : L.HOLDING_Y + 1] = levitated_static(model, None, omega)[1]
+    return replace(model, parameters=p)
 
 
 def _thinned(time: Array, speed: Array) -> Array:
@@ -311,7 +293,7 @@ def _thinned(time: Array, speed: Array) -> Array:
 def _variances(noise: Array, readings: Array) -> Array:
     """Noise variance of each channel [m²]: from the levitated part, else from their roughness."""
     noise = np.where(np.isfinite(noise), noise, rough_noise(readings))
-    noise[~np.isfinite(noise)] = USUAL_NOISE
+    noise[~np.isfinite(noise)] = DEFAULT_NOISE
     return np.asarray(noise**2 + NOISE_FLOOR**2)
 
 
@@ -343,8 +325,6 @@ def first_level(time: Array, readings: Array, until: float) -> Array:
     """Mean of the first readings of every channel [m]; NaN where there is none."""
     first = readings[time[: len(readings)] < time[0] + until]
     known = np.isfinite(first)
-    if known.all():
-        return np.asarray(first.mean(axis=0))
     count = known.sum(axis=0)
     total = np.where(known, first, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
@@ -357,7 +337,7 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     the line between the bearings, and the bending of the rotor on its touchdown bearings.
     """
     model = problem.model
-    p = _with_theta(problem, theta)
+    p = parameters_at(problem, theta)
     bearings = model.machine.touchdown_bearings
     nodes = [bearing.node for bearing in bearings]
     pull = np.array([np.zeros(len(nodes)), -np.asarray(model.load_shares)])
@@ -379,7 +359,8 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     return np.asarray(np.array(lines) + bend[:, 0::2][:, sensors], dtype=np.float64)
 
 
-def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
+def parameters_at(problem: DropProblem, theta: Array) -> L.KernelParameters:
+    """Kernel arrays of a problem with values of its unknown parameters, shape (P,)."""
     p = private_copy(problem.model.parameters)
     P.apply_parameters(np.asarray(theta, dtype=np.float64).copy(), problem.targets, p)
     return p
@@ -387,8 +368,7 @@ def _with_theta(problem: DropProblem, theta: Array) -> L.KernelParameters:
 
 def private_copy(p: L.KernelParameters) -> L.KernelParameters:
     """Kernel arrays that may be written to."""
-    copies = {name: getattr(p, name).copy() for name in p._fields}
-    return L.KernelParameters(**copies)
+    return L.KernelParameters._make(array.copy() for array in p)
 
 
 def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance: Array) -> None:
@@ -457,3 +437,118 @@ def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:
     spread = np.hypot(directions[:, 0] * TAIL_HORIZONTAL_SIGMA, directions[:, 1] * TAIL_VERTICAL_SIGMA)
     aligned = np.sign(directions @ directions[0])
     return [(aligned / len(angles), float(np.mean(spread)))]
+
+
+_KIND_OF_ARRAY = {
+    "bearing": P.ON_BEARING,
+    "spin": P.ON_SPIN,
+    "magnet": P.ON_MAGNET,
+    "unbalance": P.ON_UNBALANCE,
+    "load": P.ON_LOAD,
+    "modes": P.SCALE_MODES,
+}
+_KIND_OF_RULE = {Rule.SCALE: P.SCALE_BEARING, Rule.AT_TYPICAL_DEPTH: P.AT_TYPICAL_DEPTH}
+
+
+def _acts(targets: list[tuple[int, Target]], count: int, bearings: int) -> NDArray[np.bool_]:
+    """Which of ``count`` parameters act on each bearing and, in the last column, on the rotor itself."""
+    acts = np.zeros((count, bearings + 1), dtype=np.bool_)
+    for k, target in targets:
+        acts[k, target.row if target.entry.array == "bearing" else bearings] = True
+    return acts
+
+
+def _together(targets: list[tuple[int, Target]], count: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """For each of ``count`` parameters the targets that write where it writes, and where its list begins."""
+    # All unbalances add up in the same entries; a gap is also the radius of the rotor.
+    places = [
+        (t.entry.array,) if t.entry.array == "unbalance" else (t.entry.array, t.row, t.entry.column)
+        for _, t in targets
+    ]
+    lists = []
+    for k in range(count):
+        own = {place for place, (j, _) in zip(places, targets, strict=True) if j == k}
+        lists.append([i for i, place in enumerate(places) if place in own])
+    starts = np.cumsum([0, *map(len, lists)])
+    return np.array([i for chosen in lists for i in chosen], dtype=np.int64), starts.astype(np.int64)
+
+
+def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.ParameterTargets:
+    """Flat table of what the unknowns set in the kernel, in the order given."""
+    targets = [(k, target) for k, unknown in enumerate(unknowns) for target in unknown.targets]
+    # What changes an entry comes after what sets it.
+    targets.sort(key=lambda item: item[1].entry.rule in _KIND_OF_RULE)
+    planes = [model.basis.node_row(unbalance.node) for unbalance in model.machine.unbalances]
+    shape = np.array(planes) if planes else np.zeros((0, model.layout.n_modes))
+    drift = np.array([u.drift for u in unknowns])
+    kinds = [_KIND_OF_RULE.get(t.entry.rule, _KIND_OF_ARRAY[t.entry.array]) for _, t in targets]
+    rows = [(k, kind, t.row, t.entry.column) for kind, (k, t) in zip(kinds, targets, strict=True)]
+    together, starts = _together(targets, len(unknowns))
+    return P.ParameterTargets(
+        target=np.array(rows, dtype=np.int64).reshape(-1, 4),
+        acts=_acts(targets, len(unknowns), len(model.parameters.bearing)),
+        together=together,
+        starts=starts,
+        factor=np.array([t.factor for _, t in targets]),
+        logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),
+        drift=drift,
+        late_drift=drift * np.array([u.parameter.late_drift_factor for u in unknowns]),
+        step=np.array([1e-5 if u.logarithmic else max(1e-3 * u.sigma, 1e-12) for u in unknowns]),
+        plane_shape=np.ascontiguousarray(shape),
+        lower=np.array([u.bounds[0] for u in unknowns]),
+        upper=np.array([u.bounds[1] for u in unknowns]),
+        mean=np.array([u.begin for u in unknowns]),
+        eigenvalue=model.parameters.eigenvalue,
+    )
+
+
+def transferred(coarse: DropProblem, fine: DropProblem, means: Array) -> Array:
+    """Trajectory (N, n) of a coarse problem in the coordinates of a fine one, by projecting the modes.
+
+    Sensors that the coarse problem leaves out start at what is known of them beforehand.
+    """
+    one, two = coarse.model.layout, fine.model.layout
+    result = np.zeros((len(means), len(fine.mean)))
+    project = (fine.model.basis.shapes.T @ (fine.model.fe.mass @ coarse.model.basis.shapes)).T
+    for part in ("modal_x", "modal_y"):
+        source, target = getattr(one, part), getattr(two, part)
+        result[:, target] = means[:, source] @ project
+        result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)] @ project
+    for part in ("race", "support"):
+        source, target = getattr(one, part), getattr(two, part)
+        result[:, target] = means[:, source]
+        result[:, two.velocity_of(target)] = means[:, one.velocity_of(source)]
+    # spins and parameters do not depend on the basis
+    own, wanted = coarse.n_dynamic + len(coarse.unknowns), fine.n_dynamic + len(fine.unknowns)
+    result[:, two.race_spin] = means[:, one.race_spin]
+    for place, states in one.further:
+        if (place, states) in two.further:
+            result[:, two.further_at(place)] = means[:, one.further_at(place)]
+    if two.moves_axially and one.moves_axially:
+        result[:, two.axial : two.axial + 2] = means[:, one.axial : one.axial + 2]
+    result[:, two.rotor_speed : two.n_dynamic] = means[:, one.rotor_speed : one.n_dynamic]
+    _carry_unknowns(coarse, fine, means, result)
+    if two.sensor_own:
+        result[:, two.sensors] = result[:, : two.n_dynamic] @ fine.sensor_rows.T
+    result[:, wanted:] = fine.mean[wanted:]
+    names = [sensor.name for sensor in coarse.model.machine.sensors]
+    for c, sensor in enumerate(fine.model.machine.sensors):
+        if sensor.name in names:
+            kinds = np.arange(4)  # gain, offset, cosine and sine of the runout
+            source = own + kinds * coarse.n_channels + names.index(sensor.name)
+            result[:, wanted + kinds * fine.n_channels + c] = means[:, source]
+    return result
+
+
+def _carry_unknowns(coarse: DropProblem, fine: DropProblem, means: Array, result: Array) -> None:
+    """Carry the unknowns by name; what the coarse problem does not have begins at what is known of it.
+
+    So does what another prior holds now: where the old one held it is no place to begin.
+    """
+    source = {unknown.path: k for k, unknown in enumerate(coarse.unknowns)}
+    for k, unknown in enumerate(fine.unknowns):
+        at = source.get(unknown.path)
+        if at is not None and not math.isclose(coarse.unknowns[at].sigma, unknown.sigma):
+            at = None
+        values = fine.start[fine.n_dynamic + k] if at is None else means[:, coarse.n_dynamic + at]
+        result[:, fine.n_dynamic + k] = values

@@ -11,16 +11,18 @@ from rotordrop.arrays import Array, Integers
 from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
 from rotordrop.evidence.colour import SlowNoise, decay
-from rotordrop.physics._compile import kernel, lean_kernel
+from rotordrop.physics._compile import by_reference, kernel, lean_kernel
 from rotordrop.physics.elementary import exp, sine_cosine
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.unknowns import Unknown
+from rotordrop.track._arrays import fill
 
 CATCHING_UP_SIGMA = 1e-6
 """How far [m] a sensor may lag behind at power-off."""
 
 
+@by_reference
 class SensorForm(NamedTuple):
     """What sensors do beyond gain, offset and runout; T terms, G sensors that lag behind, M parts of noise
     that outlast a sample, s dynamic.
@@ -81,9 +83,9 @@ def lag_step(before: Array, after: Array, form: SensorForm, dt: float, F: Array)
         q = dt / exp(min(max(before[s + k], form.shortest[c]), form.longest[c]))
         a = exp(-q)
         b = (1.0 - a) / q
-        F[i, :] = 0.0
+        fill(F[i], 0.0)
         first = add_seen(c, before, form.lag_row[c], form, s, b - a, F[i])
-        by_state[:] = 0.0
+        fill(by_state, 0.0)
         last = add_seen(c, after, form.lag_row[c], form, s, 1.0, by_state)
         # What it sees now depends on the sample before by way of the state now.
         for e in range(s, columns):
@@ -108,7 +110,7 @@ def measurement_row(
     read beside all that. A sensor that lags behind reads its own state, and its terms act on what it lags
     behind of.
     """
-    row[:] = 0.0
+    fill(row, 0.0)
     k = first + c
     sine, cosine = sine_cosine(angle)
     growth = 1.0 + at[k]
@@ -139,8 +141,10 @@ def noise_step(mean: Array, P: Array, form: SensorForm) -> None:
     for m in range(parts):
         i, a = n - parts + m, form.noise_decay[m]
         mean[i] *= a
-        P[i, :] *= a
-        P[:, i] *= a
+        for j in range(n):
+            P[i, j] *= a
+        for j in range(n):
+            P[j, i] *= a
         P[i, i] += (1.0 - a * a) * form.noise_variance[m]
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, Literal, TypeVar
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,29 +12,15 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics import ring
-from rotordrop.track import _filter as F
+from rotordrop.simulate._rhs import suited
+from rotordrop.track import _filter
 from rotordrop.track import _propagation as P
-from rotordrop.track._covariance import unpack
+from rotordrop.track._arrays import unpack
+from rotordrop.track._filter import Measurements, Segment, backward_pass, forward_pass
 from rotordrop.track.problem import DropProblem, private_copy
-
-Compact = NDArray[np.float32]
-"""What a pass stores of covariances and transitions for the smoother: seven digits of them are plenty."""
-
-Number = TypeVar("Number", np.float32, np.float64)
-
-Keep = Literal["all", "means", "nothing"]
-"""What a pass keeps: what the smoother needs, what smoothed means alone need, or nothing."""
 
 REFERENCE_STEP = 50e-6
 """Time for which the numbers of `PassSettings` hold [s]."""
-STEP = 0.007
-"""Time over which unknown forces are alike, over the time of a free fall through the air gap [1]."""
-SPIN = 0.07
-"""Unknown friction on races and rotor as a coefficient of friction under the weight [1]."""
-LEARNING = 7.0
-"""Time at which a race turns with the rotor, over the time of a free fall [1]; see `PassSettings`."""
-PASS_MEMORY = 64_000_000
-"""Memory [B] for what a pass keeps of its samples for the smoother; what does not fit is filtered again."""
 LARGEST_PHASE = 1.0
 """Largest phase [rad] by which the fastest mode may turn in one integration step of the filter."""
 FROZEN = 2
@@ -102,245 +86,128 @@ class PassSettings:
         )
 
 
-def pass_settings(problem: DropProblem, *, force: float, share: float, substeps: int = 4) -> PassSettings:
-    """Settings of a pass by the size of the machine: weight on a bearing, air gap, friction of a race.
-
-    Parameters
-    ----------
-    problem : DropProblem
-        Gives the machine.
-    force, share : float
-        Unknown force as a part of the mean weight on a bearing and of the force of the contact [1]; a new one
-        every `STEP` of a free fall.
-    substeps : int
-        Integration steps per 50 µs.
-    """
-    model = problem.model
-    weight, bearings = float(np.mean(model.load_shares)), model.machine.touchdown_bearings
-    growth = math.sqrt(STEP * problem.fall_time / REFERENCE_STEP)
-    impulse = weight * REFERENCE_STEP * growth
-    race = max(float(bearing.bore_radius) / float(bearing.race.inertia) for bearing in bearings)
-    rotor = sum(float(bearing.bore_radius) for bearing in bearings) / model.fe.polar_inertia
-    return PassSettings(
-        substeps=substeps,
-        impulse=force * impulse,
-        share=share * growth,
-        spin_noise=SPIN * impulse * race,
-        speed_noise=SPIN * impulse * rotor,
-        learning_end=LEARNING * problem.fall_time,
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
-class Stretch:
-    """What the smoother needs of some samples of a pass beside its means; K samples, n estimated.
+class Forward:
+    """A forward pass over a drop, in segments; N samples, n estimated, C channels.
 
-    It begins with the sample ``first`` of the pass, or goes on from it. Covariances are stored packed; there
-    are none where only means are wanted.
-    """
-
-    first: int
-    covariances: Compact
-    transitions: Compact
-    rows: Array
-    gains: Array
-    impulse_sigmas: Array
-
-    @property
-    def has_covariances(self) -> bool:
-        """Whether it is enough for smoothed covariances."""
-        return bool(self.covariances.shape[1] > 0)
-
-
-class Storage:
-    """Memory for stretches of a pass: what a pass writes to it is overwritten by the next.
-
-    Memory asked of the system anew is as slow to fill for the first time as the filter.
-
-    Parameters
-    ----------
-    memory : int
-        How much is taken [B]; that of two stretches in any case.
-    """
-
-    def __init__(self, memory: int = PASS_MEMORY) -> None:
-        self._memory = memory
-        self._blocks: dict[str, NDArray[Any]] = {}
-        self._held: dict[int, tuple[Array, Stretch]] = {}
-
-    def slots(self, size: int) -> int:
-        """Places for stretches of a size [B]: stretches that follow one another have different ones."""
-        return max(2, self._memory // size)
-
-    def array(self, name: str, shape: tuple[int, ...], kind: type[Number]) -> NDArray[Number]:
-        """An array of any content; those of the same name share their memory."""
-        size = math.prod(shape)
-        block = self._blocks.get(name)
-        if block is None or block.size < size or block.dtype != kind:
-            self._blocks[name] = block = np.empty(size, dtype=kind)
-        return block[:size].reshape(shape)
-
-    @property
-    def size(self) -> int:
-        """Memory taken [B]."""
-        return sum(block.nbytes for block in self._blocks.values())
-
-    def begin(self, slot: int, means: Array, keep: Keep) -> None:
-        """Forget what a slot holds, and what other passes, or passes that kept something else, have left."""
-        self._held = {
-            place: one
-            for place, one in self._held.items()
-            if place != slot and one[0] is means and one[1].has_covariances == (keep == "all")
-        }
-
-    def hold(self, slot: int, means: Array, stretch: Stretch) -> None:
-        """Remember which pass, told by its means, and which stretch of it a slot of the memory holds."""
-        self._held[slot] = means, stretch
-
-    def held(self, means: Array, first: int) -> Stretch | None:
-        """The stretch of a pass that begins at a sample, if nothing was written over it."""
-        for known, stretch in self._held.values():
-            if known is means and stretch.first == first:
-                return stretch
-        return None
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Course:
-    """What every stretch of a pass starts from: the problem, where it begins, where it is linearised.
-
-    ``resumed`` is 1 where the first sample is the last one of the pass before, else 0.
+    Of every segment the covariance that it begins with is kept as a checkpoint. What the smoother needs
+    besides is filtered again from there, with the same bits: kept for all samples it would be hundreds of
+    megabytes. The last segments are kept as far as memory goes, until the means are smoothed.
     """
 
     problem: DropProblem
     settings: P.FilterSettings
-    mean: Array
-    reference: Array
-    length: int
-    resumed: int
-
-    def stretch(self, number: int, count: int, keep: Keep, storage: Storage) -> tuple[int, Stretch]:
-        """Room for the samples of a stretch, and its place in the memory."""
-        n, s, updates = len(self.mean), self.problem.n_dynamic, self.problem.n_channels + 1
-        columns, bearings = s + len(self.problem.unknowns), len(self.problem.model.bearing_names)
-        packed = n * (n + 1) // 2 if keep == "all" else 0
-        size = (self.length + 1) * (4 * (packed + s * columns) + 8 * (2 * updates * n + bearings))
-        slots = (
-            1 if keep == "nothing" else min(storage.slots(size), len(self.problem.time) // self.length + 1)
-        )
-        slot, kept = number % slots, 0 if keep == "nothing" else self.length + 1
-
-        def room(name: str, kind: type[Number], *shape: int) -> NDArray[Number]:
-            # one block for all slots: the system gets a large one back at once
-            return storage.array(name, (slots, kept, *shape), kind)[slot, :count]
-
-        return slot, Stretch(
-            first=number * self.length,
-            covariances=room("covariances", np.float32, packed),
-            transitions=room("transitions", np.float32, s, columns),
-            rows=room("rows", np.float64, updates, n),
-            gains=room("gains", np.float64, updates, n),
-            impulse_sigmas=room("impulse sigmas", np.float64, bearings),
-        )
-
-    def followed(
-        self, number: int, covariance: Array, filled: tuple[Array, Array, Array], keep: Keep, storage: Storage
-    ) -> tuple[int, Stretch]:
-        """Filter a stretch; gives the sample reached, and ``covariance`` becomes that of the last one.
-
-        ``filled`` are means, innovations and their variances of the whole pass.
-        """
-        problem, means, first = self.problem, filled[0], number * self.length
-        chosen = slice(first, min(first + self.length, len(means) - 1) + 1)
-        slot, stretch = self.stretch(number, chosen.stop - first, keep, storage)
-        storage.begin(slot, means, keep)
-        done = F.forward_pass(
-            min(first + self.resumed, 1),
-            means[first].copy() if first else self.mean,
-            covariance,
-            problem.time[chosen],
-            np.ascontiguousarray(problem.readings[chosen]),
-            problem.speed[chosen],
-            problem.reading_rows,
-            problem.white_variances,
-            problem.speed_variance,
-            problem.targets,
-            private_copy(problem.model.parameters),
-            self.settings,
-            problem.sensor_form,
-            self.reference[chosen],
-            means[chosen],
-            stretch.covariances,
-            stretch.transitions,
-            stretch.rows,
-            stretch.gains,
-            stretch.impulse_sigmas,
-            filled[1][chosen],
-            filled[2][chosen],
-        )
-        if keep != "nothing":
-            storage.hold(slot, means, stretch)
-        return first + int(done), stretch
-
-
-@dataclass(frozen=True, kw_only=True)
-class Forward:
-    """What a forward pass leaves; N samples, n estimated.
-
-    ``done`` is the number of samples reached; ``innovations`` and ``innovation_variances`` have one column
-    per channel and one for the speed, NaN where nothing was measured; ``impulse`` is the size of the
-    unknown impulses of the pass [N s]; ``reached`` is the
-    covariance (n, n) where the pass ended: of the last sample, or of the one that lost the drop. What
-    the smoother needs besides is filtered again from ``starts``, the covariances at the beginning of every
-    stretch: kept for all samples it would be hundreds of megabytes.
-    """
-
-    done: int
     impulse: float
+    """Size of the unknown impulses of the pass [N s]."""
+    prior: Array
+    """Prior mean of the first sample, shape (n,)."""
+    reference: Array
+    """Trajectory to linearise at, shape (M, n)."""
+    length: int
+    """Samples of a segment."""
+    done: int = 0
+    """Number of samples before the filter diverged, or all."""
     means: Array
+    """Posterior mean of every sample, shape (N, n)."""
     innovations: Array
     innovation_variances: Array
-    reached: Array
-    course: _Course
-    starts: tuple[Array, ...]
+    """One column for each channel and one for the speed, NaN where missing, shape (N, C + 1)."""
+    covariance_at_end: Array
+    """Covariance where the pass ended: of the last sample, or of the one that diverged, shape (n, n)."""
+    checkpoints: list[Array] = field(default_factory=list)
+    """Covariance at the beginning of every segment, shape (n, n)."""
+    segments: dict[int, Segment] = field(default_factory=dict)
+    """Segments kept for the smoothed means, by number."""
 
-    def stretch(self, number: int, storage: Storage, keep: Keep = "all") -> Stretch:
-        """What the smoother needs of a stretch: as it is held, or filtered again with the same bits."""
-        held = storage.held(self.means, number * self.course.length)
-        if held is not None and held.has_covariances == (keep == "all"):
-            return held
-        filled = (self.means, self.innovations, self.innovation_variances)
-        return self.course.followed(number, self.starts[number].copy(), filled, keep, storage)[1]
+    def filter_segment(
+        self, number: int, P: Array, *, keep: bool, covariances: bool = False
+    ) -> tuple[int, Segment]:
+        """Filter a segment from the covariance ``P`` (n, n) at its beginning, which becomes that of its end.
+
+        Gives the number of samples done from the first of the pass on, and the segment, filled.
+        """
+        problem, start = self.problem, number * self.length
+        chosen = slice(start, min(start + self.length, len(self.means) - 1) + 1)
+        n, s, updates = self.means.shape[1], problem.n_dynamic, problem.n_channels + 1
+        count = chosen.stop - start if keep else 0
+        segment = Segment(
+            first=min(start, 1),
+            reference=self.reference[chosen],
+            x=self.means[chosen],
+            e=self.innovations[chosen],
+            S=self.innovation_variances[chosen],
+            P=np.empty((count, n * (n + 1) // 2 if covariances else 0), dtype=np.float32),
+            F=np.empty((count, s, s + len(problem.unknowns)), dtype=np.float32),
+            H=np.zeros((count, updates, n)),
+            K=np.empty((count, updates, n)),
+            sigma=np.empty((count, len(problem.model.bearing_names))),
+        )
+        measured = Measurements(
+            time=problem.time[chosen],
+            readings=np.ascontiguousarray(problem.readings[chosen]),
+            speed=problem.speed[chosen],
+            H=problem.reading_rows,
+            R=problem.white_variances,
+            speed_R=problem.speed_variance,
+        )
+        x_0, p = self.means[start] if start else self.prior, private_copy(problem.model.parameters)
+        done = suited(forward_pass, p)(
+            x_0, P, measured, problem.targets, p, self.settings, problem.sensor_form, segment
+        )
+        return start + int(done), segment
+
+    def from_the_last(self, *, covariances: bool) -> Iterator[tuple[slice, Segment]]:
+        """The segments of the samples that were followed, backwards, and where their samples stand."""
+        last = min(max(self.done - 2, 0) // self.length, len(self.checkpoints) - 1)
+        for number in range(last, -1, -1):
+            samples = slice(number * self.length, min((number + 1) * self.length + 1, self.done))
+            segment = None if covariances else self.segments.pop(number, None)
+            segment = segment or self._recomputed(number, covariances=covariances)
+            yield samples, segment.cut(samples.stop - samples.start)
+
+    def _recomputed(self, number: int, *, covariances: bool) -> Segment:
+        """A segment filtered again from its checkpoint."""
+        P = self.checkpoints[number].copy()
+        return self.filter_segment(number, P, keep=True, covariances=covariances)[1]
 
     def covariance(self, sample: int) -> Array:
         """Filtered covariance at a sample, shape (n, n); single precision."""
-        number = min(sample // self.course.length, len(self.starts) - 1)
-        stretch = self.stretch(number, Storage(0))
-        return _unpacked(stretch, sample, self.means.shape[1])
+        number = min(sample // self.length, len(self.checkpoints) - 1)
+        P = np.empty_like(self.covariance_at_end)
+        unpack(self._recomputed(number, covariances=True).P[sample - number * self.length], P)
+        return P
+
+    @property
+    def size_of_segments(self) -> int:
+        """Memory of the segments that are kept [B]."""
+        kept = (array for one in self.segments.values() for array in (one.P, one.F, one.H, one.K, one.sigma))
+        return sum(array.nbytes for array in kept)
 
     @property
     def parameter_sample(self) -> int:
         """Sample at which parameters are read: shortly after the first contacts."""
-        return min(self.course.problem.parameter_sample, max(self.done - 1, 0))
+        return min(self.problem.parameter_sample, max(self.done - 1, 0))
 
     @property
     def last(self) -> Array:
-        """Covariance (n, n) of the last sample that was followed."""
-        whole = self.done == len(self.means)
-        return self.reached if whole else self.covariance(max(self.done - 1, 0))
+        """Covariance (n, n) of the last valid sample."""
+        return self.covariance(max(self.done - 1, 0)) if has_diverged(self) else self.covariance_at_end
 
     @property
     def nis(self) -> float:
         """Mean normalised innovation squared [1]; about one when model and noise are right."""
-        values = self.innovations[: self.done] ** 2 / self.innovation_variances[: self.done]
-        return float(np.nanmean(values))
+        return float(np.nanmean(self.innovations[: self.done] ** 2 / self.innovation_variances[: self.done]))
 
     @property
     def negative_log_likelihood(self) -> float:
-        """Negative logarithm of the likelihood of the readings, up to a constant [1]."""
+        """Negative logarithm of the marginal likelihood of the readings, up to a constant [1]."""
         S = self.innovation_variances[: self.done]
-        values = self.innovations[: self.done] ** 2 / S + np.log(S)
-        return 0.5 * float(np.nansum(values))
+        return 0.5 * float(np.nansum(self.innovations[: self.done] ** 2 / S + np.log(S)))
+
+
+def has_diverged(filtered: Forward) -> bool:
+    """Whether the filter diverged before the last sample."""
+    return filtered.done < len(filtered.means)
 
 
 def fastest_frequency(problem: DropProblem) -> float:
@@ -364,83 +231,54 @@ def forward(
     covariance: Array | None = None,
     reference: Array | None = None,
     samples: int | None = None,
-    keep: Keep = "all",
-    storage: Storage | None = None,
-    after: Forward | None = None,
+    memory: int | None = None,
 ) -> Forward:
-    """Run the filter over the first samples of a problem.
+    """Run the filter over the first samples of a problem; by default over all.
 
-    Parameters
-    ----------
-    mean, covariance : ndarray, optional
-        Start estimate, shapes (n,), (n, n); the problem's prior by default.
-    reference : ndarray, shape (M, n), optional
-        Trajectory to linearise at for the first M samples; the filter's own mean afterwards.
-    samples : int, optional
-        Number of samples; all by default.
-    keep : {"all", "means", "nothing"}
-        Keep what the smoother needs, what smoothed means alone need, or nothing.
-    storage : Storage, optional
-        Where to keep it: what an earlier pass left there is overwritten.
-    after : Forward, optional
-        A pass to go on from with its settings, in place of a start estimate: its last sample is the first of
-        the problem.
+    The prior has a mean (n,) and a covariance (n, n), the problem's by default. The first M samples are
+    linearised at a ``reference`` (M, n), the others at the filter's own mean. Segments are kept for the
+    smoothed means up to a ``memory`` [B], by default none.
     """
     count = len(problem.time) if samples is None else min(samples, len(problem.time))
-    if after is not None:
-        mean, covariance = after.means[after.done - 1], after.reached
     mean = problem.mean if mean is None else mean
     P = np.array(problem.covariance if covariance is None else covariance)
     n, updates = len(mean), problem.n_channels + 1
     dt = float(problem.time[1] - problem.time[0])
-    course = _Course(
+    found = Forward(
         problem=problem,
         settings=settings.for_sampling(
             dt, fastest_frequency(problem), problem.first_contact, problem.impulse_in_fall
-        )
-        if after is None
-        else after.course.settings,
-        mean=np.ascontiguousarray(mean),
-        reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
-        length=count if keep == "nothing" else _stretch_length(problem),
-        resumed=0 if after is None else 1,
-    )
-    filled = np.empty((count, n)), np.empty((count, updates)), np.empty((count, updates))
-    if after is not None:  # its readings have been taken already
-        filled[0][0], filled[1][0], filled[2][0] = mean, np.nan, np.nan
-    storage, starts = storage or Storage(), []
-    for number in range(max(math.ceil((count - 1) / course.length), 1)):
-        starts.append(P.copy())
-        done, _stretch = course.followed(number, P, filled, keep, storage)
-        if done <= min((number + 1) * course.length, count - 1):
-            break
-    return Forward(
-        done=done,
+        ),
         impulse=settings.impulse,
-        means=filled[0],
-        innovations=filled[1],
-        innovation_variances=filled[2],
-        reached=P,
-        course=course,
-        starts=tuple(starts),
+        prior=np.ascontiguousarray(mean),
+        reference=np.zeros((0, n)) if reference is None else np.ascontiguousarray(reference[:count]),
+        length=_segment_length(problem),
+        means=np.empty((count, n)),
+        innovations=np.empty((count, updates)),
+        innovation_variances=np.empty((count, updates)),
+        covariance_at_end=P,
     )
+    done = 0
+    for number in range(max(math.ceil((count - 1) / found.length), 1)):
+        found.checkpoints.append(P.copy())
+        done, segment = found.filter_segment(number, P, keep=memory is not None)
+        if memory is not None:
+            found.segments[number] = segment
+            while len(found.segments) > 1 and found.size_of_segments > memory:
+                del found.segments[min(found.segments)]
+        if done <= min((number + 1) * found.length, count - 1):
+            break
+    return replace(found, done=done)
 
 
-def _stretch_length(problem: DropProblem) -> int:
-    """Samples of a stretch: a free fall through the air gap, for rounding grows from impact to impact.
+def _segment_length(problem: DropProblem) -> int:
+    """Samples of a segment: a free fall through the air gap, for rounding grows from impact to impact.
 
-    Smoothed means go forward from the first sample of a stretch. Through the first impacts of the bundled
+    Smoothed means go forward from the first sample of a segment. Through the first impacts of the bundled
     drop, in single precision, they err by 6e-4 standard deviations after 200 samples, by 4e-3 after 500.
     """
     dt = float(problem.time[1] - problem.time[0])
     return max(2, math.ceil(problem.fall_time / dt))
-
-
-def _unpacked(stretch: Stretch, sample: int, n: int) -> Array:
-    """Filtered covariance (n, n) at a sample of a stretch."""
-    P = np.empty((n, n))
-    unpack(stretch.covariances[sample - stretch.first], P)
-    return P
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -454,7 +292,7 @@ class Smoothed:
     """Smoothed covariance of the watched linear functions at each sample, shape (N, G, G)."""
     kept: NDArray[np.int64]
     """Samples whose whole covariance can be asked for, shape (K,)."""
-    spread: Array
+    posterior: Array
     information: Array
     """Filtered P and Λ of these samples: the smoothed covariance is ``P − P Λ P``, shape (K, n, n)."""
     score_0: Array
@@ -466,7 +304,7 @@ class Smoothed:
         found = np.flatnonzero(self.kept == sample)
         if len(found) == 0:
             raise IndexError(f"the covariance of sample {sample} was not kept; kept are {self.kept.tolist()}")
-        P = self.spread[found[0]]
+        P = self.posterior[found[0]]
         return np.asarray(P - P @ self.information[found[0]] @ P)
 
 
@@ -477,62 +315,33 @@ def smooth(
     *,
     watched: Array | None = None,
     kept: Sequence[int] | None = None,
-    storage: Storage | None = None,
-    part: tuple[int, int] | None = None,
-    carried: bool = False,
 ) -> Smoothed:
     """Run the backward pass.
 
-    Parameters
-    ----------
-    score, information : ndarray, shapes (n,), (n, n), optional
-        What later drops, or later samples, say about the last sample.
-    watched : ndarray, shape (G, n), optional
-        Linear functions of the estimate whose covariance is wanted at every sample.
-    kept : sequence of int, optional
-        Samples whose whole covariance is wanted; by default the first, the one that parameters are read at
-        and the last.
-    storage : Storage, optional
-        That of the forward pass, whose last stretch is at hand there.
-    part : tuple of int, optional
-        Samples from the first to before the second are smoothed; all by default. Others are left empty.
-    carried : bool
-        Carry back what later readings say, and leave all samples empty.
+    ``score`` (n,) and ``information`` (n, n) are what later drops say about the last sample, ``watched``
+    (G, n) linear functions of the estimate whose covariance is wanted at every sample. The whole covariance
+    is ``kept`` of some samples; by default of the first, the one that parameters are read at and the last.
     """
-    n, course = filtered.means.shape[1], filtered.course
-    begin, done = part or (course.resumed, filtered.done)
+    n, done = filtered.means.shape[1], filtered.done
     wanted = (0, min(filtered.parameter_sample, done - 1), done - 1) if kept is None else kept
     chosen = np.unique(np.asarray(wanted, dtype=np.int64))
     rows = np.zeros((0, n)) if watched is None else np.ascontiguousarray(watched)
-    means = np.empty((done, n))
-    blocks = np.empty((done, len(rows), len(rows)))
-    spread, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
+    means, blocks = np.empty((done, n)), np.empty((done, len(rows), len(rows)))
+    posterior, stored = np.empty((len(chosen), n, n)), np.empty((len(chosen), n, n))
     lam = np.zeros(n) if score is None else score.copy()
     Lam = np.zeros((n, n)) if information is None else information.copy()
-    last = _stretch_before(filtered, done)
-    for stretch in _from_the_last(filtered, storage or Storage(0), last, "all"):
-        first = stretch.first
-        samples = slice(first, min(first + course.length + 1, done))
-        held, own = slice(0, samples.stop - first), max(begin - first, min(first, 1))
-        if own >= samples.stop - first:
-            break
-        inside = slice(*np.searchsorted(chosen, (first + own, samples.stop)))
-        F.backward_pass(
-            own,
-            filtered.means[samples],
-            stretch.covariances[held],
-            stretch.transitions[held],
-            stretch.rows[held],
-            stretch.gains[held],
-            filtered.innovations[samples],
-            filtered.innovation_variances[samples],
-            course.problem.sensor_form.noise_decay,
+    noise_decay = filtered.problem.sensor_form.noise_decay
+    for samples, segment in filtered.from_the_last(covariances=True):
+        own = slice(*np.searchsorted(chosen, (samples.start + segment.first, samples.stop)))
+        backward_pass(
+            segment,
+            noise_decay,
             rows,
-            chosen[inside] - first,
-            means[:0] if carried else means[samples],
+            chosen[own] - samples.start,
+            means[samples],
             blocks[samples],
-            spread[inside],
-            stored[inside],
+            posterior[own],
+            stored[own],
             lam,
             Lam,
         )
@@ -541,65 +350,33 @@ def smooth(
         means=means,
         watched=blocks,
         kept=chosen,
-        spread=spread,
+        posterior=posterior,
         information=stored,
         score_0=lam,
         information_0=Lam,
     )
 
 
-def smooth_means(
-    filtered: Forward, score: Array | None = None, *, storage: Storage | None = None
-) -> tuple[Array, Array]:
+def smooth_means(filtered: Forward, score: Array | None = None) -> tuple[Array, Array]:
     """Smoothed means (N, n) alone, and λ before the first measurement, without any covariance.
 
-    Where a pass goes on from another, the sample they share is left empty. ``score`` (n,) is what later drops
-    say about the last sample, ``storage`` that of the forward pass.
+    ``score`` (n,) is what later drops say about the last sample. The segments that the pass kept are given
+    back.
     """
-    n, course = filtered.means.shape[1], filtered.course
-    means = np.empty((filtered.done, n))
+    n, problem = filtered.means.shape[1], filtered.problem
+    means, p = np.empty((filtered.done, n)), private_copy(problem.model.parameters)
     lam = np.zeros(n) if score is None else score.copy()
-    parameters, last = private_copy(course.problem.model.parameters), _stretch_before(filtered, filtered.done)
-    for stretch in _from_the_last(filtered, storage or Storage(0), last, "means"):
-        samples = slice(stretch.first, min(stretch.first + course.length + 1, filtered.done))
-        held, own = slice(0, samples.stop - stretch.first), min(stretch.first + course.resumed, 1)
-        F.smooth_means(
-            own,
-            course.mean,
-            filtered.starts[stretch.first // course.length],
-            course.problem.time[samples],
-            course.problem.targets,
-            parameters,
-            course.settings,
-            course.problem.sensor_form,
-            course.reference[samples],
-            filtered.means[samples],
-            stretch.transitions[held],
-            stretch.rows[held],
-            stretch.gains[held],
-            stretch.impulse_sigmas[held],
-            filtered.innovations[samples],
-            filtered.innovation_variances[samples],
+    for samples, segment in filtered.from_the_last(covariances=False):
+        _filter.smooth_means(
+            filtered.prior,
+            filtered.checkpoints[samples.start // filtered.length],
+            problem.time[samples],
+            problem.targets,
+            p,
+            filtered.settings,
+            problem.sensor_form,
+            segment,
             means[samples],
             lam,
         )
     return means, lam
-
-
-def _stretch_before(filtered: Forward, stop: int) -> int:
-    """Number of the stretch that has the last sample before one."""
-    return min(max(stop - 2, 0) // filtered.course.length, len(filtered.starts) - 1)
-
-
-def _from_the_last(filtered: Forward, storage: Storage, number: int, keep: Keep) -> Iterator[Stretch]:
-    """The stretches of a pass from one backwards; while one is used, the one before it is filtered again."""
-    if number == 0:  # a thread would take as long to begin as a short pass
-        yield filtered.stretch(0, storage, keep)
-        return
-    with ThreadPoolExecutor(max_workers=1) as ahead:
-        coming = ahead.submit(filtered.stretch, number, storage, keep)
-        while number > 0:
-            stretch, number = coming.result(), number - 1
-            coming = ahead.submit(filtered.stretch, number, storage, keep)
-            yield stretch
-        yield coming.result()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # What the model leaves out is set so that 90 % intervals held 90 % of the truths of one ensemble, right and
-# wrong structures of rotors of 5 kg to 6 t, and was checked on another: ``studies/coverage``.
+# wrong structures of rotors of 5 kg to 6 t, and was checked on another: study `coverage`.
 MODEL_FORCE_SIGMA = 0.006
 """Relative standard deviation of a force peak by what the model leaves out (basis, sampling) [1]."""
 MODEL_STRESS_SIGMA = 0.002

@@ -14,12 +14,14 @@ from rotordrop.elements.magnet import FORCES
 from rotordrop.elements.parameter import below
 from rotordrop.elements.table import row_of, rows, separating_measurement
 from rotordrop.errors import IdentificationError, UsageError
-from rotordrop.estimate.document import published_structure
-from rotordrop.estimate.estimate import Structure
+from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import read_evidence
+from rotordrop.evidence.given import given_drops
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, RecordedLift
+from rotordrop.one_thread import one_thread
+from rotordrop.progress import Shown, shown
 from rotordrop.record.record import Record
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
@@ -30,8 +32,8 @@ from rotordrop.track.smoother import Smoothed
 from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Search, track_drops
-from rotordrop.twin.steps import Progress, Steps
-from rotordrop.twin.tracked_loads import widening_of
+from rotordrop.twin.steps import Steps
+from rotordrop.twin.tracked_loads import INCONSISTENT, symmetric, widening_of
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED, fitted_values, identified
 
 CONFOUNDED = 0.9
@@ -83,12 +85,10 @@ class Calibration:
 
     def sentence(self) -> str:
         """The outcome in words."""
-        found, weakly = (
-            sum(entry.verdict == verdict for entry in self.identifiability)
-            for verdict in ("determined", "weakly determined")
-        )
+        verdicts = [entry.verdict for entry in self.identifiability]
+        found, weakly = (verdicts.count(one) for one in ("determined", "weakly determined"))
         text = (
-            f"{found} of {len(self.identifiability)} parameters are determined by {len(self.checks)} drop(s)"
+            f"{found} of {len(verdicts)} parameters are determined by {len(self.checks)} drop(s)"
             f", {weakly} more weakly"
         )
         found_too = "".join(f" {one.sentence}" for one in self.structure)
@@ -98,13 +98,14 @@ class Calibration:
         return f"{text}; the model is not consistent with {', '.join(bad)}: intervals are doubled.{found_too}"
 
 
+@one_thread()
 def calibrate_machine(
     machine: Machine,
     records: Sequence[Record],
     tails: Sequence[Record | None],
     *,
     names: Sequence[str] | None = None,
-    progress: Progress | None = None,
+    progress: Shown = None,
 ) -> Calibration:
     """Fit the parameters of a machine to several recorded drops.
 
@@ -116,20 +117,21 @@ def calibrate_machine(
         Drops of this machine, and their settled tails (None where there is none).
     names : sequence of str, optional
         Names of the drops.
-    progress : callable, optional
-        Called with a sentence and the fraction done.
+    progress : callable or False, optional
+        Called with a sentence and the fraction done; by default a bar in a terminal or a notebook.
 
     Returns
     -------
     Calibration
         The machine with estimates, what the records determine and what not.
     """
-    stems = list(names or [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(records)])
+    records, tails, stems = given_drops(machine, records, tails, names)
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=True)
-    search = Search(drops=drops, progress=progress and Steps(progress))
-    found = track_drops(search, search.with_rotor(machine))
+    with shown(progress, "calibrating") as tell:
+        search = Search(drops=drops, progress=Steps(tell))
+        found = track_drops(search, search.with_rotor(machine))
     machine, tracked = found.machine, found.fit
     checks = {
         name: consistency_checks(problem, judged, found.noise_factor)
@@ -142,12 +144,11 @@ def calibrate_machine(
     mean = smoothed.means[at]
     widening = widening_of(check for one in checks.values() for check in one)
     values = values_of(problem, mean, covariance, widening)
-    bearings = [bearing.name for bearing in machine.touchdown_bearings]
     identifiability = _identifiability(problem, covariance, values)
     known = _as_known(as_filed(machine, values), identifiability)
     marked = "" if consistent else " (not consistent with them)"  # for people: nothing reads a source
     source = f"calibrated on {', '.join(stems)}{marked}"
-    fitted = machine_values(bearings, known, source)
+    fitted = machine_values([one.name for one in machine.touchdown_bearings], known, source)
     fit = {unknown.path: unknown for unknown in problem.unknowns}
     of = slice(problem.n_dynamic, problem.n_dynamic + len(fit))
     joint = joint_covariance(problem.model, fit, mean[of], covariance[of, of], known)
@@ -159,6 +160,9 @@ def calibrate_machine(
         )
     ]
     origin = CalibrationOrigin(drops=tuple(calibrated_on), consistent=consistent, joint=joint)
+    if not consistent:  # nothing is determined by a model that is not believed
+        values = {path: replace(one, status=INCONSISTENT) for path, one in values.items()}
+        identifiability = tuple(replace(one, verdict=INCONSISTENT) for one in identifiability)
     return Calibration(
         machine=_possible(with_found(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
@@ -166,7 +170,7 @@ def calibrate_machine(
         confounded=confounded_of(problem, covariance),
         checks=checks,
         consistent=consistent,
-        nis={name: one.nis for name, one in zip(stems, found.usual, strict=True)},
+        nis={name: one.nis for name, one in zip(stems, found.baseline, strict=True)},
         structure=tuple(one.structure(machine, said, believed=consistent) for one in found.accepted),
     )
 
@@ -245,24 +249,14 @@ def values_of(problem: DropProblem, mean: Array, covariance: Array, widening: fl
     for c, sensor in enumerate(problem.model.machine.sensors):
         gain, offset = first + c, first + problem.n_channels + c
         reading = 1.0 + float(mean[gain])
-        values[f"sensors.{sensor.name}.gain"] = _plain(
-            1.0 / reading, float(sigma[gain]) / reading**2, widening, "1"
-        )
-        values[f"sensors.{sensor.name}.offset"] = _plain(
-            float(mean[offset]), float(sigma[offset]), widening, "m"
-        )
+        values |= {
+            f"sensors.{sensor.name}.{name}": symmetric(value, error, "determined", unit, widening)
+            for name, value, error, unit in (
+                ("gain", 1.0 / reading, float(sigma[gain]) / reading**2, "1"),
+                ("offset", float(mean[offset]), float(sigma[offset]), "m"),
+            )
+        }
     return values
-
-
-def _plain(value: float, sigma: float, widening: float, unit: str) -> Known:
-    half = NINETY * sigma * widening
-    return Known(
-        value=value,
-        status="determined",
-        standard_error=sigma * widening,
-        interval_90=(value - half, value + half),
-        unit=unit,
-    )
 
 
 def as_filed(machine: Machine, values: dict[str, Known]) -> dict[str, Known]:
@@ -382,7 +376,7 @@ def calibration_json(calibration: Calibration) -> dict[str, object]:
             for name, checks in calibration.checks.items()
         },
         "consistent": calibration.consistent,
-        "structure": [one.as_json() for one in published_structure(calibration.structure)],
+        "structure": [one.as_json() for one in calibration.structure],
         "nis": {name: value if math.isfinite(value) else None for name, value in calibration.nis.items()},
         "sentence": calibration.sentence(),
     }

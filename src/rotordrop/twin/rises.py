@@ -14,23 +14,22 @@ from rotordrop.elements.parameter import Extension
 from rotordrop.machine import Machine
 from rotordrop.track.calibration import THREADS, Stage, TrackedDrops, window_end
 from rotordrop.track.noise_size import forward_passes, likelihood_of
-from rotordrop.track.problem import DropProblem
-from rotordrop.track.transfer import transferred
+from rotordrop.track.problem import DropProblem, transferred
 from rotordrop.twin.problems import Drops
 
-Rise = tuple[float, Extension]
+LogLikelihoodGain = tuple[float, Extension]
 """Rise of the log likelihood [1] with an extension."""
 
 
-def carried(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
+def initial_guess_from(known: TrackedDrops, problems: Sequence[DropProblem]) -> list[Array]:
     """Trajectories of a fit in the coordinates of other problems of the same drops."""
     drops = zip(known.problems, problems, known.trajectories, strict=True)
     return [transferred(one, two, means) for one, two, means in drops]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rises:
-    """Rises of the log likelihood beside a fit of a machine to drops."""
+class LogLikelihoodGains:
+    """Gains of the log likelihood beside a fit of a machine to drops."""
 
     drops: Drops
     machine: Machine
@@ -40,7 +39,7 @@ class Rises:
     noise: float
     """Process noise over that of the stage [1]."""
 
-    def of_all(self, extensions: Sequence[Extension]) -> list[Rise]:
+    def of_all(self, extensions: Sequence[Extension]) -> list[LogLikelihoodGain]:
         """The rise with each of some extensions.
 
         One that says nothing costs what its unknowns leave open, so that most fall.
@@ -51,20 +50,20 @@ class Rises:
             at_once = pool.submit(self.at_once, together)
             return [*self.apart(apart), *at_once.result()]
 
-    def apart(self, extensions: Sequence[Extension]) -> list[Rise]:
+    def apart(self, extensions: Sequence[Extension]) -> list[LogLikelihoodGain]:
         """The same by one pass for each extension."""
         with ThreadPoolExecutor(max_workers=THREADS) as pool:
-            described = pool.submit(self._unlikelihood, self.machine)
+            described = pool.submit(self._negative_log_likelihood, self.machine)
 
             def rise(one: Extension) -> float:
-                with_it = self._unlikelihood(one.added_to(self.machine))
+                with_it = self._negative_log_likelihood(one.added_to(self.machine))
                 if not one.base_values(self.machine):
                     return described.result() - with_it
-                return self._unlikelihood(one.as_base_model(self.machine)) - with_it
+                return self._negative_log_likelihood(one.as_base_model(self.machine)) - with_it
 
             return list(zip(pool.map(rise, extensions), extensions, strict=True))
 
-    def at_once(self, extensions: Sequence[Extension]) -> list[Rise]:
+    def at_once(self, extensions: Sequence[Extension]) -> list[LogLikelihoodGain]:
         """The same by one pass with the unknowns of all extensions, which begin as the base model.
 
         Around the fit these are normal before the readings and after them. The others held where they begin,
@@ -100,13 +99,13 @@ class Rises:
         return window_end(self.stage, first.first_contact, first.fall_time)
 
     def _references(self, problems: Sequence[DropProblem]) -> list[Array]:
-        means = carried(self.fit, problems)
+        means = initial_guess_from(self.fit, problems)
         return [
             one[: int(np.searchsorted(problem.time, self._end, side="right"))]
             for one, problem in zip(means, problems, strict=True)
         ]
 
-    def _unlikelihood(self, machine: Machine) -> float:
+    def _negative_log_likelihood(self, machine: Machine) -> float:
         problems = self.drops.fine(machine)
         passes = forward_passes(problems, self._references(problems), self.stage, self.noise)
         return sum(likelihood_of(one) for one in passes)

@@ -23,8 +23,8 @@ from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction, modes_that_sag
 from rotordrop.rotor.unknowns import prior
+from rotordrop.track.input_state import corrections_by_record, rotor_likelihood_of
 from rotordrop.track.problem import RecordedDrop, build_problem
-from rotordrop.track.rotor_likelihood import Readings, readings_of, rotor_likelihood_of
 
 STEP = 5e-3
 """Step of the derivatives, in standard deviations of the prior [1]."""
@@ -67,10 +67,9 @@ def with_found_rotor(machine: Machine, drops: Sequence[RecordedDrop]) -> Machine
     # the search asks for the motion of the sensor planes; as many modes throughout, else the likelihood jumps
     basis = Reduction(modes=modes_that_sag(build_rotor_fe(machine)), attachment=False)
     model = build_drop_model(machine, basis)
-    seen: list[tuple[RecordedDrop, Readings]] = []
-    for drop in drops:
-        until = float(drop.time[-1])
-        seen.append((drop, readings_of(build_problem(model, drop, until=until))))
+    corrections = [
+        corrections_by_record(build_problem(model, drop, until=float(drop.time[-1]))) for drop in drops
+    ]
 
     def with_values(deviations: Array) -> Machine:
         return machine.with_values({u.path: u.value(d) for u, d in zip(unknowns, deviations, strict=True)})
@@ -80,7 +79,7 @@ def with_found_rotor(machine: Machine, drops: Sequence[RecordedDrop]) -> Machine
         beyond = 1e3 * float(np.sum((deviations - inside) ** 2))
         try:
             tried = build_drop_model(with_values(inside), basis)
-            total = sum(rotor_likelihood_of(tried, drop, readings) for drop, readings in seen)
+            total = sum(rotor_likelihood_of(tried, *one) for one in zip(drops, corrections, strict=True))
         except RotordropError:  # no rotor can be so
             return math.inf
         return total + 0.5 * float(np.sum(inside**2)) + beyond

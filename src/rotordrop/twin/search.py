@@ -21,7 +21,8 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Extension, Values
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
-from rotordrop.estimate.estimate import Structure
+from rotordrop.estimate.bearing_drop import finite
+from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares
@@ -39,14 +40,14 @@ from rotordrop.track.calibration import (
     is_inconsistent,
     track,
 )
-from rotordrop.track.consistency import DIRECTIONS, consistency_checks, judged_by
+from rotordrop.track.consistency import DIRECTIONS, consistency_checks, reference_pass
 from rotordrop.track.noise_size import forward_passes, likeliest_noise, likelihood_of
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
-from rotordrop.twin.rises import Rises, carried
+from rotordrop.twin.rises import LogLikelihoodGains, initial_guess_from
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.steps import GUESSES, WEIGHED, WHOLE, Steps
 from rotordrop.twin.tracked_parameters import parameters
@@ -92,7 +93,7 @@ model leaves out of any machine is evidence too.
 
 In the fine basis, where a fit has come to rest, all ten fell on drops of the bench without a departure; on
 two drops of a foreign code cross-axis sensitivity rose by 12, with friction 11 % off. The right ones
-rose by 16 to 570 on one drop (``studies/structure``).
+rose by 16 to 570 on one drop (study `structure`).
 """
 
 MOST_LOG_ODDS = 100.0
@@ -110,7 +111,7 @@ FIRST_CHOICE = 2
 """Window after which the half that follows the record worse stays behind, and after each one from then on.
 
 Before, the windows hold little more than the first contact. After it the right one of ten extensions was in
-the better half, and first from the next window on (three structures, both ways: ``studies/structure``).
+the better half, and first from the next window on (three structures, both ways: study `structure`).
 """
 FEWEST = 2
 
@@ -133,7 +134,10 @@ class Accepted:
         else:
             load = float(sum(bearing_load_shares(machine))) / len(machine.touchdown_bearings)
             sentence = f"Found: {self.extension.found(machine, values, load)}."
-        return Structure(name=self.extension.name, gain=self.gain, sentence=sentence)
+        rise = finite(self.gain)
+        return Structure(
+            name=self.extension.name, log_likelihood_rise=rise, sentence=sentence, probability=None
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,15 +147,15 @@ class Candidate:
     machine: Machine
     fit: TrackedDrops
     accepted: tuple[Accepted, ...] = ()
-    usual: tuple[Forward, ...] = ()
-    """The drops filtered with process noise of the usual size, where the fit has that of the likeliest."""
+    baseline: tuple[Forward, ...] = ()
+    """The drops filtered with process noise of the baseline, where the fit has that of the likeliest."""
 
     alternatives: tuple[Alternative, ...] = ()
     """Models that the readings do not tell from this one."""
 
     @property
     def noise_factor(self) -> float:
-        """Process noise of the fit over the usual one [1]."""
+        """Process noise of the fit over the baseline [1]."""
         return max(self.fit.noise_factors)
 
     @property
@@ -173,8 +177,10 @@ class Candidate:
     def judged(self) -> tuple[Smoothed, ...]:
         """The drops with the pass by whose innovations a model is judged."""
         return tuple(
-            replace(smoothed, filtered=judged_by(problem, smoothed.filtered, usual))
-            for problem, smoothed, usual in zip(self.fit.problems, self.fit.smoothed, self.usual, strict=True)
+            replace(smoothed, filtered=reference_pass(problem, smoothed.filtered, one))
+            for problem, smoothed, one in zip(
+                self.fit.problems, self.fit.smoothed, self.baseline, strict=True
+            )
         )
 
 
@@ -231,7 +237,7 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         search.begins(WHOLE, (WHOLE,) if quick else (WHOLE, WEIGHED))
         fit = track(drops.fine(machine), schedule, progress=search.progress)
         if quick:
-            return search.not_lost(Candidate(machine=machine, fit=fit, usual=fit.filtered))
+            return search.followed(Candidate(machine=machine, fit=fit, baseline=fit.filtered))
         first = Candidate(machine=machine, fit=fit)
         noise = likeliest_noise(fit, CALIBRATED_SCHEDULE[-1])
         found: Candidate | None = search.at_rest(first, fit.trajectories, noise)
@@ -251,28 +257,28 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
         if again is not None:
-            again = search.without_silent(again, machine)
+            again = search.without_uninformative(again, machine)
         followed = [one for one in (found, again) if one is not None]
         if not followed:
-            return search.not_lost(search.refine(other))  # says where it was lost
+            return search.followed(search.refine(other))  # says where it was lost
         found = min(followed, key=lambda one: one.sized_score)
-    return search.not_lost(found)
+    return search.followed(found)
 
 
-def asked_for(drops: int) -> float:
+def evidence_threshold(drops: int) -> float:
     """Rise of the log likelihood with which an extension is as probable as the model without it [1]."""
     return math.log((1.0 - ASSUMED_SHARE) / ASSUMED_SHARE) + drops * RISE_OF_NOTHING
 
 
-def times_likelier(one: Candidate, other: Candidate) -> float:
+def bayes_factor(one: Candidate, other: Candidate) -> float:
     """Marginal likelihood of the readings by a candidate over that by another one [1]; nothing where lost."""
-    (lost, unlikelihood), (other_lost, of_other) = one.sized_score, other.sized_score
-    if lost or other_lost:
-        return 0.0 if lost else math.exp(MOST_LOG_ODDS)
-    return math.exp(min(of_other - unlikelihood, MOST_LOG_ODDS))
+    (diverged, of_one), (other_diverged, of_other) = one.sized_score, other.sized_score
+    if diverged or other_diverged:
+        return 0.0 if diverged else math.exp(MOST_LOG_ODDS)
+    return math.exp(min(of_other - of_one, MOST_LOG_ODDS))
 
 
-def _says_nothing(found: Candidate, extension: Extension) -> bool:
+def _is_uninformative(found: Candidate, extension: Extension) -> bool:
     """Whether all values of an extension that a candidate has hold the one that says nothing."""
     stated = parameters(found.fit.problems[-1], found.fit.smoothed[-1], fits=True, widening=1.0)
     return extension.says_nothing(found.machine, {one.path: one.estimate for one in stated})
@@ -323,7 +329,7 @@ def _best_extension(base: Candidate, search: Fits) -> Candidate | None:
         if extension.values(base.machine)
         for start in (UNDAMPED, DAMPED)
     ]
-    return _halve(attempts, search)
+    return _successive_halving(attempts, search)
 
 
 def _base_again(base: Candidate, better: Candidate, search: Fits) -> Candidate:
@@ -344,7 +350,7 @@ def best_start(best: Candidate, search: Fits) -> Candidate:
         return best
     starts = range(FIRST_OTHER_START, FIRST_OTHER_START + OTHER_STARTS)
     attempts = [_Attempt(machine=best.machine, start=start, accepted=best.accepted) for start in starts]
-    found = _halve(attempts, search)
+    found = _successive_halving(attempts, search)
     return best if found is None else min(best, found, key=lambda one: one.score)
 
 
@@ -362,7 +368,7 @@ class _Attempt:
         return (True, math.inf, math.inf) if self.checkpoint is None else self.checkpoint.score
 
 
-def _halve(attempts: Sequence[_Attempt], search: Fits) -> Candidate | None:
+def _successive_halving(attempts: Sequence[_Attempt], search: Fits) -> Candidate | None:
     """Who follows the record best of those that many short windows and few long ones leave.
 
     Successive halving: Jamieson & Talwalkar, AISTATS 2016.
@@ -448,12 +454,12 @@ class Search:
         """Passes with another machine over the first window whole, linearised at a fit that is known."""
         problems = self.drops.coarse(machine)
         last = replace(BLIND_SCHEDULE[-1], passes=passes)
-        return track(problems, (last,), references=carried(known, problems))
+        return track(problems, (last,), references=initial_guess_from(known, problems))
 
     def refine(self, first: Candidate) -> Candidate:
         """The same machine with the finer basis, from what the coarse one found."""
         fine = self.drops.fine(first.machine)
-        there = carried(first.fit, fine)
+        there = initial_guess_from(first.fit, fine)
         # The finer basis may lie in the valley that the coarse one only came near: turned axes of a support
         # were found at one bearing by the coarse one and at both by the finer, some passes later.
         passes = MOST_REPEATS if first.accepted else 1
@@ -461,7 +467,7 @@ class Search:
         start = converged(fine, CALIBRATION_STAGE, there, passes=passes)
         found = self.at_rest(first, start.trajectories, likeliest_noise(start, CALIBRATION_STAGE))
         if not self.drops.calibrate_only and is_doubtful(first.fit, found.fit):
-            # With noise of the usual size, which a whole drop seldom has, the same minimum is found again.
+            # With noise of the baseline size, which a whole drop seldom has, the same minimum is found again.
             noise, known = found.noise_factor, _with_prior_parameters(found.fit)
             start = converged(fine, CALIBRATION_STAGE, known, noise_factor=noise)
             again = self.at_rest(first, start.trajectories, noise)
@@ -472,18 +478,18 @@ class Search:
         """The candidate with a fit over its last window, repeated while that pays.
 
         ``references`` are where to linearise at first, shape (M, n) each, ``noise`` the size of process noise
-        that made the first impacts likeliest, over the usual one [1].
+        that made the first impacts likeliest, over the baseline [1].
         """
         problems = self.drops.fine(first.machine)
         stage = CALIBRATION_STAGE if self.drops.calibrate_only else WHOLE_STAGE
         fit = converged(problems, stage, references, noise_factor=noise, progress=self.progress)
-        usual = forward_passes(problems, fit.trajectories, stage, 1.0)
-        if sum(map(likelihood_of, usual)) < fit.negative_log_likelihood:
+        baseline = forward_passes(problems, fit.trajectories, stage, 1.0)
+        if sum(map(likelihood_of, baseline)) < fit.negative_log_likelihood:
             # the whole drop leaves more unexplained than its first impacts
             noise = likeliest_noise(fit, stage)
             fit = converged(problems, stage, fit.trajectories, noise_factor=noise, progress=self.progress)
-            usual = forward_passes(problems, fit.trajectories, stage, 1.0)
-        return replace(first, fit=fit, usual=tuple(usual))
+            baseline = forward_passes(problems, fit.trajectories, stage, 1.0)
+        return replace(first, fit=fit, baseline=tuple(baseline))
 
     def weighed(self, found: Candidate) -> Candidate:
         """The candidate with the extensions that the readings ask for, one on top of the other.
@@ -511,9 +517,9 @@ class Search:
             return most
         return [one for rise, one in self.rises(found, WHOLE_STAGE).apart(most) if rise > 0.0]
 
-    def rises(self, found: Candidate, stage: Stage) -> Rises:
+    def rises(self, found: Candidate, stage: Stage) -> LogLikelihoodGains:
         """What every extension would bring over the window of a stage."""
-        return Rises(
+        return LogLikelihoodGains(
             drops=self.drops,
             machine=found.machine,
             fit=found.fit,
@@ -525,34 +531,34 @@ class Search:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
         described, had = found.machine, tuple(one.extension for one in found.accepted)
         plain = extension.as_base_model(described) if extension.base_values(described) else described
-        against = math.exp(-asked_for(len(found.fit.problems)))
+        against = math.exp(-evidence_threshold(len(found.fit.problems)))
         try:
             without = found if plain is described else self._again(found, plain)
             other = self._again(found, extension.added_to(described))
         except IdentificationError:
             return found
-        if against * times_likelier(other, without) >= 1.0:
+        if against * bayes_factor(other, without) >= 1.0:
             # It may have only led to a better start: the model without it is given what it has found.
             with suppress(IdentificationError):
                 back = self._again(other, plain)
                 without = min(without, back, key=lambda one: one.sized_score)
-        odds = 0.0 if _says_nothing(other, extension) else against * times_likelier(other, without)
+        odds = 0.0 if _is_uninformative(other, extension) else against * bayes_factor(other, without)
         stated = without if plain is described else found
         if odds < 1.0:
-            paler, beside = times_likelier(found, stated), Alternative((*had, extension), odds, other.fit)
+            scale, alternative = bayes_factor(found, stated), Alternative((*had, extension), odds, other.fit)
         else:
-            paler, beside = 1.0 / odds, Alternative(had, 1.0 / odds, without.fit)
+            scale, alternative = 1.0 / odds, Alternative(had, 1.0 / odds, without.fit)
             gain = math.inf if without.sized_score[0] else without.sized_score[1] - other.sized_score[1]
             stated = replace(other, accepted=(*found.accepted, Accepted(extension=extension, gain=gain)))
-        before = [replace(one, odds=paler * one.odds) for one in found.alternatives]
-        return replace(stated, alternatives=worth_keeping((*before, beside)))
+        before = [replace(one, odds=scale * one.odds) for one in found.alternatives]
+        return replace(stated, alternatives=worth_keeping((*before, alternative)))
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""
-        references = carried(found.fit, self.drops.fine(machine))
+        references = initial_guess_from(found.fit, self.drops.fine(machine))
         return self.at_rest(replace(found, machine=machine), references, found.noise_factor)
 
-    def without_silent(self, found: Candidate, described: Machine) -> Candidate:
+    def without_uninformative(self, found: Candidate, described: Machine) -> Candidate:
         """The candidate without the extensions whose values all hold the one that says nothing.
 
         Such an extension has led to a better start. The model without it is refined from there; should that
@@ -560,7 +566,7 @@ class Search:
         """
         if not found.accepted:
             return found
-        telling = [one for one in found.accepted if not _says_nothing(found, one.extension)]
+        telling = [one for one in found.accepted if not _is_uninformative(found, one.extension)]
         if len(telling) == len(found.accepted):
             return found
         machine = described
@@ -569,8 +575,8 @@ class Search:
         silent = replace(found, accepted=tuple(telling))
         with suppress(IdentificationError):
             without = self.refine(replace(silent, machine=machine))
-            lost, unlikelihood = without.sized_score
-            if not lost and unlikelihood - found.sized_score[1] < asked_for(len(found.fit.problems)):
+            (diverged, of_it), threshold = without.sized_score, evidence_threshold(len(found.fit.problems))
+            if not diverged and of_it - found.sized_score[1] < threshold:
                 return without
         return silent
 
@@ -583,9 +589,9 @@ class Search:
                 raise
             return None
 
-    def not_lost(self, found: Candidate) -> Candidate:
+    def followed(self, found: Candidate) -> Candidate:
         """What was found, if the filter followed all drops to the end."""
-        return replace(found, fit=_not_lost(found.fit, self.drops.evidence))
+        return replace(found, fit=_refuse_diverged(found.fit, self.drops.evidence))
 
 
 def _checkpoint_of(fit: TrackedDrops) -> Checkpoint:
@@ -662,7 +668,7 @@ def _other_start(problem: DropProblem, number: int) -> DropProblem:
     return replace(problem, start=start)
 
 
-def _not_lost(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
+def _refuse_diverged(tracked: TrackedDrops, evidence: Sequence[Evidence]) -> TrackedDrops:
     """The drops, if the filter followed all of them to the end: a part of a drop says nothing of its peak."""
     for item, problem, filtered in zip(evidence, tracked.problems, tracked.filtered, strict=True):
         done, samples = filtered.done, len(filtered.means)

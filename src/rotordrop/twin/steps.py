@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-Progress = Callable[[str, float], None]
+from rotordrop.progress import Progress
 
 GUESSES, WHOLE, WEIGHED = "from the guesses", "fitting the whole drop", "weighing extensions"
 LASTS = {GUESSES: 0.30, WHOLE: 0.62, WEIGHED: 0.08}

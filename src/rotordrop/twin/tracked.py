@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
-from rotordrop.estimate.estimate import Structure
+from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.machine import Machine
+from rotordrop.progress import Progress
 from rotordrop.track.consistency import DIRECTIONS, Check, consistency_checks
 from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
@@ -18,7 +19,7 @@ from rotordrop.track.smoother import Forward, Smoothed
 from rotordrop.twin.mixture import Alternative, probabilities
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Accepted, Search, track_drops
-from rotordrop.twin.steps import Progress, Steps
+from rotordrop.twin.steps import Steps
 from rotordrop.twin.tracked_loads import check_without_contact_law, checks_begun, with_form_error
 
 
@@ -39,7 +40,7 @@ class OtherModel:
         """The model in words."""
         return Structure(
             name=self.name,
-            gain=math.log(self.odds),
+            log_likelihood_rise=math.log(self.odds),
             probability=self.probability,
             sentence=(
                 f"Not to be told from it: {self.name}, with a probability of "

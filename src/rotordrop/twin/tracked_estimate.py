@@ -10,7 +10,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError
-from rotordrop.estimate.advice import Advice
+from rotordrop.estimate.advice import Advice, is_wide
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.bearing_values import bearing_values
@@ -20,23 +20,25 @@ from rotordrop.estimate.estimate import (
     FittedParameter,
     Innovations,
     SensorErrors,
+    SensorMotion,
     Verdict,
 )
-from rotordrop.estimate.later_motion import LaterMotion, later_motion
+from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Tracked
+from rotordrop.estimate.published import LaterMotion
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.estimate.unbalance import unbalance_notes
 from rotordrop.known import Known
 from rotordrop.track.consistency import NIS_RANGE, Check
+from rotordrop.track.forces import predicted_readings
 from rotordrop.track.input_state import InputEstimate, at_bearings
 from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_loads import (
     Loads,
     bearing_drop,
     check_with_noise,
-    check_without_form_error,
     cross_checks,
-    from_nothing,
+    interval_from_zero,
     is_beyond_accuracy,
     is_beyond_factor,
     loads_of_cross_check,
@@ -44,18 +46,17 @@ from rotordrop.twin.tracked_loads import (
     twin_loads,
     widened_to_cross_check,
     widening_of,
-    without_form_error,
 )
 from rotordrop.twin.tracked_parameters import (
     gap_of_record,
-    is_lost,
+    is_impossible_gap,
     joint_estimate,
     mixed_parameters,
     parameters,
     sensor_errors,
 )
 from rotordrop.twin.tracked_unbalance import plane_unbalances
-from rotordrop.twin.value_of_information import DRAWING, value_of_information
+from rotordrop.twin.value_of_information import value_of_information
 
 QUICK = (
     "Quick estimate: one pass over the record, {}without the search for the size of the process noise. "
@@ -133,6 +134,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         ),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),
+        at_sensors=_at_sensors(drop),
         nis=drop.judged.nis,
         noise_factor=drop.noise_factor,
         advice=advice,
@@ -155,35 +157,14 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
 
 
 def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
-    """What to measure of a machine whose rotor is not known by its drawing; of others it costs a pass."""
+    """What to measure of a machine whose rotor is not known by its drawing, or whose forces are wide."""
     unsure = any(unknown.parameter.by_drawing for unknown in drop.problem.unknowns)
-    if not unsure or drop.drops != 1:
+    loads = (_loads(drop, judged, b).peak_force for b in range(len(drop.problem.model.bearing_names)))
+    wide = any(is_wide(one.known) for one in loads)
+    # of a model that does not fit the covariances say nothing
+    if not judged.fits or not (unsure or wide) or drop.drops != 1:
         return ()
-    if judged.fits:
-        return value_of_information(drop.problem, drop.smoothed, drop.forces, judged.widening)
-    return _by_a_drawing(drop, judged)
-
-
-def _by_a_drawing(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
-    """What a drawing of the rotor brings at least, where the twin with a beam does not fit the record.
-
-    Its covariances say nothing then, so no other number can be weighed. The error of a beam is known and
-    falls away; the rest stays as wide as the cross-check leaves it, though a twin of the rotor may well fit.
-    """
-    form = drop.problem.model.machine.rotor.force_sigma
-    if judged.check is None or not form:
-        return ()
-    drawn = replace(drop, forces=without_form_error(drop.forces, form))
-    known = replace(judged, check=check_without_form_error(judged.check, form))
-    before, after = (
-        {
-            name: 0.5 * (high - low)
-            for b, name in enumerate(drop.problem.model.bearing_names)
-            for low, high in [_loads(one, by, b).peak_force.interval_90 or (0.0, 0.0)]
-        }
-        for one, by in ((drop, judged), (drawn, known))
-    )
-    return (Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=after, at_most=True),)
+    return value_of_information(drop.problem, drop.smoothed, drop.forces, judged.widening)
 
 
 def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
@@ -256,7 +237,7 @@ def _judge(drop: TrackedDrop, check: InputEstimate | None) -> _Judgement:
                 continue
             # the twin has lost the drop there: by its peak force, or by an air gap that cannot be
             gap, peak = found[AIR_GAP.path_of(name)], float(drop.forces.magnitude[:, b].max())
-            replaced_at[b] = is_beyond_factor(peak, check, b) or is_lost(problem, gap.estimate, b)
+            replaced_at[b] = is_beyond_factor(peak, check, b) or is_impossible_gap(problem, gap.estimate, b)
             if replaced_at[b]:
                 found[gap.path] = replace(gap, estimate=gap_of_record(problem, b))
     verdict = Verdict.CONSISTENT if drop.consistent else Verdict.ONE_DIRECTION
@@ -314,7 +295,7 @@ def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
 def _loads(drop: TrackedDrop, judged: _Judgement, b: int, preload: Known | None = None) -> Loads:
     twin = _twin(drop, judged, b)
     if b in drop.problem.held:
-        return from_nothing(twin)
+        return interval_from_zero(twin)
     if judged.fits or judged.check is None:
         return twin
     if judged.replaced_at[b]:
@@ -359,6 +340,19 @@ def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
         _measured(drop, judged, evidence.readings(np.inf)),
         until=float(drop.problem.time[-1]),
         noise=float(np.sqrt(np.mean(drop.problem.variances))),
+    )
+
+
+def _at_sensors(drop: TrackedDrop) -> SensorMotion:
+    estimated = predicted_readings(drop.problem, drop.smoothed)
+    measured = drop.problem.readings[: len(estimated)]
+    live = np.isfinite(measured).any(axis=0)
+    names = np.array([sensor.name for sensor in drop.problem.model.machine.sensors])
+    return SensorMotion(
+        channels=tuple(names[live].tolist()),
+        time=drop.problem.time[: len(estimated)].copy(),
+        measured=measured[:, live],
+        estimated=estimated[:, live],
     )
 
 

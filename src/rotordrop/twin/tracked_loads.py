@@ -28,8 +28,9 @@ from rotordrop.estimate.bearing_drop import (
     when_largest,
 )
 from rotordrop.estimate.estimate import CrossCheck
+from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import NINETY, Known, Status
-from rotordrop.record.impacts import after_flights, lasting_from
+from rotordrop.one_thread import one_thread
 from rotordrop.series import runs_of
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.track.consistency import Check, direction_check
@@ -65,17 +66,17 @@ OF_CROSS_CHECK: Status = "of the cross-check: the model does not fit the record"
 """Status of a number that does not rest on the twin, because the twin lost the record."""
 CUT: Status = "the estimated part ends during this contact"
 """Status of the numbers of an impact that goes on behind the end of the window."""
-LOST_WIDENING = 2.6
+DIVERGED_WIDENING = 2.6
 """Half width of a number of the cross-check, where the twin lost the record, over the error that it makes on
 drops that the model fits [1].
 
 Source: of the peak forces of eight hidden machines told in twelve numbers it holds nine in ten, 13 of 14; of
-seven others, too (``studies/twelve_numbers``).
+seven others, too (study `twelve_numbers`).
 """
 RIPPLE = 4e-3
 """Where model and record disagree, what a mean over this time takes off a force may be noise [s] (chosen)."""
 
-NO_LATE_MEAN = f"the estimated part ends before {1e3 * LATE[1]:.0f} ms"
+NO_LATE_MEAN = f"estimate ends before {1e3 * LATE[1]:.0f} ms"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,15 +107,7 @@ def with_form_error(forces: ForceHistory, sigma: float) -> ForceHistory:
     )
 
 
-def without_form_error(forces: ForceHistory, sigma: float) -> ForceHistory:
-    """Forces without the error of the rotor's form, as its drawing would leave them."""
-    return replace(
-        forces,
-        magnitude_sigma=_without(forces.magnitude_sigma, sigma * forces.magnitude),
-        stress_sigma=_without(forces.stress_sigma, sigma / 3.0 * forces.stress),
-    )
-
-
+@one_thread()
 def check_without_contact_law(problem: DropProblem) -> InputEstimate:
     """The cross-check, with the error of the rotor's form; it takes nothing from the twin."""
     check = input_state_estimate(problem, corrections_by_record(problem))
@@ -139,19 +132,16 @@ def check_with_form_error(check: InputEstimate, sigma: float) -> InputEstimate:
     )
 
 
-def check_without_form_error(check: InputEstimate, sigma: float) -> InputEstimate:
-    """The cross-check without the error of the rotor's form."""
-    form = NINETY * sigma
-    return replace(
-        check,
-        peak_error=_without(check.peak_error, form),
-        stress_error=_without(check.stress_error, form / 3.0),
+def symmetric(value: float, sigma: float, status: Status, unit: str, widening: float = 1.0) -> Known:
+    """A value with a symmetric 90 % interval."""
+    half = NINETY * sigma * widening
+    return Known(
+        value=value,
+        status=status,
+        standard_error=sigma * widening,
+        interval_90=(value - half, value + half),
+        unit=unit,
     )
-
-
-def _without(sigma: Array, part: Array | float) -> Array:
-    """A standard deviation, shape and unit of ``sigma``, less an independent part of it."""
-    return np.sqrt(np.maximum(sigma * sigma - part * part, 0.0))
 
 
 def with_interval(
@@ -161,15 +151,11 @@ def with_interval(
 
     ``left_out`` is the standard deviation by what the model leaves out alone, independent of the rest.
     """
-    half = NINETY * sigma * widening
-    low = max(value - half, 0.0) if value >= 0.0 else value - half
-    return Known(
-        value=value,
-        status="determined",
-        standard_error=sigma * widening,
-        interval_90=(low, value + half),
+    known = symmetric(value, sigma, "determined", unit, widening)
+    return replace(
+        known,
+        interval_90=(max(known.low, 0.0) if value >= 0.0 else known.low, known.high),
         allowance_90=NINETY * left_out * widening if left_out > 0.0 else None,
-        unit=unit,
     )
 
 
@@ -222,10 +208,10 @@ def mixed_loads(loads: Loads, others: Sequence[tuple[float, Loads]]) -> Loads:
         name: mixed(known, [(weight, one.means[name]) for weight, one in others])
         for name, known in loads.means.items()
     }
-    return _as_wide_as(loads, peak_force, peak_stress, means)
+    return _match_width(loads, peak_force, peak_stress, means)
 
 
-def from_nothing(loads: Loads) -> Loads:
+def interval_from_zero(loads: Loads) -> Loads:
     """Force of a bearing whose end was held: what the twin finds there is noise, its interval holds zero."""
 
     def held(known: Known) -> Known:
@@ -259,9 +245,8 @@ def _peak(history: History, sigma: Array, widening: float, unit: str, model_shar
 
 def widened_to(value: Known, ratio: float, accuracy: float) -> Known:
     """The value with an interval that also holds ``ratio`` times it, within a relative accuracy [1]."""
-    low, high = value.interval_90 or (value.value, value.value)
     other = value.value * ratio if math.isfinite(ratio) else value.value
-    low, high = min(low, other - accuracy * abs(other)), max(high, other + accuracy * abs(other))
+    low, high = min(value.low, other - accuracy * abs(other)), max(value.high, other + accuracy * abs(other))
     if value.value >= 0.0:
         low = max(low, 0.0)
     return replace(
@@ -337,10 +322,10 @@ def widened_to_cross_check(loads: Loads, check: InputEstimate, b: int, preload: 
         name: reduce(lambda known, other: widened_to(known, *other), held.get(name, ()), value)
         for name, value in loads.means.items()
     }
-    return _as_wide_as(loads, peak_force, peak_stress, means)
+    return _match_width(loads, peak_force, peak_stress, means)
 
 
-def _as_wide_as(loads: Loads, force: Peak, stress: Peak, means: Mapping[str, Known]) -> Loads:
+def _match_width(loads: Loads, force: Peak, stress: Peak, means: Mapping[str, Known]) -> Loads:
     """The loads with other peaks and means, and bands at least as wide as these peaks."""
     return replace(
         loads,
@@ -377,23 +362,23 @@ def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
     peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
     force = History(label="cross-check", time=check.time, values=check.magnitude[:, b], role="cross-check")
     stress = History(label="cross-check", time=check.time, values=check.stress[:, b], role="cross-check")
-    means = {"mean_stress_Pa": _lost(float(np.mean(stress.values)), MEAN_STRESS_ERROR, "Pa")}
+    means = {"mean_stress_Pa": _where_diverged(float(np.mean(stress.values)), MEAN_STRESS_ERROR, "Pa")}
     late = float(check.mean_magnitude_late[b])
     if math.isfinite(late):
         # No mean magnitude is below that of the mean vector; how much of what is above is noise is not known.
-        mean = _lost(late, MEAN_ERROR, "N")
+        mean = _where_diverged(late, MEAN_ERROR, "N")
         held = widened_to(mean, float(check.mean_late[b]) / max(late, 1e-9), MEAN_ERROR)
         means["mean_force_0p15_0p2_N"] = replace(held, status=mean.status)
     return Loads(
         force=force,
-        force_band=_band(force, LOST_WIDENING * peak_error * force.values),
+        force_band=_band(force, DIVERGED_WIDENING * peak_error * force.values),
         stress=stress,
-        stress_band=_band(stress, LOST_WIDENING * stress_error * stress.values),
+        stress_band=_band(stress, DIVERGED_WIDENING * stress_error * stress.values),
         peak_force=_checked_peak(force, peak_error, "N"),
         peak_stress=_checked_peak(stress, stress_error, "Pa"),
         means=means,
         missing={
-            "impacts": "the twin, which tells impacts apart, lost the record",
+            "impacts": "the model lost the record",
             **({} if math.isfinite(late) else {"mean_force_0p15_0p2_N": NO_LATE_MEAN}),
         },
     )
@@ -402,14 +387,14 @@ def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
 def _checked_peak(history: History, error: float, unit: str) -> Peak:
     at = int(np.argmax(history.values))
     return Peak(
-        known=_lost(float(history.values[at]), error, unit),
+        known=_where_diverged(float(history.values[at]), error, unit),
         time=float(history.time[at]),
         origin=Origin.CROSS_CHECK,
     )
 
 
-def _lost(value: float, error: float, unit: str) -> Known:
-    half = LOST_WIDENING * error
+def _where_diverged(value: float, error: float, unit: str) -> Known:
+    half = DIVERGED_WIDENING * error
     return Known(
         value=value,
         status=OF_CROSS_CHECK,
@@ -436,7 +421,6 @@ def bearing_drop(
     """
     name = problem.model.bearing_names[b]
     gap = values[AIR_GAP.field]
-    low, high = gap.interval_90 or (gap.value, gap.value)
     estimated = Motion(
         label="estimated", time=forces.time, displacement=forces.displacement[:, b], role="estimated"
     )
@@ -459,8 +443,8 @@ def bearing_drop(
     ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))
     return BearingDrop(
         name=name,
-        motions=(shown, estimated) if loads.peak_force.origin is Origin.TWIN else (shown,),
-        air_gap=AirGap(lower=low, upper=high),
+        motions=(estimated if loads.peak_force.origin is Origin.TWIN else shown,),
+        air_gap=AirGap(lower=gap.low, upper=gap.high),
         force=loads.force,
         force_band=loads.force_band,
         force_vector=forces.force[:, b] if loads.peak_force.origin is Origin.TWIN else None,

@@ -12,15 +12,15 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
 from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
-from rotordrop.estimate.estimate import FittedParameter, JointEstimate, SensorErrors
+from rotordrop.estimate.estimate import FittedParameter, SensorErrors
+from rotordrop.estimate.published import Joint
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
-from rotordrop.track.consistency import is_lost as is_lost_record
 from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Smoothed
+from rotordrop.track.smoother import Smoothed, has_diverged
 from rotordrop.twin.mixture import mixed
-from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, with_interval
+from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, symmetric, with_interval
 
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
@@ -132,8 +132,7 @@ def never_used_up(problem: DropProblem, means: Array, unknown: Unknown, value: K
     travel = float(np.max(np.hypot(moved[:, 0], moved[:, 1])))
     if travel >= value.value:
         return value
-    low, high = value.interval_90 or (value.value, value.value)
-    ends = max(low, travel), max(high, travel)
+    ends = max(value.low, travel), max(value.high, travel)
     return replace(value, status=UNDETERMINED, lower=travel, interval_90=ends)
 
 
@@ -165,19 +164,20 @@ def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening
     ]
 
 
-def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> JointEstimate:
+def joint_estimate(problem: DropProblem, smoothed: Smoothed) -> Joint:
     """What belongs to the machine as it was shortly after the first contacts, with all covariances."""
     at, places = smoothed.filtered.parameter_sample, problem.machine_indices
     sensors = problem.model.machine.sensors
     paths = [unknown.path for unknown in problem.unknowns if unknown.scope == "machine"]
     paths += [parameter(part, "sensor").path_of(s.name) for part in ("gain", "offset") for s in sensors]
     before = prior_of(problem)
-    return JointEstimate(
-        paths=tuple(paths),
-        mean=smoothed.means[at][places],
-        covariance=smoothed.covariance(at)[np.ix_(places, places)],
-        prior_mean=before[0][places],
-        prior_sigma=before[1][places],
+    covariance = smoothed.covariance(at)[np.ix_(places, places)]
+    return Joint(
+        paths=paths,
+        mean=smoothed.means[at][places].tolist(),
+        covariance=[float(f"{c:.9g}") for c in covariance[np.tril_indices(len(paths))]],
+        prior_mean=before[0][places].tolist(),
+        prior_standard_deviation=before[1][places].tolist(),
     )
 
 
@@ -199,8 +199,7 @@ def prior_of(problem: DropProblem) -> tuple[Array, Array]:
 
 
 def _hull(one: Known, other: Known) -> tuple[float, float]:
-    (a, b), (c, d) = (v.interval_90 or (v.value, v.value) for v in (one, other))
-    return min(a, c), max(b, d)
+    return min(one.low, other.low), max(one.high, other.high)
 
 
 def gap_of_record(problem: DropProblem, b: int) -> Known:
@@ -216,7 +215,7 @@ def gap_of_record(problem: DropProblem, b: int) -> Known:
     )
 
 
-def is_lost(problem: DropProblem, gap: Known, b: int) -> bool:
+def is_impossible_gap(problem: DropProblem, gap: Known, b: int) -> bool:
     """Whether an estimated air gap is none that the machine can have, by settled tail and machine file."""
     entry = problem.gap_entries[b]
     sigma = math.sqrt(problem.covariance[entry, entry])
@@ -241,7 +240,7 @@ def sensor_errors(
         before = _sensor_values(
             problem, problem.mean, np.sqrt(np.diag(problem.covariance)), UNDETERMINED, form
         )
-        if is_lost_record(smoothed.filtered):
+        if has_diverged(smoothed.filtered):
             found = before
         found = [
             [replace(value, interval_90=_hull(value, prior)) for value, prior in zip(*both, strict=True)]
@@ -269,16 +268,7 @@ def _sensor_values(
     """
     return [
         [
-            Known(
-                value=float(value),
-                standard_error=math.hypot(error, more),
-                interval_90=(
-                    float(value) - NINETY * math.hypot(error, more),
-                    float(value) + NINETY * math.hypot(error, more),
-                ),
-                status=status,
-                unit=unit,
-            )
+            symmetric(float(value), math.hypot(error, more), status, unit)
             for value, error in zip(values, errors, strict=True)
         ]
         for values, errors, unit, more in zip(

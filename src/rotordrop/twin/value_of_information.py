@@ -15,7 +15,7 @@ from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed, smooth
 from rotordrop.twin.allowances import MODEL_FORCE_SIGMA
 
-DRAWING = "the rotor by its sections, from a drawing,"
+DRAWING = "the rotor by its sections, from a drawing"
 MOST_NAMED = 3
 """Measurements that are named (chosen)."""
 

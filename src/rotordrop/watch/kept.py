@@ -26,7 +26,7 @@ from rotordrop.files import (
     write_json,
     write_text,
 )
-from rotordrop.web.workspace import Job, Role, Workspace, labelled, stored_as
+from rotordrop.jobs.workspace import Job, Role, Workspace, labelled, stored_as
 
 STATUS_FILE = "watch.json"
 QUARANTINE = "quarantine"

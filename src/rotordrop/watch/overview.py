@@ -11,6 +11,7 @@ from typing import Any
 
 from rotordrop.errors import RotordropError
 from rotordrop.files import require_file
+from rotordrop.jobs.runner import published_run
 from rotordrop.ledger.book import used_shares
 from rotordrop.report.content import Column, Link, ReportContent, Section, Statement, table
 from rotordrop.report.page import write_page
@@ -19,11 +20,10 @@ from rotordrop.units import format_minute
 from rotordrop.watch.fleet import Fleet
 from rotordrop.watch.kept import QUARANTINE, Kept, status_of
 from rotordrop.watch.scalars import KINDS, NO_PEAKS, NOT_KNOWN, PEAKS, REPLACED, VERBS, shown_peak
-from rotordrop.web.running import published_run
 
 MOST_ROWS = 300
 """Records of one table; chosen, not measured."""
-RANKS = ("failed", "estimated", "quarantined", "looked", "superseded", REPLACED)
+RANKS = ("failed", "estimated", "quarantined", "looked", REPLACED)
 """Outcomes by how soon somebody should look where there is a reason to."""
 
 

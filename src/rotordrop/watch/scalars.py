@@ -7,13 +7,12 @@ import math
 from typing import Any
 
 from rotordrop.estimate.published import Drop, Value, read_drop
-from rotordrop.report.compared_drop import ComparedDrop
-from rotordrop.report.limits import limit_statement
+from rotordrop.jobs.runner import Verb, result_folder
+from rotordrop.jobs.workspace import Job
+from rotordrop.report.compare_page import ComparedDrop, limit_statement
 from rotordrop.report.quantity import Quantity
 from rotordrop.units import format_quantity
 from rotordrop.watch.fleet import Watched
-from rotordrop.web.running import Verb, result_folder
-from rotordrop.web.workspace import Job
 
 NOT_KNOWN = "the machine is not known"
 PEAKS = (("peak_force", "N"), ("peak_stress", "Pa"))

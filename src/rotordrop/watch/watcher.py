@@ -7,8 +7,8 @@ holds its lock, which the system takes back from a dead one.
 
 from __future__ import annotations
 
+import hashlib
 import json
-import math
 import os
 import shlex
 import shutil
@@ -23,11 +23,12 @@ from typing import Any
 
 from rotordrop.errors import OutputError, RecordError, RotordropError, UsageError
 from rotordrop.estimate.published import read_drop
-from rotordrop.files import clear_of_no_file, digest_of_file
+from rotordrop.files import clear_of_no_file
+from rotordrop.jobs.runner import Runner, Verb, result_folder, state_of, take_lock
+from rotordrop.jobs.workspace import Job
 from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate, logged_drops, remove_drop
 from rotordrop.watch.fleet import Fleet, read_fleet
 from rotordrop.watch.kept import (
-    STATUS_FILE,
     Arrived,
     Kept,
     arrived,
@@ -39,8 +40,6 @@ from rotordrop.watch.kept import (
 )
 from rotordrop.watch.overview import write_overview
 from rotordrop.watch.scalars import REPLACED, line_of, scalars_of
-from rotordrop.web.running import Runner, Verb, result_folder, state_of, take_lock
-from rotordrop.web.workspace import Job
 
 SETTLES_S = 2.0
 """How long size and date of a file must stay the same [s]; chosen, not measured."""
@@ -54,18 +53,9 @@ CRASHES = 3
 """Computations of a record that may be ended from outside before a person must look; chosen, not measured."""
 AGAIN_S, LATEST_S = 5.0, 3600.0
 """First and longest pause before what failed is tried again [s]; chosen, not measured."""
-GONE = ("superseded", REPLACED)
-"""Outcomes of what is no record of its own."""
 CUT_SHORT = "the file was taken before it was complete, and is kept whole since"
 HOOK_S = 60.0
 """How long a hook may take [s]; chosen, not measured."""
-LOOK_SHARE = 0.1
-"""Most of the time that is spent on looking round [1]; chosen, not measured. Of 9,000 files in a folder one
-took longer than the half second between two."""
-LONGEST_PAUSE_S = 5.0
-"""Longest pause after a slow look, where no longer one is asked for [s]; chosen."""
-CLOCKS_APART_S = 600.0
-"""Time [s] by which the clocks of two computers may differ that share a folder; chosen."""
 OVERVIEW_SHARE = 0.05
 """Most of the time that is spent on the overview [1]; chosen, not measured."""
 
@@ -86,8 +76,8 @@ class Watcher:
     complain: Callable[[str], None] = lambda line: None
     _fleet: Fleet = field(init=False)
     _machine_files: set[Arrived] = field(default_factory=set)
-    _machines_changed: float = 0.0
-    """When the last of them was written or moved there [s]."""
+    _machines: str = ""
+    """Digest of how they stand."""
     _mine: dict[str, int] = field(default_factory=dict)
     """Drops that are worked on, and the lock of each."""
     _ended: set[str] = field(default_factory=set)
@@ -113,7 +103,7 @@ class Watcher:
             raise UsageError(f"{self.folder} is no folder; name the one in which records arrive")
         self._fleet = read_fleet(self.machines)
         self._machine_files = _standing_in(self.machines)
-        self._machines_changed = _last_change(self._machine_files)
+        self._machines = _digest_of(self._machine_files)
         self.kept.prepare()
         self._runner = Runner(self.kept.space)
 
@@ -135,9 +125,9 @@ class Watcher:
             self._reload_machines()
             self._pick_up()
             self._look_round(now)
-            ended = time.monotonic()
-            usual = min(self.every, SETTLES_S) if self._standing else self.every
-            self._next_look = ended + max(usual, min((ended - now) / LOOK_SHARE, LONGEST_PAUSE_S))
+            self._next_look = time.monotonic() + (
+                min(self.every, SETTLES_S) if self._standing else self.every
+            )
         while self._queue and len(self._mine) - len(self._later) < ROOM and self._due("", now):
             self._take(self._queue.pop())
         for number in [number for number in self._mine if self._due(number, now)]:
@@ -165,7 +155,7 @@ class Watcher:
         """Read the machine files again where one has changed; what has a machine now is tried again."""
         if (now := _standing_in(self.machines)) == self._machine_files:
             return
-        self._machine_files, self._machines_changed = now, _last_change(now)
+        self._machine_files, self._machines = now, _digest_of(now)
         try:
             self._fleet = read_fleet(self.machines)
             self._ended.clear()
@@ -214,18 +204,9 @@ class Watcher:
     def _is_to_be_tried_again(self, job: Job, status: dict[str, Any]) -> bool:
         if status["outcome"] == "quarantined":
             return not self.kept.quarantined(job).is_dir()
-        if status["outcome"] != "looked" or self._looked_since(job):
-            return False
+        if status["outcome"] != "looked" or status.get("machines") == self._machines:
+            return False  # to ask the head of every record again took half a minute of 4,700
         return self._fleet.of(*self._names(job, status))[0] is not None
-
-    def _looked_since(self, job: Job) -> bool:
-        """Whether a drop was looked at well after the last change of the machine files.
-
-        To ask the head of every record again took a watcher half a minute of 4,700 before it took the next.
-        """
-        with suppress(OSError):
-            return (job.path / STATUS_FILE).stat().st_mtime > self._machines_changed + CLOCKS_APART_S
-        return False
 
     def _names(self, job: Job, status: dict[str, Any]) -> tuple[Path, Path]:
         """A record as it lay under the folder, and where it is kept."""
@@ -255,7 +236,7 @@ class Watcher:
             self._standing.pop(one.path, None)
             job = self.kept.job(number)
             status = status_of(job)
-            if status is not None and status["outcome"] in GONE:  # its content is back
+            if status is not None and status["outcome"] == REPLACED:  # its content is back
                 keep_status(job, _anew(status))
                 self._ended.discard(number)
             if number not in self._ended and number not in self._mine:
@@ -291,7 +272,7 @@ class Watcher:
             self._ask(job, status, state["options"])
             return status
         if state["state"] == "done" and (folder := result_folder(job, verb, "document.json")) is not None:
-            status = status | self._judged(job, status, verb, folder)
+            status = status | _judged(verb, folder)
         else:
             status = status | _failed(job, status, state)
         keep_status(job, status)
@@ -320,33 +301,14 @@ class Watcher:
             self._announced.add(job.number)
             self.say(f"{job.read()['files']['record']['name']}: {status['serial']}, estimate begun")
 
-    def _judged(self, job: Job, status: dict[str, Any], verb: Verb, folder: Path) -> dict[str, Any]:
-        """What a finished computation means: the outcome, with the reason."""
-        source, record = Path(status["source"]), record_of(job)
-        if Arrived.at(source) not in (None, Arrived(source, status["size"], status["mtime_ns"])):
-            if is_part(record, source):
-                return {"outcome": REPLACED, "why": CUT_SHORT}
-            if not is_part(source, record) and not digest_of_file(source).startswith(job.number):
-                why = "it was taken before it was complete; what stands there now is another record"
-                return {"outcome": "superseded", "why": why}
-        if verb == "estimate":
-            return {"outcome": "estimated"}
-        findings = json.loads((folder / "document.json").read_bytes())["findings"]
-        stops = [one for one in findings if one["severity"] == "stop"]
-        if stops:
-            worst = stops[0]
-            where = f"{worst['channel']}: " if worst["channel"] else ""
-            return {"outcome": "quarantined", "why": f"{where}{worst['message']}; {worst['remedy']}"}
-        return {"outcome": "looked"}
-
     def _deliver(self, job: Job, status: dict[str, Any]) -> bool:
         """Quarantine, log and report a drop, each once, whatever was done before; whether that is done."""
-        if status["outcome"] not in GONE:
+        if status["outcome"] != REPLACED:
             for number in sorted(self._of_file[Path(status["source"])] - {job.number}):
                 other = self.kept.job(number)
                 if (of_other := status_of(other)) is None:
                     continue  # removed on the page
-                if of_other["outcome"] not in GONE and is_part(record_of(job), record_of(other)):
+                if of_other["outcome"] != REPLACED and is_part(record_of(job), record_of(other)):
                     status = status | {"outcome": REPLACED, "why": CUT_SHORT}
                     break
                 if is_part(record_of(other), record_of(job)) and not self._withdrawn(other, of_other):
@@ -361,10 +323,10 @@ class Watcher:
                 status["logged"] = self._logged(job, bearings)
             status["scalars"] = scalars_of(job, status, watched)
             keep_status(job, status)
-        if self.hook is not None and status["outcome"] not in GONE and not status.get("hooked"):
+        if self.hook is not None and status["outcome"] != REPLACED and not status.get("hooked"):
             run_hook(self.hook, status["scalars"])
             status["hooked"] = True
-        keep_status(job, status | {"done": True})
+        keep_status(job, status | {"machines": self._machines, "done": True})
         self.say(line_of(status["scalars"], status["logged"]))
         return True
 
@@ -420,12 +382,10 @@ class Watcher:
         self._next_overview = ended + max(self.every, (ended - now) / OVERVIEW_SHARE)
 
 
-def _last_change(files: set[Arrived]) -> float:
-    """When the last of some files was written or moved to its place [s]; without end where one is gone."""
-    try:
-        return max((one.path.stat().st_ctime for one in files), default=0.0)
-    except OSError:
-        return math.inf  # every record is asked again
+def _digest_of(files: set[Arrived]) -> str:
+    """Digest of names, sizes and dates."""
+    told = sorted((one.path.name, one.size, one.mtime_ns) for one in files)
+    return hashlib.sha256(repr(told).encode()).hexdigest()
 
 
 def _standing_in(folder: Path) -> set[Arrived]:
@@ -438,6 +398,19 @@ def _standing_in(folder: Path) -> set[Arrived]:
 def _anew(status: dict[str, Any]) -> dict[str, Any]:
     """Of a drop that is begun again only where it came from is known."""
     return {"outcome": "", **{key: status[key] for key in ("source", "size", "mtime_ns")}}
+
+
+def _judged(verb: Verb, folder: Path) -> dict[str, Any]:
+    """What a finished computation means: the outcome, with the reason."""
+    if verb == "estimate":
+        return {"outcome": "estimated"}
+    findings = json.loads((folder / "document.json").read_bytes())["findings"]
+    stops = [one for one in findings if one["severity"] == "stop"]
+    if stops:
+        worst = stops[0]
+        where = f"{worst['channel']}: " if worst["channel"] else ""
+        return {"outcome": "quarantined", "why": f"{where}{worst['message']}; {worst['remedy']}"}
+    return {"outcome": "looked"}
 
 
 def _failed(job: Job, status: dict[str, Any], state: dict[str, Any]) -> dict[str, Any]:

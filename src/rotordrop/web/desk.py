@@ -1,61 +1,38 @@
-"""What the handlers of the page share: the folder, what runs, and how an order is read."""
+"""What the handlers of the page share: the folder, what runs, and how a request is read."""
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import hmac
 import json
-import math
-import os
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import AsyncIterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
 from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
 
 from rotordrop.errors import RotordropError, UsageError
-from rotordrop.web.running import VERBS, Runner, Verb, result_folder
-from rotordrop.web.workspace import LONGEST_OPTION, Job, TooLargeError, Workspace, in_time, labelled
+from rotordrop.files import atomic_path, clear_of_no_file
+from rotordrop.jobs.runner import VERBS, Runner, Verb, result_folder
+from rotordrop.jobs.workspace import Job, Role, Workspace, labelled, stored_as
 
-LARGEST_ORDER = 16 * 2**10
-"""Bytes of an order; chosen, not measured: options are short texts."""
-OPTIONS = {
-    "gap": str,
-    "speed": str,
-    "planes": str,
-    "operator": str,
-    "method": str,
-    "quick": bool,
-    "plan": str,
-}
-LONGEST_PLAN = 8000
-"""Characters of the plan of a study or a design; chosen, not measured."""
+OPTIONS = {"gap": str, "speed": str, "planes": str, "operator": str, "method": str, "quick": bool}
 METHODS = ("tracked", "replay")
 
-Handler = Callable[["Desk", Request], Awaitable[Response]]
 
-
-@dataclass(frozen=True)
-class Operation:
-    """One thing the page may ask for: method, address with its placeholders, and questions after it."""
-
-    method: str
-    path: str
-    handler: Handler
-    query: tuple[str, ...] = ()
+class NotThereError(RotordropError):
+    """What an address names does not exist."""
 
 
 @dataclass
 class Desk:
-    """What the handlers share: the folder, what runs, the log of drops, and tickets for reports."""
+    """What the handlers share."""
 
     space: Workspace
     runner: Runner
-    log: str
-    own_log: bool
-    """The log of drops; whether it is that of the folder, which is made when it is first written."""
-    tickets: dict[str, tuple[Path, float]] = field(default_factory=dict)
+    token: str
 
     def job(self, request: Request) -> Job:
         """The job an address names."""
@@ -71,9 +48,10 @@ class Desk:
             raise NotThereError("there is no result yet")
         return folder
 
-
-class NotThereError(RotordropError):
-    """What an address names does not exist."""
+    def report_of(self, job: str, verb: str, run: str) -> str:
+        """Address of one report, which opens that report alone: a page that is opened carries no token."""
+        key = hmac.new(self.token.encode(), f"{job} {verb} {run}".encode(), hashlib.sha256).hexdigest()
+        return f"/report/{job}/{verb}/{run}/{key}"
 
 
 def verb_of(request: Request) -> Verb:
@@ -84,40 +62,10 @@ def verb_of(request: Request) -> Verb:
     return cast("Verb", verb)
 
 
-def number(request: Request, name: str, usual: float) -> float:
-    """A number that follows an address, or its usual value."""
-    text = request.query_params.get(name)
-    try:
-        value = float(usual if text is None else text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < 1e9:
-        raise UsageError(f"{name} is {labelled(str(text))!r}; expected a number")
-    return value
-
-
-async def of_file(place: Path, kind: str, headers: Mapping[str, str] | None = None) -> Response:
-    """A file as an answer, opened first: what another tab removes meanwhile is sent whole, or it is gone."""
-    stream = await asyncio.to_thread(place.open, "rb")
-
-    async def pieces() -> AsyncIterator[bytes]:
-        with stream:
-            while part := await asyncio.to_thread(stream.read, 2**20):
-                yield part
-
-    length = {"content-length": str(os.fstat(stream.fileno()).st_size)}
-    return StreamingResponse(pieces(), media_type=kind, headers={**(headers or {}), **length})
-
-
 async def order_of(request: Request) -> dict[str, Any]:
     """The body of a request as a table of JSON."""
-    body = b""
-    async for part in in_time(request.stream(), "the order"):
-        body += part
-        if len(body) > LARGEST_ORDER:
-            raise TooLargeError(f"more than {LARGEST_ORDER} bytes are no order")
     try:
-        order = json.loads(body or b"{}")
+        order = json.loads(await request.body() or b"{}")
     except (ValueError, RecursionError):
         order = None
     if not isinstance(order, dict):
@@ -132,11 +80,49 @@ def options_of(given: Any) -> dict[str, Any]:
     for name, value in given.items():
         if name not in OPTIONS:
             raise UsageError(f"there is no option {labelled(name)!r}; there are {', '.join(OPTIONS)}")
-        most = LONGEST_PLAN if name == "plan" else LONGEST_OPTION
-        if type(value) is not OPTIONS[name] or (isinstance(value, str) and len(value) > most):
+        if type(value) is not OPTIONS[name]:
             raise UsageError(
                 f"the option {name} is {labelled(str(value))!r}; expected {OPTIONS[name].__name__}"
             )
     if given.get("method", "tracked") not in METHODS:
         raise UsageError(f"the method is {labelled(given['method'])!r}; there are {', '.join(METHODS)}")
     return {name: value for name, value in given.items() if value != ""}
+
+
+async def receive(job: Job, role: Role, name: str, body: AsyncIterable[bytes]) -> dict[str, Any]:
+    """Write a file of a job while it comes in; it stands there whole or not at all.
+
+    The name at the client is a label.
+    """
+    label, stored = labelled(name), stored_as(role, name)
+    key = role if role != "beside" else f"beside {stored}"
+    _refuse_clash(job, key, label, stored)
+    counted, digest, file = 0, hashlib.sha256(), job.path / "files" / stored
+    clear_of_no_file(file)
+    with atomic_path(file) as place, place.open("wb") as stream:
+        async for part in body:
+            counted += len(part)
+            digest.update(part)
+            stream.write(part)
+        if counted == 0:
+            raise UsageError(f"{label} is empty")
+        # From here to the new name nothing else runs: of uploads side by side only one gets a name.
+        _refuse_clash(job, key, label, stored)
+    told = job.read()
+    entry = {"name": label, "stored": stored, "bytes": counted, "sha256": digest.hexdigest()}
+    before = told["files"].get(key)
+    told["files"][key] = entry
+    job.write(told)
+    if before is not None and before["stored"] != stored:
+        clear_of_no_file(job.path / "files" / before["stored"])
+        (job.path / "files" / before["stored"]).unlink(missing_ok=True)
+    return entry
+
+
+def _refuse_clash(job: Job, key: str, label: str, stored: str) -> None:
+    """Two files of a job that would lie under one name, whatever the case of its letters."""
+    for other, entry in job.read()["files"].items():
+        if other != key and entry["stored"].lower() == stored.lower():
+            raise UsageError(
+                f"{label} would lie where {entry['name']} lies; send it to a job of its own, or as what it is"
+            )

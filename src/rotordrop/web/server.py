@@ -5,46 +5,52 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotordrop.errors import UsageError
-from rotordrop.web.running import running
-from rotordrop.web.workspace import Workspace
+from rotordrop.jobs.runner import running
+from rotordrop.jobs.workspace import Workspace
+
+if TYPE_CHECKING:
+    import uvicorn
 
 
-def serve(
-    folder: Path,
-    port: int,
-    announce: Callable[[str], None],
-    tell: Callable[[str], None],
-    log: str | None = None,
-) -> None:
+def serve(folder: Path, port: int, announce: Callable[[str], None], tell: Callable[[str], None]) -> None:
     """Serve the page until it is interrupted; computations that run go on without it.
 
     It listens on the loopback address only, port 0 takes a free one. ``announce`` hears the address with its
     token once the server listens, ``tell`` what goes on when it ends.
     """
-    try:
-        import uvicorn
-
-        from rotordrop.web.app import make_app
-        from rotordrop.web.connection import configured
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"the page needs the package {error.name}; install it with pip install 'rotordrop[serve]'"
-        ) from None
     listening = listening_at(port)
-    port = listening.getsockname()[1]
     space = Workspace(folder)
-    app = make_app(space, port=port, log=log)
-    announce(f"http://127.0.0.1:{port}/#token={space.token()}")
+    server = server_of(space, listening)
+    announce(f"http://127.0.0.1:{listening.getsockname()[1]}/#token={space.token()}")
     try:
-        uvicorn.Server(configured(app)).run(sockets=[listening])
+        server.run(sockets=[listening])
     finally:
         if left := running(space):
             tell(
                 f"Still computing: {', '.join(left)}. That goes on without the server; start it again to see "
                 "or to cancel it."
             )
+
+
+def server_of(space: Workspace, listening: socket.socket) -> uvicorn.Server:
+    """The server of a folder, for a socket that listens."""
+    try:
+        import uvicorn
+
+        from rotordrop.web.app import make_app
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"the page needs the package {error.name}; install it with pip install 'rotordrop[serve]'"
+        ) from None
+    app = make_app(space, port=listening.getsockname()[1])
+    configured = uvicorn.Config(
+        app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,
+        timeout_graceful_shutdown=2, proxy_headers=False,
+    )  # fmt: skip
+    return uvicorn.Server(configured)
 
 
 def listening_at(port: int) -> socket.socket:

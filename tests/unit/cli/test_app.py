@@ -1,31 +1,28 @@
 """The command line: help without imports, stable exit codes, sentences instead of tracebacks."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
+import rotordrop
 from rotordrop import errors
 from rotordrop.cli import _output
 from rotordrop.cli import app as command_line
-from rotordrop.cli._options import quantity
 
 VERBS = command_line.VerbTable.verbs()
 
 
-def call(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+def call(*arguments, **environment):
     return subprocess.run(
         [sys.executable, "-m", "rotordrop", *arguments],
         capture_output=True,
         text=True,
         env=os.environ | environment,
-        timeout=60,
+        timeout=600,
     )
 
 
@@ -33,17 +30,8 @@ def test_help_lists_every_verb_with_its_line():
     done = call("--help")
     assert done.returncode == 0
     for name, verb in VERBS.items():
-        assert f"  {name}" in done.stdout
-        assert verb.line.split()[0] in done.stdout
-
-
-def test_no_arguments_is_help():
-    assert call().stdout == call("--help").stdout
-
-
-def test_version():
-    import rotordrop
-
+        assert f"  {name}" in done.stdout and verb.line.split()[0] in done.stdout
+    assert call().stdout == done.stdout
     assert call("--version").stdout == f"rotordrop {rotordrop.__version__}\n"
 
 
@@ -56,23 +44,20 @@ def test_each_verb_has_help_and_a_line_that_fits(verb):
     for parameter in command.params:
         if parameter.name != "help":
             assert getattr(parameter, "help", None), f"{verb}: {parameter.name} has no help text"
+    options = [name for parameter in command.params for name in parameter.opts]
+    assert "--json" in options or verb in {"init", "profile", "serve", "watch"}, "it computes nothing"
 
 
 @pytest.mark.parametrize(
-    "verb", [verb for verb in VERBS if verb not in {"init", "profile", "serve", "watch"}]
+    ("word", "told"),
+    [
+        ("--no-such-option", "No such option: --no-such-option\nSee 'rotordrop --help'."),
+        ("frobnicate", "there is no command 'frobnicate'; try 'rotordrop --help'"),
+    ],
 )
-def test_each_verb_that_computes_offers_json(verb):
-    options = [name for parameter in VERBS[verb].load().params for name in parameter.opts]
-    assert "--json" in options
-
-
-def test_an_unknown_verb_is_a_wrong_call_with_a_suggestion():
-    done = call("--no-such-option")
-    assert (done.returncode, done.stdout) == (64, "")
-    assert done.stderr == "rotordrop: No such option: --no-such-option\nSee 'rotordrop --help'.\n"
-    done = call("frobnicate")
-    assert (done.returncode, done.stdout) == (64, "")
-    assert done.stderr == "rotordrop: there is no command 'frobnicate'; try 'rotordrop --help'\n"
+def test_an_unknown_verb_is_a_wrong_call_with_a_suggestion(word, told):
+    done = call(word)
+    assert (done.returncode, done.stdout, done.stderr) == (64, "", f"rotordrop: {told}\n")
 
 
 @pytest.fixture
@@ -85,41 +70,20 @@ def verb_folder(tmp_path, monkeypatch):
         del sys.modules[name]
 
 
-def write_verb(folder: Path, name: str, body: str) -> None:
+def write_verb(folder, name, body):
     (folder / f"{name}.py").write_text("from rotordrop import errors\n" + body)
     command_line.VerbTable.groups = {"Try": (command_line.Verb(name.replace("_", "-"), "Try it out", name),)}
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
-        "MachineFileError",
-        "RecordError",
-        "IdentificationError",
-        "SimulationError",
-        "OutputError",
-        "UsageError",
-    ],
-)
+ERRORS = ("MachineFile", "Record", "Identification", "Simulation", "Output", "Usage", "DamagedFile")
+
+
+@pytest.mark.parametrize("error", ERRORS)
 def test_each_error_becomes_its_exit_code_and_one_line(verb_folder, capsys, error):
-    name = f"try_{error.lower()}"
-    write_verb(
-        verb_folder,
-        name,
-        f"def {name}() -> None:\n    'Try.'\n    raise errors.{error}('the gap is -3 µm')\n",
-    )
-    code = command_line.run([name.replace("_", "-")])
-    out, err = capsys.readouterr()
-    assert code == getattr(errors, error).exit_code
-    assert (out, err) == ("", "rotordrop: the gap is -3 µm\n")
-
-
-def test_ctrl_c_ends_with_130_and_no_traceback(verb_folder, capsys):
-    write_verb(verb_folder, "try_stop", "def try_stop() -> None:\n    'Try.'\n    raise KeyboardInterrupt\n")
-    assert command_line.run(["try-stop"]) == 130
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.strip() == "rotordrop: stopped; nothing was left half written"
+    raises = f"def try_it() -> None:\n    'Try.'\n    raise errors.{error}Error('the gap is -3 µm')\n"
+    write_verb(verb_folder, "try_it", raises)
+    assert command_line.run(["try-it"]) == getattr(errors, f"{error}Error").exit_code
+    assert capsys.readouterr() == ("", "rotordrop: the gap is -3 µm\n")
 
 
 def test_an_error_of_ours_is_not_hidden(verb_folder):
@@ -157,80 +121,49 @@ def test_a_reader_that_goes_away_is_no_traceback():
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
-def test_ctrl_c_in_the_real_command_ends_with_130():
-    program = (
-        "import os, signal, sys\n"
-        "from rotordrop.cli import app\n"
-        "app.Verb.load = lambda verb: os.kill(os.getpid(), signal.SIGINT)\n"
-        "sys.exit(app.run(['simulate']))\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 130
-    assert "Traceback" not in done.stderr
-    assert signal.SIGINT.name not in done.stderr
-
-
-def command_in_which(fault):
-    """The command, ended, after a verb of it ran a piece of generated code."""
-    program = (
-        "import sys\n"
-        "from rotordrop.cli import app\n"
-        f"app.Verb.load = lambda verb: exec({fault!r}, {{}})\n"
-        "sys.argv = ['rotordrop', 'simulate']\n"
-        "app.main()\n"
-    )
-    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+COMMAND = """
+import ctypes, os, signal, sys
+class Interrupted:
+    def find_spec(self, name, *rest):
+        if name == 'typer':
+            raise KeyboardInterrupt
+def stop():
+    os.kill(os.getpid(), signal.SIGINT)
+def verb(of):
+    {verb}
+{loading}
+from rotordrop.cli import app
+app.Verb.load = verb
+sys.argv = ['rotordrop', 'simulate']
+from rotordrop.__main__ import main
+main()
+"""
+IGNORED = "ctypes.CFUNCTYPE(None)(stop)()"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
 @pytest.mark.parametrize(
-    "fault",
+    ("verb", "loading"),
     [
-        "raise KeyboardInterrupt",
-        "import os, signal\ntry:\n os.kill(os.getpid(), signal.SIGINT)\nfinally:\n"
-        " raise RuntimeError('not compiled')",
+        ("stop()", ""),
+        ("exec('raise KeyboardInterrupt', {})", ""),
+        ("exec('try: stop()\\nfinally: raise RuntimeError', globals())", ""),
+        pytest.param(f"{IGNORED}; raise RuntimeError", "", marks=pytest.mark.slow),
+        pytest.param(f"{IGNORED}\n    while True: pass", "", marks=pytest.mark.slow),
+        ("pass", "sys.meta_path.insert(0, Interrupted())\nimport rotordrop.__main__ as m; m.main()"),
     ],
+    ids=["plain", "generated", "caught", "foreign, then a fault", "foreign, then goes on", "while loading"],
 )
-def test_ctrl_c_inside_generated_code_ends_with_130(fault):
-    """Python kills itself with SIGINT after an interrupt inside an exec, even one that was caught."""
-    done = command_in_which(fault)
-    assert done.returncode == 130
-    assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
+def test_ctrl_c_ends_with_130_wherever_it_comes(verb, loading):
+    """Python kills itself with SIGINT after one inside an exec; foreign code, as the compiler, ignores it."""
+    program = COMMAND.format(verb=verb, loading=loading)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=600)
+    assert (done.returncode, done.stderr) == (130, "rotordrop: stopped; nothing was left half written\n")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
-@pytest.mark.parametrize("then", ["raise RuntimeError('no compiled object yet')", "while True: pass"])
-def test_ctrl_c_that_foreign_code_ignores_ends_with_130(then):
-    """The compiler calls back into Python; an interrupt is ignored there, what follows fails or goes on."""
-    fault = (
-        "import ctypes, os, signal\n"
-        "callback = ctypes.CFUNCTYPE(None)(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
-        f"callback()\n{then}"
-    )
-    done = command_in_which(fault)
-    assert done.returncode == 130
-    assert done.stderr.strip() == "rotordrop: stopped; nothing was left half written"
-
-
-def test_ctrl_c_while_the_command_itself_is_loaded_ends_with_130():
-    program = (
-        "import sys\n"
-        "class Interrupted:\n"
-        "    def find_spec(self, name, *rest):\n"
-        "        if name == 'typer':\n"
-        "            raise KeyboardInterrupt\n"
-        "sys.meta_path.insert(0, Interrupted())\n"
-        "from rotordrop.__main__ import main\n"
-        "main()\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=20)
-    assert done.returncode == 130
-    assert done.stderr == "rotordrop: stopped; nothing was left half written\n"
-
-
-@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
-@pytest.mark.parametrize("seconds", [0.5, 5.0, 8.0])
+@pytest.mark.parametrize("seconds", [0.5, 3.0, 6.0])
 def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
     machine = str(tmp_path / "machine.toml")
     assert command_line.run(["init", machine]) == 0
@@ -248,25 +181,11 @@ def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
     with pytest.raises(subprocess.TimeoutExpired):
         process.wait(timeout=seconds)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=600)
     assert (process.returncode, out) == (130, "")
     assert err.strip().splitlines()[-1] == "rotordrop: stopped; nothing was left half written"
     assert "Traceback" not in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".toml"] == ["cache"]
-
-
-@pytest.mark.parametrize(("text", "value"), [("280 um", 280e-6), ("0.28 mm", 280e-6), (280e-6, 280e-6)])
-def test_a_quantity_on_the_command_line_arrives_in_si(text, value):
-    assert quantity("length")(text) == pytest.approx(value)
-
-
-def test_a_quantity_without_unit_is_refused_with_the_way_out():
-    import typer
-
-    with pytest.raises(
-        typer.BadParameter, match=r"'280' has no unit; a length needs one, for example '280 um'"
-    ):
-        quantity("length")("280")
 
 
 def test_verbs_of_two_words_are_listed_by_their_first(capsys):
@@ -276,21 +195,12 @@ def test_verbs_of_two_words_are_listed_by_their_first(capsys):
         assert all(f"rotordrop {verb}: " in out for verb in VERBS if verb.startswith("study "))
 
 
-def test_a_command_of_before_is_told_its_present_name(capsys):
-    for old, new in command_line.NOW.items():
-        assert command_line.run([old]) == 64
-        assert f"there is no command {old!r}; it is {new} now" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (["look", "a.h5", "b.toml", "--split", "x", "--json", "y"], "--split does not go with --json"),
         (["look", "a.h5", "--split", "x"], "--split needs the machine file too"),
-        (
-            ["compare", "a.json", "b.json", "--changes", "--report", "x"],
-            "--changes does not go with --report",
-        ),
+        (["compare", "a.json", "b", "--changes", "--report", "x"], "--changes does not go with --report"),
         (["compare", "a.json", "--changes"], "--changes compares two estimates, and 1 are given"),
         (["convert", "a.toml", "--to", "ross", "--gap", "1 mm"], "--to ross does not go with --gap"),
     ],
@@ -306,7 +216,7 @@ def test_a_log_gets_a_line_on_the_progress_now_and_then(capsys, monkeypatch):
     with _output.progress_bar("estimating") as tell:
         for stage, share in (("step 1 of 3", 0.0), ("step 2 of 3", 0.3)):
             tell(stage, share)
-            told, until = "", time.monotonic() + 30.0
+            told, until = "", time.monotonic() + 600.0
             while stage not in told and time.monotonic() < until:
                 time.sleep(0.01)
                 told += capsys.readouterr().err

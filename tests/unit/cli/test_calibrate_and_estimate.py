@@ -1,36 +1,31 @@
 """The verbs calibrate and estimate, from files to files: what is written, refused, and left by a stop."""
 
-from __future__ import annotations
-
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+import shutil
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import h5py
 import jsonschema
 import numpy as np
 import pytest
 
+from rotordrop import example_record_path, look, read_record
 from rotordrop.cli.app import INTERRUPTED, run
-from rotordrop.errors import ConsistencyError, UsageError
+from rotordrop.errors import UsageError
 from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimate.record_facts import COUNTED_TWICE, INCONSISTENT_CALIBRATION, facts_of
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
-from rotordrop.evidence.look import look
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import Machine, example_path, load_machine
+from rotordrop.machine import example_path, load_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.machine.saving import machine_text
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
 from rotordrop.spectrum.indentation import find_settling
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
-from rotordrop.twin.search import Candidate, Search, is_calibrated, track_drops
+from rotordrop.twin.search import is_calibrated, track_drops
 
 LP400 = str(example_path("lp400"))
 RECORD = str(example_record_path("lp400_drop_060"))
@@ -46,11 +41,11 @@ TRUE_IMPACTS = {
 
 
 @pytest.fixture(scope="module")
-def fitted_once() -> Callable[[Search, Machine], Candidate]:
+def fitted_once():
     """The fit of a calibration, made once for each machine and set of drops."""
-    found: dict[tuple[str, ...], Candidate] = {}
+    found = {}
 
-    def fit(search: Search, machine: Machine) -> Candidate:
+    def fit(search, machine):
         drops = (str(one.record.sha256) for one in search.drops.evidence)
         key = (machine_text(machine), *drops)
         if key not in found:
@@ -61,7 +56,7 @@ def fitted_once() -> Callable[[Search, Machine], Candidate]:
 
 
 @pytest.fixture(scope="module")
-def shortened() -> Iterator[None]:
+def shortened():
     """The estimator with a few passes over the first impacts only."""
     with pytest.MonkeyPatch.context() as patch:
         module = "rotordrop.twin.search"
@@ -73,11 +68,7 @@ def shortened() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def folder(
-    shortened: None,
-    fitted_once: Callable[[Search, Machine], Candidate],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> Path:
+def folder(shortened, fitted_once, tmp_path_factory):
     """Where a calibration has written its machine and its JSON."""
     place = tmp_path_factory.mktemp("calibration")
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(place / "calibrated.toml")]
@@ -87,7 +78,13 @@ def folder(
     return place
 
 
-def another_drop(place: Path) -> Path:
+@pytest.fixture
+def calibrated(folder):
+    """A call for an estimate of the record on the calibrated machine."""
+    return ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL]
+
+
+def another_drop(place):
     """A file that reads like the bundled record and is not the same."""
     copy = place / "second.h5"
     copy.write_bytes(Path(RECORD).read_bytes())
@@ -96,47 +93,45 @@ def another_drop(place: Path) -> Path:
     return copy
 
 
-def words(text: str) -> str:
+def words(text):
     return " ".join(text.split())
 
 
-def interrupted(title: str) -> Any:
+@pytest.fixture
+def interrupted(shortened, monkeypatch):
     """A progress bar during which somebody presses Ctrl-C."""
 
     @contextmanager
-    def bar(title: str) -> Iterator[Any]:
-        def report(stage: str, fraction: float) -> None:
+    def bar(title):
+        def report(stage, fraction):
             if fraction > 0.0:
                 raise KeyboardInterrupt
 
         yield report
 
-    return bar(title)
+    monkeypatch.setattr("rotordrop.cli.estimate.progress_bar", bar)
 
 
-def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder: Path) -> None:
+def test_the_calibrated_machine_loads_with_intervals_and_provenance(folder):
     before, machine = load_machine(LP400), load_machine(folder / "calibrated.toml")
-    assert is_calibrated(machine) and not is_calibrated(before)
-    assert machine.calibration is not None and before.calibration is None
+    assert is_calibrated(machine) and not is_calibrated(before) and before.calibration is None
     digest = hashlib.sha256(Path(RECORD).read_bytes()).hexdigest()
     assert [(drop.name, drop.sha256) for drop in machine.calibration.drops] == [("drop_060", digest)]
     assert machine.calibration.consistent
     found = json.loads((folder / "calibration.json").read_text())["values"]
-    for b, bearing in enumerate(machine.touchdown_bearings):
+    for bearing, guess in zip(machine.touchdown_bearings, before.touchdown_bearings, strict=True):
         for path in ("stiffness", "mass", "damping"):
-            quantity = getattr(bearing.support, path)
-            entry = found[f"{bearing.name}.support.{path}"]
-            assert quantity.status == "estimated"
+            quantity, entry = getattr(bearing.support, path), found[f"{bearing.name}.support.{path}"]
+            assert (quantity.status, quantity.source) == ("estimated", "calibrated on drop_060")
             assert float(quantity) == pytest.approx(entry["value"])
-            assert quantity.interval_90 == pytest.approx(entry["interval_90"])
             low, high = quantity.interval_90
+            assert [low, high] == pytest.approx(entry["interval_90"])
             assert low < float(quantity) < high
-            assert quantity.source == "calibrated on drop_060"
-        assert float(bearing.air_gap) != float(before.touchdown_bearings[b].air_gap)
+        assert float(bearing.air_gap) != float(guess.air_gap)
     assert all(sensor.gain.status == "estimated" for sensor in machine.sensors)
 
 
-def test_the_calibration_says_what_the_records_determine(folder: Path) -> None:
+def test_the_calibration_says_what_the_records_determine(folder):
     found = json.loads((folder / "calibration.json").read_text())
     verdicts = {entry["path"]: entry["verdict"] for entry in found["identifiability"]}
     assert verdicts["NDE.support.stiffness"] == "determined"
@@ -145,34 +140,29 @@ def test_the_calibration_says_what_the_records_determine(folder: Path) -> None:
     assert set(found["checks"]) == set(found["nis"]) == {"drop_060"}
 
 
-def test_quick_estimate_writes_numbers_and_report(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out, page, film = tmp_path / "out.json", tmp_path / "report.html", tmp_path / "drop.gif"
-    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
-    assert run([*arguments, "--json", str(out), "--report", str(page), "--film", str(film)]) == 0
-    assert film.read_bytes().startswith(b"GIF89a")
+def test_quick_estimate_writes_numbers_and_report(calibrated, tmp_path, capsys):
+    out, page = tmp_path / "out.json", tmp_path / "report.html"
+    assert run([*calibrated, "--quick", "--json", str(out), "--report", str(page)]) == 0
     written = json.loads(out.read_text())
     jsonschema.Draft202012Validator(estimate_schema()).validate(written)
     assert written["method"] == "tracked"
-    twice = [warning for warning in written["warnings"] if "its readings count twice" in warning]
-    assert len(twice) == 1 and "calibrated on a drop named drop_060" in twice[0]
+    (twice,) = (warning for warning in written["warnings"] if "its readings count twice" in warning)
+    assert "calibrated on a drop named drop_060" in twice
     for name in ("NDE", "DE"):
         entry = written["bearings"][name]["peak_force_N"]
         low, high = entry["interval_90"]
         assert low < entry["value"] < high and 0.0 < entry["time_s"] < SHORT
     html = page.read_text(encoding="utf-8")
-    assert "This record is simulated" in html and 'src="http' not in html
+    assert "Simulated record." in html and 'src="http' not in html
     assert "Quick estimate: one pass over the record" in html
-    for heading in ("Impacts", "Parameters", "Consistency", "Orbit", "Hertz stress"):
+    for heading in ("Impacts", "Parameters", "Checks", "Orbit", "Severity"):
         assert f">{heading}<" in html
     told = words(capsys.readouterr().out)
-    assert f"Film: {film}" in told
     assert written["consistency"]["sentence"] in told
     assert str(page) in told.replace(" ", "")
 
 
-def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder: Path, tmp_path: Path) -> None:
+def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder, tmp_path):
     """Gap, first touch, impacts, begin of lasting contact: one rule, numbers within their intervals."""
     out = tmp_path / "out.json"
     assert run(["estimate", str(folder / "calibrated.toml"), RECORD, "--quick", "--json", str(out)]) == 0
@@ -180,15 +170,10 @@ def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder: Path, tmp_
     machine = load_machine(LP400)
     signal = recorded_coast_down(machine, read_record(RECORD, machine))
     off = estimate["drop_instant_s"]
-    assert signal.air_gap_error is not None
     for plane in seen.planes:
         name = plane.plane
-        down = find_settling(
-            signal.planes[name],
-            signal.sampling_rate,
-            air_gap=signal.air_gap[name],
-            start_time=signal.start_time,
-        )
+        known = {"air_gap": signal.air_gap[name], "start_time": signal.start_time}
+        down = find_settling(signal.planes[name], signal.sampling_rate, **known)
         own = [hit.time - off for hit in seen.impacts if hit.plane == name]
         contacts = estimate["bearings"][name]["impacts"]
         begun = [contact["start_s"] for contact in contacts if contact["after_flight"]]
@@ -203,7 +188,6 @@ def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder: Path, tmp_
         early, late = settled.contact_from_interval_90
         assert early - off < TRUE_IMPACTS[name][-1] < late - off
         assert begun == pytest.approx([time for time in TRUE_IMPACTS[name] if time < SHORT], abs=0.2e-3)
-        assert plane.touch_interval_90 is not None
         low, high = plane.touch_interval_90
         assert low < contacts[0]["start_s"] + off < high
         gaps = [
@@ -214,10 +198,10 @@ def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder: Path, tmp_
         assert max(gap[0] for gap in gaps) < min(gap[1] for gap in gaps)
 
 
-def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_the_full_estimate_sets_the_cross_check_beside_it(calibrated, tmp_path):
     out, page = tmp_path / "out.json", tmp_path / "report.html"
-    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL]
-    assert run([*arguments, "--json", str(out), "--report", str(page)]) == 0
+    assert run([*calibrated, "--json", str(out), "--report", str(page)]) == 0
     checks = {check["name"]: check for check in json.loads(out.read_text())["cross_check"]}
     assert set(checks) == {f"{b} peak {what}" for b in ("NDE", "DE") for what in ("force", "stress")}
     for check in checks.values():
@@ -227,55 +211,47 @@ def test_the_full_estimate_sets_the_cross_check_beside_it(folder: Path, tmp_path
     assert ">Independent cross-check<" in html and "Quick estimate" not in html
 
 
-def inconsistent(*_: object) -> tuple[Check, ...]:
-    return (Check(name="innovation size", passed=False, message="mean squared innovation 9.00 × expected"),)
+INCONSISTENT = (
+    Check(name="innovation size", passed=False, message="mean squared innovation 9.00 × expected"),
+)
 
 
+@pytest.mark.slow
 def test_an_estimate_inconsistent_with_its_record_is_written_and_ends_with_its_own_code(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", inconsistent)
+    calibrated, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", lambda *_: INCONSISTENT)
     out, page = tmp_path / "out.json", tmp_path / "report.html"
-    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, "--tail", TAIL, "--quick"]
-    code = run([*arguments, "--json", str(out), "--report", str(page)])
-    assert code == ConsistencyError.exit_code == 7
+    assert run([*calibrated, "--quick", "--json", str(out), "--report", str(page)]) == 7
     written = json.loads(out.read_text())
-    assert written["consistent"] is False and written["verdict"].startswith("The model is not consistent")
-    assert page.exists()
-    streams = capsys.readouterr()
-    told = words(streams.out)
-    assert told.index("problem: The model is not consistent") < told.index("peak bearing force")
-    assert "drop_060: The model is not consistent with the record" in words(streams.err)
-    assert "9.00 × expected" in words(streams.err)
+    assert written["consistent"] is False and page.exists()
+    told, complained = (words(text) for text in capsys.readouterr())
+    assert told.index("problem: ") < told.index("peak bearing force")
+    assert "drop_060: The model does not follow the record" in complained
+    assert "9.00 × expected" in complained
 
 
+@pytest.mark.slow
 def test_a_calibration_inconsistent_with_its_drops_is_not_written(
-    shortened: None,
-    fitted_once: Callable[[Search, Machine], Candidate],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+    shortened, fitted_once, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr("rotordrop.twin.calibrated.track_drops", fitted_once)
-    monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", inconsistent)
+    monkeypatch.setattr("rotordrop.twin.calibrated.consistency_checks", lambda *_: INCONSISTENT)
     output = tmp_path / "calibrated.toml"
     arguments = ["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]
-    assert run(arguments) == ConsistencyError.exit_code
+    assert run(arguments) == 7
     told = words(capsys.readouterr().err)
     assert f"not consistent with drop_060: intervals are doubled. {output} was not written" in told
     assert "--even-if-inconsistent writes the file all the same" in told and not output.exists()
-    assert run([*arguments, "--even-if-inconsistent"]) == ConsistencyError.exit_code
+    assert run([*arguments, "--even-if-inconsistent"]) == 7
     origin = load_machine(output).calibration
-    assert origin is not None and not origin.consistent and origin.drops[0].name == "drop_060"
+    assert not origin.consistent and origin.drops[0].name == "drop_060"
 
 
-def test_several_records_give_machine_and_drops(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy = another_drop(tmp_path)
-    page = tmp_path / "page.html"
-    arguments = ["estimate", str(folder / "calibrated.toml"), RECORD, str(copy), "--tail", TAIL, "--quick"]
-    assert run([*arguments, "--json", "-", "--report", str(page)]) == 0
+@pytest.mark.slow
+def test_several_records_give_machine_and_drops(calibrated, tmp_path, capsys):
+    copy, page = another_drop(tmp_path), tmp_path / "page.html"
+    assert run([*calibrated, str(copy), "--quick", "--json", "-", "--report", str(page)]) == 0
     written = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator(estimate_schema()).validate(written)
     assert written["machine"] == load_machine(LP400).name
@@ -283,127 +259,94 @@ def test_several_records_give_machine_and_drops(
     assert sorted(f.name for f in tmp_path.glob("*.html")) == ["page_drop_060.html", "page_second.html"]
 
 
-def test_a_stopped_calibration_leaves_no_file(
-    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("rotordrop.cli.estimate.progress_bar", interrupted)
+def test_a_stopped_calibration_leaves_no_file(interrupted, tmp_path, capsys):
     output = tmp_path / "calibrated.toml"
     assert run(["calibrate", LP400, RECORD, "--tail", TAIL, "--output", str(output)]) == INTERRUPTED
     assert "stopped; nothing was left half written" in words(capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_stopped_estimate_leaves_an_earlier_one_alone(
-    shortened: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("rotordrop.cli.estimate.progress_bar", interrupted)
+def test_a_stopped_estimate_leaves_an_earlier_one_alone(interrupted, tmp_path):
     earlier = tmp_path / "estimate.json"
     earlier.write_text("{}")
     arguments = ["estimate", LP400, RECORD, "--json", str(earlier), "--report", str(tmp_path / "r.html")]
     assert run(arguments) == INTERRUPTED
-    assert [file.name for file in tmp_path.iterdir()] == ["estimate.json"]
-    assert earlier.read_text() == "{}"
-
-
-def test_tails_must_fit_the_records(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tails = ["--tail", TAIL, "--tail", TAIL, "--tail", TAIL]
-    expected = "3 tails for 2 records; expected one for all, one for each, or none."
-    second = another_drop(tmp_path)
-    assert run(["estimate", LP400, RECORD, str(second), *tails]) == USAGE
-    assert expected in words(capsys.readouterr().err)
-    output = tmp_path / "out.toml"
-    assert run(["calibrate", LP400, RECORD, str(second), *tails, "--output", str(output)]) == USAGE
-    assert expected in words(capsys.readouterr().err)
-    assert not output.exists()
-
-
-@pytest.mark.parametrize("option", ["--json", "--report"])
-def test_an_unwritable_place_is_refused_before_anything_is_read(
-    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    nowhere = tmp_path / "nowhere" / "out"
-    assert run(["estimate", LP400, str(tmp_path / "no_record.csv"), option, str(nowhere)]) != 0
-    told = words(capsys.readouterr().err)
-    assert f"the folder {nowhere.parent} does not exist; create it first" in told
-    assert "no_record" not in told
-
-
-def test_calibrate_refuses_an_unwritable_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["calibrate", LP400, RECORD, "--output", str(tmp_path)]) != 0
-    assert f"cannot write {tmp_path}: it is a folder; name a file in it" in words(capsys.readouterr().err)
+    assert [(file, file.read_text()) for file in tmp_path.iterdir()] == [(earlier, "{}")]
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
 @pytest.mark.parametrize(
-    ("profile", "message"),
+    ("arguments", "message"),
     [
-        ("", "drop_060_tail cannot be used: no drop in the record: the shaft moves away by"),
         (
-            '[speed]\nconstant = "60 Hz"\n',
+            "{record} {other} --tail {tail} --tail {tail} --tail {tail}",
+            "3 tails for 2 records; expected one for all, one for each, or none.",
+        ),
+        ("{tail}", "drop_060_tail cannot be used: no drop in the record: the shaft moves away by"),
+        (
+            "{tail} --profile {profile}",
             "drop_060_tail cannot be used: missing pre-trigger: no drop in the record",
         ),
+        ("{record} {copy}", "copy.h5 are the same recording (equal content)"),
+        ("a/drop_060.csv b/drop_060.csv", "2 records are named 'drop_060'; expected a name of its own"),
     ],
 )
-def test_a_record_without_speed_or_drop_is_refused(
-    verb: str, profile: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    channels = tmp_path / "profile.toml"
-    channels.write_text(profile)
+def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_path, capsys):
+    (tmp_path / "profile.toml").write_text('[speed]\nconstant = "60 Hz"\n')
+    shutil.copy(RECORD, tmp_path / "copy.h5")
+    made = {name: tmp_path / file for name, file in (("profile", "profile.toml"), ("copy", "copy.h5"))}
+    call = arguments.format(record=RECORD, tail=TAIL, other=another_drop(tmp_path), **made).split()
     output = tmp_path / "out.toml"
-    arguments = [verb, LP400, TAIL, *(["--profile", str(channels)] if profile else [])]
-    assert run([*arguments, *(["--output", str(output)] if verb == "calibrate" else [])]) != 0
+    place = ["--output" if verb == "calibrate" else "--json", str(output)]
+    assert run([verb, LP400, *call, *place]) == (3 if "cannot be used" in message else USAGE)
     assert message in words(capsys.readouterr().err)
     assert not output.exists()
 
 
-def test_quick_needs_a_calibrated_machine(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quick_needs_a_calibrated_machine(capsys):
     assert run(["estimate", LP400, RECORD, "--quick"]) == USAGE
     told = words(capsys.readouterr().err)
     assert "--quick needs a calibrated machine" in told and "rotordrop calibrate" in told
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
-def test_one_recording_under_two_names_is_refused(
-    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    copy, output = tmp_path / "copy.h5", tmp_path / "out.toml"
-    copy.write_bytes(Path(RECORD).read_bytes())
-    place = ["--output" if verb == "calibrate" else "--json", str(output)]
-    assert run([verb, LP400, RECORD, str(copy), *place]) == USAGE
-    assert "are the same recording (equal content)" in words(capsys.readouterr().err)
-    assert not output.exists()
+def test_a_tail_of_another_recorder_has_a_profile_of_its_own(verb, tmp_path, capsys, monkeypatch):
+    """Also one without a speed, as recorders of slow data have none."""
+    other, rules = tmp_path / "slow.csv", tmp_path / "slow.toml"
+    other.write_text(Path(TAIL).read_text().replace("S_NDE_A", "X1").replace("S_DE_B", "Y2"))
+    rules.write_text('[channels]\nS_NDE_A = "X1"\nS_DE_B = "Y2"\n')
+    seen = []
+
+    def noted(_machine, _records, tails, **_others):
+        seen.extend(tails)
+        raise UsageError("seen")
+
+    monkeypatch.setattr("rotordrop.estimation.estimate_drops", noted)
+    monkeypatch.setattr("rotordrop.twin.calibrated.calibrate_machine", noted)
+    call = [verb, LP400, RECORD, "--tail", str(other)]
+    call += ["--output", str(tmp_path / "m.toml")] if verb == "calibrate" else []
+    assert run(call) == 3
+    assert "no channel 'S_NDE_A' for sensor S_NDE_A (2 sensors have none)" in capsys.readouterr().err
+    assert run([*call, "--tail-profile", str(rules)]) == USAGE
+    assert seen[0].channel_names == ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
+    assert seen[0].speed is None
 
 
-@pytest.mark.parametrize("verb", ["estimate", "calibrate"])
-def test_two_records_of_one_name_are_refused(
-    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    output = ["--output", str(tmp_path / "out.toml")] if verb == "calibrate" else []
-    assert run([verb, LP400, "a/drop_060.csv", "b/drop_060.csv", *output]) == USAGE
-    assert "2 records are named 'drop_060'; expected a name of its own" in words(capsys.readouterr().err)
-
-
-def warnings_for(machine: Machine, name: str) -> set[str]:
+def warnings_for(machine, name):
     """Warnings that the bundled record, under a name, gets for the calibration of a machine."""
-    known = {
-        INCONSISTENT_CALIBRATION,
-        *(COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second")),
-    }
-    return known & set(
-        facts_of(
-            Evidence(record=read_record(RECORD, machine), machine=machine, tail=None, name=name)
-        ).warnings
-    )
+    twice = {COUNTED_TWICE.format(drop) for drop in ("drop_060", "first", "first, second")}
+    evidence = Evidence(record=read_record(RECORD, machine), machine=machine, tail=None, name=name)
+    return {INCONSISTENT_CALIBRATION, *twice} & set(facts_of(evidence).warnings)
 
 
-def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration() -> None:
+def test_what_a_user_writes_as_a_source_is_not_taken_for_a_calibration():
     text = "calibrated on drop_060 (not consistent with them)"
     written = Known(value=1e8, status="estimated", interval_90=(9e7, 1.1e8), source=text)
     machine = load_machine(LP400).with_values({f"{end}.support.stiffness": written for end in ("NDE", "DE")})
     assert warnings_for(machine, "drop_060") == set()
 
 
-def test_a_drop_of_the_calibration_is_known_by_its_whole_name_or_its_hash() -> None:
+def test_a_drop_of_the_calibration_is_known_by_its_whole_name_or_its_hash():
     """A comma does not make two drops of it, and a copy under another name is the same recording."""
     digest = hashlib.sha256(Path(RECORD).read_bytes()).hexdigest()
     twice = {COUNTED_TWICE.format("first, second")}

@@ -26,7 +26,7 @@ def test_it_names_what_is_installed(capsys):
 def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys, monkeypatch):
     known = computer.version
 
-    def stated(name: str) -> str:
+    def stated(name):
         if name in ("pint", "npTDMS"):
             raise PackageNotFoundError(name)
         return known(name)
@@ -38,18 +38,6 @@ def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys,
     assert "missing: npTDMS; pip install 'rotordrop[io]'" in out
 
 
-def test_an_empty_cache_and_one_that_cannot_be_written_are_told_apart():
-    empty = {"folder": "/there", "writable": True, "kernels": 0, "bytes": 0}
-    assert computer.cache_lines(empty) == [
-        "compiled code is not cached yet in /there; the first run takes a minute or two"
-    ]
-    assert "cannot be written" in computer.cache_lines(empty | {"writable": False})[0]
-    full = empty | {"kernels": 12, "bytes": 3_400_000}
-    assert computer.cache_lines(full) == ["compiled code is cached: 12 kernels, 3.4 MB, in /there"]
-    assert "every run copies it" in computer.cache_lines(full | {"writable": False})[0]
-
-
 def test_requirements_lose_their_versions():
-    assert computer.bare("npTDMS>=1.9") == "npTDMS"
-    assert computer.bare("tree-sitter-toml>=0.7") == "tree-sitter-toml"
-    assert computer.bare("psycopg[binary]>=3.1") == "psycopg"
+    texts = ("npTDMS>=1.9", "tree-sitter-toml>=0.7", "psycopg[binary]>=3.1")
+    assert [*map(computer.bare, texts)] == ["npTDMS", "tree-sitter-toml", "psycopg"]

@@ -1,7 +1,5 @@
 """No command writes over what it reads, or twice to one place; any terminal can be printed to."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -14,6 +12,7 @@ from typing import get_args
 import pytest
 from tests.published import bearing, published, value
 
+from rotordrop import example_record_path, save_machine
 from rotordrop.cli import app
 from rotordrop.cli._output import FILLED, OUTPUTS
 from rotordrop.cli._terminal import printable
@@ -21,32 +20,32 @@ from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.files import write_json
 from rotordrop.machine import example_machine, example_path
-from rotordrop.machine.saving import save_machine
-from rotordrop.record.examples import example_record_path
-
-SMALL = example_path("small")
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Path:
+def machine(tmp_path):
     save_machine(example_machine("small"), tmp_path / "m.toml")
     return tmp_path / "m.toml"
 
 
+def linked(file, how):
+    how(file)
+    return file
+
+
+WAYS = {
+    "same name": lambda machine: machine,
+    "other spelling": lambda machine: machine.parent / "." / ".." / machine.parent.name / machine.name,
+    "link": lambda machine: linked(machine.parent / "link.json", lambda new: new.symlink_to(machine)),
+    "hard link": lambda machine: linked(machine.parent / "hard.json", lambda new: os.link(machine, new)),
+}
+
+
 @pytest.mark.parametrize("option", ["--json", "--report"])
-@pytest.mark.parametrize("way", ["same name", "other spelling", "link", "hard link"])
+@pytest.mark.parametrize("way", WAYS)
 def test_an_input_is_never_replaced(machine, option, way, capsys):
-    named = machine
-    if way == "other spelling":
-        named = machine.parent / "." / ".." / machine.parent.name / machine.name
-    if way == "link":
-        named = machine.parent / "link.json"
-        named.symlink_to(machine)
-    if way == "hard link":
-        named = machine.parent / "hard.json"
-        os.link(machine, named)
     before = machine.read_bytes()
-    assert run(["check", str(machine), option, str(named)]) == UsageError.exit_code
+    assert run(["check", str(machine), option, str(WAYS[way](machine))]) == UsageError.exit_code
     assert "is read by this command and would be replaced; name another" in _told(capsys)
     assert machine.read_bytes() == before
 
@@ -55,10 +54,9 @@ def test_the_shaft_table_of_a_machine_is_an_input_too(tmp_path, capsys):
     lp400 = example_path("lp400")
     for file in lp400.parent.glob("lp400*"):
         shutil.copy(file, tmp_path)
-    table = next(tmp_path.glob("*.csv"))
+    (table,) = tmp_path.glob("*.csv")
     before = table.read_bytes()
-    arguments = ["check", str(tmp_path / lp400.name), "--json", str(table)]
-    assert run(arguments) == UsageError.exit_code
+    assert run(["check", str(tmp_path / lp400.name), "--json", str(table)]) == UsageError.exit_code
     assert f"{table.name} is read by this command" in _told(capsys)
     assert table.read_bytes() == before
 
@@ -79,7 +77,7 @@ def test_every_path_of_every_command_is_known_as_read_or_written(verb):
             assert name in (*OUTPUTS, *FILLED), f"{verb.name} writes {name}: is it kept apart?"
 
 
-def _call(verb, option: str, place: str) -> list[str]:
+def _call(verb, option, place):
     """A call of a verb with one output; what else it asks for is no file that is there."""
     words = []
     for parameter in verb.load().params:
@@ -100,39 +98,37 @@ WRITTEN = [
 ]
 
 
+PLACES = {
+    "missing": ("{}/none/o.json", "does not exist; create it first"),
+    "deleted": ("o.json", "the folder you are in has been deleted"),
+    "deleted, by its name": ("{}/o.json", "does not exist; create it first"),
+    "read-only": ("{}/o.json", "is read-only; choose another"),
+    "a folder": ("{}", "it is a folder; name a file in it"),
+    "a long name": ("{}/" + "x" * 300, "File name too long; choose another place"),
+}
+
+
 @pytest.mark.parametrize(("verb", "option"), WRITTEN)
-@pytest.mark.parametrize(
-    "place", ["missing", "deleted", "deleted, by its name", "read-only", "a folder", "a long name"]
-)
+@pytest.mark.parametrize("place", PLACES)
 def test_a_place_that_takes_no_file_is_said_before_anything_is_read(
     verb, option, place, tmp_path, monkeypatch, capsys
 ):
-    folder = tmp_path / "place"
+    folder, (file, words) = tmp_path / "place", PLACES[place]
     folder.mkdir()
-    file, words = str(folder / "o.json"), "does not exist; create it first"
-    if place == "missing":
-        file = str(folder / "none" / "o.json")
     if place.startswith("deleted"):
         monkeypatch.chdir(folder)
         folder.rmdir()
-        if place == "deleted":
-            file, words = "o.json", "the folder you are in has been deleted"
     if place == "read-only":
         monkeypatch.setattr(os, "access", lambda path, mode: False)
-        words = "is read-only; choose another"
-    if place == "a folder":
-        file, words = str(folder), "it is a folder; name a file in it"
-    if place == "a long name":
-        file, words = str(folder / ("x" * 300)), "File name too long; choose another place"
     try:
-        assert run(_call(verb, option, file)) == 6
+        assert run(_call(verb, option, file.format(folder))) == 6
     finally:
         monkeypatch.undo()
     assert words in _told(capsys)
 
 
 @pytest.fixture(scope="module")
-def things(tmp_path_factory) -> Path:
+def things(tmp_path_factory):
     """A folder with what the commands read."""
     folder = tmp_path_factory.mktemp("things")
     save_machine(example_machine("small"), folder / "small.toml")
@@ -145,10 +141,8 @@ def things(tmp_path_factory) -> Path:
     )
     small = example_machine("small").name
     for name, force, machine in (("a", 3300.0, "m"), ("b", 2000.0, "m"), ("small", 900.0, small)):
-        peaks = {"peak_force_N": value(force), "peak_stress_Pa": value(1.5e9)}
-        drop = published(
-            record=name, record_sha256=name * 64, machine=machine, bearings={"DE": bearing(peaks)}
-        )
+        peaks = {"DE": bearing({"peak_force_N": value(force), "peak_stress_Pa": value(1.5e9)})}
+        drop = published(record=name, record_sha256=name * 64, machine=machine, bearings=peaks)
         write_json(folder / f"{name}.json", drop.as_json(), sealed=True)
     assert run(["log", "add", str(folder / "log.db"), str(folder / "a.json")]) == 0
     assert run(["study", "run", str(folder / "s.toml"), "--folder", str(folder / "study")]) == 0
@@ -173,29 +167,29 @@ CALLS = {
     "doctor": "doctor",
 }
 """Commands that end soon with what they write."""
-LONG = {"clearance", "estimate", "calibrate", "study repeat", "study rare", "study design"}
-"""Commands that compute for long: `studies/interruptions/full.py` calls them with a full disk, and what they
+LONG = {"clearance", "estimate", "calibrate", "study repeat"}
+"""Commands that compute for long: study `interruptions` calls them with a full disk, and what they
 write is written by functions that `test_written_files` gives one."""
-BEYOND = {"look share": "--licence CC0-1.0"}
 
 
 def test_every_command_that_writes_is_called_with_a_full_disk_or_computes_for_long():
     assert {verb.values[0].name for verb in WRITTEN} == set(CALLS) | LONG
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 @pytest.mark.parametrize(("verb", "option"), [one for one in WRITTEN if one.values[0].name in CALLS])
 def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, capsys):
-    suffix = {"output": ".h5", "share": ".h5", "film": ".gif"}.get(option, ".json")
+    suffix = {"output": ".h5"}.get(option, ".json")
     file = tmp_path / f"o{suffix}"
     file.symlink_to("/dev/full")
     monkeypatch.chdir(things)
     (parameter,) = (one for one in verb.load().params if one.name == option)
-    words = f"{CALLS[verb.name]} {BEYOND.get(f'{verb.name} {option}', '')}".split()
-    assert run([*words, parameter.opts[0], str(file)]) == 6
+    assert run([*CALLS[verb.name].split(), parameter.opts[0], str(file)]) == 6
     assert "No space left on device" in _told(capsys)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "verb",
     [
@@ -204,20 +198,19 @@ def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, 
         if verb.name in CALLS and any(parameter.name == "data" for parameter in verb.load().params)
     ],
 )
-@pytest.mark.parametrize("place", ["below a file", "deleted", "read-only"])
-def test_a_folder_that_cannot_be_made_is_a_sentence(verb, place, things, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("place", "made"), [("file/data", False), ("gone/data", True), ("/proc/data", False)]
+)
+def test_a_folder_that_cannot_be_made_is_a_sentence(verb, place, made, things, tmp_path, monkeypatch, capsys):
+    """Those above it are made; in /proc nobody makes one, not even root."""
     (tmp_path / "file").write_text("mine")
-    folder, words = tmp_path / "file" / "data", "cannot make the folder"
-    if place == "deleted":
-        folder = tmp_path / "gone" / "data"
-    if place == "read-only":
-        folder = Path("/proc/data")  # nobody makes a folder there, not even root
+    folder = tmp_path / place
     monkeypatch.chdir(things)
     code = run([*CALLS[verb.name].split(), "--data", str(folder)])
-    if place == "deleted":  # the folders above are made
+    if place == "gone/data":
         assert code == 0 and any(folder.iterdir())
     else:
-        assert code == 6 and words in _told(capsys)
+        assert code == 6 and "cannot make the folder" in _told(capsys)
     assert (tmp_path / "file").read_text() == "mine"
 
 
@@ -245,23 +238,36 @@ def test_a_name_that_is_too_long_and_a_folder_that_is_gone_are_a_sentence(
     assert "Traceback" not in _told(capsys)
 
 
+def called(machine, *arguments, encoding="utf-8", stdout=subprocess.PIPE):
+    return subprocess.run(
+        [sys.executable, "-m", "rotordrop", "check", str(machine), *arguments],
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        check=False,
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
 @pytest.mark.parametrize("arguments", [[], ["--json", "-"]])
 def test_any_encoding_of_the_terminal_will_do(machine, encoding, arguments):
-    done = _called(["check", str(machine), *arguments], encoding)
+    done = called(machine, *arguments, encoding=encoding)
     assert done.returncode == 0, done.stderr
     assert b"Traceback" not in done.stderr
     assert len(done.stdout) > 500
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_standard_output_is_a_sentence(machine):
     with open("/dev/full", "w") as full:
-        done = _called(["check", str(machine)], "utf-8", stdout=full)
+        done = called(machine, stdout=full)
     assert done.returncode == 6
     assert done.stderr.decode() == "rotordrop: cannot write the output: No space left on device\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&- <&-"])
 def test_closed_streams_do_no_harm(machine, closed):
@@ -282,26 +288,14 @@ def test_a_name_from_a_file_cannot_command_the_terminal(tmp_path, capsys):
     assert "\x1b" not in _told(capsys)
 
 
-def _told(capsys: pytest.CaptureFixture[str]) -> str:
+def _told(capsys):
     return " ".join(capsys.readouterr().err.split())
-
-
-def _called(
-    arguments: list[str], encoding: str, stdout: object = subprocess.PIPE
-) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-m", "rotordrop", *arguments],
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        check=False,
-        env=os.environ | {"PYTHONIOENCODING": encoding},
-    )
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        ("critical-speeds", "machine.toml", "--unbalance", "--data"),
+        ("critical-speeds", "machine.toml", "--data"),
         ("estimate", "machine.toml", "record.csv", "--data"),
         ("look", "record.h5", "machine.toml", "--split"),
     ],

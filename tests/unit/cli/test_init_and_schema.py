@@ -1,7 +1,5 @@
 """The verbs init and schema: files that are right, and none that overwrite another."""
 
-from __future__ import annotations
-
 import io
 import json
 import tomllib
@@ -20,17 +18,12 @@ def in_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_template_is_a_machine_that_passes_the_check(capsys):
+def test_the_template_is_a_commented_machine_that_passes_the_check(capsys):
     assert run(["init"]) == 0
     assert capsys.readouterr().err == "written: machine.toml\n"
     assert load_machine("machine.toml").touchdown_bearings
     assert run(["check", "machine.toml"]) == 0
-
-
-def test_the_template_is_commented():
-    run(["init", "my.toml"])
-    lines = Path("my.toml").read_text(encoding="utf-8").splitlines()
-    assert sum("#" in line for line in lines) > 30
+    assert sum("#" in line for line in Path("machine.toml").read_text(encoding="utf-8").splitlines()) > 30
 
 
 def test_nothing_is_overwritten_unasked(capsys):
@@ -50,9 +43,7 @@ def test_an_example_is_copied_whole(name):
 
 def test_the_example_with_a_recording_says_that_it_is_simulated():
     assert run(["init", "--example", "lp400"]) == 0
-    assert {"drop_060.h5", "drop_060_tail.csv", "README.md"} <= {
-        file.name for file in Path("lp400").iterdir()
-    }
+    assert {"drop_060.h5", "drop_060_tail.csv", "README.md"} <= {one.name for one in Path("lp400").iterdir()}
     assert "made by simulation" in Path("lp400/README.md").read_text(encoding="utf-8")
 
 
@@ -80,14 +71,9 @@ def test_the_schema_accepts_the_template_and_refuses_a_wrong_key(capsys):
         jsonschema.validate(machine | {"nmae": "x"}, schema)
 
 
-def test_the_schema_goes_to_a_file(capsys):
+def test_the_schema_goes_to_a_file():
     assert run(["init", "--schema", "machine", "machine.schema.json"]) == 0
-    assert (
-        json.loads(Path("machine.schema.json").read_text(encoding="utf-8"))["title"]
-        == "rotordrop machine file"
-    )
-    assert run(["init", "--schema", "machine", "nowhere/machine.schema.json"]) == 6
-    assert "the folder nowhere does not exist; create it first" in capsys.readouterr().err
+    assert json.loads(Path("machine.schema.json").read_text())["title"] == "rotordrop machine file"
 
 
 def test_the_schema_of_an_estimate_knows_its_fields(capsys):

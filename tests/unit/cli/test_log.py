@@ -1,12 +1,8 @@
 """The verb ``log``: add, show, allow, export, remove."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -18,9 +14,8 @@ from rotordrop.cli.app import run
 @pytest.fixture
 def estimate(tmp_path):
     peaks = {"peak_force_N": value(3300.0, 3200.0, 3400.0), "peak_stress_Pa": value(1.5e9)}
-    document = published(
-        machine="LP-400", record_sha256="c" * 64, bearings={"NDE": bearing(peaks), "DE": bearing(peaks)}
-    )
+    both = {"NDE": bearing(peaks), "DE": bearing(peaks)}
+    document = published(machine="LP-400", record_sha256="c" * 64, bearings=both)
     file = tmp_path / "estimate.json"
     file.write_text(json.dumps(document.as_json()))
     return str(file)
@@ -75,46 +70,24 @@ def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, 
     capsys.readouterr()
     for machine, told in (("LP-40", True), ("LP-400", False)):
         assert run(["log", "allow", log, "--machine", machine, "--drops", "10", "--source", "x"]) == 0
-        said = " ".join(capsys.readouterr().out.split())
-        assert (
-            f"no drop of {machine!r} is in the log, only of 'LP-400'; an allowance counts" in said
-        ) == told
+        none = f"no drop of {machine!r} is in the log, only of 'LP-400'; an allowance counts"
+        assert (none in " ".join(capsys.readouterr().out.split())) == told
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "message"),
+    ("arguments", "message"),
     [
-        (["show", "{log}"], 64, "is not there; 'rotordrop log add' makes a log"),
-        (["add", "{log}"], 64, "nothing to add"),
-        (["add", "{log}", "{log}"], 64, "cannot be read (No such file or directory). Give a file"),
-        (["add", "{log}", "{estimate}", "--recorded", "14.3.2026"], 64, "'14.3.2026' is not a date"),
-        (["export", "{log}", "{log}"], 64, "is the log itself; name another file"),
-        (["remove", "{log}", "first"], 64, "'first' is not the number of a drop"),
-        (["allow", "{log}", "--drops", "3", "--source", "x"], 64, "name it with --machine"),
+        ("show {log}", "is not there; 'rotordrop log add' makes a log"),
+        ("add {log}", "nothing to add"),
+        ("add {log} {log}", "cannot be read (No such file or directory). Give a file"),
+        ("add {log} {estimate} --recorded 14.3.2026", "'14.3.2026' is not a date"),
+        ("export {log} {log}", "is the log itself; name another file"),
+        ("remove {log} first", "'first' is not the number of a drop"),
+        ("allow {log} --drops 3 --source x", "name it with --machine"),
     ],
 )
-def test_a_wrong_call_says_what_was_expected(tmp_path, estimate, capsys, arguments, code, message):
-    names = {"log": str(tmp_path / "drops.db"), "estimate": estimate}
-    assert run(["log", *(argument.format(**names) for argument in arguments)]) == code
+def test_a_wrong_call_says_what_was_expected(tmp_path, estimate, capsys, arguments, message):
+    log = tmp_path / "drops.db"
+    assert run(["log", *arguments.format(log=log, estimate=estimate).split()]) == 64
     assert message in capsys.readouterr().err
-    assert not (tmp_path / "drops.db").exists()
-
-
-def test_what_has_no_digest_and_what_is_damaged_is_said(tmp_path, estimate, capsys):
-    log = str(tmp_path / "drops.db")
-    assert run(["log", "add", log, estimate]) == 0
-    with closing(sqlite3.connect(log)) as connection, connection:
-        connection.execute("DROP TABLE seals")
-    capsys.readouterr()
-    for note in ("an older rotordrop made this log, without digests", ""):
-        assert run(["log", "show", log]) == 0
-        assert note in " ".join(capsys.readouterr().err.split())
-        assert run(["log", "allow", log, "--machine", "LP-400", "--drops", "3", "--source", "x"]) == 0
-    with closing(sqlite3.connect(log)) as connection, connection:
-        connection.execute("UPDATE drops SET speed = 1")
-    capsys.readouterr()
-    assert run(["log", "show", log]) == 6
-    assert "drop 1 is not what was logged. Take a damaged drop out with 'rotordrop log remove'" in " ".join(
-        capsys.readouterr().err.split()
-    )
-    assert run(["log", "remove", log, "1"]) == 0
+    assert not log.exists()

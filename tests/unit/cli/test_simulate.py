@@ -1,8 +1,7 @@
 """The verb simulate: every start, every output, and messages that name what was written."""
 
-from __future__ import annotations
-
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -12,73 +11,59 @@ import numpy as np
 import pytest
 from tests.unit.simulate.looped import looped_machine
 
+from rotordrop import load_result, save_machine
 from rotordrop.cli.app import run
-from rotordrop.cli.simulate import magnet_events, named_pairs
+from rotordrop.cli.simulate import magnet_events
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
-from rotordrop.machine.saving import save_machine
-from rotordrop.simulate.result import load_result
 
 PAPER = str(example_path("paper"))
 SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduction", "quick"]
 
 
 def test_a_drop_from_the_centre_reaches_every_output(tmp_path, capsys):
-    files = {name: tmp_path / name for name in ("drop.h5", "drop.html", "drop.json", "drop.gif")}
-    arguments = [
-        "-o",
-        str(files["drop.h5"]),
-        "--report",
-        str(files["drop.html"]),
-        "--json",
-        str(files["drop.json"]),
-        "--film",
-        str(files["drop.gif"]),
-    ]
-    assert run([*SHORT, *arguments]) == 0
-    assert files["drop.gif"].read_bytes().startswith(b"GIF89a")
+    drop, page, told = (tmp_path / f"drop.{suffix}" for suffix in ("h5", "html", "json"))
+    assert run([*SHORT, "-o", str(drop), "--report", str(page), "--json", str(told)]) == 0
     text = capsys.readouterr().out
-    assert "The drop was simulated to 0.012 s" in text
-    assert "Peak bearing force" in text
-    numbers = json.loads(files["drop.json"].read_text())
-    result = load_result(files["drop.h5"])
+    assert "The drop was simulated to 0.012 s" in text and "Peak bearing force" in text
+    numbers, result = json.loads(told.read_text()), load_result(drop)
     assert numbers["speed_Hz"] == pytest.approx(60.0)
     assert list(numbers["bearings"]) == ["NDE", "DE"]
     for index, name in enumerate(result.bearing_names):
         found = numbers["bearings"][name]
-        largest = result.bearing_force_magnitude[:, index].max()
-        assert found["peak_force_N"]["value"] == pytest.approx(largest, rel=1e-3)
-        assert found["peak_force_N"]["value"] >= largest
-        assert found["stress_statistics_Pa"]["maximum"] == pytest.approx(
-            found["peak_stress_Pa"]["value"], rel=1e-3
-        )
+        peak, largest = found["peak_force_N"]["value"], result.bearing_force_magnitude[:, index].max()
+        assert largest <= peak == pytest.approx(largest, rel=1e-3)
+        stress = found["stress_statistics_Pa"]["maximum"]
+        assert stress == pytest.approx(found["peak_stress_Pa"]["value"], rel=1e-3)
         assert "mean_force_0p15_0p2_N" not in found
-    assert "everything here is computed" in files["drop.html"].read_text().lower()
+    assert "nothing was measured" in page.read_text()
+
+
+def first_touch(capsys, *arguments):
+    """When each bearing is touched first [s]."""
+    assert run([*SHORT, *arguments, "--json", "-"]) == 0
+    bearings = json.loads(capsys.readouterr().out)["bearings"]
+    return {name: one["impacts"][0]["start_s"] for name, one in bearings.items()}
 
 
 def test_the_first_contact_of_a_centred_drop_is_that_of_free_fall(capsys):
     """275 µm of free fall take 7.49 ms and 285 µm take 7.62 ms."""
-    assert run([*SHORT, "--json", "-"]) == 0
-    bearings = json.loads(capsys.readouterr().out)["bearings"]
+    found = first_touch(capsys)
     for name, gap in (("NDE", 275e-6), ("DE", 285e-6)):
-        assert bearings[name]["impacts"][0]["start_s"] == pytest.approx(np.sqrt(2 * gap / 9.81), rel=0.01)
+        assert found[name] == pytest.approx(np.sqrt(2 * gap / 9.81), rel=0.01)
 
 
 def test_a_start_lower_and_already_falling_is_in_contact_earlier(capsys):
     place = ["--displacement", "NDE: 0 um, -100 um", "--displacement", "DE: 0 um, -100 um"]
     move = ["--velocity", "NDE: 0 mm/s, -10 mm/s", "--velocity", "DE: 0 mm/s, -10 mm/s"]
-    assert run([*SHORT, *place, *move, "--json", "-"]) == 0
-    first = json.loads(capsys.readouterr().out)["bearings"]["NDE"]["impacts"][0]["start_s"]
     expected = (-0.01 + np.sqrt(0.01**2 + 2 * 9.81 * 175e-6)) / 9.81
-    assert first == pytest.approx(expected, rel=0.01)
+    assert first_touch(capsys, *place, *move)["NDE"] == pytest.approx(expected, rel=0.01)
 
 
 def test_a_lift_left_in_the_magnets_delays_the_contact(capsys):
-    times = []
-    for lift in ([], ["--remanent-force", "NDE: 0 N, 80 N", "--remanent-force", "DE: 0 N, 80 N"]):
-        assert run([*SHORT, "--levitated", *lift, "--json", "-"]) == 0
-        times.append(json.loads(capsys.readouterr().out)["bearings"]["NDE"]["impacts"][0]["start_s"])
-    assert times[1] > times[0] + 1e-4
+    lift = ["--remanent-force", "NDE: 0 N, 80 N", "--remanent-force", "DE: 0 N, 80 N"]
+    without, with_it = (first_touch(capsys, "--levitated", *more)["NDE"] for more in ([], lift))
+    assert with_it > without + 1e-4
 
 
 @pytest.mark.parametrize(
@@ -86,32 +71,20 @@ def test_a_lift_left_in_the_magnets_delays_the_contact(capsys):
     [
         (["--speed", "60"], 64, r"'60' has no unit; a speed needs one, for example '60 Hz'"),
         (["--displacement", "XX: 1 um, 2 um"], 64, r"'XX: 1 um, 2 um' is not 'NAME: horizontal, vertical'"),
-        (
-            ["--displacement", "NDE: 1 um"],
-            64,
-            r"with a name out of NDE, DE; write for example 'NDE: 10 um, -20 um'",
-        ),
+        (["--displacement", "NDE: 1 um"], 64, r"out of NDE, DE; write for example 'NDE: 10 um, -20 um'"),
         (["--velocity", "NDE: 1 um, 2 um"], 64, r"'1 um' is not a velocity|' 1 um' is not a velocity"),
         (["--levitated", "--velocity", "NDE: 0 m/s, 0 m/s"], 64, r"--levitated cannot go with"),
         (["--duration", "-1 s"], 5, r"duration is -1\.0; expected a positive, finite number"),
-        (["-o", "nowhere/drop.h5"], 6, r"the folder nowhere does not exist; create it first"),
         (["--reduction", "fast"], 64, r"'fast' is not one of"),
     ],
 )
 def test_a_refusal_names_the_value_and_leaves_nothing(
     tmp_path, monkeypatch, capsys, arguments, code, message
 ):
-    import re
-
     monkeypatch.chdir(tmp_path)
     assert run([*SHORT, "--json", "drop.json", *arguments]) == code
     assert re.search(message, capsys.readouterr().err)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_machine_without_the_part_is_told_so():
-    with pytest.raises(UsageError, match=r"'NDE: 0 N, 1 N' names a part of the machine, which has none"):
-        named_pairs(["NDE: 0 N, 1 N"], "force", [])
 
 
 def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path):
@@ -123,7 +96,7 @@ def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path)
         said = running.stderr.readline()
         time.sleep(1.0)
         running.send_signal(signal.SIGINT)
-        out, rest = running.communicate(timeout=60.0)
+        out, rest = running.communicate(timeout=600.0)
     assert "this will take long: at least" in said
     assert "million steps are needed, because the bearing damping of NDE on the mass of its support" in said
     assert running.returncode == 130
@@ -131,9 +104,10 @@ def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path)
     assert out == ""
 
 
+@pytest.mark.slow
 def test_a_lift_stands_on_the_terminal_the_page_and_in_json(tmp_path, capsys):
     save_machine(looped_machine(), tmp_path / "machine.toml")
-    arguments = ["simulate", str(tmp_path / "machine.toml"), "--speed", "60 Hz", "--duration", "0.15 s"]
+    arguments = ["simulate", str(tmp_path / "machine.toml"), "--speed", "60 Hz", "--duration", "0.11 s"]
     arguments += ["--levitated", "--delay", "5 ms", "--relevitate", "60 ms", "--output-step", "0.1 ms"]
     out = ["--report", str(tmp_path / "drop.html"), "--json", str(tmp_path / "drop.json")]
     assert run([*arguments, *out]) == 0

@@ -1,7 +1,5 @@
 """The verb ``study``: run, help, show."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
@@ -23,35 +21,37 @@ def study_file(tmp_path_factory):
 
 
 def test_a_study_runs_shows_and_helps(study_file, tmp_path, capsys):
-    numbers, page, drops = tmp_path / "s.json", tmp_path / "s.html", tmp_path / "s.h5"
+    numbers, page, drops, again = (tmp_path / name for name in ("s.json", "s.html", "s.h5", "again.json"))
     call = ["study", "run", str(study_file), "--by", "speed", "--threads", "1"]
     assert run([*call, "--json", str(numbers), "--report", str(page), "--output", str(drops)]) == 0
-    said = capsys.readouterr().out
-    assert "12 simulated drops" in said
+    assert "12 simulated drops" in capsys.readouterr().out
     content = json.loads(numbers.read_text())
     assert content["drops"] == 12
-    cells = content["maps"]["speed"]["NDE.peak_force"]
-    assert cells[0]["from"] >= 60 * 6.283
-    low, high = content["quantiles"]["NDE.peak_force"]["0.5"]["interval_90"]
-    assert 1000.0 < low < content["quantiles"]["NDE.peak_force"]["0.5"]["value"] < high < 6000.0
+    assert content["maps"]["speed"]["NDE.peak_force"][0]["from"] >= 60 * 6.283
+    median = content["quantiles"]["NDE.peak_force"]["0.5"]
+    low, high = median["interval_90"]
+    assert 1000.0 < low < median["value"] < high < 6000.0
     assert "Against speed" in page.read_text()
     folder = study_file.with_suffix("")
     before = (folder / "shards" / "000000.npy").read_bytes()
-    again = tmp_path / "again.json"
-    assert run(["study", "run", str(folder), "--claim", "--by", "speed", "--json", str(again)]) == 0
+    assert run(["study", "run", str(folder), "--by", "speed", "--json", str(again)]) == 0
     assert json.loads(again.read_text()) == content
     assert (folder / "shards" / "000000.npy").read_bytes() == before
     assert run(["study", "show", str(folder)]) == 0
 
 
-def test_what_cannot_be_done_is_said(study_file, tmp_path, capsys):
-    assert run(["study", "show", str(tmp_path)]) == 64
-    assert "is not a study folder" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ("show {empty}", "is not a study folder"),
+        ("run {file} --by spead --threads 1", "did you mean 'speed'"),
+        ("run {empty} --folder x", "leave out --folder"),
+    ],
+)
+def test_what_cannot_be_done_is_said(study_file, tmp_path, capsys, call, words):
     study_file.with_suffix("").mkdir(exist_ok=True)
-    assert run(["study", "run", str(study_file), "--by", "spead", "--threads", "1"]) == 64
-    assert "did you mean 'speed'" in capsys.readouterr().err
-    assert run(["study", "run", str(tmp_path), "--folder", "x"]) == 64
-    assert "leave out --folder" in capsys.readouterr().err
+    assert run(["study", *call.format(empty=tmp_path, file=study_file).split()]) == 64
+    assert words in capsys.readouterr().err
 
 
 def test_the_page_says_why_a_study_ended(study_file, tmp_path, capsys):

@@ -1,23 +1,15 @@
 """A recorded coast-down counts from the centre of the bearing, wherever the rotor floated before."""
 
-from __future__ import annotations
-
-import gc
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rotordrop import example_machine, example_record_path, look, read_record
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
-from rotordrop.evidence.look import look
-from rotordrop.evidence.paths import Motion, motion_of
-from rotordrop.machine import example_machine
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
-from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.spectrum.candidates import machine_candidates, swing_ranges
 from rotordrop.spectrum.indentation import displacement_history, find_settling, settling_words
-from rotordrop.spectrum.machine_candidates import machine_candidates, swing_ranges
 
 # Of the bundled recording, which is simulated: the DE floats 26.5 µm below the centre of its bearing.
 TRUE_GAP = {"NDE": 275e-6, "DE": 285e-6}
@@ -34,14 +26,18 @@ def record(machine):
     return read_record(example_record_path("lp400_drop_060"), machine)
 
 
+@pytest.fixture(scope="module")
+def signal(machine, record):
+    return recorded_coast_down(machine, record)
+
+
 def displaced(record, sideways):
     """The record with all sensors reading a distance [m] aside, as with zeros that are off."""
     angle = np.array([float(sensor.angle) for sensor in record.sensors])
     return replace(record, signals=record.signals + sideways * np.cos(angle))
 
 
-def test_air_gap_and_largest_displacement_are_those_of_the_estimate(machine, record):
-    signal = recorded_coast_down(machine, record)
+def test_the_gap_is_that_of_the_estimate_and_handed_on(machine, record, signal):
     for name, moved in signal.planes.items():
         # The vertical zeros of the sensors are off by up to 7 µm, which the tail cannot tell from the gap.
         assert signal.air_gap[name] == pytest.approx(TRUE_GAP[name], abs=9e-6)
@@ -54,11 +50,7 @@ def test_air_gap_and_largest_displacement_are_those_of_the_estimate(machine, rec
     assert found.largest == pytest.approx(TRUE_LARGEST["DE"], abs=1.5e-6)
     assert found.largest_time == pytest.approx(8.9e-3, abs=0.4e-3)
     assert "above the rest of the last 1 s" in signal.centre
-
-
-def test_the_found_gap_is_handed_on_with_its_interval(machine, record):
-    """The interval is that of a normal error on both sides; a search may not leave it."""
-    signal = recorded_coast_down(machine, record)
+    # The interval is that of a normal error on both sides; a search may not leave it.
     for name, gap in signal.air_gap.items():
         found = with_found_air_gaps(machine, signal).bearing(name).air_gap
         half = 1.6448536 * signal.air_gap_error[name]
@@ -70,9 +62,8 @@ def test_the_found_gap_is_handed_on_with_its_interval(machine, record):
         assert with_found_air_gaps(machine, rough).bearing(name).air_gap.lower == 0.5 * gap
 
 
-def test_the_speed_counts_from_power_off(machine, record):
+def test_neither_level_nor_swing_matter_and_time_counts_from_power_off(machine, record, signal):
     """One that was given by hand says from where the rotor fell, not how it slowed down."""
-    signal = recorded_coast_down(machine, record)
     time, speed = record.measured_speed
     np.testing.assert_array_equal(signal.speed, speed)
     assert np.ptp(time - signal.speed_time) < 1e-9
@@ -83,18 +74,10 @@ def test_the_speed_counts_from_power_off(machine, record):
     assert signal.profile.speed_at([0.0])[0] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
     by_hand = recorded_coast_down(machine, replace(record, speed_by_hand=True))
     assert (by_hand.speed, by_hand.speed_time, by_hand.profile) == (None, None, None)
-
-
-def test_the_levitated_position_does_not_matter(machine, record):
     aside = recorded_coast_down(machine, displaced(record, 30e-6))
-    plain = recorded_coast_down(machine, record)
-    for name, moved in plain.planes.items():
+    for name, moved in signal.planes.items():
         assert aside.planes[name][:] == pytest.approx(moved[:], abs=1e-9)
-        assert aside.air_gap[name] == pytest.approx(plain.air_gap[name], abs=1e-9)
-
-
-def test_a_swing_along_the_race_is_no_bounce(machine, record):
-    signal = recorded_coast_down(machine, record)
+        assert aside.air_gap[name] == pytest.approx(signal.air_gap[name], abs=1e-9)
     for name, moved in signal.planes.items():
         settled = find_settling(
             moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
@@ -106,9 +89,9 @@ def test_a_swing_along_the_race_is_no_bounce(machine, record):
         assert 1e-6 * told == pytest.approx(signal.air_gap[name] + 4e-6, abs=3.5e-6)
 
 
-def test_impacts_are_those_of_a_look_at_the_record(machine, record):
+def test_impacts_are_those_of_a_look_at_the_record(machine, record, signal):
     """One circle, one rule: counts, times and their intervals are the same, from power-off on."""
-    signal, looked = recorded_coast_down(machine, record), look(record, machine=machine)
+    looked = look(record, machine=machine)
     off = looked.planes[0].settling.touched[0] - signal.settling["NDE"].touched[0]
     for plane in looked.planes:
         found = signal.settling[plane.plane]
@@ -119,27 +102,7 @@ def test_impacts_are_those_of_a_look_at_the_record(machine, record):
         assert np.add(found.contact_from_interval_90, off) == pytest.approx(begun, abs=1e-9)
 
 
-def test_the_paths_of_the_record_are_gone_before_the_rotor_model_is_built(machine, record, monkeypatch):
-    """Of a minute they fill 100 MB, as much as the compiler that the model brings with it."""
-    order = []
-
-    def follow(*given, **words):
-        order.append("paths")
-        return motion_of(*given, **words)
-
-    def build(described):
-        order.append(sum(isinstance(one, Motion) for one in gc.get_objects()) - before)
-        return build_drop_model(described)
-
-    monkeypatch.setattr("rotordrop.evidence.paths.motion_of", follow)
-    monkeypatch.setattr("rotordrop.estimate.recorded_coast_down.build_drop_model", build)
-    before = sum(isinstance(one, Motion) for one in gc.get_objects())
-    recorded_coast_down(machine, replace(record))
-    assert order == ["paths", 0]
-
-
-def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record):
-    signal = recorded_coast_down(machine, record)
+def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record, signal):
     found = with_found_air_gaps(machine, signal)
     swings = {swing.bearing: swing for swing in swing_ranges(found)}
     assert swings["DE"].length == pytest.approx(287.3e-6, abs=2e-6)
@@ -153,15 +116,11 @@ def test_pendulum_length_and_plane_follow_from_the_found_gap(machine, record):
 def cut(record, seconds):
     """The record until so long after the nominal power-off [s]."""
     early = record.time < seconds
-    return replace(
-        record,
-        time=record.time[early],
-        signals=record.signals[early],
-        speed=None if record.speed is None else record.speed[early],
-    )
+    speed = None if record.speed is None else record.speed[early]
+    return replace(record, time=record.time[early], signals=record.signals[early], speed=speed)
 
 
-def test_a_record_that_ends_before_the_rest_counts_from_the_circle_that_it_shows(machine, record):
+def test_a_record_that_ends_too_early_says_what_its_centre_is(machine, record):
     signal = recorded_coast_down(machine, cut(record, 0.3))
     for name, gap in signal.air_gap.items():
         assert abs(gap - TRUE_GAP[name]) < min(1.65 * signal.air_gap_error[name], 20e-6)
@@ -169,9 +128,6 @@ def test_a_record_that_ends_before_the_rest_counts_from_the_circle_that_it_shows
     assert recorded_coast_down(machine, displaced(cut(record, 0.3), 20e-6)).air_gap == pytest.approx(
         signal.air_gap, abs=1e-6
     )
-
-
-def test_a_record_that_ends_in_the_fall_says_that_the_centre_is_a_guess(machine, record):
     signal = recorded_coast_down(machine, cut(record, 7e-3))
     assert signal.air_gap == {"NDE": 250e-6, "DE": 250e-6}
     assert signal.air_gap_error is None

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import butter, sosfilt
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
@@ -14,23 +16,31 @@ from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality import (
     NO_CHECK_SEES,
     Finding,
-    Kind,
     check_record,
     gate,
     not_seen,
     refuse_unusable,
     standing,
 )
-from rotordrop.evidence.quality import fall as quality_fall
-from rotordrop.evidence.quality.arrangement import check_planes
+from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes
+from rotordrop.evidence.quality.channels import check_channels
+from rotordrop.evidence.quality.continuity import check_continuity, check_orbit
 from rotordrop.evidence.quality.fall import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
-from rotordrop.evidence.quality.recorder import check_clock
+from rotordrop.evidence.quality.recorder import check_clock, check_filters, check_speed
+from rotordrop.evidence.quality.tail import check_rest_in_record
 from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench.sensor_chain import PERFECT
 
 HZ = 2 * np.pi
+
+
+def filtered(signals, rate, corner, kind):
+    sections = butter(2 if kind == "low" else 1, corner, btype=kind, fs=rate, output="sos")
+    level = np.mean(signals[: int(0.2 * rate)], axis=0)
+    return level + sosfilt(sections, signals - level, axis=0)
 
 
 def findings(record, machine, tail=None, kind=None):
@@ -46,68 +56,247 @@ def only(record, machine, tail=None, *, severity="stop", without=""):
     return found[0]
 
 
-def scaled(edited, record, factor, channels=slice(None)):
-    def change(signals):
-        signals[:, channels] *= factor
+def signals(change):
+    """A record with other readings, changed in place or given anew."""
 
-    return edited(record, change)
+    def edit(record):
+        readings = record.signals.copy()
+        changed = change(readings)
+        return replace(record, signals=readings if changed is None else np.ascontiguousarray(changed))
 
-
-def reordered(edited, record, order):
-    return edited(record, lambda signals: signals[:, order].copy())
-
-
-def test_a_sound_record_passes_without_a_word(whole_drop, tail, machine):
-    assert check_record(whole_drop, machine, tail) == ()
+    return edit
 
 
-def test_another_sound_record_only_lacks_length_and_standstill(fast_drop, machine):
-    kinds = {(found.kind, found.severity) for found in check_record(fast_drop, machine)}
-    assert kinds == {("short record", "warning"), ("record ends before standstill", "warning")}
+def held(at, count, channel, value=None):
+    def change(s):
+        s[at : at + count, channel] = s[at, channel] if value is None else value
+
+    return signals(change)
+
+
+def times(**channels):
+    return signals(lambda s: s * [channels.get(name, channels.get("all", 1.0)) for name in "abcd"])
+
+
+def order(*columns):
+    return signals(lambda s: s[:, columns])
+
+
+def spike(s):
+    s[9000, 2] += 60e-6
+
+
+def dead(s):
+    s[:, 1] = 3e-6 + 1e-7 * np.random.default_rng(1).normal(size=len(s))
+
+
+def two_missing(s):
+    s[5200, 2], s[5300, 2] = np.nan, np.inf
+
+
+def wander(s):
+    s[:, 0] += 300e-6 * np.linspace(0.0, 1.0, len(s))
+
+
+def cut(keep, clock):
+    """Rows that are kept, with their own times or under a clock that runs on."""
+
+    def edit(record):
+        rows = keep(len(record.time))
+        time = record.time[rows] if clock else record.time[: len(rows)]
+        return replace(record, time=time, signals=record.signals[rows], speed=record.speed[: len(rows)])
+
+    return edit
+
+
+def without_60(count):
+    return np.delete(np.arange(count), np.r_[5600:5660])
+
+
+def copied(count):
+    return np.r_[0:5600, 5500 : count - 100]
+
+
+def at(sample, value):
+    def edit(record):
+        time = record.time.copy()
+        time[sample] = time[value]
+        return replace(record, time=time)
+
+    return edit
+
+
+def clock(factor, unit=1.0):
+    """A clock that is too fast by a factor, and the times of the speed with it."""
+
+    def edit(record):
+        start = record.time[0] if unit == 1.0 else 0.0
+        time, when = (start + (t - start) / factor for t in (record.time, record.speed_time))
+        rate = factor * record.sampling_rate
+        return replace(record, time=time, speed_time=when, sampling_rate=rate, metadata={})
+
+    return edit
+
+
+def speed(change):
+    def edit(record):
+        return replace(record, speed_readings=change(record.speed_readings.copy(), record.speed_time))
+
+    return edit
+
+
+def pulse(read, when):
+    read[30] *= 2
+    return read
+
+
+def not_finite(read, when):
+    read[7] = np.nan
+    return read
+
+
+def dies(read, when):
+    return np.where(when > 0.0, 0.0, read)
+
+
+def no_speed(record):
+    return replace(record, speed=None, speed_time=None, speed_readings=None)
+
+
+def hum(size, mains):
+    return lambda record: replace(
+        record, signals=record.signals + size * np.sin(HZ * mains * record.time)[:, None]
+    )
+
+
+def through(corner, kind):
+    return lambda record: replace(record, signals=filtered(record.signals, 20e3, corner, kind))
+
+
+def late(channel, delay):
+    def edit(record):
+        readings = record.signals.copy()
+        moved = np.interp(record.time - delay, record.time, readings[:, channel])
+        early = record.time - delay < record.time[0]
+        readings[:, channel] = np.where(early, readings[:, channel], moved)
+        return replace(record, signals=readings)
+
+    return edit
+
+
+def window(since, until=np.inf):
+    return lambda record: record.window(since, until)
+
+
+def damaged(record):
+    return replace(record, warnings=("the file ends within line 7",))
+
+
+NAMES = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
+A, B, C, D = NAMES
+EVERY = ", ".join(NAMES)
+NDE, ENDS, CROSSED, OVER = f"{A}, {B}", f"{A}, {C}, {B}, {D}", f"{A}, {C}", f"{A}, {D}"
+BACK, RATE, UNIT = "non-monotonic time", "wrong sampling rate", "wrong unit factor"
+LOST = "dropped block"
+TURNED, LATE = "inverted polarity", "missing pre-trigger"
+
+FAULTS = {
+    "NaN": ("drop", signals(two_missing), "missing samples", C, "2 of 11001 samples are NaN"),
+    "dead": ("drop", signals(dead), "dead channel", B, "around 3.0"),
+    "constant": ("drop", held(0, 99999, 3, 0.0), "dead channel", D, "moves by 0 m around 0 m"),
+    "stuck": ("drop", held(6000, 500, 0), "stuck channel", A, "(25 ms) read exactly"),
+    "held shortly": ("drop+", held(6000, 12, 0), "stuck channel", A, "12 samples (0.6 ms)"),
+    "six held": ("drop+", held(6000, 6, 1), "stuck channel", B, "6 samples (0.3 ms)"),
+    "steps": ("drop+", held(9000, 6, 3, 0.0), "spikes", D, "2 steps of up to"),
+    "spike": ("drop+", signals(spike), "spikes", C, "1 single samples"),
+    "clock back": ("drop", at(5000, 4990), BACK, None, "after sample 5000 at -5e-05 s"),
+    "time twice": ("drop", at(100, 99), BACK, None, ""),
+    "gap": ("drop", cut(without_60, True), LOST, None, "60 samples are missing"),
+    "hidden gap": ("drop", cut(without_60, False), LOST, None, "1 jump(s) of most"),
+    "copy": ("drop", cut(copied, False), "duplicate block", None, "repeat those from 0.025 s"),
+    "half a rate": ("drop", clock(0.5), RATE, None, "at 60 Hz by the speed channel"),
+    "double rate": ("drop", clock(2.0), RATE, None, "so the clock is wrong"),
+    "2 % fast": ("drop+", clock(1.02), RATE, None, "of the speed channel, +2.0 % or more"),
+    "ms for s": ("drop", clock(1e-3, unit=1e3), RATE, None, "the clock gives 20 Hz over"),
+    "no speed": ("drop", no_speed, "speed missing", None, "S_NDE_A"),
+    "rpm for Hz": ("drop", speed(lambda r, _: 60 * r), "wrong speed unit", "speed", "rpm taken for Hz"),
+    "Hz for rpm": ("drop", speed(lambda r, _: r / 60), "wrong speed unit", "speed", "Hz taken for rpm"),
+    "half a speed": ("drop", speed(lambda r, _: 0.5 * r), "wrong speed", "speed", "so the speed is wrong"),
+    "double speed": ("drop", speed(lambda r, _: 2.0 * r), "wrong speed", "speed", "so the speed is wrong"),
+    "pulse": ("drop+", speed(pulse), "speed readings", "speed", "1 readings jump, the first to 1"),
+    "NaN speed": ("drop", speed(not_finite), "speed readings", "speed", "are not finite"),
+    "dead speed": ("whole_drop", speed(lambda r, t: 0.0 * r), "dead speed", "speed", "from the begin"),
+    "speed dies": ("whole_drop", speed(dies), "dead speed", "speed", "to nothing"),
+    "negative": ("whole_drop+", speed(lambda r, t: -r), "negative speed", "speed", "the sign is left out"),
+    "mm for µm": ("drop", times(all=1e3), UNIT, EVERY, "unit factor of 1000"),
+    "µm for mm": ("drop", times(all=1e-3), UNIT, EVERY, "unit factor of 0.001"),
+    "mil for µm": ("drop", times(all=25.4), UNIT, EVERY, "mil and µm mixed up"),
+    "µm for mil": ("drop", times(all=1 / 25.4), UNIT, EVERY, "mil and µm"),
+    "one in mil": ("drop", times(c=1 / 25.4), UNIT, C, "mil and µm"),
+    "gain of two": ("drop+", times(c=2.0), "wrong gain", C, "reading about 1.6 ×"),
+    "inverted 0": ("drop", times(a=-1.0), TURNED, A, "it fits with S_NDE_A inverted"),
+    "inverted 1": ("drop", times(b=-1.0), TURNED, B, "it fits with S_NDE_B inverted"),
+    "inverted 2": ("drop", times(c=-1.0), TURNED, C, "it fits with S_DE_A inverted"),
+    "inverted 3": ("drop", times(d=-1.0), TURNED, D, "it fits with S_DE_B inverted"),
+    "axes": ("drop", order(1, 0, 2, 3), "swapped axes", NDE, "S_NDE_A and S_NDE_B exchanged"),
+    "axes, fast": ("fast_drop", order(1, 0, 2, 3), "swapped axes", NDE, "S_NDE_A and S_NDE_B exchanged"),
+    "all axes": ("drop", order(1, 0, 3, 2), "swapped axes", EVERY, "against the spin"),
+    "ends": ("drop", order(2, 3, 0, 1), "swapped ends", ENDS, "S_NDE_B and S_DE_B exchanged"),
+    "ends, fast": ("fast_drop", order(2, 3, 0, 1), "swapped ends", ENDS, "exchanged"),
+    "crossed": ("fast_drop", order(2, 1, 0, 3), "swapped channels", CROSSED, "exchanged"),
+    "crossed over": ("fast_drop", order(3, 1, 2, 0), "swapped channels", OVER, "exchanged"),
+    "no drop": ("drop", window(-0.25, -0.01), "no drop in the record", None, "spans 26.5 µm, 20.5 µm"),
+    "begins late": ("drop", window(0.002, 0.3), LATE, None, ""),
+    "begins shortly before": ("drop", window(-0.01, 0.3), LATE, None, ""),
+    "begins thrown about": ("whole_drop", window(0.035, 0.6), LATE, None, ""),
+    "short": ("drop+", window(-0.25, 0.1), "short record", None, "ends 100."),
+    "damage": ("drop+", damaged, "damage on reading", None, "line 7"),
+    "drift": ("drop+", signals(wander), "drift", A, "it wanders by"),
+    "hum hides": ("drop", hum(100e-6, 60.0), "hum", EVERY, "mains hum of 60 Hz"),
+    "low-pass 50": ("whole_drop", through(50.0, "low"), "recorder low-pass", None, "has smoothed both"),
+    "low-pass 200": ("whole_drop", through(200.0, "low"), "recorder low-pass", None, "has smoothed both"),
+    "coupled 0.3": ("whole_drop", through(0.3, "high"), "AC coupling", None, "cannot rise"),
+    "coupled 1": ("whole_drop", through(1.0, "high"), "AC coupling", None, "cannot rise"),
+    "late 0.5 ms": ("drop+", late(1, 5e-4), "late channel", B, "about 0.4 ms late"),
+    "late 1 ms": ("drop+", late(2, 1e-3), "late channel", C, "S_DE_A"),
+    "late 2 ms": ("drop+", late(3, 2e-3), "late channel", D, "S_DE_B"),
+}
+"""Record, mistake, kind, channel and words of the one a warning with a tail (+), else a stop."""
+
+TIMES = {
+    "NaN": 0.01,
+    "stuck": 0.05,
+    "held shortly": 0.05,
+    "six held": 0.05,
+    "spike": 0.2,
+    "gap": 0.02995,
+    "hidden gap": 0.02995,
+    "copy": 0.03,
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_named_with_channel_and_time(fault, request, machine):
+    name, edit, kind, channel, words = FAULTS[fault]
+    record, tail = request.getfixturevalue(name.rstrip("+")), None
+    if name.endswith("+"):
+        tail = request.getfixturevalue("tail")
+    one = only(edit(record), machine, tail, severity="stop" if tail is None else "warning")
+    assert (one.kind, one.channel) == (kind, channel), one
+    assert fault not in TIMES or one.time == pytest.approx(TIMES[fault])
+    assert words in one.message
+    assert one.remedy
 
 
 def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):
     found = only(whole_drop, machine, severity="warning")
-    assert found.kind == "record ends before standstill"
-    assert "47.7 Hz (2860 rpm) at 2 s" in found.message
-    assert "settled tail" in found.remedy
-    assert found.time == pytest.approx(2.0)
+    assert (found.kind, found.time) == ("record ends before standstill", pytest.approx(2.0))
 
 
-def _block_exchanged(signals):
-    """Two blocks of eight samples of a channel while the rotor floats."""
-    signals[1000:1016, 1] = np.roll(signals[1000:1016, 1].copy(), 8)
-
-
-UNSEEN_FAULTS = {
-    "in the tail ends exchanged": lambda edited, drop, tail: (drop, reordered(edited, tail, [2, 3, 0, 1])),
-    ", axes exchanged": lambda edited, drop, tail: (drop, reordered(edited, tail, [1, 0, 3, 2])),
-    "all gains off by 20 %": lambda edited, drop, tail: (
-        scaled(edited, drop, 1.2),
-        scaled(edited, tail, 1.2),
-    ),
-    "blocks exchanged": lambda edited, drop, tail: (edited(drop, _block_exchanged), tail),
-}
-
-
-@pytest.mark.parametrize("words", UNSEEN_FAULTS)
-def test_what_the_gate_cannot_see_of_this_record_is_said_and_passes_it(
-    words, whole_drop, tail, machine, edited
-):
-    spoiled, other = UNSEEN_FAULTS[words](edited, whole_drop, tail)
-    assert check_record(spoiled, machine, other) == ()
-    said = not_seen(Evidence(record=spoiled, machine=machine, tail=other))
-    assert said.startswith(NO_CHECK_SEES) and words in said
-    assert len(said) <= 185  # two lines of a terminal, so that the first screen of an estimate keeps it
-
-
-def test_what_the_gate_sees_of_this_record_is_not_said_to_pass(whole_drop, tail, machine, edited):
-    def moved(signals):
-        signals[:, 0] += 4e-5
-
-    assert "zeros off" not in not_seen(Evidence(record=whole_drop, machine=machine, tail=tail))
-    assert only(whole_drop, machine, edited(tail, moved), severity="warning").kind == "tail offset"
-    assert "tail" not in not_seen(Evidence(record=whole_drop, machine=machine))
+def test_sound_records_pass_without_a_word(whole_drop, tail, machine, fast_drop):
+    assert check_record(whole_drop, machine, tail) == ()
+    kinds = {(found.kind, found.severity) for found in check_record(fast_drop, machine)}
+    assert kinds == {("short record", "warning"), ("record ends before standstill", "warning")}
 
 
 def test_what_a_stopped_gate_did_not_ask_is_said_to_pass(whole_drop, machine, edited):
@@ -116,74 +305,18 @@ def test_what_a_stopped_gate_did_not_ask_is_said_to_pass(whole_drop, machine, ed
     passed = gate(Evidence(record=slow, machine=machine))
     said = not_seen(Evidence(record=slow, machine=machine), passed=passed)
     assert "as the checks end with 'speed missing', axes exchanged or reversed, ends exchanged" in said
-    turned = reordered(edited, slow, [1, 0, 3, 2])
+    turned = order(1, 0, 3, 2)(slow)
     assert [one.kind for one in gate(Evidence(record=turned, machine=machine)).findings] == ["speed missing"]
     whole = Evidence(record=whole_drop, machine=machine)
     assert not_seen(whole, passed=gate(whole)) == not_seen(whole)
+    assert not_seen(whole).startswith(NO_CHECK_SEES)
 
 
 class TestSingleChannels:
-    def test_missing_samples(self, drop, machine, edited):
-        def change(signals):
-            signals[5200, 2] = np.nan
-            signals[5300, 2] = np.inf
-
-        found = only(edited(drop, change), machine)
-        assert (found.kind, found.channel) == ("missing samples", "S_DE_A")
-        assert found.time == pytest.approx(0.01)
-        assert "2 of 11001 samples are NaN or infinite, the first at 0.01 s" in found.message
-
-    @pytest.mark.parametrize("value", [7.5e229, 1e-208, -1e-310], ids=str)
-    def test_bytes_that_are_no_reading(self, drop, machine, edited, value):
-        """Exchanged or zeroed bytes of a file read as numbers that no sensor gives; they went unnoticed."""
-
-        def change(signals):
-            signals[5200, 2] = value
-
-        found = only(edited(drop, change), machine)
-        assert (found.kind, found.channel) == ("damaged block", "S_DE_A")
-        assert "1 of 11001 samples are no readings, the first," in found.message
-        assert "at 0.01 s: bytes of the file have changed" in found.message
-
     def test_clipping(self, drop, machine, edited):
         found = check_record(edited(drop, lambda signals: np.clip(signals, -220e-6, None)), machine)
         assert {one.kind for one in found if one.severity == "stop"} == {"clipping"}
         assert {one.channel for one in found} >= {"S_NDE_B", "S_DE_B"}
-        assert "stays at its lower limit -220 µm for up to" in found[0].message
-
-    def test_a_dead_channel(self, drop, machine, edited):
-        def change(signals):
-            signals[:, 1] = 3e-6 + 1e-7 * np.random.default_rng(1).normal(size=len(signals))
-
-        found = only(edited(drop, change), machine)
-        assert (found.kind, found.channel) == ("dead channel", "S_NDE_B")
-        assert "around 3.0" in found.message
-
-    def test_a_constant_channel_is_dead_too(self, drop, machine, edited):
-        def change(signals):
-            signals[:, 3] = 0.0
-
-        found = only(edited(drop, change), machine)
-        assert (found.kind, found.channel) == ("dead channel", "S_DE_B")
-        assert "moves by 0 m around 0 m" in found.message
-
-    def test_a_stuck_channel(self, drop, machine, edited):
-        def change(signals):
-            signals[6000:6500, 0] = signals[6000, 0]
-
-        found = only(edited(drop, change), machine)
-        assert (found.kind, found.channel) == ("stuck channel", "S_NDE_A")
-        assert found.time == pytest.approx(0.05)
-        assert "(25 ms) read exactly" in found.message
-
-    def test_a_short_hold_is_stuck_too_and_gone_on_without(self, drop, tail, machine, edited):
-        def change(signals):
-            signals[6000:6012, 0] = signals[6000, 0]
-
-        found = only(edited(drop, change), machine, tail, severity="warning")
-        assert (found.kind, found.channel) == ("stuck channel", "S_NDE_A")
-        assert "12 samples (0.6 ms)" in found.message
-        assert "the tracked twin goes on without these samples" in found.remedy
 
     def test_a_hold_of_all_channels_is_no_dropped_block(self, drop, tail, machine, edited):
         """2 ms were refused as a record to be made again, which a drop that happened cannot be."""
@@ -206,44 +339,23 @@ class TestSingleChannels:
         assert np.argwhere(bad[6040:]).tolist() == [[9000 - 6040, 2]]
         assert not Evidence(record=drop, machine=machine).damaged.any()
 
-    def test_a_damaged_block(self, drop, tail, machine, edited):
-        def change(signals):
-            signals[9000:9006, 3] = 0.0
-
-        found = only(edited(drop, change), machine, tail, severity="warning")
-        assert (found.kind, found.channel) == ("spikes", "S_DE_B")
-        assert "2 steps of up to" in found.message
-
-    def test_spikes(self, drop, tail, machine, edited):
-        def change(signals):
-            signals[9000, 2] += 60e-6
-
-        found = only(edited(drop, change), machine, tail, severity="warning")
-        assert (found.kind, found.channel) == ("spikes", "S_DE_A")
-        assert found.time == pytest.approx(0.2)
-        assert "1 single samples stand out by up to" in found.message
-
-    def test_coarse_quantisation_is_no_clipping(self, drop, machine, edited):
+    def test_coarse_steps_are_neither_clipping_nor_spikes(self, drop, machine, edited):
         found = check_record(edited(drop, lambda signals: np.round(signals / 2e-6) * 2e-6), machine)
         assert {one.kind for one in found if one.channel} == {"coarse quantisation"}
-        assert "steps of 2.00 µm" in found[0].message
+        found = check_record(edited(drop, lambda signals: np.round(signals / 7e-6) * 7e-6), machine)
+        assert "coarse quantisation" in {one.kind for one in found}
+        assert "spikes" not in {one.kind for one in found}
 
     def test_hum(self, drop, tail, machine):
         loud = replace(drop, signals=drop.signals + 6e-6 * np.cos(HZ * 50 * drop.time)[:, None])
         found = findings(loud, machine, tail, "hum")
         assert [one.channel for one in found] == list(drop.channel_names)
-        assert all("50 Hz with 6." in one.message or "50 Hz with 5." in one.message for one in found)
 
     def test_hum_above_the_line_of_the_rotor_is_no_wrong_speed(self, drop, machine):
         loud = replace(drop, signals=drop.signals + 25e-6 * np.cos(HZ * 50 * drop.time)[:, None])
         stops = {one.kind for one in check_record(loud, machine) if one.severity == "stop"}
         assert not stops & {"wrong speed", "wrong sampling rate", "wrong speed unit"}
         assert len(findings(loud, machine, None, "hum")) == len(drop.channel_names)
-
-    def test_steps_of_a_coarse_converter_are_no_spikes(self, drop, machine, edited):
-        found = check_record(edited(drop, lambda signals: np.round(signals / 7e-6) * 7e-6), machine)
-        assert "coarse quantisation" in {one.kind for one in found}
-        assert "spikes" not in {one.kind for one in found}
 
     def test_noise(self, drop, tail, machine):
         rng = np.random.default_rng(2)
@@ -254,71 +366,22 @@ class TestSingleChannels:
 
 
 class TestClock:
-    def test_backward(self, drop, machine):
-        time = drop.time.copy()
-        time[5000] = time[4990]
-        found = only(replace(drop, time=time), machine)
-        assert found.kind == "non-monotonic time"
-        assert "sample 5001 is at -0.0005 s after sample 5000 at -5e-05 s" in found.message
-
-    def test_repeated(self, drop, machine):
-        time = drop.time.copy()
-        time[100] = time[99]
-        assert only(replace(drop, time=time), machine).kind == "non-monotonic time"
-
-    def test_a_gap_in_the_clock(self, drop, machine):
-        keep = np.r_[0:5600, 5660 : len(drop.time)]
-        cut = replace(drop, time=drop.time[keep], signals=drop.signals[keep], speed=drop.speed[keep])
-        found = only(cut, machine)
-        assert (found.kind, found.time) == ("dropped block", pytest.approx(0.02995))
-        assert "60 samples are missing after 0.02995 s" in found.message
-
-    def test_a_gap_the_clock_hides(self, drop, machine):
-        keep = np.r_[0:5600, 5660 : len(drop.time)]
-        count = len(keep)
-        cut = replace(drop, time=drop.time[:count], signals=drop.signals[keep], speed=drop.speed[:count])
-        found = only(cut, machine)
-        assert (found.kind, found.time) == ("dropped block", pytest.approx(0.02995))
-        assert "1 jump(s) of most channels at once" in found.message
-
-    def test_a_block_that_is_there_twice(self, drop, machine):
-        keep = np.r_[0:5600, 5500 : len(drop.time) - 100]
-        found = only(replace(drop, signals=drop.signals[keep]), machine)
-        assert (found.kind, found.time) == ("duplicate block", pytest.approx(0.03))
-        assert "100 samples from 0.03 s on repeat those from 0.025 s" in found.message
-
-    def test_jitter(self, drop):
+    def test_clocks_that_scatter_contradict_or_are_slow(self, drop):
         jitter = 4e-6 * np.random.default_rng(0).normal(size=len(drop.time))
         found = check_clock(replace(drop, time=drop.time + jitter))
         assert [one.kind for one in found] == ["jittered clock"]
-        assert "µs scatters by 11" in found[0].message
-
-    def test_a_clock_that_scatters_everywhere_drops_no_block(self, drop):
         late = 0.4 * 5e-5 * np.random.default_rng(0).uniform(-1.0, 1.0, len(drop.time))
         assert [one.kind for one in check_clock(replace(drop, time=drop.time + late))] == ["jittered clock"]
-
-    def test_a_rate_that_contradicts_the_header(self, drop):
         found = check_clock(replace(drop, metadata={"fs [Hz]": "25000"}))
         assert [one.kind for one in found] == ["wrong sampling rate"]
-        assert "header says 25000 Hz, the time column 20000 Hz" in found[0].message
+        slow = replace(drop, time=drop.time * 20, sampling_rate=1000.0)
+        assert [one.kind for one in check_clock(slow)] == ["slow sampling"]
+        assert check_clock(slow, drop=False) == []
 
     @pytest.mark.parametrize("rate", [float("nan"), 0.0, float("inf")])
     def test_a_rate_that_is_none(self, drop, machine, rate):
         found = check_record(replace(drop, sampling_rate=rate), machine)
         assert [finding.kind for finding in found] == ["wrong sampling rate"]
-        assert f"the sampling rate is {rate:g} Hz" in found[0].message
-
-    def test_slow_sampling(self, drop):
-        slow = replace(drop, time=drop.time * 20, sampling_rate=1000.0)
-        assert [one.kind for one in check_clock(slow)] == ["slow sampling"]
-        assert check_clock(slow, drop=False) == []
-
-    def test_a_rate_that_contradicts_the_speed(self, drop, machine):
-        slow = replace(drop, time=drop.time * 2, sampling_rate=10000.0, speed_time=drop.speed_time * 2)
-        found = only(slow, machine)
-        assert found.kind == "wrong sampling rate"
-        assert "a factor 0.49" in found.message or "a factor 0.50" in found.message
-        assert "at 60 Hz by the speed channel" in found.message
 
 
 def test_the_fall_has_begun_when_half_of_the_channels_went_a_quarter_of_their_way(drop):
@@ -332,24 +395,11 @@ def test_the_fall_has_begun_when_half_of_the_channels_went_a_quarter_of_their_wa
 
 
 class TestSpeed:
-    def test_missing(self, drop, machine):
-        silent = replace(drop, speed=None, speed_time=None, speed_readings=None)
-        found = only(silent, machine)
-        assert found.kind == "speed missing"
-        assert '[speed] constant = "60 Hz"' in found.remedy
-
-    def test_rpm_taken_for_hertz(self, drop, machine):
-        wrong = replace(drop, speed=60 * drop.speed, speed_readings=60 * drop.speed_readings)
-        found = only(wrong, machine)
-        assert found.kind == "wrong speed unit"
-        assert "3600 Hz by the speed channel" in found.message
-        assert "rpm taken for Hz" in found.message
-
-    def test_hertz_taken_for_rpm(self, drop, machine):
-        slow = replace(drop, speed=drop.speed / 60.0, speed_readings=drop.speed_readings / 60.0)
-        found = only(slow, machine)
-        assert found.kind == "wrong speed unit"
-        assert "at 1 Hz by the speed channel" in found.message and "Hz taken for rpm" in found.message
+    def test_0_hz_is_a_speed_for_whoever_gives_it_by_hand(self, drop):
+        still = replace(drop, speed_readings=0.0 * drop.speed_readings)
+        assert [one.kind for one in check_speed(still)] == ["dead speed"]
+        assert check_speed(replace(still, speed_by_hand=True)) == []
+        assert check_rotation_line(replace(drop, speed_by_hand=True), -0.01, 0.0) == []
 
     def test_the_direction_of_rotation_is_no_fault(self, drop):
         for way in (-1.0, 1.0):
@@ -367,56 +417,8 @@ class TestSpeed:
             ["wrong sampling rate"] if seen else []
         )
 
-    def test_double_pulses(self, drop, tail, machine):
-        readings = drop.speed_readings.copy()
-        readings[30] *= 2
-        found = only(replace(drop, speed_readings=readings), machine, tail, severity="warning")
-        assert found.kind == "speed readings"
-        assert "1 readings jump, the first to 1" in found.message
-
-    def test_readings_that_are_not_finite(self, drop, machine):
-        readings = drop.speed_readings.copy()
-        readings[7] = np.nan
-        assert (
-            only(replace(drop, speed_readings=readings), machine).message == "1 speed readings are not finite"
-        )
-
 
 class TestUnits:
-    @pytest.mark.parametrize(
-        ("factor", "words"),
-        [
-            (1e3, "unit factor of 1000"),
-            (1e-3, "unit factor of 0.001"),
-            (25.4, "mil and µm mixed up"),
-            (1 / 25.4, "mil and µm"),
-        ],
-    )
-    def test_wrong_in_all_channels(self, factor, words, drop, machine, edited):
-        found = only(scaled(edited, drop, factor), machine)
-        assert found.kind == "wrong unit factor"
-        assert found.channel == "S_NDE_A, S_NDE_B, S_DE_A, S_DE_B"
-        assert words in found.message
-
-    def test_wrong_in_one_channel(self, drop, machine, edited):
-        found = only(scaled(edited, drop, 1 / 25.4, 2), machine)
-        assert (found.kind, found.channel) == ("wrong unit factor", "S_DE_A")
-
-    def test_a_gain_of_two_shows_in_the_fall(self, drop, tail, machine, edited):
-        found = only(scaled(edited, drop, 2.0, 2), machine, tail, severity="warning")
-        assert (found.kind, found.channel) == ("wrong gain", "S_DE_A")
-        assert "S_DE_A reading about 1.6 × what it should" in found.message
-
-    def test_a_gain_within_the_tolerance_of_sensors_is_not_named(self, drop, machine, monkeypatch):
-        """A score test of small noise sees a gain of a few per cent, which any sensor may have."""
-        for size, named in ((0.03, 0), (-0.04, 0), (0.3, 1)):
-
-            def gained(fault, *_, size=size):
-                return (1e4, size) if fault.kind == "wrong gain" and len(fault.channels) == 1 else (0.0, 0.0)
-
-            monkeypatch.setattr(quality_fall, "_gain", gained)
-            assert len(findings(drop, machine, kind="wrong gain")) == named
-
     def test_a_tail_without_its_level_is_coupled_and_not_in_another_unit(self, drop, tail, machine, edited):
         level = np.mean(drop.signals[drop.time < -0.02], axis=0)
         found = check_record(
@@ -427,7 +429,7 @@ class TestUnits:
         assert {one.kind for one in check_record(drop, machine, small)} == {"wrong unit factor"}
 
     def test_a_tail_in_another_unit(self, drop, tail, machine, edited):
-        found = check_record(drop, machine, scaled(edited, tail, 2.0))
+        found = check_record(drop, machine, times(all=2.0)(tail))
         assert [one.kind for one in found] == ["wrong unit factor", "wrong unit factor"]
         assert (
             "tail: the rotor rests 565 µm from its levitated position, 2.26 × the nominal air gap"
@@ -436,31 +438,12 @@ class TestUnits:
 
 
 class TestArrangement:
-    @pytest.mark.parametrize("channel", range(4))
-    def test_one_inverted_sensor(self, channel, drop, machine, edited):
-        found = only(scaled(edited, drop, -1.0, channel), machine)
-        name = drop.channel_names[channel]
-        assert (found.kind, found.channel) == ("inverted polarity", name)
-        assert f"it fits with {name} inverted" in found.message
-
-    def test_all_inverted(self, drop, machine, edited):
-        found = check_record(scaled(edited, drop, -1.0), machine)
+    def test_inverted_channels_are_named_where_ends_can_be_decided(self, drop, machine, edited, tail):
+        found = check_record(times(all=-1.0)(drop), machine)
         assert [one.kind for one in found] == ["inverted polarity"] * 2
         assert [one.channel for one in found] == ["S_NDE_A, S_NDE_B", "S_DE_A, S_DE_B"]
-
-    def test_axes_swapped_in_one_plane(self, drop, fast_drop, machine, edited):
-        for record in (drop, fast_drop):
-            found = only(reordered(edited, record, [1, 0, 2, 3]), machine)
-            assert (found.kind, found.channel) == ("swapped axes", "S_NDE_A, S_NDE_B")
-            assert (
-                "orbit at NDE runs against the spin; it fits with S_NDE_A and S_NDE_B exchanged"
-                in found.message
-            )
-
-    def test_axes_swapped_in_all_planes_may_be_the_spin(self, drop, machine, edited):
-        found = only(reordered(edited, drop, [1, 0, 3, 2]), machine)
-        assert found.kind == "swapped axes"
-        assert "either the shaft turns clockwise" in found.remedy
+        found = only(drop, machine.changed(ambs=()), tail, severity="note")
+        assert "cannot be decided: it takes two AMB planes" in found.message
 
     def test_sensors_turned_by_a_quarter(self, drop, machine, edited):
         """The fall alone cannot tell this from one inverted sensor; the sense of the orbit does."""
@@ -470,9 +453,6 @@ class TestArrangement:
 
         found = only(edited(drop, change), machine)
         assert found.kind == "swapped axes"
-        assert "S_NDE_A and S_NDE_B exchanged, S_NDE_A inverted" in found.message or (
-            "S_NDE_A and S_NDE_B exchanged, S_NDE_B inverted" in found.message
-        )
 
     def test_sensors_at_other_angles_than_described(self, drop, machine, edited):
         """Turned by 45°: no exchange explains it, and the rotor falls aside before it touches anything."""
@@ -484,7 +464,6 @@ class TestArrangement:
 
         found = only(edited(drop, change), machine)
         assert (found.kind, found.severity) == ("leaning fall", "stop")
-        assert "leans 38° from straight down; no exchange or inversion explains it" in found.message
         aside = only(
             edited(drop, change), machine, severity="warning", without="record ends before standstill"
         )
@@ -508,8 +487,7 @@ class TestArrangement:
         (wired,) = check_planes(planes, aside, forward)
         assert (wired.kind, wired.severity) == ("swapped axes", "stop")
         (driven,) = check_planes(planes, aside, forward, fell_straight=True)
-        assert (driven.kind, driven.severity) == ("leaning fall", "warning")
-        assert "leans 66° from straight down, but before the first contact the rotor falls" in driven.message
+        assert (driven.kind, driven.severity) == ("leaning fall", "note")
         # an orbit against the spin is no matter of the fall
         backward = check_planes(planes, aside, forward.conj(), fell_straight=True)
         assert {one.severity for one in backward} == {"stop"}
@@ -533,41 +511,19 @@ class TestArrangement:
         fall = find_fall(record, rotor, Beginning(coarse=coarse, levitated=levitated))
         assert fell_as_described(record, machine, fall) is told
 
-    def test_ends_swapped(self, drop, fast_drop, machine, edited):
-        for record in (drop, fast_drop):
-            found = only(reordered(edited, record, [2, 3, 0, 1]), machine)
-            assert found.kind == "swapped ends"
-            assert "S_NDE_A and S_DE_A exchanged and S_NDE_B and S_DE_B exchanged" in found.message
-
-    @pytest.mark.parametrize(
-        ("order", "pair"), [([2, 1, 0, 3], "S_NDE_A, S_DE_A"), ([3, 1, 2, 0], "S_NDE_A, S_DE_B")]
-    )
-    def test_channels_crossed_between_the_ends(self, order, pair, fast_drop, machine, edited):
-        found = only(reordered(edited, fast_drop, order), machine)
-        assert (found.kind, found.channel) == ("swapped channels", pair)
-
     def test_nothing_is_refused_for_the_fall_of_a_beam(self, fast_drop, machine, edited):
         """A beam in place of the rotor bends otherwise: what its fall seems to say is a warning."""
         beam = machine.changed(rotor=machine.rotor.changed(mass_to_ends=0.0))
-        every = check_record(reordered(edited, fast_drop, [2, 1, 0, 3]), beam)
+        every = check_record(order(2, 1, 0, 3)(fast_drop), beam)
         (found,) = (one for one in every if one.kind == "swapped channels")
         assert (found.severity, found.channel) == ("warning", "S_NDE_A, S_DE_A")
-        assert "a beam stands for the rotor" in found.message
 
-    def test_crossed_channels_show_in_the_swing_of_the_tail(self, drop, tail, machine, edited):
-        found = check_record(drop, machine, reordered(edited, tail, [2, 1, 0, 3]))
+    def test_tails_show_crossed_and_inverted_sensors(self, drop, tail, machine, edited):
+        found = check_record(drop, machine, order(2, 1, 0, 3)(tail))
         stops = [one for one in found if one.severity == "stop"]
         assert {one.kind for one in stops} == {"swapped channels"}
-        assert "tail: at node 5 the rotor swings by 21.9 µm at 53° to the level" in stops[0].message
-
-    def test_a_tail_with_an_inverted_sensor(self, drop, tail, machine, edited):
-        found = check_record(drop, machine, scaled(edited, tail, -1.0, 1))
+        found = check_record(drop, machine, times(b=-1.0)(tail))
         assert found[0].kind == "swapped axes"
-        assert "tail: the rotor rests at x = +286" in found[0].message
-
-    def test_ends_cannot_be_decided_without_the_amb_planes(self, drop, tail, machine):
-        found = only(drop, machine.changed(ambs=()), tail, severity="note")
-        assert "cannot be decided: it takes two AMB planes" in found.message
 
     def test_a_tiny_orbit_cannot_show_its_sense(self, drop, tail, machine, edited):
         """Without an orbit before the drop the exchange of A and B stays open, and this is said."""
@@ -578,44 +534,15 @@ class TestArrangement:
         still = replace(drop, signals=drop.signals - wave)
         found = findings(still, machine, tail, "sense of the orbit")
         assert [one.severity for one in found] == ["note", "note"]
-        assert "whether S_NDE_A and S_NDE_B are exchanged cannot be decided" in found[0].message
 
 
-class TestLength:
-    def test_no_drop(self, drop, machine):
-        found = only(drop.window(-0.25, -0.01), machine)
-        assert found.kind == "no drop in the record"
-        assert "spans 26.5 µm, 20.5 µm in its planes and sinks by 5 % of the nominal air gap" in found.message
-
-    @pytest.mark.parametrize("start", [0.002, -0.01])
-    def test_missing_pre_trigger(self, start, drop, machine):
-        found = only(drop.window(start, 0.3), machine)
-        assert found.kind == "missing pre-trigger"
-        assert "pre-trigger" in found.remedy
-
-    def test_a_rotor_that_is_thrown_about_from_the_beginning_was_dropped_before(self, whole_drop, machine):
-        late = whole_drop.window(0.035, 0.6)
-        found = only(late, machine)
-        assert found.kind == "missing pre-trigger", found.message
-
-    def test_a_short_record(self, drop, tail, machine):
-        found = only(drop.window(-0.25, 0.1), machine, tail, severity="warning")
-        assert found.kind == "short record"
-        assert "ends 100." in found.message
-
-    def test_a_tail_that_still_moves(self, whole_drop, machine):
-        found = only(whole_drop, machine, whole_drop.window(1.5, 2.0))
-        assert found.kind == "not settled"
-        assert "the shaft still turns at 47.7 Hz" in found.message
-
-
-def test_damage_worked_around_on_reading_is_passed_on(drop, tail, machine):
-    found = only(replace(drop, warnings=("the file ends within line 7",)), machine, tail, severity="warning")
-    assert (found.kind, found.message) == ("damage on reading", "the file ends within line 7")
+def test_a_tail_that_still_moves(whole_drop, machine):
+    found = only(whole_drop, machine, tail=whole_drop.window(1.5, 2.0))
+    assert found.kind == "not settled"
 
 
 def test_unusable_records_are_refused_with_all_faults(drop, machine, edited):
-    found = check_record(scaled(edited, drop, -1.0), machine)
+    found = check_record(times(all=-1.0)(drop), machine)
     with pytest.raises(
         RecordError,
         match=r"the record cannot be used \(2 faults\): inverted polarity S_NDE_A, .*\n  also: inverted",
@@ -688,11 +615,211 @@ def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_named(
     assert abs(shown - 1e6 * true) < abs(stated - 1e6 * true)
 
 
-@pytest.mark.parametrize(("kind", "severity"), [("turned sensors", "stop"), ("ends", "warning")])
+@pytest.mark.parametrize(("kind", "severity"), [("turned sensors", "stop"), ("ends", "note")])
 def test_a_fall_that_leans_stops_only_where_sensors_look_elsewhere(kind, severity):
     """A free fall that deviates from the rotor model by itself refuses no drop that friction drove aside."""
-    leaning = Finding(kind=Kind.LEANING, message="leans 34°", remedy="", severity="warning")
-    other = Finding(kind=Kind(kind), message="deviates", remedy="", severity="note")
-    first, second = standing({"wiring": [leaning], "fall": [other], "flights": []}, gains_right=False)
-    assert (first.kind, first.severity) == (Kind.LEANING, severity)
+    leaning = Finding(kind="leaning fall", message="leans 34°", remedy="", severity="note")
+    other = Finding(kind=kind, message="deviates", remedy="", severity="note")
+    first, second = standing([leaning, other])
+    assert (first.kind, first.severity) == ("leaning fall", severity)
     assert second == other
+
+
+@pytest.mark.parametrize(
+    ("kind", "channel", "graver", "where", "stands"),
+    [
+        ("coarse quantisation", "A", "wrong unit factor", "A, B", False),
+        ("wrong air gap", "A", "wrong gain", "B", False),
+        ("tail offset", "A", "hum", "B", False),
+        ("late channel", "A", "wrong gain", "A", False),
+        ("late channel", "A", "wrong gain", "B", True),
+        ("soft saturation", "A, B", "turned sensors", "A, B", False),
+        ("hum", "A", "wrong gain", "A", True),
+    ],
+)
+def test_a_finding_yields_to_what_explains_it(kind, channel, graver, where, stands):
+    one, other = (
+        Finding(kind=name, message="", remedy="", severity="warning", channel=hit)
+        for name, hit in ((kind, channel), (graver, where))
+    )
+    assert (one in standing([one, other])) == stands
+    assert one in standing([one, replace(other, severity="note")])
+
+
+@pytest.mark.parametrize("count", [3, 8, 64])
+@pytest.mark.parametrize("at", [5600, 6500])
+def test_a_block_of_zeros_far_from_zero_is_damage(count, at, drop, machine, edited):
+    def change(signals):
+        signals[at : at + count, 1] = 0.0
+
+    found = [one for one in check_record(edited(drop, change), machine) if one.kind == "zeroed block"]
+    assert [one.channel for one in found] == ["S_NDE_B"]
+    assert f"{count} samples in 1 block(s) read exactly zero" in found[0].message
+    assert found[0].time == pytest.approx(drop.time[at])
+
+
+def test_zeros_of_a_coarse_recorder_while_the_rotor_floats_at_zero_are_none(drop, machine, edited):
+    level = np.mean(drop.signals[:4000], axis=0)
+    rounded = edited(drop, lambda signals: 1e-6 * np.rint((signals - level) / 1e-6))
+    assert np.any(rounded.signals[:4000] == 0.0)
+    assert "zeroed block" not in [one.kind for one in check_record(rounded, machine)]
+
+
+@pytest.mark.parametrize("size", [0.15, 1.0, 4.0])
+def test_filters_are_found_whatever_the_size_of_the_air_gap(size, whole_drop):
+    """A reading at rest of less than 50 µm was not looked at: a machine with a small gap passed."""
+    for kind, corner in (("AC coupling", 1.0), ("recorder low-pass", 100.0)):
+        signals = size * filtered(whole_drop.signals, 20e3, corner, "high" if corner == 1.0 else "low")
+        assert [finding.kind for finding in filters_of(replace(whole_drop, signals=signals))] == [kind]
+    assert filters_of(replace(whole_drop, signals=size * whole_drop.signals)) == []
+
+
+def filters_of(record):
+    levitated = fit_levitated(record, -5e-3, speed=float(record.speed_readings[0]))
+    return check_filters(record, levitated, 0.0, bounces=460.0)
+
+
+def test_a_second_drop(whole_drop, machine):
+    once = whole_drop.window(-0.25, 0.6)
+    rng = np.random.default_rng(0)
+    again = once.signals + rng.normal(0.0, 0.3e-6, once.signals.shape)
+    ramp = np.linspace(0.0, 1.0, 400)[:, None]
+    lift = once.signals[-1] * (1 - ramp) + again[0] * ramp
+    lift += rng.normal(0.0, 0.5e-6, lift.shape)
+    signals = np.vstack([once.signals, lift, again])
+    time = once.time[0] + np.arange(len(signals)) / 20e3
+    speed = np.full(len(time), float(once.speed_readings[0]))
+    changes = {"speed": speed, "speed_time": time[[0, -1]], "speed_readings": speed[:2]}
+    twice = replace(once, time=time, signals=signals, **changes)
+    found = only(twice, machine)
+    assert found.kind == "second drop"
+    assert found.time == pytest.approx(0.87, abs=5e-3)
+
+
+def bent(records, level):
+    limit = level * float(np.max(np.abs(records[0].signals)))
+    return [replace(one, signals=limit * np.tanh(one.signals / limit)) for one in records]
+
+
+def test_sensors_that_saturate_softly_are_named_and_straight_ones_not(drop, tail, machine):
+    record, rest = bent((drop, tail), 1.2)
+    found = check_record(record, machine, rest)[0]
+    assert found.kind == "soft saturation"
+    assert set(found.channel.split(", ")) == set(drop.channel_names)
+    # At 3.2 × the largest reading they miss 3 % of it; API 670 allows 5 %.
+    record, rest = bent((drop, tail), 3.2)
+    assert [one for one in check_record(record, machine, rest) if one.severity != "note"] == []
+
+
+def test_sensors_without_noise_are_not_judged_finer_than_the_model_is(machine):
+    hidden = hidden_machine(machine, 3)
+    made = synthesize_drop(hidden, 2 * np.pi * 90.0, 3, sensor_chain=PERFECT, duration=0.1, tolerance=1e-6)
+    kinds = {found.kind for found in check_record(made.record, machine, made.tail)}
+    assert not kinds & {"late channel", "wrong gain", "soft saturation", "turned sensors"}
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_a_tenth_in_all_gains_shows_in_no_fall(gain, drop, tail, machine):
+    """Less lift that remains fits as well: the record does not say it, and nothing is invented."""
+    wrong = [replace(one, signals=gain * one.signals) for one in (drop, tail)]
+    assert "wrong gain" not in {finding.kind for finding in check_record(*wrong[:1], machine, wrong[1])}
+
+
+def test_hum_on_the_tail_is_no_exchanged_channel(whole_drop, tail, machine):
+    """Mains hum moves all channels alike, at an angle to the race that looked like a crossed channel."""
+    humming = tail.signals + 20e-6 * np.sin(2 * np.pi * 50.0 * tail.time)[:, None]
+    kinds = {found.kind for found in check_record(whole_drop, machine, replace(tail, signals=humming))}
+    assert "swapped channels" not in kinds
+
+
+def test_a_single_run_of_equal_readings_is_stuck(drop, machine):
+    """A recorder of many bits repeats no reading: the one run was compared with itself and passed."""
+    rng = np.random.default_rng(5)
+    signals = drop.signals + rng.normal(0.0, 1e-9, drop.signals.shape)
+    signals[6000:6014, 2] = signals[6000, 2]
+    (found,) = (
+        one for one in check_record(replace(drop, signals=signals), machine) if one.kind == "stuck channel"
+    )
+    assert found.channel == drop.channel_names[2]
+
+
+def test_slow_motion_without_noise_is_not_stuck_and_what_stands_still_in_it_is(whole_drop):
+    """Behind a low-pass and a quiet converter a rotor at rest reads the same for a millisecond and more."""
+    smooth = uniform_filter1d(uniform_filter1d(whole_drop.signals, 60, axis=0), 60, axis=0)
+    quiet = 0.4e-6 * np.round(smooth / 0.4e-6)
+    held = quiet.copy()
+    held[6000:6100, 2] = held[6000, 2]
+    for signals, channels in ((quiet, []), (held, [whole_drop.channel_names[2]])):
+        found = check_channels(replace(whole_drop, signals=signals))
+        assert [one.channel for one in found if one.kind == "stuck channel"] == channels
+
+
+def test_the_levitated_part_of_a_slow_clock_is_fitted(drop):
+    slow = replace(drop, time=1e3 * drop.time, sampling_rate=20.0)
+    assert fit_levitated(slow, -10.0, speed=2.0 * np.pi * 0.06).end <= -10.0
+
+
+def test_twenty_lost_samples_under_a_running_clock(fast_drop, machine):
+    at = int(np.searchsorted(fast_drop.time, 0.05))
+    keep = np.delete(np.arange(len(fast_drop.time)), np.arange(at, at + 20))
+    count = len(keep)
+    cut = replace(
+        fast_drop,
+        time=fast_drop.time[:count],
+        signals=fast_drop.signals[keep],
+        speed=fast_drop.speed[:count],
+    )
+    found = check_record(cut, machine)[0]
+    assert (found.kind, found.time) == ("dropped block", pytest.approx(0.05, abs=2e-3))
+
+
+def without(record, at, count):
+    """The record with samples lost at a time under a clock that runs on."""
+    first, left = int(np.searchsorted(record.time, at)), len(record.time) - count
+    signals = np.delete(record.signals, np.s_[first : first + count], axis=0)
+    return replace(record, time=record.time[:left], signals=signals, speed=record.speed[:left])
+
+
+def levitated(record):
+    return fit_levitated(record, -0.02, speed=float(record.speed_readings[0]))
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_lost_samples_in_the_fall(count, drop):
+    assert check_continuity(drop) == []
+    (found,) = check_continuity(without(drop, 5e-3, count))
+    assert (found.kind, found.severity) == ("dropped block", "stop")
+    assert found.time == pytest.approx(5e-3, abs=1.1e-3)
+    missing = float(re.search(r"what they do in ([\d.]+) samples", found.message)[1])
+    assert missing == pytest.approx(count, abs=0.5)
+
+
+def test_samples_lost_before_the_drop_turn_the_orbit(fast_drop):
+    assert check_orbit(levitated(fast_drop), fast_drop) == []
+    cut = without(fast_drop, -0.12, 20)
+    (found,) = check_orbit(levitated(cut), cut)
+    assert (found.kind, found.severity) == ("dropped block", "warning")
+    assert found.time == pytest.approx(-0.12, abs=0.02)
+    ahead = 360.0 * 20 / fast_drop.sampling_rate * levitated(fast_drop).frequency
+    seen = float(re.search(r"jumps by about ([+-][\d.]+)°", found.message)[1])
+    assert seen == pytest.approx(ahead, rel=0.2)
+
+
+def test_a_tail_whose_zero_moved_rests_beside_the_path_of_the_rotor(whole_drop, tail, machine):
+    floating = levitated(whole_drop).mean
+    assert check_rest_in_record(tail, whole_drop, machine, floating, sag=1e-6) == []
+    moved = replace(tail, signals=tail.signals + 40e-6 * np.eye(4)[2])
+    (found,) = check_rest_in_record(moved, whole_drop, machine, floating, sag=1e-6)
+    assert (found.kind, found.severity) == ("tail offset", "warning")
+    off = float(re.search(r"rests ([\d.]+) µm higher at node 25", found.message)[1])
+    assert off == pytest.approx(40.0 / np.sqrt(2.0), abs=3.0)
+    assert found.channel == ", ".join(whole_drop.channel_names[2:])
+
+
+def test_magnetic_bearings_at_the_nodes_of_each_other(machine):
+    assert check_ends_named(machine) == []
+    first, second = machine.ambs
+    exchanged = machine.changed(ambs=(first.changed(node=second.node), second.changed(node=first.node)))
+    (found,) = check_ends_named(exchanged)
+    assert (found.kind, found.severity) == ("machine file", "warning")
+    assert f"AMB {first.name} at node {second.node} next to touchdown bearing {second.name}" in found.message

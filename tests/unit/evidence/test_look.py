@@ -11,19 +11,16 @@ import jsonschema
 import numpy as np
 import pytest
 
+from rotordrop import Known, example_record_path, read_record
 from rotordrop.cli._options import machine_first
 from rotordrop.cli.app import run
 from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
-from rotordrop.evidence.quality import Kind
 from rotordrop.evidence.quality.motion import check_slow_fall
 from rotordrop.evidence.touch import first_touch
-from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
 from rotordrop.report.look_page import look_page
 
 RATE = 20_000.0
@@ -100,9 +97,7 @@ def test_the_gap_comes_from_the_depth_of_the_rest_where_it_is_not_given(tmp_path
         low, high = plane.gap_interval_90
         assert low < gap < high and high - low < 0.3 * gap
         assert plane.gap == pytest.approx(gap, rel=0.05)
-    low, high = (1e6 * end for end in seen.planes[0].gap_interval_90)
-    told = f"NDE: air gap between {low:.0f} and {high:.0f} µm"
-    assert any(note.startswith(told) and note.endswith("give it where it is known") for note in seen.notes)
+    assert "air gap by where the rotor touched; give it where it is known" in seen.notes
 
 
 def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_left_out():
@@ -110,7 +105,7 @@ def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_left_out():
     record, machine = example_record_path("lp400_drop_060"), load_machine(example_path("lp400"))
     wide = {f"{one}.air_gap": Known(value=400e-6, status="given", unit="m") for one in ("NDE", "DE")}
     alone, seen = look(record), look(record, machine=machine.with_values(wide))
-    assert any("400 µm" in one.message for one in seen.findings if one.kind == Kind.WRONG_AIR_GAP)
+    assert any("400 µm" in one.message for one in seen.findings if one.kind == "wrong air gap")
     for plane, own in zip(seen.planes, alone.planes, strict=True):
         assert plane.gap == pytest.approx(own.gap, rel=0.01)
         assert plane.gap_interval_90 == pytest.approx(own.gap_interval_90, rel=0.02)
@@ -123,7 +118,7 @@ def test_a_given_gap_that_the_record_contradicts_is_named_with_both_numbers(tmp_
     (found,) = seen.findings
     # it stood below the numbers that it makes false
     assert look_page(seen, drawn=False).verdict[0].text.endswith(found.message)
-    assert found.kind == Kind.WRONG_AIR_GAP and found.severity == "warning"
+    assert found.kind == "wrong air gap" and found.severity == "warning"
     told = re.search(r"air gap of (\d+) µm \((\d+) to (\d+)\) at NDE, 400 µm was given", found.message)
     own, low, high = map(float, told.groups())
     assert own == pytest.approx(1e6 * GAP, rel=0.05) and low < 1e6 * GAP < high
@@ -181,7 +176,7 @@ def test_count_and_last_impact_hold_those_of_the_contacts():
     low, high = seen.drops[0].count_interval_90
     assert low <= 10 <= high
     told = " ".join(one.sentence for one in look_page(seen, drawn=False).verdict)
-    assert f"; 7 impacts (90 %: {low} to {high}) followed, the last at 0.0518 s (90 %: " in told
+    assert f"; 7 impacts (90 %: {low} to {high}) followed, the last at 0.0518 s (" in told
     planes = seen.as_json()["planes"]
     assert [plane["impacts"] for plane in planes] == [5, 2]
     assert all(plane["contact_from_interval_90_s"][0] < plane["contact_from_s"] for plane in planes)
@@ -269,10 +264,8 @@ def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
     assert re.search(r"no two channels of alpha, bravo, c, d, Speed are a pair by", alone.no_fall)
     assert alone.notes[0].startswith('say which look at one plane: if they are listed in pairs, --map "')
     assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
-    file.write_text(
-        text.replace("alpha", "a1").replace("bravo", "a2").replace(",c ", ",a3 ").replace(",d ", ",a4 ")
-    )
-    assert any("in no plane, and not looked at: a3, a4; say" in note for note in look(file).notes)
+    file.write_text(text.replace("alpha", "a1").replace("bravo", "a2"))
+    assert any("in no plane, and not looked at: c, d; say" in note for note in look(file).notes)
     file.write_text(text)
     seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
     assert [plane.plane for plane in seen.planes] == ["left", "right"]
@@ -315,7 +308,7 @@ def test_the_bundled_tail_is_no_drop(machine):
         assert not any(one.severity == "stop" for one in seen.findings)  # a tail needs no speed
 
 
-def rubbing(rate: float = 10_000.0) -> tuple[np.ndarray, np.ndarray, list[float]]:
+def rubbing(rate=10_000.0):
     """A mass on soft magnets that a pulse throws against a race of 200 µm: time, path, when it touches."""
     steps, height, speed, touching = 20, 0.0, 0.0, False
     time, path, touched = np.arange(int(2.0 * rate)) / rate, [], []
@@ -355,7 +348,7 @@ def test_a_held_rotor_that_touches_is_an_event(tmp_path, machine):
     jsonschema.validate(json.loads(json.dumps(seen.as_json(), allow_nan=False)), look_schema())
 
 
-def surging(natural: float, damping: float, begins: float = 1.0, until: float = 3.0):
+def surging(natural, damping, begins=1.0, until=3.0):
     """A mass on magnets, from rest, that a surge of 20 ms presses against a race of 250 µm.
 
     Time, path, and per contact its begin, the velocities before and after, and the impulse over the mass.
@@ -483,7 +476,7 @@ def test_a_unit_in_which_the_shaft_falls_faster_than_gravity_is_doubted(tmp_path
     time, path, _ = fall_and_bounce()
     file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
     file.write_text(file.read_text().replace("[um]", f"[{unit}]"))
-    found = [one for one in look(file).findings if one.kind == Kind.WRONG_UNIT]
+    found = [one for one in look(file).findings if one.kind == "wrong unit factor"]
     if unit == "um":
         assert found == []
         return
@@ -541,16 +534,13 @@ def test_the_step_of_a_drop_is_no_line_of_its_channel(tmp_path):
     assert any(at == pytest.approx(50.0, abs=level.resolution) for at, _ in level.lines)
 
 
-def test_a_tail_is_told_to_be_one(tmp_path):
+def test_tails_and_records_too_short_are_told(tmp_path):
     """It was said that one end stayed held by its magnets, and an estimate asked for a speed."""
     seen = look(example_record_path("lp400_drop_060_tail"))
     assert not seen.drops and "as one that swings on its bearings" in seen.no_fall
     assert "readings at standstill are its settled tail" in seen.no_fall
     assert not seen.unit_doubted
     assert not any("held by its magnets" in note for note in seen.notes)
-
-
-def test_a_record_too_short_for_a_level_says_so(tmp_path):
     file = tmp_path / "short.csv"
     file.write_text("time [s],Force [N]\n" + "".join(f"{k * 1e-3:.3f},{k % 3}\n" for k in range(12)))
     with pytest.raises(UnpairedError, match=r"no channel has the 16 readings that show a level"):
@@ -619,8 +609,8 @@ def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path, capsys
     page, file = tmp_path / "look.html", tmp_path / "look.json"
     assert run(["look", record, "--gap", "280 um", "--report", str(page), "--json", str(file)]) == 0
     told = capsys.readouterr().out
-    assert "first touch at NDE" in told
-    assert "This record is simulated" in told
+    assert "DE touched first, at 0.0" in told
+    assert "Simulated record." in told
     jsonschema.validate(json.loads(file.read_text()), look_schema())
     assert "Path of the rotor centre against the clearance circle" in page.read_text()
     assert run(["look", record, str(example_path("lp400"))]) == 0
@@ -638,20 +628,17 @@ def test_machine_and_record_come_in_either_order_and_ranges_say_of_what(turned, 
     assert run(["look", *(files[::-1] if turned else files)]) == 0
     told = capsys.readouterr().out
     assert re.search(r"largest distance .* 90 %: \d+ to \d+ µm +90 %: \d+ to \d+ µm", told)
-    assert "It did not whirl" in told  # the tutorial says that a look says so
+    assert "No whirl." in told  # the tutorial says that a look says so
     first, second = (Path(one) for one in files)
-    assert machine_first(second, first) == machine_first(first, second) == (first, second)
+    assert machine_first(second, first) == machine_first(first, second) == [first, second]
 
 
 def test_the_terminal_says_what_was_read_and_guessed(capsys):
     assert run(["look", str(example_record_path("lp400_drop_060"))]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert re.search(r"Read: .*_A, .*_B; .* at 20000 Hz, -0\.25 to ", said)
-    assert "their sensors taken as perpendicular" in said
-    assert (
-        "lost samples; without a machine file none looks at wiring, polarity, exchanged ends, gains and gaps"
-        in said
-    )
+    assert "sensors 90° apart" in said
+    assert "No check sees" not in said
 
 
 @pytest.mark.parametrize(

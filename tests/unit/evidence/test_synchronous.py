@@ -1,17 +1,14 @@
 """Amplitude and phase of 1X against the mark: on circles that are known, and through a file with pulses."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 import pytest
 
+from rotordrop import example_machine, example_record_path
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
 from rotordrop.evidence.synchronous import angle_since_mark, synchronous_motion
-from rotordrop.machine import example_machine
-from rotordrop.record.examples import example_record_path
 from rotordrop.record.profile import Profile, SpeedSource
 from rotordrop.record.record import read_record, record_of, save_record
 from rotordrop.record.recording import Channel, Recording
@@ -46,16 +43,13 @@ def test_amplitude_and_phase_are_those_of_the_circle_and_their_intervals_hold():
     assert found.turns == 13
 
 
-def test_nothing_but_noise_has_any_phase():
+def test_noise_and_few_turns_have_no_phase():
     time, position, marks = circle(1)
     rng = np.random.default_rng(8)
     found = synchronous_motion("NDE", time, rng.normal(0.0, 1e-6, position.shape), marks, until=0.24)
     assert found is not None
     assert found.amplitude < 0.15e-6
     assert found.phase_interval_90[1] - found.phase_interval_90[0] > 1.0
-
-
-def test_too_few_turns_give_none():
     time, position, marks = circle(1)
     assert synchronous_motion("NDE", time, position, marks, until=0.05) is None
 
@@ -93,7 +87,7 @@ def test_a_file_with_pulses_gives_speed_marks_and_phase(tmp_path, capsys):
     assert np.allclose(again.speed_readings, read.speed_readings, rtol=1e-12)
     profile = tmp_path / "recorder.toml"
     call = ["profile", str(path), "--pulses", "KPH", "-o", str(profile)]
-    assert run([*call, *(f"--channel={name}={name}" for name in record.channel_names)]) == 0
+    assert run([*call, *(f"--map={name}={name}" for name in record.channel_names)]) == 0
     assert "shaft speed: pulses of KPH" in capsys.readouterr().out
     assert run(["look", str(path), "--profile", str(profile), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)["synchronous"]
@@ -102,19 +96,13 @@ def test_a_file_with_pulses_gives_speed_marks_and_phase(tmp_path, capsys):
     assert all(one["amplitude_interval_90_m"][0] < one["amplitude_m"] for one in found)
 
 
-def test_a_missing_pulse_is_told_with_the_record(tmp_path):
+def test_pulses_that_are_missing_are_told_with_the_way_out(tmp_path):
     path, *_ = with_pulses(tmp_path, missing=True)
     read = read_record(path, example_machine("lp400"), profile=Profile(speed=SpeedSource(pulses="KPH")))
     assert any("pulses missing after" in warning for warning in read.warnings)
-
-
-def test_a_channel_of_pulses_that_is_not_there_is_named(tmp_path):
     path, *_ = with_pulses(tmp_path)
     with pytest.raises(RecordError, match=r"no channel of pulses 'Key'; it has .*KPH"):
         read_record(path, example_machine("lp400"), profile=Profile(speed=SpeedSource(pulses="Key")))
-
-
-def test_a_speed_in_volts_is_told_how_to_be_read_as_pulses():
     time = np.arange(0.0, 0.1, 1e-4)
     names = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
     channels = [Channel(name=n, label=n, unit="um", values=0.0 * time, time=time) for n in names]

@@ -1,31 +1,23 @@
-"""``import rotordrop`` and ``rotordrop --help`` stay light."""
-
-from __future__ import annotations
+"""Imports and help stay light, a wheel compiles nothing, every wrong call is refused in words."""
 
 import json
 import os
 import re
 import subprocess
 import sys
+import zipfile
+from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from tests.published import bearing, published, value
 
-HEAVY = {
-    "scipy",
-    "scipy.signal",
-    "numba",
-    "llvmlite",
-    "plotly",
-    "pandas",
-    "xarray",
-    "h5py",
-    "matplotlib",
-    "pint",
-    "pydantic",
-    "jinja2",
-    "numpy",
-}
+import rotordrop as rd
+from rotordrop.errors import RotordropError
+
+HEAVY = set("scipy scipy.signal numba llvmlite plotly pandas xarray h5py matplotlib pint".split())
+HEAVY |= {"pydantic", "jinja2", "numpy"}
 LIMIT_S = 0.2
 CASES = [["-c", "import rotordrop"], ["-m", "rotordrop", "--help"]]
 
@@ -56,14 +48,6 @@ def test_it_starts_fast(arguments):
     assert min(times) < LIMIT_S
 
 
-def test_the_report_on_an_estimate_loads_no_simulation():
-    program = (
-        "import sys, rotordrop.estimation, rotordrop.report.estimate_page; "
-        "assert 'rotordrop.simulate.drop' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
-
-
 @pytest.mark.parametrize("words", [["compare", "A", "B"], ["log", "add", "LOG", "A"]], ids=["compare", "log"])
 def test_what_reads_estimates_loads_neither_compiler_nor_scipy_nor_elements(words, tmp_path):
     places = {"LOG": tmp_path / "log.db", "A": tmp_path / "a.json", "B": tmp_path / "b.json"}
@@ -79,38 +63,231 @@ def test_what_reads_estimates_loads_neither_compiler_nor_scipy_nor_elements(word
     subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.DEVNULL)
 
 
-def test_a_look_with_a_machine_file_loads_no_unit_library_and_no_signal_library():
-    program = (
-        "import sys\nfrom importlib.resources import files\nfrom rotordrop.cli.app import run\n"
-        "place = files('rotordrop.examples') / 'lp400' / 'drop_060.h5'\n"
-        "machine = files('rotordrop.machine.examples') / 'lp400.toml'\n"
-        "assert run(['look', str(machine), str(place)]) == 0\n"
-        "loaded = {'pint', 'scipy.signal', 'scipy.ndimage', 'scipy.stats'} & set(sys.modules)\n"
-        "assert not loaded, loaded\n"
-    )
+LIGHT = {
+    "the report on an estimate loads no simulation": """
+import sys, rotordrop.estimation, rotordrop.report.estimate_page
+assert 'rotordrop.simulate.drop' not in sys.modules
+""",
+    "a look with a machine file loads no unit library and no signal library": """
+import sys
+from importlib.resources import files
+from rotordrop.cli.app import run
+place = files('rotordrop.examples') / 'lp400' / 'drop_060.h5'
+machine = files('rotordrop.machine.examples') / 'lp400.toml'
+assert run(['look', str(machine), str(place)]) == 0
+loaded = {'pint', 'scipy.signal', 'scipy.ndimage', 'scipy.stats'} & set(sys.modules)
+assert not loaded, loaded
+""",
+    "public names are loaded on first use": """
+import sys, rotordrop
+assert 'rotordrop.units' not in sys.modules
+assert round(rotordrop.parse_quantity('60 Hz', 'speed'), 2) == 376.99
+assert 'rotordrop.units' in sys.modules
+""",
+}
+
+
+@pytest.mark.parametrize("program", LIGHT.values(), ids=LIGHT)
+def test_what_is_not_needed_is_not_loaded(program):
     subprocess.run([sys.executable, "-c", program], check=True, stdout=subprocess.DEVNULL)
 
 
-def test_public_names_are_loaded_on_first_use():
-    program = (
-        "import sys, rotordrop\n"
-        "assert 'rotordrop.units' not in sys.modules\n"
-        "assert round(rotordrop.parse_quantity('60 Hz', 'speed'), 2) == 376.99\n"
-        "assert 'rotordrop.units' in sys.modules\n"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
-
-
-def test_every_public_name_exists():
+def test_every_public_name_exists_and_others_do_not():
     import rotordrop
 
     for name in rotordrop.__all__:
         assert getattr(rotordrop, name) is not None, name
     assert set(rotordrop.__all__) <= set(dir(rotordrop))
-
-
-def test_an_unknown_name_is_an_attribute_error():
-    import rotordrop
-
     with pytest.raises(AttributeError, match="module 'rotordrop' has no attribute 'simulate_everything'"):
         rotordrop.simulate_everything  # noqa: B018
+
+
+ROOT = Path(__file__).parents[3]
+
+
+def called(*words, folder, **environment):
+    """Standard error of a command that must succeed."""
+    done = subprocess.run(
+        [sys.executable, "-m", *words],
+        cwd=folder,
+        env={key: value for key, value in os.environ.items() if not key.startswith("NUMBA_")} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+@pytest.mark.slow
+def test_a_wheel_with_kernels_compiles_nothing(tmp_path):
+    tool = [sys.executable, ROOT / "tools" / "kernels.py", tmp_path / "kernels", "check", "simulate"]
+    assert subprocess.run(tool, check=False).returncode == 0
+    called(
+        *("pip", "wheel", "--no-deps", "--no-build-isolation", "-w", str(tmp_path), str(ROOT)),
+        folder=tmp_path,
+        ROTORDROP_KERNELS=str(tmp_path / "kernels"),
+    )
+    (wheel,) = tmp_path.glob("rotordrop-*.whl")
+    assert f"cp{sys.version_info.major}{sys.version_info.minor}" in wheel.name
+    with zipfile.ZipFile(wheel) as packed:
+        packed.extractall(tmp_path / "installed")
+    on = "lp400/machine.toml"
+    for command in ("init --example lp400 lp400", f"check {on}", f"simulate {on} --speed 60Hz"):
+        said = called(
+            *("rotordrop", *command.split()),
+            folder=tmp_path,
+            PYTHONPATH=str(tmp_path / "installed"),
+            XDG_CACHE_HOME=str(tmp_path / "cache"),
+        )
+        assert "Compiling" not in said
+    assert not (tmp_path / "cache").exists()
+
+
+MACHINE, PAPER, SMALL = (rd.example_machine(name) for name in ("lp400", "paper", "small"))
+NAMES = [sensor.name for sensor in MACHINE.sensors]
+TIME = np.arange(200) / 20e3
+SIGNALS = np.random.default_rng(1).normal(0.0, 1e-6, (200, 4))
+
+
+def made(time=TIME, signals=SIGNALS, unit="m", speed="60 Hz", **more):
+    return rd.Record.from_arrays(MACHINE, time, signals, unit=unit, speed=speed, **more)
+
+
+RECORD = made()
+OTHER = rd.Record.from_arrays(PAPER, TIME, SIGNALS, unit="m", speed="60 Hz")
+
+
+def plain(**fields):
+    given = {"time": TIME, "signals": SIGNALS, "sensors": MACHINE.sensors, "sampling_rate": 20e3}
+    return rd.Record(**(given | fields))
+
+
+def force(**options):
+    return rd.estimate_force(MACHINE, RECORD, **options)
+
+
+def case(**fields):
+    return rd.DropCase(**({"speed": "60 Hz"} | fields))
+
+
+def framed(index):
+    return rd.Record.from_dataframe(MACHINE, pd.DataFrame(SIGNALS, columns=NAMES, index=index), unit="m")
+
+
+WRONG = {
+    # masks, kinds of numbers, lengths
+    "complex readings": (lambda: made(signals=SIGNALS + 1j), "signals is a ndarray.*complex128"),
+    "texts for readings": (lambda: made(signals=np.full((200, 4), "a")), "signals is .* no array of real"),
+    "times not finite": (lambda: made(time=np.where(TIME > 0, TIME, np.nan)), "time holds 1 values"),
+    "moments for times": (lambda: made(time=TIME.astype("M8[s]")), "time is .*datetime64"),
+    "speed of another length": (lambda: plain(speed=np.ones(10)), r"speed has the shape \(10,\).*\(200,\)"),
+    "fewer speeds": (lambda: plain(speed_time=TIME[:3], speed_readings=TIME[:2]), r"shape \(2,\).*\(3,\)"),
+    "no unit": (lambda: made(unit=None), "unit is None; expected a text or a Mapping. Say it"),
+    "rate below zero": (lambda: made(time="-20 kHz"), "sampling rate in time is -2.*positive"),
+    "time backwards": (lambda: made(time=TIME[::-1]), "the time runs backwards.*sort"),
+    "unit of time": (lambda: made(time_unit="h"), "time_unit is 'h'; expected one of s, ms"),
+    "columns of other names": (lambda: made(signals=pd.DataFrame(SIGNALS, None, list("abcd"))), "no channel"),
+    "two levels": (
+        lambda: framed(pd.MultiIndex.from_product([[0], TIME])),
+        "one level of index.*reset_index",
+    ),
+    "array for a frame": (lambda: rd.Record.from_dataframe(MACHINE, SIGNALS), "frame is a ndarray"),
+    # settings
+    "integrator": (lambda: case(integrator="rk4"), "integrator is 'rk4'; expected one of tsit5, dp5"),
+    "spin": (lambda: case(spin="no"), "spin is 'no'; expected one of dynamic"),
+    "drop of a lifetime": (lambda: case(duration=1e9), "1e.09 s.*3600 s at most"),
+    "fine steps": (lambda: case(output_step=1e-12), "makes 2e.11 of them"),
+    "step beyond the end": (lambda: case(output_step=1.0), "makes 0.2 of them; expected 1"),
+    "jump before": (lambda: rd.UnbalanceJump(node=1, amount=1e-3, time=-1.0), "time is -1.*at least 0"),
+    "half a node to jump": (lambda: rd.UnbalanceJump(node=2.5, amount=1e-3, time=0.0), "node is 2.5.* whole"),
+    "delay before": (lambda: rd.LevitatedStart(delay=-1.0), "delay is -1.*at least 0"),
+    "fewer draws than none": (lambda: rd.Replay(draws=-5), "draws is -5; expected a whole number"),
+    "half a draw": (lambda: rd.Replay(draws=1.5), "draws is 1.5; expected a whole number"),
+    "quick as text": (lambda: rd.Tracked(quick="no"), "quick is 'no'; expected True or False"),
+    "rating": (lambda: rd.find_bearing("7203", static_load_rating=np.nan), "static_load_rating .* nan"),
+    "number of a bearing": (lambda: rd.find_bearing(7203), "designation is 7203; expected a text"),
+    "look at a speed": (lambda: rd.look(RECORD, speed=np.nan), "speed"),
+    "look with a map": (lambda: rd.look(RECORD, mapping=["S=X"]), "expected none with a Record"),
+    "bandwidth": (lambda: force(held="free-free", bandwidth="100 m"), "'100 m' is not a frequency"),
+    "no gap": (lambda: rd.look(RECORD, gap=0.0), r"gap \[m\] is 0.0; expected a positive"),
+    "gap below zero": (lambda: rd.look(RECORD, gap="-100 um"), r"gap \[m\] is -"),
+    "gap of a street": (lambda: rd.look(RECORD, gap="250 m"), r"gap \[m\] is 250.* up to 0.1"),
+    "gap that is no number": (lambda: rd.look(RECORD, gap=np.nan), r"gap \[m\] is nan"),
+    "micrometres as metres": (
+        lambda: rd.look(made(signals=1e8 * SIGNALS)),
+        "readings span .* m, .*unit='um'",
+    ),
+    "another machine": (
+        lambda: rd.check_record(RECORD, SMALL),
+        "record has sensor .* read for another machine",
+    ),
+    "tail of another": (
+        lambda: rd.estimate_drop(PAPER, OTHER, RECORD),
+        "tail has sensor .* for another machine",
+    ),
+    "half a node": (lambda: force(nodes=[2.5]), r"nodes\[0\] is 2.5"),
+    # what was given for what
+    "exchanged": (
+        lambda: rd.estimate_drop(RECORD, MACHINE),
+        "machine is a Record; expected a Machine.*load_",
+    ),
+    "file for a record": (lambda: rd.estimate_drop(MACHINE, "drop.csv"), "record is 'drop.csv'.*read_record"),
+    "frame for a record": (lambda: rd.estimate_drop(MACHINE, pd.DataFrame()), "record is a DataFrame"),
+    "one for several": (lambda: rd.estimate_drops(MACHINE, RECORD), r"expected a list.*records=\[...\]"),
+    "none for several": (lambda: rd.estimate_drops(MACHINE, []), "records is empty"),
+    "few tails": (lambda: rd.calibrate_machine(MACHINE, [RECORD, RECORD], [None]), "1 tails for 2 records"),
+    "names": (
+        lambda: rd.estimate_drops(MACHINE, [RECORD], names=["a", "b"]),
+        "2 names for 1 records; expected",
+    ),
+    "case as a table": (lambda: rd.simulate_drop(MACHINE, {"speed": 1.0}), "case is a dict.*DropCase"),
+    "text for a machine": (lambda: rd.simulate_drop("m.toml", case()), "machine is 'm.toml'.*load_machine"),
+    "model of nothing": (lambda: rd.build_drop_model(None), "machine is None"),
+    "profile as a table": (lambda: rd.read_record("a.csv", MACHINE, profile={}), "profile is a dict"),
+    "map as a text": (lambda: rd.read_record("a.csv", MACHINE, mapping="A=B"), "mapping is 'A=B'.*list"),
+    "look at an array": (lambda: rd.look(SIGNALS), "record is a ndarray; expected"),
+    "gate of an array": (lambda: rd.check_record(SIGNALS, MACHINE), "record is a ndarray"),
+    "threads": (lambda: rd.sweep(MACHINE, {"speed": ["60 Hz"]}, threads=-1, drops=1), "threads is -1"),
+    "repeats": (lambda: rd.sweep(MACHINE, {"speed": ["60 Hz"]}, repeats=0), "repeats is 0"),
+    "one value to vary": (lambda: rd.sweep(MACHINE, {"speed": "60 Hz"}), r"speed is '60 Hz'.*speed=\["),
+    "result of nothing": (lambda: rd.load_result(None), "path is None; expected a text or a path"),
+    "document of nothing": (lambda: rd.read_document(3), "path is 3; expected a text or a path"),
+    "study of nothing": (lambda: rd.load_study(None), "path is None; expected a text or a path"),
+    "text to save": (lambda: rd.save_machine("m", "m.toml"), "machine is 'm'; expected a Machine"),
+    "list of examples": (lambda: rd.example_record_path(["x"]), "name is a list; expected a text"),
+    "path of nothing": (lambda: rd.load_machine(None), "path is None; expected a text or a path"),
+}
+
+
+@pytest.mark.parametrize(("call", "words"), WRONG.values(), ids=list(WRONG))
+def test_a_wrong_call_is_refused_in_words(call, words):
+    with pytest.raises(RotordropError, match=words):
+        call()
+
+
+def test_tables_and_masked_arrays_are_read_as_they_are_meant():
+    masked = np.ma.masked_array(SIGNALS, np.zeros(SIGNALS.shape, dtype=bool))
+    masked[7, 2] = np.ma.masked
+    record = made(signals=masked)
+    assert np.argwhere(record.missing).tolist() == [[7, 2]]
+    assert record.signals[7, 2] != SIGNALS[7, 2]  # bridged, not taken
+    frame = pd.DataFrame(SIGNALS, columns=NAMES)[NAMES[::-1]]
+    np.testing.assert_allclose(made(signals=frame).signals, SIGNALS)
+    index = pd.Timestamp("2026-03-01", tz="Europe/Berlin") + pd.to_timedelta(TIME, unit="s")
+    frame = pd.DataFrame(SIGNALS, columns=NAMES, index=pd.DatetimeIndex(index, name="time"))
+    record = rd.Record.from_dataframe(MACHINE, frame, unit="m", speed="60 Hz")
+    np.testing.assert_allclose(record.time, TIME, atol=1e-9)
+    assert rd.Replay(draws=np.int64(64)).draws == 64
+    assert rd.UnbalanceJump(node=np.int64(2), amount=np.float32(1e-3), time=0).node == 2
+
+
+def test_arrays_of_the_caller_stay_his_and_a_window_is_no_copy():
+    time, signals = TIME.copy(), SIGNALS.copy()
+    record = plain(time=time, signals=signals)
+    time[0], signals[0] = -1.0, 1.0
+    assert record.time[0] == 0.0
+    np.testing.assert_array_equal(record.signals, SIGNALS)
+    with pytest.raises(ValueError, match="read-only"):
+        record.signals[0] = 0.0
+    assert np.shares_memory(RECORD.window(1e-3, 2e-3).signals, RECORD.signals)

@@ -1,7 +1,5 @@
 """Units: what stock parsers get wrong, and what the messages say instead."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -14,76 +12,58 @@ from rotordrop.units import (
     KINDS,
     fall_speed,
     fall_time,
+    format_amount,
     format_chance,
     format_moment,
     format_quantity,
     parse_quantity,
-    si_unit,
 )
 
 
 @pytest.mark.parametrize(
-    ("text", "kind", "value"),
+    ("kind", "value", "texts"),
     [
-        # each was seen wrong with a stock registry
-        ("60 Hz", "speed", 2 * math.pi * 60),
-        ("3600 rpm", "frequency", 60.0),
-        ("10 mil", "length", 254e-6),
-        ("3600 RPM", "speed", 2 * math.pi * 60),
-        ("60 rev/s", "speed", 2 * math.pi * 60),
-        # the same unit, chosen by the kind of the field
-        ("60 Hz", "frequency", 60.0),
-        ("376.99111843077515 rad/s", "frequency", 60.0),
-        ("1 deg/s", "speed", math.pi / 180),
-        ("1.5 kHz", "frequency", 1500.0),
-        ("3000 r/min", "speed", 100 * math.pi),
-        ("3000 U/min", "speed", 100 * math.pi),
-        ("45 deg", "angle", math.pi / 4),
-        ("-45°", "angle", -math.pi / 4),
-        # lengths
-        ("280 um", "length", 280e-6),
-        ("280 µm", "length", 280e-6),
-        ("280 μm", "length", 280e-6),
-        ("280 micron", "length", 280e-6),
-        ("0.27 mm", "length", 0.27e-3),
-        ("1 in", "length", 0.0254),
-        ("5 thou", "length", 127e-6),
-        # mechanics
-        ("1e8 N/m", "stiffness", 1e8),
-        ("100 N/um", "stiffness", 1e8),
-        ("1 lbf/in", "stiffness", 4.4482216152605 / 0.0254),
-        ("5 kN s/m", "damping", 5000.0),
-        ("5000 Ns/m", "damping", 5000.0),
-        ("5 N·s/mm", "damping", 5000.0),
-        ("50 g mm", "unbalance", 5e-5),
-        ("50 gmm", "unbalance", 5e-5),
-        ("0.42 kg m²", "inertia", 0.42),
-        ("7.85 g/cm^3", "density", 7850.0),
-        ("210 GPa", "pressure", 210e9),
-        ("1 psi", "pressure", 6894.757293168361),
-        ("3 g_n", "acceleration", 29.41995),
-        ("1 kgf", "force", 9.80665),
-        ("2 t", "mass", 2000.0),
-        ("1 lb", "mass", 0.45359237),
-        ("0.1 N m s", "rotational_drag", 0.1),
-        ("0.1 N m s/rad", "rotational_drag", 0.1),
-        ("1 N m/rpm", "rotational_drag", 60 / (2 * math.pi)),
-        ("0.1 s/m", "contact_damping", 0.1),
-        ("8 mV/um", "voltage_sensitivity", 8000.0),
-        ("20 degC", "temperature", 293.15),
-        ("68 °F", "temperature", 293.15),
-        ("15 %", "dimensionless", 0.15),
-        (0.15, "dimensionless", 0.15),
-        ("0.15", "dimensionless", 0.15),
-        # the contact's exponent is part of its unit
-        ("1.05e9 N/m^1.11", "contact_stiffness", 1.05e9),
-        ("1.05e9 N/m^(10/9)", "contact_stiffness", 1.05e9),
-        ("1 N/mm^1.5", "contact_stiffness", 1000**1.5),
-        ("2 kN/m", "contact_stiffness", 2000.0),
+        ("speed", 2 * math.pi * 60, "60 Hz; 3600 RPM; 60 rev/s"),
+        ("frequency", 60.0, "3600 rpm; 60 Hz; 376.99111843077515 rad/s"),
+        ("length", 254e-6, "10 mil"),
+        ("speed", math.pi / 180, "1 deg/s"),
+        ("frequency", 1500.0, "1.5 kHz"),
+        ("speed", 100 * math.pi, "3000 r/min; 3000 U/min"),
+        ("angle", math.pi / 4, "45 deg"),
+        ("angle", -math.pi / 4, "-45°"),
+        ("length", 280e-6, "280 um; 280 µm; 280 μm; 280 micron"),
+        ("length", 0.27e-3, "0.27 mm"),
+        ("length", 0.0254, "1 in"),
+        ("length", 127e-6, "5 thou"),
+        ("stiffness", 1e8, "1e8 N/m; 100 N/um"),
+        ("stiffness", 4.4482216152605 / 0.0254, "1 lbf/in"),
+        ("damping", 5000.0, "5 kN s/m; 5000 Ns/m; 5 N·s/mm"),
+        ("unbalance", 5e-5, "50 g mm; 50 gmm"),
+        ("inertia", 0.42, "0.42 kg m²"),
+        ("density", 7850.0, "7.85 g/cm^3"),
+        ("pressure", 210e9, "210 GPa"),
+        ("pressure", 6894.757293168361, "1 psi"),
+        ("acceleration", 29.41995, "3 g_n"),
+        ("force", 9.80665, "1 kgf"),
+        ("mass", 2000.0, "2 t"),
+        ("mass", 0.45359237, "1 lb"),
+        ("rotational_drag", 0.1, "0.1 N m s; 0.1 N m s/rad"),
+        ("rotational_drag", 60 / (2 * math.pi), "1 N m/rpm"),
+        ("contact_damping", 0.1, "0.1 s/m"),
+        ("voltage_sensitivity", 8000.0, "8 mV/um"),
+        ("temperature", 293.15, "20 degC; 68 °F"),
+        ("dimensionless", 0.15, "15 %; 0.15"),
+        ("contact_stiffness", 1.05e9, "1.05e9 N/m^1.11; 1.05e9 N/m^(10/9)"),
+        ("contact_stiffness", 1000**1.5, "1 N/mm^1.5"),
+        ("contact_stiffness", 2000.0, "2 kN/m"),
+        ("speed", 300 * math.pi, "9000 1/min; 9000 min^-1; 9000 min-1; 9000 min⁻¹; 9000 U/min"),
+        ("frequency", 150.0, "9000 1/min; 9000 min^-1; 9000 min-1; 9000 min⁻¹; 9000 U/min"),
     ],
 )
-def test_value_in_si(text, kind, value):
-    assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-12)
+def test_value_in_si(kind, value, texts):
+    for text in texts.split("; "):
+        assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-15), text
+    assert parse_quantity(0.15, "dimensionless") == 0.15
 
 
 @pytest.mark.parametrize(
@@ -129,11 +109,7 @@ def test_usual_units_are_those_of_the_unit_library(kind, units):
         ("1e999 m", "length", r"'1e999 m' is too large to be a length"),
         ("3 m; 4", "length", r"'m; 4' is not a unit known here"),
         ("3 m + 4 mm", "length", r"'m \+ 4 mm' is not a unit known here"),
-        (
-            "1e9 N/m^3",
-            "contact_stiffness",
-            r"'1e9 N/m\^3' is not a contact stiffness; write N/m\^n with n from 1 to 2",
-        ),
+        ("1e9 N/m^3", "contact_stiffness", r"'1e9 N/m\^3' is not .*; write N/m\^n with n from 1 to 2"),
         (True, "length", r"True is not a length; write a number with a unit, '280 um'"),
         (None, "mass", r"None is not a mass"),
     ],
@@ -157,11 +133,6 @@ def test_the_example_of_each_kind_is_accepted(kind):
 def test_one_si_unit_is_one(kind):
     unit = KINDS[kind].unit.replace("^n", "^1.5")
     assert parse_quantity(f"1 {unit}", kind) == pytest.approx(1.0, rel=1e-12)
-
-
-@pytest.mark.parametrize(("kind", "unit"), [("speed", "rad/s"), ("frequency", "Hz"), ("force", "N")])
-def test_si_unit_is_named(kind, unit):
-    assert si_unit(kind) == unit
 
 
 @settings(max_examples=300, deadline=None)
@@ -225,12 +196,6 @@ def test_a_unit_that_would_be_computed_for_ever_is_refused_at_once(text):
         parse_quantity(text, "length")
 
 
-@pytest.mark.parametrize("written", ["9000 1/min", "9000 min^-1", "9000 min-1", "9000 min⁻¹", "9000 U/min"])
-def test_revolutions_per_minute_as_din_writes_them(written):
-    assert parse_quantity(written, "speed") == pytest.approx(300 * math.pi, rel=1e-15)
-    assert parse_quantity(written, "frequency") == pytest.approx(150.0, rel=1e-15)
-
-
 @pytest.mark.parametrize(
     ("time", "text"),
     [(-0.00002, "0.0000 s"), (-0.00006, "-0.0001 s"), (0.21449, "0.2145 s"), (57.1, "57.1000 s")],
@@ -268,3 +233,11 @@ def test_a_fall_takes_as_long_and_ends_as_fast_as_gravity_makes_it(gravity):
     took, speed = fall_time(2e-4, gravity), fall_speed(2e-4, gravity)
     assert 0.5 * gravity * took**2 == pytest.approx(2e-4, rel=1e-14)
     assert speed == pytest.approx(gravity * took, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(0.0, "0"), (127.6, "128"), (1111.0, "1110"), (9.36e-14, "< 0.001"), (0.0993, "0.0993")],
+)
+def test_a_factor_is_written_as_one_says_it(number, text):
+    assert format_amount(number) == text

@@ -1,9 +1,5 @@
 """A small machine, as text of a file, for tests that change it."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
-
 import pytest
 
 SMALL = """
@@ -74,16 +70,16 @@ angle = "45 deg"
 
 
 @pytest.fixture(scope="session")
-def small_text() -> str:
+def small_text():
     """Text of the small machine."""
     return SMALL
 
 
 @pytest.fixture(scope="session")
-def changed() -> Callable[..., str]:
+def changed():
     """Text of the small machine with replacements, each where its text stands first."""
 
-    def replaced(*changes: tuple[str, str]) -> str:
+    def replaced(*changes):
         text = SMALL
         for old, new in changes:
             assert old in text, f"{old!r} is not in the text"

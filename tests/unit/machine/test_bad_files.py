@@ -11,57 +11,29 @@ from rotordrop.machine import load_machine, loads_machine
 from rotordrop.machine.ross_files import read_ross
 from rotordrop.record.profile import load_profile
 
-GAP = 'air_gap = "250 um"'
+GAP, NAME, HEAVY = 'air_gap = "250 um"', 'name = "small"', 'preload = "heavy"'
+SEAL = '[[clearances]]\nname = "seal"\nnode = {}\ngap = "{} mm"\n[[sensors]]'
+COMMA = r"0,25 has a decimal comma; write 0\.25"
 
 BAD = [
     # syntax and decimal commas
-    (GAP, "air_gap = 0,25", r"0,25 has a decimal comma; write 0\.25, in quotes with its unit", "0,25"),
+    (GAP, "air_gap = 0,25", f"{COMMA}, in quotes with its unit", "0,25"),
     (GAP, 'air_gap = "0,25 mm"', r"'0,25 mm' has a decimal comma; use 0\.25 mm", '"0,25'),
-    (GAP, "air_gap = { guess = 0,25 }", r"0,25 has a decimal comma; write 0\.25", "0,25"),
+    (GAP, "air_gap = { guess = 0,25 }", COMMA, "0,25"),
     (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
     (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
     # keys
-    (
-        'name = "small"',
-        'name = "small"\ngravity = [0.0, -9.81]',
-        "gravity as a direction is reserved and not yet supported",
-        "gravity",
-    ),
-    (
-        'name = "small"',
-        'name = "small"\nside_force = "5 N"',
-        "side_force: '5 N' has a unit; side_force is the steady force across over the weight of the rotor",
-        "5 N",
-    ),
+    (NAME, f"{NAME}\ngravity = [0.0, -9.81]", "gravity as a direction is reserved", "gravity"),
+    (NAME, f'{NAME}\nside_force = "5 N"', "'5 N' has a unit; side_force is .* over the weight", "5 N"),
     (GAP, 'airgap = "250 um"', "unknown key 'airgap'; did you mean 'air_gap'", "airgap"),
-    (
-        GAP,
-        GAP + '\nkind = "planetary"',
-        "is reserved for bearings of several rollers, which are not yet supported; there are .*sleeve",
-        "kind",
-    ),
-    (
-        GAP,
-        GAP + '\nmount = "soft"',
-        "'soft' is no mount; write a list of its elements, mount = .*kind = .stop",
-        "mount",
-    ),
+    (GAP, f'{GAP}\nkind = "planetary"', "is reserved for bearings of .*; there are .*sleeve", "kind"),
+    (GAP, f'{GAP}\nmount = "soft"', "'soft' is no mount; write a list .*kind = .stop", "mount"),
     ("[[rotor.discs]]", "[[rotor.disks]]", "unknown key 'disks'; did you mean 'discs'", "rotor.disks"),
     ("[speed]", "[sped]", "unknown key 'sped'; did you mean 'speed'", "sped"),
-    (
-        "elements = 2",
-        "elements = 2\nshaft_tabel = 1",
-        "unknown key 'shaft_tabel'; known here are",
-        "shaft_tabel",
-    ),
-    (
-        "[rotor]",
-        '[rotor]\nshaft_tabel = "x"',
-        "unknown key 'shaft_tabel'; did you mean 'shaft_table'",
-        "shaft_t",
-    ),
+    ("elements = 2", "elements = 2\nshaft_tabel = 1", "'shaft_tabel'; known here are", "shaft_tabel"),
+    ("[rotor]", '[rotor]\nshaft_tabel = "x"', "'shaft_tabel'; did you mean 'shaft_table'", "shaft_t"),
     (GAP, "", "'air_gap' is missing; add it, for example air_gap = \"280 um\"", "touchdown_bearings]]"),
-    ('name = "small"', "", "'name' is missing; add it", None),
+    (NAME, "", "'name' is missing; add it", None),
     # whole numbers
     ("elements = 2", f"elements = {'9' * 400}", "9{9}... has 400 digits; TOML holds whole numbers", "9999"),
     # units and dimensions
@@ -82,35 +54,20 @@ BAD = [
     # diameters, layers, materials
     ('"60 mm"', '"0 mm"', "0 m is not allowed here; a length must be positive", '"0 mm"'),
     ('"60 mm"', '"-60 mm"', r"-60\.0 mm is not allowed here; a length must be positive", '"-60 mm"'),
-    (
-        '"20 mm"',
-        '"90 mm"',
-        r"the inner diameter 90\.0 mm must be smaller than the outer one, 80\.0 mm",
-        '"90 mm"',
-    ),
+    ('"20 mm"', '"90 mm"', r"inner diameter 90\.0 mm must be smaller than .*, 80\.0 mm", '"90 mm"'),
     ('"20 mm"', '"-1 mm"', r"-1\.00 mm is not allowed here; it must not be negative", '"-1 mm"'),
     ("elements = 4", 'elements = 4\nlayer_diameter = "90 mm"', "a layer needs both", "rotor.sections]]"),
     (
         "elements = 4",
         'elements = 4\nlayer_diameter = "70 mm"\nlayer_density = "7650 kg/m^3"',
-        r"the layer reaches to 70\.0 mm and must reach beyond the outer diameter 80\.0 mm",
+        r"layer reaches to 70\.0 mm and must reach beyond the outer diameter 80\.0 mm",
         '"70 mm"',
     ),
-    (
-        "[rotor]",
-        '[rotor]\nmaterial = "titan"',
-        r"unknown material 'titan'; .*\[rotor\.materials\.titan\]",
-        "mat",
-    ),
+    ("[rotor]", '[rotor]\nmaterial = "titan"', r"material 'titan'; .*\[rotor\.materials\.titan\]", "mat"),
     ("elements = 2", "elements = 0", "0 does not fit; expected greater than or equal to 1", "0"),
     ("elements = 2", "elements = 2.5", r"2\.5 does not fit; expected a valid integer", "2.5"),
     ("elements = 2", "nodes = [1, 3]", "a section has either 'length' or 'nodes', not both", "length"),
-    (
-        'length = "0.4 m"\nelements = 4',
-        "nodes = [3, 7]",
-        "some sections have 'length' and others 'nodes'",
-        "rotor",
-    ),
+    ('length = "0.4 m"\nelements = 4', "nodes = [3, 7]", "some .* 'length' and others 'nodes'", "rotor"),
     ("0.02 kg", "0.2 kg", r"polar_inertia 0\.2 kg m² is more than twice diametral_inertia", '"0.2 kg'),
     # touchdown bearings
     ('"30.25 mm"', '"60.5 mm"', r"bore radius 60\.5 mm is larger than that of XCB71914E.*, 35 mm", '"60.5'),
@@ -118,76 +75,31 @@ BAD = [
     ("XCB71914-E", "XCB71915-X", "no bearing 'XCB71915-X'; did you mean one of", '"XCB71915-X"'),
     ("XCB71914-E", "30206", "no bearing '30206'", '"30206"'),
     ('"heavy"', '"hevy"', "'hevy' is no preload class; did you mean 'heavy'", '"hevy"'),
-    (
-        'preload = "heavy"',
-        "ball_count = 40",
-        r"40 balls of 9\.525 mm do not fit on .* 85 mm; at most 28",
-        "40",
-    ),
-    ('preload = "heavy"', "ball_count = 2", "2 does not fit; expected greater than or equal to 3", "2"),
-    (
-        'preload = "heavy"',
-        'arrangement = "Y"',
-        "'Y' does not fit; expected 'X', 'O', 'tandem' or 'single'",
-        '"Y"',
-    ),
-    (
-        'preload = "heavy"',
-        "conformity = 0.5",
-        r"0\.500 is not allowed here; the number must be greater",
-        "0.5",
-    ),
-    (
-        'designation = "XCB71914-E"',
-        'preload = "1 N"',
-        "has no 'ball_diameter', 'ball_count', 'pitch_diam",
-        None,
-    ),
+    (HEAVY, "ball_count = 40", r"40 balls of 9\.525 mm do not fit on .* 85 mm; at most 28", "40"),
+    (HEAVY, "ball_count = 2", "2 does not fit; expected greater than or equal to 3", "2"),
+    (HEAVY, 'arrangement = "Y"', "'Y' does not fit; expected 'X', 'O', 'tandem' or 'single'", '"Y"'),
+    (HEAVY, "conformity = 0.5", r"0\.500 is not allowed here; the number must be greater", "0.5"),
+    ('designation = "XCB71914-E"', 'preload = "1 N"', "no 'ball_diameter', 'ball_count', 'pitch_diam", None),
     ('name = "DE"', 'name = "NDE"', "the name 'NDE' is used twice", '"NDE"'),
     ('name = "DE"', 'name = "D E"', "'D E' is not a name; write one word without dots", '"D E"'),
     ('name = "DE"', 'name = "speed"', "a touchdown bearing cannot be called 'speed'", '"speed"'),
     ('position = "0.7 m"', "node = 2", "DE sits at node 2, where NDE sits already; give it another", "2"),
     # clearances beside the touchdown bearings
+    ("[[sensors]]", SEAL.format(3, 0), r"0 m is not allowed here; a length must be positive", '"0 mm"'),
     (
         "[[sensors]]",
-        '[[clearances]]\nname = "seal"\nnode = 3\ngap = "0 mm"\n[[sensors]]',
-        r"0 m is not allowed here; a length must be positive",
-        '"0 mm"',
-    ),
-    (
-        "[[sensors]]",
-        '[[clearances]]\nname = "seal"\nnode = 3\ngap = "0.2 mm"\n[[sensors]]',
-        r"the clearance 'seal' of .* at node 3 is used up before .* whose air gap is .* there; widen it",
+        SEAL.format(3, 0.2),
+        r"'seal' .* at node 3 is used up before .* there; widen",
         '"0.2 mm"',
     ),
-    (
-        "[[sensors]]",
-        '[[clearances]]\nname = "seal"\nnode = 99\ngap = "2 mm"\n[[sensors]]',
-        "node 99 is outside the rotor",
-        "99",
-    ),
+    ("[[sensors]]", SEAL.format(99, 2), "node 99 is outside the rotor", "99"),
     # clearance
-    ('preload = "heavy"', 'clearance = "C7"', "'C7' is neither a length nor a clearance class", '"C7"'),
-    (
-        'preload = "heavy"',
-        'clearance = "C3", preload = "heavy"',
-        "has a preload .* or a clearance .* not both",
-        None,
-    ),
-    (
-        'preload = "heavy"',
-        'clearance = "190 um"',
-        "is more than the .* that these grooves leave at 25°",
-        '"190 um"',
-    ),
-    (
-        'preload = "heavy"',
-        'clearance = "9 um", rows = 1',
-        "say the same of rows that face one way",
-        '"9 um"',
-    ),
-    ('preload = "heavy"', "rows = 3", "rows = 3 is neither 1 nor 2", "3"),
-    ('preload = "heavy"', 'rows = 1, arrangement = "O"', "rows = 1 does not go with arrangement = 'O'", "1"),
+    (HEAVY, 'clearance = "C7"', "'C7' is neither a length nor a clearance class", '"C7"'),
+    (HEAVY, f'clearance = "C3", {HEAVY}', "has a preload .* or a clearance .* not both", None),
+    (HEAVY, 'clearance = "190 um"', "is more than the .* that these grooves leave at 25°", '"190 um"'),
+    (HEAVY, 'clearance = "9 um", rows = 1', "say the same of rows that face one way", '"9 um"'),
+    (HEAVY, "rows = 3", "rows = 3 is neither 1 nor 2", "3"),
+    (HEAVY, 'rows = 1, arrangement = "O"', "rows = 1 does not go with arrangement = 'O'", "1"),
     (
         'designation = "XCB71914-E", preload = "heavy"',
         'ball_diameter = "8 mm", ball_count = 12, pitch_diameter = "85 mm", clearance = "C3"',
@@ -200,7 +112,7 @@ BAD = [
     ('"60 mm"', '"6e8 mm"', "is no diameter of a rotor, which has 100 µm to 100 m; ch", '"6e8 mm"'),
     ('"60 mm"', '"1e300 mm"', "'1e300 mm' is no length that a machine has; write for ex", '"1e300 mm"'),
     ('"5 kg"', '"1e300 kg"', "'1e300 kg' is no mass that a machine has", '"1e300 kg"'),
-    ('preload = "heavy"', 'first_ball_angle = "1e20 deg"', "is not allowed here; at most", '"1e20 deg"'),
+    (HEAVY, 'first_ball_angle = "1e20 deg"', "is not allowed here; at most", '"1e20 deg"'),
     # sensors
     ('"135 deg"', '"45 deg"', "resolve only 3 of the 4 rigid motions: in the plane at 100 mm", '"45 deg"'),
     ('"135 deg"', '"225 deg"', "resolve only 3 of the 4 rigid motions", '"225 deg"'),
@@ -208,12 +120,6 @@ BAD = [
     ('name = "B"', 'name = "A"', "the name 'A' is used twice", '"A"'),
     ('name = "B"', 'name = "B"\nbearing = "XE"', "belongs to touchdown bearing 'XE', .* DE, NDE", '"XE"'),
 ]
-
-
-def test_an_error_inside_a_bearing_is_told_alone(changed):
-    with pytest.raises(MachineFileError, match=r"air_gap: '250 g' is not a length") as refused:
-        loads_machine(changed((GAP, 'air_gap = "250 g"')))
-    assert "at least one entry is needed" not in str(refused.value)
 
 
 def test_a_machine_without_touchdown_bearings_is_refused(small_text):
@@ -238,15 +144,13 @@ def test_refusals_say_where_what_and_the_way_out(tmp_path, changed, old, new, to
         assert line[error.column - 1 :].startswith(at) or at in line, (line, error.column)
 
 
-def test_the_column_points_at_the_value_itself(changed):
+def test_a_column_points_at_the_value_itself_in_characters(changed):
     text = changed((GAP, '  air_gap   =   "250 g"   # a remark'))
-    with pytest.raises(MachineFileError, match="'250 g' is not a length") as caught:
+    with pytest.raises(MachineFileError, match=r"air_gap: '250 g' is not a length") as caught:
         loads_machine(text)
     line = text.split("\n")[caught.value.line - 1]
     assert line[caught.value.column - 1 :].startswith('"250 g"')
-
-
-def test_columns_count_characters_not_bytes(changed):
+    assert "at least one entry is needed" not in str(caught.value)
     text = changed(
         ('bearing = { designation = "XCB71914-E" }', 'bearing = { "designation" = "µµµ", ball_cout = 3 }')
     )
@@ -258,7 +162,7 @@ def test_columns_count_characters_not_bytes(changed):
     assert line[caught.value.column - 1 :].startswith("ball_cout")
 
 
-def test_all_that_is_wrong_is_told_at_once(changed):
+def test_all_that_is_wrong_is_told_at_once(changed, small_text):
     text = changed((GAP, 'air_gap = "250 g"'), ("300 Hz", "300 s"), ("elements = 4", "elements = 0"))
     with pytest.raises(MachineFileError) as caught:
         loads_machine(text)
@@ -266,70 +170,52 @@ def test_all_that_is_wrong_is_told_at_once(changed):
     assert len(told) == 3
     assert [re.match(r"\d+:\d+: ", line) is not None for line in told] == [True] * 3
     assert "'300 s' is not a speed" in told[0]
-
-
-def test_sensors_in_one_plane_cannot_see_a_tilt(small_text):
+    # Three planes turned against each other, four sensors in all, determine four rigid motions.
     text = small_text.replace("node = 8", "node = 2")
     with pytest.raises(MachineFileError, match=r"4 sensors sit in 1 plane \(100 mm\) and cannot tell a tilt"):
         loads_machine(text)
-
-
-def test_three_planes_with_one_direction_each_can_do(changed):
-    """Three planes turned against each other, four sensors in all, determine four rigid motions."""
     text = changed(('name = "B"\nnode = 2', 'name = "B"\nnode = 5'))
     assert len(loads_machine(text).sensors) == 4
-
-
-def test_a_machine_without_sensors_can_be_simulated(small_text):
     assert loads_machine(small_text[: small_text.index("[[sensors]]")]).sensors == ()
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_files_are_there_in_utf_8_with_a_mark_or_without(tmp_path, small_text):
     with pytest.raises(MachineFileError, match="cannot read the machine file: No such file"):
         load_machine(tmp_path / "nowhere.toml")
-
-
-def test_a_file_in_another_encoding_is_refused(tmp_path, small_text):
     file = tmp_path / "machine.toml"
     file.write_bytes(small_text.replace("small", "größe").encode("latin-1"))
     with pytest.raises(MachineFileError, match=r"toml:2:11: the byte 0xf6 is not UTF-8 text; save the mach"):
         load_machine(file)
-
-
-def test_a_byte_order_mark_does_no_harm(tmp_path, small_text):
+    with pytest.raises(MachineFileError, match=r"more than 16777216 bytes are no machine file"):
+        load_machine("/dev/zero")
     file = tmp_path / "machine.toml"
     file.write_bytes(b"\xef\xbb\xbf" + small_text.encode())
     assert load_machine(file) == loads_machine(small_text)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("air_gap = ", 'air_gap = {guess = "0.2 mm", range = ["0.2 mm", "0.2 mm"]}\n#', "has no width"),
-        ("air_gap = ", 'air_gap = {guess = "0.2 mm", range = ["-1 mm", "1 mm"]}\n#', "range reaches to -1"),
-        (
-            "air_gap = ",
-            'air_gap = {value = "0.2 mm", interval = ["0.3 mm", "0.4 mm"]}\n#',
-            "lies outside its own interval, 300 µm to 400 µm",
-        ),
-        ("air_gap = ", 'air_gap = {value = "0.2 mm", standard_error = "-1 um"}\n#', "must be zero or positi"),
-        (
-            "air_gap = ",
-            'air_gap = {value = "0.2 mm", lower = "0.3 mm", upper = "0.1 mm"}\n#',
-            "lower = 300 µm lies above upper = 100 µm",
-        ),
-        ("air_gap = ", 'air_gap = "1e-300 mm"\n#', "'1e-300 mm' is no length that a machine has"),
-        ("air_gap = ", 'air_gap = "0.2 m**9**9**9**9"\n#', "is not a unit known here"),
-        ("air_gap = ", "air_gap = " + 5000 * "9" + "\n#", "this cannot be a value of a machine"),
-        ("air_gap = ", "air_gap = " + 5000 * "[" + "\n#", "5000 levels inside one another"),
-        ("air_gap = ", "air_gap = " + 3000 * "{a=" + "\n#", "3000 levels inside one another"),
-        ("air_gap = ", 20_000 * "a." + "b = 1\n#", "20000 levels inside one another"),
-    ],
-)
-def test_nonsense_is_refused_with_its_line(tmp_path, small_text, old, new, told):
+NONSENSE = [
+    ('air_gap = {guess = "0.2 mm", range = ["0.2 mm", "0.2 mm"]}', "has no width"),
+    ('air_gap = {guess = "0.2 mm", range = ["-1 mm", "1 mm"]}', "range reaches to -1"),
+    (
+        'air_gap = {value = "0.2 mm", interval = ["0.3 mm", "0.4 mm"]}',
+        "outside its own interval, 300 µm to 400 µm",
+    ),
+    ('air_gap = {value = "0.2 mm", standard_error = "-1 um"}', "must be zero or positi"),
+    ('air_gap = {value = "0.2 mm", lower = "0.3 mm", upper = "0.1 mm"}', "300 µm lies above upper = 100 µm"),
+    ('air_gap = "1e-300 mm"', "'1e-300 mm' is no length that a machine has"),
+    ('air_gap = "0.2 m**9**9**9**9"', "is not a unit known here"),
+    ("air_gap = " + 5000 * "9", "this cannot be a value of a machine"),
+    ("air_gap = " + 5000 * "[", "5000 levels inside one another"),
+    ("air_gap = " + 3000 * "{a=", "3000 levels inside one another"),
+    (20_000 * "a." + "b = 1", "20000 levels inside one another"),
+]
+
+
+@pytest.mark.parametrize(("new", "told"), NONSENSE, ids=[told for _, told in NONSENSE])
+def test_nonsense_is_refused_with_its_line(tmp_path, small_text, new, told):
     file = tmp_path / "machine.toml"
-    file.write_text(small_text.replace(old, new, 1), encoding="utf-8")
-    line = small_text[: small_text.index(old)].count("\n") + 1
+    file.write_text(small_text.replace("air_gap = ", f"{new}\n#", 1), encoding="utf-8")
+    line = small_text[: small_text.index("air_gap = ")].count("\n") + 1
     with pytest.raises(MachineFileError) as caught:
         load_machine(file)
     assert told in str(caught.value)
@@ -347,11 +233,6 @@ def test_a_shaft_table_that_is_no_file_is_refused_with_the_line(tmp_path, small_
     with pytest.raises(MachineFileError, match=r"shaft table") as caught:
         load_machine(file)
     assert "shaft_table" in file.read_text().splitlines()[caught.value.line - 1]
-
-
-def test_an_endless_machine_file_is_refused(tmp_path):
-    with pytest.raises(MachineFileError, match=r"more than 16777216 bytes are no machine file"):
-        load_machine("/dev/zero")
 
 
 NESTED = {

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from tests.reference.ball_bearing_catalogue import geometry_of
 
 from rotordrop.elements.ball_numbers import inferred_stress_sigma
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions
@@ -19,7 +20,6 @@ from rotordrop.elements.catalog.lookup import designations, find_bearing
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.hertz import compliance, race_contact
 
 
@@ -114,7 +114,7 @@ def described(small_text, text):
     return loads_machine(small_text.replace(FIRST, f"bearing = {{ {table} }}")).touchdown_bearings[0].bearing
 
 
-def test_a_deep_groove_bearing_by_designation_is_one_row_with_the_clearance_it_names(small_text):
+def test_a_bearing_by_designation_takes_rows_angle_clearance_and_preload_from_it(small_text):
     bearing = described(small_text, 'designation = "6014-2Z/C3"')
     assert bearing.arrangement == "single"
     assert bearing.clearance.range == pytest.approx((25e-6, 51e-6))
@@ -123,33 +123,23 @@ def test_a_deep_groove_bearing_by_designation_is_one_row_with_the_clearance_it_n
     assert bearing.ball_diameter.status == "inferred"
     assert bearing.ball_diameter.range == pytest.approx((10.319e-3, 12.7e-3), rel=1e-3)
     assert "inferred from the boundary dimensions: 12 to 15 balls" in bearing.ball_diameter.source
-
-
-def test_a_pair_by_designation_takes_angle_arrangement_and_preload_from_it(small_text):
     bearing = described(small_text, 'designation = "7014 ACD/HCP4ADBB"')
     assert math.degrees(bearing.contact_angle.value) == pytest.approx(25.0)
     assert (bearing.arrangement, bearing.ball_material) == ("O", "silicon nitride")
     low, high = bearing.preload.range
     assert high / low == pytest.approx(4.0)
     assert "medium preload carried over from listed bearings of the same size" in bearing.preload.source
-
-
-def test_a_size_nobody_lists_needs_its_preload(small_text):
     with pytest.raises(MachineFileError, match=r"has no 'preload'; write for example preload = \"100 N\""):
         described(small_text, 'designation = "71820 C"')
 
 
-def test_ratings_in_the_file_narrow_the_balls(small_text):
+def test_ratings_in_the_file_narrow_the_balls_and_inferred_ones_widen_the_stress(small_text):
     rated = described(
-        small_text,
-        'designation = "6014"\nstatic_load_rating = "30.9 kN"\ndynamic_load_rating = "38.1 kN"',
+        small_text, 'designation = "6014"\nstatic_load_rating = "30.9 kN"\ndynamic_load_rating = "38.1 kN"'
     )
     alone = described(small_text, 'designation = "6014"')
     assert rated.ball_diameter.range[1] <= alone.ball_diameter.range[1]
     assert inferred_stress_sigma(rated) < inferred_stress_sigma(alone)
-
-
-def test_balls_that_are_listed_leave_the_stress_as_it_is_and_inferred_ones_do_not(small_text):
     assert inferred_stress_sigma(loads_machine(small_text).touchdown_bearings[0].bearing) == 0.0
     bearing = described(small_text, 'designation = "7014 ACD/P4A"')
     sigma = inferred_stress_sigma(bearing)
@@ -162,20 +152,7 @@ def test_the_rigidity_of_a_pair_is_that_of_the_simulated_bearing(name, preload_c
     """In closed form for the catalogue, by Hertz contacts for the simulation."""
     bearing, balls = find_bearing(name), find_bearing(name).complement
     preload, hybrid = bearing.preload[preload_class], bearing.ball_material != "steel"
-    modulus, poisson = (315e9, 0.26) if hybrid else (208e9, 0.3)
-    simulated = bearing_constants(
-        BallBearingGeometry(
-            ball_diameter=balls.ball_diameter,
-            ball_count=balls.ball_count,
-            pitch_diameter=balls.pitch_diameter,
-            contact_angle=bearing.contact_angle,
-            conformity_inner=balls.conformity,
-            conformity_outer=balls.conformity,
-            ball_youngs_modulus=modulus,
-            ball_poisson_ratio=poisson,
-            preload=preload,
-        )
-    )
+    simulated = bearing_constants(geometry_of(bearing, preload))
     row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, bearing.contact_angle)
     closed = pair_rigidity(row, balls.conformity, preload, hybrid=hybrid)
     assert closed == pytest.approx(axial_rigidity(simulated), rel=0.01)
@@ -199,15 +176,8 @@ def test_a_rigidity_narrows_what_size_and_ratings_leave_open():
     assert abs(known.conformity[0] - conformity) < abs(alone.conformity[0] - conformity)
 
 
-def test_grooves_of_deep_groove_bearings_are_those_of_the_rating_tables():
+def test_a_rigidity_in_the_file_narrows_the_grooves_and_deep_grooves_are_those_of_the_tables(small_text):
     """At 0.52 the tables of ISO 281 hold as they stand, so that a dynamic rating needs no correction."""
-    balls = infer_balls(kind="deep groove", dimension_series="10", bore=0.08, outside_diameter=0.125)
-    row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, 0.0)
-    assert balls.conformity[0] == 0.52
-    assert groove_factors(row, balls.conformity[0]) == pytest.approx((1.0, 1.0), abs=1e-12)
-
-
-def test_a_rigidity_in_the_file_narrows_the_grooves_and_needs_its_preload(small_text):
     rated = 'static_load_rating = "43 kN"\ndynamic_load_rating = "47 kN"'
     stiff = 'designation = "7014 CD"\npreload = "290 N"\naxial_rigidity = "88 N/um"\n' + rated
     known = described(small_text, stiff).conformity_inner.range
@@ -215,6 +185,10 @@ def test_a_rigidity_in_the_file_narrows_the_grooves_and_needs_its_preload(small_
     assert known[1] - known[0] < alone.conformity_inner.range[1] - alone.conformity_inner.range[0]
     with pytest.raises(MachineFileError, match=r"axial_rigidity = 88\.0 MN/m holds at a preload"):
         described(small_text, 'designation = "7014 CD"\naxial_rigidity = "88 N/um"')
+    balls = infer_balls(kind="deep groove", dimension_series="10", bore=0.08, outside_diameter=0.125)
+    row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, 0.0)
+    assert balls.conformity[0] == 0.52
+    assert groove_factors(row, balls.conformity[0]) == pytest.approx((1.0, 1.0), abs=1e-12)
 
 
 def test_ratings_of_wide_grooves_are_those_of_the_same_balls():
@@ -222,10 +196,7 @@ def test_ratings_of_wide_grooves_are_those_of_the_same_balls():
     size = {"kind": "angular contact", "dimension_series": "10", "bore": 0.005, "outside_diameter": 0.014}
     for static, dynamic in ((545.0, 1400.0), (310.0, 990.0)):
         found = infer_balls(
-            **size,
-            contact_angle=math.radians(15.0),
-            static_load_rating=static,
-            dynamic_load_rating=dynamic,
+            **size, contact_angle=math.radians(15.0), static_load_rating=static, dynamic_load_rating=dynamic
         )
         assert found.count_range[0] <= 8 <= found.count_range[1]
         assert found.diameter_range[0] <= 2.3813e-3 <= found.diameter_range[1] + 1e-6

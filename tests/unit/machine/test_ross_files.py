@@ -9,6 +9,8 @@ from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_machine, load_machine
 from rotordrop.machine.ross_files import Spring, read_ross, read_rotor, write_ross
+from rotordrop.machine.saving import machine_text
+from rotordrop.report.machine_content import imported_json
 from rotordrop.rotor.assembly import modes_on_springs, rotor_fe
 
 STEEL = {"name": "Steel", "rho": 7810.0, "E": 211e9, "G_s": 81.2e9}
@@ -71,7 +73,7 @@ def test_a_rotor_goes_to_ross_and_back_without_loss(tmp_path, name, suffix):
     assert back.rotor.mass == pytest.approx(rotor.mass, rel=1e-12)
 
 
-def test_a_soft_element_around_the_shaft_is_a_layer(written):
+def test_layers_cones_and_what_is_left_out_are_kept_or_told(written):
     soft = STEEL | {"name": "soft sleeve", "E": 7e3, "G_s": 2.7e3}
     sleeve = shaft(1, od=0.08, material=soft, tag="sleeve") | {"idl": 0.05, "idr": 0.05}
     rotor = read_ross(written(published() | {"ShaftElement_sleeve": sleeve})).rotor
@@ -79,9 +81,6 @@ def test_a_soft_element_around_the_shaft_is_a_layer(written):
     assert (element.layer_diameter, element.layer_density) == pytest.approx((0.08, 7810.0))
     extra = 7810.0 * math.pi / 4 * (0.08**2 - 0.05**2) * 0.25
     assert rotor.mass == pytest.approx(88.18180401658343 + extra, rel=1e-12)
-
-
-def test_cones_keep_their_mass_and_are_told(written):
     cone = shaft(0) | {"odl": 0.04, "odr": 0.06}
     imported = read_ross(written(published() | {"ShaftElement_0": cone}))
     assert "conical elements stand as 8 cylinders each" in imported.notes
@@ -89,14 +88,64 @@ def test_cones_keep_their_mass_and_are_told(written):
     volume = math.pi / 4 * 0.25 * (0.04**2 + 0.04 * 0.06 + 0.06**2) / 3
     whole = math.pi / 4 * 0.25 * 0.05**2
     assert imported.rotor.mass == pytest.approx(88.18180401658343 + 7810.0 * (volume - whole), rel=2e-4)
-
-
-def test_what_is_left_out_or_switched_is_told(written):
     coupling = {"n": 3, "kt_x": 1.0}
     stiff = shaft(2, shear_effects=False)
     imported = read_ross(written(published() | {"CouplingElement_1": coupling, "ShaftElement_2": stiff}))
     assert "1 CouplingElement left out" in imported.notes
     assert "the source switched shear effects off; it acts here" in imported.notes
+
+
+def supported():
+    """The same rotor with a mass on a spring under one bearing, at the link node 7."""
+    content = published()
+    content["BearingElement_0"] = content["BearingElement_0"] | {"kxx": [1e7], "kyy": [1e7], "n_link": 7}
+    content["BearingElement_6"] = content["BearingElement_6"] | {"kxx": [1e7], "kyy": [1e7]}
+    content["DiskElement_2"], content["DiskElement_4"] = disc(1), disc(3)
+    ground = {"n": 7, "tag": "ground", "kxx": [1e8], "cxx": [500.0]}
+    return content | {
+        "BearingElement_ground": ground,
+        "PointMass_7": {"n": 7, "m": 12.0, "mx": 12.0, "my": 12.0, "tag": "housing"},
+    }
+
+
+def test_a_point_mass_at_a_link_node_is_the_mass_of_a_support(written, tmp_path):
+    source = written(supported())
+    imported = read_ross(source)
+    found = imported_json(imported)
+    assert found["mass_kg"] == pytest.approx(88.18180401658343, rel=1e-12)
+    # ROSS 2.3.0, run_modal at standstill [Hz], less its torsion
+    for axis in "xy":
+        assert found[f"on_source_bearings_{axis}_Hz"][:3] == pytest.approx([20.315, 78.326, 185.27], rel=1e-4)
+    assert run(["convert", str(source), "-o", str(tmp_path / "machine.toml")]) == 0
+    nde, de = (bearing.support for bearing in load_machine(tmp_path / "machine.toml").touchdown_bearings)
+    assert [float(x) for x in (nde.mass, nde.stiffness, nde.damping_horizontal)] == [12.0, 1e8, 500.0]
+    assert de.stiffness.status == "guess"
+    write_ross(imported.rotor, tmp_path / "back.toml", imported.springs)
+    assert read_ross(tmp_path / "back.toml").springs == imported.springs
+
+
+def test_magnets_stand_where_the_source_has_them(written, tmp_path, capsys):
+    magnet = {"kxx": [1e6], "cxx": [1e3], "g0": 1e-3, "i0": 1.0}
+    magnets = {f"MagneticBearingElement_{n}": {"n": n, "tag": f"AMB {n}", **magnet} for n in (1, 5)}
+    assert run(["convert", str(written(published() | magnets)), "-o", str(tmp_path / "machine.toml")]) == 0
+    machine = load_machine(tmp_path / "machine.toml")
+    assert [amb.node for amb in machine.ambs] == [2, 6]
+    assert [bearing.node for bearing in machine.touchdown_bearings] == [1, 7]
+    assert "planes of the magnets" not in capsys.readouterr().err
+
+
+def test_damping_that_files_of_ross_do_not_hold_is_said(tmp_path, capsys):
+    path = tmp_path / "machine.toml"
+    path.write_text(machine_text(example_machine("small")), encoding="utf-8")
+    assert run(["convert", str(path), "--to", "ross", "-o", str(tmp_path / "back.toml")]) == 0
+    assert "modal damping of 0.5 %" in capsys.readouterr().out
+    assert run(["convert", str(tmp_path / "back.toml"), "-o", str(path), "--force"]) == 0
+    assert "modal damping" in capsys.readouterr().err
+    assert any(line.startswith("modal_damping = 0.005  # made up") for line in path.read_text().splitlines())
+
+
+def _without(content, *keys):
+    return {key: value for key, value in content.items() if key not in keys}
 
 
 @pytest.mark.parametrize(
@@ -110,6 +159,12 @@ def test_what_is_left_out_or_switched_is_told(written):
             "different materials lie around each other at node 1",
         ),
         (published() | {"ShaftElement_2": shaft(2, material="unobtainium")}, "'unobtainium' is only named"),
+        (
+            _without(published(), "ShaftElement_3") | {"CouplingElement_1": {"n": 3, "kt_x": 1.0}},
+            "a CouplingElement joins two shafts between nodes 3 and 4",
+        ),
+        (_without(supported(), "PointMass_7"), "'Bearing 0' is linked to node 7, where one point mass"),
+        (published() | {"DiskElement_x": disc(9)}, "DiskElement at node 9: the shaft has nodes 0 to 6"),
     ],
 )
 def test_what_is_no_rotor_is_refused(written, content, message):
@@ -117,16 +172,13 @@ def test_what_is_no_rotor_is_refused(written, content, message):
         read_ross(written(content))
 
 
-def test_the_command_makes_a_machine_of_it_and_gives_it_back(written, tmp_path, capsys):
+def test_the_command_makes_a_machine_of_it_and_back_and_refuses_what_is_no_rotor(written, tmp_path, capsys):
     source, machine, back = written(published()), tmp_path / "machine.toml", tmp_path / "back.toml"
     assert run(["convert", str(source), "-o", str(machine)]) == 0
     assert "on the bearings of the" in capsys.readouterr().out
     assert [bearing.node for bearing in load_machine(machine).touchdown_bearings] == [1, 7]
     assert run(["convert", str(machine), "--to", "ross", "-o", str(back)]) == 0
     assert read_ross(back).rotor.mass == pytest.approx(88.18180401658343, rel=1e-12)
-
-
-def test_the_command_refuses_what_is_no_rotor(tmp_path, capsys):
     (tmp_path / "rotor.pdf").write_text("x")
     assert run(["convert", str(tmp_path / "rotor.pdf")]) == 2
     assert "'.pdf' is no format of a rotor" in capsys.readouterr().err

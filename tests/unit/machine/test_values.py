@@ -1,62 +1,57 @@
-"""A physical value: with unit, as a guess with range, as an estimate with interval and source."""
+"""Values with units, guesses and estimates; the machines that ship say what their sources say."""
 
 import math
 
 import pytest
 
+from rotordrop import Known, check_record, example_record_path, read_record
 from rotordrop.elements.values import LEFT_OUT, Physical
-from rotordrop.errors import UsageError
-from rotordrop.known import Known
+from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.evidence.quality.finding import stops
+from rotordrop.machine import example_machine, example_path, load_machine, loads_machine
+from rotordrop.machine.saving import machine_text
 
 STIFFNESS = Physical("stiffness", above=0.0)
 ANGLE = Physical("angle", least=0.0, most=math.pi)
 
 
-def test_a_number_with_unit_is_given():
-    assert STIFFNESS.read("100 kN/mm") == Known(value=1e8, status="given", unit="N/m")
+@pytest.mark.parametrize(
+    ("written", "known"),
+    [
+        ("100 kN/mm", {"status": "given"}),
+        (
+            {"guess": "1e8 N/m", "range": ["5e7 N/m", "2e8 N/m"], "source": "drawing"},
+            {"status": "guess", "range": (5e7, 2e8), "source": "drawing"},
+        ),
+        (
+            {"value": "1e8 N/m", "interval": ["9e7 N/m", "1.1e8 N/m"], "source": "drop 3"},
+            {"status": "estimated", "interval_90": (9e7, 1.1e8), "source": "drop 3"},
+        ),
+        ({"value": "1e8 N/m", "standard_error": "2e6 N/m"}, {"status": "estimated", "standard_error": 2e6}),
+        ({"value": "1e8 N/m", "source": "drawing"}, {"status": "given", "source": "drawing"}),
+        (
+            {"value": "1e8 N/m", "lower": "9e7 N/m", "upper": "2e8 N/m"},
+            {"status": "estimated", "lower": 9e7, "upper": 2e8},
+        ),
+    ],
+)
+def test_what_is_written_is_known(written, known):
+    assert STIFFNESS.read(written) == Known(value=1e8, unit="N/m", **known)
 
 
-def test_a_guess_has_a_range():
-    read = STIFFNESS.read({"guess": "1e8 N/m", "range": ["5e7 N/m", "2e8 N/m"], "source": "drawing"})
-    assert read == Known(value=1e8, status="guess", range=(5e7, 2e8), source="drawing", unit="N/m")
-
-
-def test_an_estimate_has_interval_error_and_source():
-    read = STIFFNESS.read({"value": "1e8 N/m", "interval": ["9e7 N/m", "1.1e8 N/m"], "source": "drop 3"})
-    assert (read.status, read.interval_90, read.source) == ("estimated", (9e7, 1.1e8), "drop 3")
-    assert STIFFNESS.read({"value": "1e8 N/m", "standard_error": "2e6 N/m"}).standard_error == 2e6
-
-
-def test_limits_of_an_estimate_are_kept_apart_from_its_interval():
-    read = Physical("length").read({"value": "280 um", "lower": "275 um", "upper": "285 um"})
-    assert (read.lower, read.upper) == pytest.approx((275e-6, 285e-6), rel=1e-15)
-    assert read.interval_90 is None
-
-
-def test_a_value_with_a_source_only_stays_given():
-    assert STIFFNESS.read({"value": "1e8 N/m", "source": "drawing"}).status == "given"
-
-
-def test_numbers_without_dimension_need_no_unit():
-    assert Physical("dimensionless").read(0.15).value == 0.15
-    assert Physical("dimensionless").read(1).value == 1.0
-
-
-def test_an_angle_may_be_zero_but_not_negative():
+def test_numbers_come_back_exactly_zero_where_it_makes_sense():
+    for value in (1.0000000000000002, 123456789.12345679, 3e-17, 1.0000000000000002e-19):
+        assert STIFFNESS.read(f"{value!r} N/m").value == value
+    assert [Physical("dimensionless").read(number).value for number in (0.15, 1)] == [0.15, 1.0]
+    assert STIFFNESS.read(LEFT_OUT) is LEFT_OUT
     assert ANGLE.read("0 deg").value == 0.0
     with pytest.raises(UsageError, match=r"-5\.00° is not allowed here; it must not be negative"):
         ANGLE.read("-5 deg")
     with pytest.raises(UsageError, match=r"200° is not allowed here; at most 180°"):
         ANGLE.read("200 deg")
-
-
-def test_what_was_left_out_passes_unread():
-    assert STIFFNESS.read(LEFT_OUT) is LEFT_OUT
-
-
-def test_saved_numbers_in_si_come_back_exactly():
-    for value in (1.0000000000000002, 123456789.12345679, 3e-17, 1.0000000000000002e-19):
-        assert STIFFNESS.read(f"{value!r} N/m").value == value
+    assert Physical("quadratic_drag", least=0.0).read("1e-32 N m s^2").value == 1e-32
+    with pytest.raises(UsageError, match="'1e-32 m' is no length that a machine has"):
+        Physical("length", above=0.0).read("1e-32 m")
 
 
 @pytest.mark.parametrize(
@@ -73,10 +68,7 @@ def test_saved_numbers_in_si_come_back_exactly():
         ({"guess": "1e8 N/m", "standard_error": "1e7 N/m"}, "a guess has a range, not 'standard_error'"),
         ({"guess": "1e8 N/m", "range": "1e7 N/m"}, "range = '1e7 N/m' is not a pair"),
         ({"guess": "1e8 N/m", "range": ["2e8 N/m", "1e7 N/m"]}, "runs backwards"),
-        (
-            {"guess": "1e8 N/m", "range": ["2e8 N/m", "3e8 N/m"]},
-            "100 MN/m lies outside its own range, 200 MN/m",
-        ),
+        ({"guess": "1e8 N/m", "range": ["2e8 N/m", "3e8 N/m"]}, "100 MN/m lies outside its own range, 200"),
         ({"value": "1e8 N/m", "sorce": "x"}, "'sorce' does not belong to a value"),
         ({"value": "1e8 N/m", "source": 3}, "source = 3 is not a text"),
         ({"value": "1e8 N/m", "status": "sure"}, "status = 'sure' is not known; it is one of given, guess"),
@@ -90,7 +82,93 @@ def test_refusals_name_the_value_and_the_way_out(written, told):
         STIFFNESS.read(written)
 
 
-def test_what_may_be_zero_may_be_as_good_as_zero():
-    assert Physical("quadratic_drag", least=0.0).read("1e-32 N m s^2").value == 1e-32
-    with pytest.raises(UsageError, match="'1e-32 m' is no length that a machine has"):
-        Physical("length", above=0.0).read("1e-32 m")
+@pytest.fixture(scope="module", params=["paper", "lp400"])
+def machine(request):
+    return example_machine(request.param)
+
+
+def test_the_rotor_has_the_published_mass_and_shares(machine):
+    assert machine.rotor.mass == pytest.approx(59.49996, abs=2e-6)
+    left, right = (machine.rotor.node_positions[b.node - 1] for b in machine.touchdown_bearings)
+    far = machine.rotor.mass * (machine.rotor.centre_of_gravity - left) / (right - left)
+    assert far == pytest.approx(41.7, abs=0.05)
+    assert machine.rotor.mass - far == pytest.approx(17.8, abs=0.05)
+
+
+def test_node_positions_are_those_of_the_paper_to_the_micrometre(machine):
+    assert machine.rotor.node_positions[3] == pytest.approx(0.07, abs=1e-15)
+    assert machine.rotor.node_positions[25] == pytest.approx(0.856591, abs=1e-15)
+    assert machine.rotor.node_positions[-1] == pytest.approx(1.115523, abs=1e-15)
+    rotor = machine.rotor
+    assert len(rotor.elements) == len(rotor.node_positions) - 1 == 35
+    ends = [z + e.length for z, e in zip(rotor.node_positions, rotor.elements, strict=False)]
+    assert ends == pytest.approx(rotor.node_positions[1:], abs=1e-15)
+    parts = {e.part for e in machine.rotor.elements if e.layer_diameter is not None}
+    assert parts == {"NDE AMB laminations", "DE AMB laminations", "generator core + magnets/band"}
+
+
+def test_reference_machine_bearings():
+    nde, de = example_machine("paper").touchdown_bearings
+    assert (nde.name, nde.node, de.name, de.node) == ("NDE", 4, "DE", 26)
+    assert float(nde.air_gap) == pytest.approx(275e-6, abs=1e-18)
+    assert float(de.air_gap) == pytest.approx(285e-6, abs=1e-18)
+    assert float(nde.support.stiffness) == 1e8
+    assert float(de.support.stiffness) == 4e8
+    assert float(de.support.damping) == pytest.approx(2 * 0.025 * math.sqrt(4e8 * 40.0), rel=1e-14)
+    assert float(nde.bearing.preload) == 530.0
+    assert float(nde.contact.stiffness) == 8.3e8
+    assert float(nde.contact.exponent) == pytest.approx(10 / 9, rel=1e-15)
+
+
+def test_the_recorded_machine_is_that_of_its_owner():
+    friction = example_machine("lp400").touchdown_bearings[0].friction
+    assert friction.dynamic.status == "guess"
+    assert friction.dynamic.range == (0.05, 0.2)
+    assert friction.static.range == pytest.approx((0.065, 0.26))
+    sensors = example_machine("lp400").sensors
+    assert [s.name for s in sensors] == ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
+    assert [s.node for s in sensors] == [5, 5, 25, 25]
+    assert [round(math.degrees(float(s.angle))) for s in sensors] == [135, 45, 135, 45]
+    assert {float(s.sensitivity) for s in sensors} == {8000.0}
+    assert example_machine("paper").source_path == example_path("paper")
+    assert load_machine(example_path("paper")) == example_machine("paper")
+    with pytest.raises(UsageError, match="no example machine 'paber'; there are paper, lp400"):
+        example_machine("paber")
+
+
+def without(names, folder, marked):
+    """The example machine whose file marks sensors as lost, or leaves them out."""
+    text = example_path("lp400").read_text()
+    for name in names:
+        head, _, rest = text.partition(f'name = "{name}"')
+        if marked:
+            text = f'{head}name = "{name}"\nlost = true{rest}'
+        else:
+            before, _, _ = head.rpartition("[[sensors]]")
+            _, separator, after = rest.partition("[[sensors]]")
+            text = before + separator + after
+    return loads_machine(text, folder)
+
+
+@pytest.mark.parametrize("marked", [True, False])
+@pytest.mark.parametrize("name", ["S_NDE_A", "S_DE_B"])
+def test_three_sensors_in_two_planes_are_read_and_pass_the_gate(name, marked):
+    machine = without([name], example_path("lp400").parent, marked)
+    assert name not in [sensor.name for sensor in machine.sensors]
+    assert len(machine.sensors) == 3
+    record = read_record(example_record_path("lp400_drop_060"), machine)
+    assert record.signals.shape[1] == 3
+    assert not stops(check_record(record, machine))
+    assert loads_machine(machine_text(machine), example_path("lp400").parent) == machine
+
+
+@pytest.mark.parametrize("marked", [True, False])
+def test_one_sensor_per_plane_is_refused(marked):
+    with pytest.raises(MachineFileError, match="the sensors resolve only 2 of the 4 rigid motions"):
+        without(["S_NDE_A", "S_DE_B"], example_path("lp400").parent, marked)
+
+
+def test_a_machine_without_any_working_sensor_is_refused_as_such():
+    every = [sensor.name for sensor in example_machine("lp400").sensors]
+    with pytest.raises(MachineFileError, match="the 0 sensors sit in 0 plane"):
+        without(every, example_path("lp400").parent, True)

@@ -1,10 +1,6 @@
 """Bearings of the physics tests."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 
@@ -12,9 +8,9 @@ from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 
 
 @pytest.fixture(scope="session")
-def touchdown_bearing() -> Callable[..., BallBearingGeometry]:
+def touchdown_bearing():
     """The reference machine's touchdown bearing (23 ceramic balls, 25°, 530 N per row), with changes."""
-    reference: dict[str, Any] = {
+    reference = {
         "ball_diameter": 0.009525,
         "ball_count": 23,
         "pitch_diameter": 0.085,
@@ -24,7 +20,7 @@ def touchdown_bearing() -> Callable[..., BallBearingGeometry]:
         "preload": 530.0,
     }
 
-    def changed(**changes: Any) -> BallBearingGeometry:
+    def changed(**changes):
         return BallBearingGeometry(**(reference | changes))
 
     return changed

@@ -1,12 +1,15 @@
 """Where compiled kernels are kept."""
 
 import importlib.util
+import os
+import subprocess
 import sys
-from pathlib import Path
 
+import numba
 import pytest
 
-from rotordrop.physics import _compile
+from rotordrop.physics import _compile, _numba
+from rotordrop.simulate._tableau import tsit5
 
 KERNEL = """from rotordrop.physics import _compile
 
@@ -17,6 +20,23 @@ def doubled(x):
 """
 
 
+PARTED = """from rotordrop.physics import _compile
+from rotordrop.physics._compile import OPTIONAL_PARTS
+
+
+@_compile.lean_kernel
+def inner(x):
+    if OPTIONAL_PARTS and x > 0.0:
+        return 1.0
+    return 0.0
+
+
+@_compile.kernel
+def doubled(x, further=1.0):
+    return 2.0 * x * (further if further == 1.0 else 3.0) + inner(x)
+"""
+
+
 @pytest.fixture
 def kernel_of(tmp_path, monkeypatch):
     """A kernel of another package, loaded anew at each call, its compiled code under `tmp_path`."""
@@ -24,8 +44,6 @@ def kernel_of(tmp_path, monkeypatch):
     source.parent.mkdir()
     source.write_text(KERNEL)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
-    _compile._open_folder.cache_clear()
-    _compile.cache_folder.cache_clear()
 
     def loaded():
         spec = importlib.util.spec_from_file_location("doubled_kernel", source)
@@ -34,31 +52,80 @@ def kernel_of(tmp_path, monkeypatch):
         spec.loader.exec_module(module)
         return module.doubled
 
-    yield loaded
-    _compile._open_folder.cache_clear()
-    _compile.cache_folder.cache_clear()
+    return loaded
 
 
-def kept(folder: Path) -> set[Path]:
-    return {file.relative_to(folder) for file in folder.rglob("*.nb?")}
+def kept(folder):
+    return sorted(folder.rglob("*.object"))
 
 
-def test_kernels_are_read_where_they_cannot_be_written(kernel_of, tmp_path, monkeypatch):
+def hits(doubled):
+    return sum(doubled.outer.stats.cache_hits.values())
+
+
+def test_a_kernel_is_compiled_once(kernel_of, tmp_path):
     assert kernel_of()(2.0) == 4.0
-    before = kept(tmp_path / "kernels")
-    assert len(before) == 2
-
-    monkeypatch.setattr(_compile, "is_writable", lambda folder: False)
-    _compile._open_folder.cache_clear()
+    (object_file,) = kept(tmp_path / "kernels")
     again = kernel_of()
     assert again(3.0) == 6.0
-    assert sum(again.outer.stats.cache_hits.values()) == 1, "compiled a second time"
-    assert again(3) == 6.0  # of another type: compiled now, and kept in the copy alone
-    assert kept(tmp_path / "kernels") == before
+    assert hits(again) == 1
+    assert again(3) == 6  # of another type
+    assert len(kept(tmp_path / "kernels")) == 2
+    assert object_file in kept(tmp_path / "kernels")
 
 
-def test_a_folder_yet_to_be_made_is_as_its_nearest_parent(tmp_path, monkeypatch):
-    monkeypatch.setattr(_compile.os, "access", lambda path, mode: path != tmp_path)
-    assert not _compile.is_writable(tmp_path / "not" / "yet")
-    (tmp_path / "not").mkdir()
-    assert _compile.is_writable(tmp_path / "not" / "yet")
+def test_a_damaged_object_is_compiled_again(kernel_of, tmp_path):
+    assert kernel_of()(2.0) == 4.0
+    (object_file,) = kept(tmp_path / "kernels")
+    object_file.write_bytes(object_file.read_bytes()[:100])
+    again = kernel_of()
+    assert again(3.0) == 6.0
+    assert hits(again) == 0
+
+
+def test_a_folder_that_cannot_be_written_costs_no_answer(kernel_of, tmp_path):
+    (tmp_path / "kernels").write_text("a file where the folder should be")
+    assert kernel_of()(2.0) == 4.0
+
+
+def test_shipped_objects_are_found_by_digest(kernel_of, tmp_path, monkeypatch):
+    """Whatever the place of the sources and the dates of the files."""
+    if not _numba._is_portable_here():
+        pytest.skip("this processor does not run the shipped objects")
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path / 'other')!r}); import doubled_kernel; "
+        "doubled_kernel.doubled(2.0)"
+    )
+    portable = {"NUMBA_CPU_NAME": "x86-64-v3", "NUMBA_CPU_FEATURES": ""}
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, **portable}, check=True, timeout=600)
+    (tmp_path / "kernels").rename(tmp_path / "shipped")
+    monkeypatch.setattr(_compile, "_SHIPPED", tmp_path / "shipped")
+    doubled = kernel_of()
+    assert doubled(3.0) == 6.0
+    assert hits(doubled) == 1
+    assert not kept(tmp_path / "kernels")
+
+
+def test_parts_are_compiled_where_they_are_called_and_tuples_by_address(tmp_path):
+    """Rests on private pieces of the compiler; where they change, this tells."""
+    inner = _numba.part(lambda x: x + 1.0)
+    middle = _numba.part(lambda x: 2.0 * inner(x))
+    outer = _numba.entry(lambda x: middle(x) + inner(x), tmp_path / "own", tmp_path / "shipped")
+    assert outer(3.0) == 12.0
+    assert len(kept(tmp_path)) == 1
+    for one in (inner, middle):
+        (compiled,) = one.overloads.values()
+        assert isinstance(compiled.library, _numba._Part)
+        assert compiled.library._compiled_object is None
+    assert isinstance(numba.typeof(tsit5()), _numba.Reference)
+
+
+def test_the_plain_form_leaves_optional_parts_out_of_all_kernels_behind_it(kernel_of, tmp_path):
+    source = tmp_path / "other" / "doubled_kernel.py"
+    source.write_text(PARTED)
+    doubled = kernel_of()
+    plain = _compile.plain_form(doubled)
+    assert (doubled(2.0), plain(2.0)) == (5.0, 4.0)
+    assert doubled(2.0, 3.0) == 13.0  # what stands for an argument that is left out is kept in both
+    assert plain(2.0, 3.0) == 12.0
+    assert plain.plain is plain

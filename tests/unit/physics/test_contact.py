@@ -1,8 +1,9 @@
-"""Contact force: values of the law, no pull, and its derivative and energy."""
+"""Contact and what goes with it: no pull, derivative and energy; Stribeck friction; frictional heat."""
 
-from __future__ import annotations
+import math
 
 import pytest
+from tests.reference import impact
 
 from rotordrop.physics.contact import (
     contact_energy,
@@ -13,6 +14,9 @@ from rotordrop.physics.contact import (
     depth_at,
     stiffness_of_exponent,
 )
+from rotordrop.physics.friction import stribeck_coefficient, stribeck_gradient
+from rotordrop.physics.thermal import friction_heat, growth_of_race
+from rotordrop.physics.whirl import race_spin_up_time
 
 K, N, LAM = 8.3e8, 10.0 / 9.0, 0.08
 LAW = contact_law(K, N, LAM)
@@ -46,11 +50,13 @@ def test_gradient_is_the_derivative(delta, rate):
     assert by_rate == pytest.approx((upper - lower) / 2e-3, rel=1e-9)
 
 
-def test_energy_is_the_work_of_the_elastic_force():
+def test_energy_is_the_work_of_the_elastic_force_and_another_exponent_as_deep():
     h = 1e-9
     upper, lower = (contact_energy(LAW, 1e-5 + s) for s in (h, -h))
     assert (upper - lower) / (2 * h) == pytest.approx(contact_force(LAW, 1e-5, 0.0)[0], rel=1e-7)
     assert contact_energy(LAW, 1e-12) == pytest.approx(0.0, abs=1e-12)
+    other = contact_law(stiffness_of_exponent(LAW, 1500.0, 1.5), 1.5, LAM)
+    assert depth_at(other, 1500.0) == pytest.approx(depth_at(LAW, 1500.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("load", [30.0, 3e4])
@@ -60,6 +66,89 @@ def test_depth_carries_the_load_and_the_tangent_is_its_slope(load):
     assert contact_tangent(LAW, load) == pytest.approx(contact_gradient(LAW, depth, 0.0)[1], rel=1e-12)
 
 
-def test_another_exponent_is_as_deep_under_the_load():
-    other = contact_law(stiffness_of_exponent(LAW, 1500.0, 1.5), 1.5, LAM)
-    assert depth_at(other, 1500.0) == pytest.approx(depth_at(LAW, 1500.0), rel=1e-12)
+@pytest.mark.parametrize("n", [1.0, 10 / 9, 1.5])
+@pytest.mark.parametrize(("m", "K"), [(1.0, 1e8), (20.0, 8.3e8)])
+def test_restitution_depends_on_lambda_times_speed_only(n, m, K):
+    _, rebound, _ = impact.strike(m, K, n, 0.8, 0.5)
+    assert rebound / 0.5 == pytest.approx(impact.restitution(0.8, 0.5), abs=1e-8)
+    assert impact.restitution(0.8, 0.5) == impact.restitution(0.4, 1.0)
+
+
+@pytest.mark.parametrize("n", [1.0, 10 / 9, 1.5, 2.0])
+def test_elastic_impact_agrees_with_the_kernel(n):
+    m, K, v_0 = 3.0, 2e8, 0.2
+    duration, rebound, peak = impact.strike(m, K, n, 0.0, v_0)
+    assert duration == pytest.approx(impact.elastic_contact_time(m, K, n, v_0), rel=1e-7)
+    assert rebound == pytest.approx(v_0, rel=1e-9)
+    assert peak == pytest.approx(impact.elastic_peak_force(m, K, n, v_0), rel=0.01)
+    stored = contact_energy(contact_law(K, n, 0.0), impact.elastic_indentation(m, K, n, v_0))
+    assert stored == pytest.approx(0.5 * m * v_0**2, rel=1e-12)
+
+
+STATIC, DYNAMIC, DECAY, SMOOTH = 0.13, 0.10, 0.5, 0.02
+FRICTION = (STATIC, DYNAMIC, DECAY, SMOOTH)
+
+
+def test_corners_of_the_curve():
+    assert stribeck_coefficient(0.0, *FRICTION) == 0.0
+    assert stribeck_coefficient(SMOOTH, *FRICTION) == pytest.approx(STATIC, rel=1e-14)
+    assert stribeck_coefficient(SMOOTH + DECAY, *FRICTION) == pytest.approx(
+        DYNAMIC + 0.03 / math.e, rel=1e-12
+    )
+    assert stribeck_coefficient(100.0, *FRICTION) == pytest.approx(DYNAMIC, rel=1e-12)
+    below, above = SMOOTH * (1 - 1e-9), SMOOTH * (1 + 1e-9)
+    assert stribeck_coefficient(below, *FRICTION) == pytest.approx(
+        stribeck_coefficient(above, *FRICTION), rel=1e-8
+    )
+    assert stribeck_gradient(below, *FRICTION)[1] == pytest.approx(
+        stribeck_gradient(above, *FRICTION)[1], rel=1e-5
+    )
+    assert stribeck_gradient(above, *FRICTION)[1] == pytest.approx(-0.03 / DECAY, rel=1e-6)
+
+
+@pytest.mark.parametrize("speed", [0.003, 0.0199, 0.02, 0.4, 13.0])
+def test_the_coefficient_is_odd_and_the_gradient_even(speed):
+    assert stribeck_coefficient(-speed, *FRICTION) == -stribeck_coefficient(speed, *FRICTION) < 0.0
+    assert stribeck_gradient(-speed, *FRICTION)[1] == stribeck_gradient(speed, *FRICTION)[1]
+
+
+@pytest.mark.parametrize("speed", [-0.7, -0.015, -0.001, 0.004, 0.012, 0.019, 0.05, 0.5, 2.0])
+def test_slope_of_friction_is_the_derivative(speed):
+    value, slope = stribeck_gradient(speed, *FRICTION)
+    assert value == pytest.approx(stribeck_coefficient(speed, *FRICTION), rel=1e-14)
+    h = 1e-6
+    upper, lower = (stribeck_coefficient(speed + s, *FRICTION) for s in (h, -h))
+    assert slope == pytest.approx((upper - lower) / (2 * h), rel=1e-5)
+
+
+CASE = {"F_r": 400.0, "mu": 0.1, "omega_r": 377.0, "R_i": 0.035, "race_inertia": 1.3e-3}
+CASE |= {"drag_coefficient": 0.002, "D_pw": 0.085}
+
+
+def test_the_work_of_friction_is_heat_and_spin_at_every_time_and_then_drag():
+    """A constant force that drags a body up to a constant speed loses exactly the energy it gives."""
+    sliding, _ = friction_heat(**CASE, duration=10.0)
+    assert sliding == pytest.approx(0.5 * CASE["race_inertia"] * CASE["omega_r"] ** 2, rel=1e-12)
+    spin_up = race_spin_up_time(CASE["race_inertia"], CASE["mu"], CASE["F_r"], CASE["R_i"], CASE["omega_r"])
+    torque = CASE["mu"] * CASE["F_r"] * CASE["R_i"]
+    for share in (0.1, 0.5, 1.0):
+        time = share * spin_up
+        sliding, _ = friction_heat(**CASE, duration=time)
+        gained = 0.5 * CASE["race_inertia"] * (share * CASE["omega_r"]) ** 2
+        assert sliding + gained == pytest.approx(torque * CASE["omega_r"] * time, rel=1e-12)
+    _, first = friction_heat(**CASE, duration=10.0)
+    _, second = friction_heat(**CASE, duration=11.0)
+    power = CASE["drag_coefficient"] * CASE["F_r"] * 0.5 * CASE["D_pw"] * CASE["omega_r"]
+    assert second - first == pytest.approx(power, rel=1e-12)
+
+
+@pytest.mark.parametrize("without", ["mu", "F_r"])
+def test_no_friction_no_heat(without):
+    assert friction_heat(**CASE | {without: 0.0}, duration=0.2) == (0.0, 0.0)
+
+
+def test_a_hundred_joule_warm_half_a_kilogram_of_steel():
+    """Worked by hand: 100 J / (0.5 kg · 460 J/(kg K)) = 0.4348 K; times 12e-6 1/K times 35 mm = 0.1826 µm."""
+    warming, growth = growth_of_race(100.0, 0.5, 0.035)
+    assert warming == pytest.approx(0.43478, rel=1e-4)
+    assert growth == pytest.approx(0.18261e-6, rel=1e-4)

@@ -1,14 +1,11 @@
 """Laws of the Hertz contact: limits, scaling, energy, and equivalence of the two ways to a number."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import ellipe, ellipk
-from tests.reference import closed_forms
 
 from rotordrop.physics import hertz
 
@@ -18,32 +15,23 @@ ETA = hertz.compliance(*STEEL, *SILICON_NITRIDE)
 KAPPAS = np.array([1.0 + 1e-9, 1.001, 1.5, 4.0, 12.0, 80.0])
 
 
-def test_carlson_form_equals_the_textbook_form_away_from_the_circle() -> None:
+def test_the_ellipse_of_any_curvature_difference():
+    """F = 3/4 (κ − 1) to first order, where the textbook form has lost all its digits."""
     kappa = np.array([1.2, 3.0, 12.0, 50.0])
     m = 1.0 - kappa**-2.0
     textbook = ((kappa**2 + 1) * ellipe(m) - 2 * ellipk(m)) / ((kappa**2 - 1) * ellipe(m))
     np.testing.assert_allclose(hertz.curvature_difference_of_ellipticity(kappa), textbook, rtol=1e-12)
-
-
-def test_nearly_circular_ellipse_follows_its_expansion() -> None:
-    """F = 3/4 (κ − 1) to first order: the textbook form has lost all its digits here."""
     kappa = 1.0 + 1e-9
     assert hertz.curvature_difference_of_ellipticity(kappa) == pytest.approx(0.75e-9, rel=1e-6)
-
-
-def test_ellipticity_inverts_the_curvature_difference() -> None:
     F_rho = hertz.curvature_difference_of_ellipticity(KAPPAS)
     np.testing.assert_allclose(hertz.ellipticity(F_rho), KAPPAS, rtol=1e-11)
-
-
-def test_circle_has_unit_parameters() -> None:
     np.testing.assert_allclose(hertz.contact_parameters(0.0), (1.0, 1.0, 1.0), rtol=1e-15)
 
 
-def potential(b_over_a: float, weight: float | None) -> float:
+def potential(b_over_a, weight):
     """Integral of the ellipsoid's potential over w = tan²t, in units of a; weighted with 1/(weight + w)."""
 
-    def integrand(t: float) -> float:
+    def integrand(t):
         w = math.tan(t) ** 2
         value = 2.0 / math.cos(t) ** 2 / math.sqrt((1.0 + w) * (b_over_a**2 + w))
         return value if weight is None else value / (weight + w)
@@ -52,7 +40,7 @@ def potential(b_over_a: float, weight: float | None) -> float:
 
 
 @pytest.mark.parametrize("F_rho", [0.0, 0.3, 0.9, 0.99])
-def test_pressure_ellipsoid_carries_the_load_and_flattens_the_gap(F_rho: float) -> None:
+def test_pressure_ellipsoid_carries_the_load_and_flattens_the_gap(F_rho):
     """Load, both gap curvatures and the approach from Hertz's integrals, done numerically."""
     total, Q = 150.0, 700.0
     contact = hertz.point_contact(total, F_rho, ETA)
@@ -67,7 +55,7 @@ def test_pressure_ellipsoid_carries_the_load_and_flattens_the_gap(F_rho: float) 
 
 
 @pytest.mark.parametrize("factor", [0.1, 8.0, 1000.0])
-def test_powers_of_the_load(factor: float) -> None:
+def test_powers_of_the_load(factor):
     contact = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=True)
     a, b = contact.semi_axes(50.0)
     a_2, b_2 = contact.semi_axes(50.0 * factor)
@@ -81,16 +69,13 @@ def test_powers_of_the_load(factor: float) -> None:
     assert contact.stiffness * contact.approach(50.0) ** 1.5 == pytest.approx(50.0, rel=1e-13)
 
 
-def test_larger_contact_of_the_same_shape_follows_similarity() -> None:
+def test_contacts_scale_with_size_and_materials():
     """Twice all lengths at four times the load: the same pressure, twice the ellipse and approach."""
     small = hertz.race_contact(0.01, 0.08, 0.52, 0.3, ETA, inner=False)
     large = hertz.race_contact(0.02, 0.16, 0.52, 0.3, ETA, inner=False)
     assert large.maximum_pressure(400.0) == pytest.approx(small.maximum_pressure(100.0), rel=1e-13)
     assert large.approach(400.0) == pytest.approx(2.0 * small.approach(100.0), rel=1e-13)
     assert large.semi_axes(400.0) == pytest.approx(tuple(2.0 * np.array(small.semi_axes(100.0))), rel=1e-13)
-
-
-def test_materials_scale_the_stiffness_and_leave_the_shape() -> None:
     curvatures = hertz.race_curvatures(0.009525, 0.085, 0.53, 0.4, inner=True)
     hybrid = hertz.point_contact(*curvatures, ETA)
     steel = hertz.point_contact(*curvatures, hertz.compliance(*STEEL, *STEEL))
@@ -101,50 +86,23 @@ def test_materials_scale_the_stiffness_and_leave_the_shape() -> None:
     assert ratio > 1.1
 
 
-def test_inner_race_is_the_more_stressed_one() -> None:
-    inner = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=True)
-    outer = hertz.race_contact(0.009525, 0.085, 0.53, 0.4, ETA, inner=False)
-    assert inner.stress_coefficient > 1.05 * outer.stress_coefficient
-
-
-def test_groove_closer_to_the_ball_is_stiffer_and_longer() -> None:
-    f = np.array([0.51, 0.52, 0.54, 0.58])
-    contact = hertz.race_contact(0.01, 0.08, f, 0.3, ETA, inner=True)
-    assert np.all(np.diff(contact.stiffness) < 0.0)
-    assert np.all(np.diff(contact.ellipticity) < 0.0)
-
-
-def test_race_on_infinite_pitch_circle_is_a_straight_groove() -> None:
+def test_lines_and_straight_grooves_are_limits_of_the_ellipse():
     inner = hertz.race_curvatures(0.01, 1e9, 0.53, 0.0, inner=True)
     outer = hertz.race_curvatures(0.01, 1e9, 0.53, 0.0, inner=False)
     straight = ((4.0 - 1.0 / 0.53) / 0.01, (1.0 / 0.53) / (4.0 - 1.0 / 0.53))
     assert inner == pytest.approx(straight, rel=1e-9)
     assert outer == pytest.approx(straight, rel=1e-9)
-
-
-def test_contacts_in_series_add_their_approaches() -> None:
-    K = hertz.contacts_in_series(2e10, 5e10)
-    Q = 123.0
-    approach = (Q / 2e10) ** (2 / 3) + (Q / 5e10) ** (2 / 3)
-    assert K * approach**1.5 == pytest.approx(Q, rel=1e-13)
-
-
-def test_line_contact_stiffness_inverts_its_approach() -> None:
-    delta = closed_forms.line_contact_approach(777.0, 0.032)
-    assert closed_forms.line_contact_stiffness(0.032) * delta ** (10 / 9) == pytest.approx(777.0, rel=1e-12)
-    assert closed_forms.line_contact_stiffness(0.032) == pytest.approx(
-        3.78e9, rel=1e-3
-    )  # physics of the paper's contact
-
-
-def test_the_pressure_of_a_line_contact_carries_the_load() -> None:
     line = hertz.LineContact(radius=0.05, length=1.0, compliance=1e-11)
     assert line.maximum_pressure(1e5) * line.half_width(1e5) * math.pi / 2.0 == pytest.approx(1e5, rel=1e-12)
     assert line.maximum_pressure(4e5) == pytest.approx(2.0 * line.maximum_pressure(1e5), rel=1e-12)
-
-
-def test_a_bore_that_fits_closer_spreads_the_load() -> None:
     open_, close = (hertz.cylinder_in_bore(0.03, 0.03 + gap, 0.036, 1e-11) for gap in (300e-6, 100e-6))
     assert open_.radius == pytest.approx(0.03 * 0.0303 / 300e-6)
     assert close.maximum_pressure(1e3) < open_.maximum_pressure(1e3)
     assert close.half_width(1e3) > open_.half_width(1e3)
+
+
+def test_contacts_in_series_add_their_approaches():
+    K = hertz.contacts_in_series(2e10, 5e10)
+    Q = 123.0
+    approach = (Q / 2e10) ** (2 / 3) + (Q / 5e10) ** (2 / 3)
+    assert K * approach**1.5 == pytest.approx(Q, rel=1e-13)

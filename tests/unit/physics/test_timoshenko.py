@@ -1,7 +1,5 @@
 """Laws of the beam element: statics exact at nodes, symmetry, inertia of rigid motion, Cowper's limits."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -30,7 +28,7 @@ def rigid_motions(length):
     return shift, turn
 
 
-def test_matrices_are_symmetric_and_of_the_right_rank():
+def test_matrices_are_symmetric_of_the_right_rank_and_rigid_motion_is_free_with_the_inertia_of_the_cylinder():
     stiffness = element_stiffness(STUBBY, LENGTH)
     for matrix in (stiffness, element_mass(STUBBY, LENGTH), element_polar(STUBBY, LENGTH)):
         np.testing.assert_allclose(matrix, matrix.T, rtol=1e-14)
@@ -38,15 +36,9 @@ def test_matrices_are_symmetric_and_of_the_right_rank():
     values = np.linalg.eigvalsh(scale @ stiffness @ scale)
     assert np.sum(np.abs(values) < 1e-9 * values[-1]) == 2
     assert np.linalg.eigvalsh(element_mass(STUBBY, LENGTH))[0] > 0.0
-
-
-def test_a_rigid_motion_costs_no_force():
     stiffness = element_stiffness(STUBBY, LENGTH)
     for motion in rigid_motions(LENGTH):
         np.testing.assert_allclose(stiffness @ motion, 0.0, atol=1e-6 * np.max(stiffness))
-
-
-def test_inertia_of_rigid_motion_is_that_of_the_cylinder():
     shift, turn = rigid_motions(LENGTH)
     about_middle = turn - 0.5 * LENGTH * shift
     mass, polar = element_mass(STUBBY, LENGTH), element_polar(STUBBY, LENGTH)
@@ -100,12 +92,9 @@ def test_shear_coefficients_reach_the_limits_of_cowper(nu):
     assert shear_coefficient(nu) > shear_coefficient(nu, 0.5) > shear_coefficient(nu, 0.9)
 
 
-def test_printed_shear_coefficients():
+def test_shear_and_layers_have_the_printed_coefficients_and_inertia():
     assert shear_coefficient(0.3) == pytest.approx(0.8863636, rel=1e-7)
     assert rectangle_shear_coefficient(0.3) == pytest.approx(0.8497, abs=5e-5)
-
-
-def test_a_layer_adds_the_inertia_of_a_tube_and_no_stiffness():
     bare = round_section(0.08, 0.0, 2.1e11, 0.3, 7800.0)
     tube = round_section(0.1, 0.08, 2.1e11, 0.3, 5000.0)
     layered = with_layer(bare, 0.08, 0.1, 5000.0)

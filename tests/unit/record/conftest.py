@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from rotordrop.machine import example_machine
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
+from rotordrop import example_machine, example_record_path, read_record
 
 RECORDINGS = Path(__file__).parent / "recordings"
 

@@ -1,11 +1,8 @@
 """One small recording, written in every format by hand or by the format's own library."""
 
-from __future__ import annotations
-
 import gzip
-import io
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import h5py
@@ -110,61 +107,79 @@ def as_tdms(record: Record, path: Path, *, without: tuple[str, ...] = ()) -> Non
         writer.write_segment([nptdms.RootObject({"name": "drop"}), *objects])
 
 
-def as_uff(record: Record, path: Path, binary: bool = True) -> None:
-    """Dataset 58 as the format prescribes, written by hand: an independent counterpart of the reader."""
+def universal(
+    channels: Mapping[str, np.ndarray],
+    start: float,
+    step: float,
+    *,
+    unit: str = "m",
+    time: str = "s",
+    binary: str = "",
+    padded: bool = True,
+    single: bool = False,
+) -> bytes:
+    """Dataset 58 as the format prescribes, by hand: an independent counterpart of the reader.
+
+    Text with the digits of double or single precision, or ``binary`` of the order "<" or ">".
+    """
+    parts, (digits, across) = [], ("13.5e", 6) if single else ("20.11e", 4)
+    for k, (name, values) in enumerate(channels.items(), start=1):
+        count, order = len(values), {"<": 1, ">": 2}.get(binary, 0)
+        more = f"b{order:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}" if binary else ""
+        lines = [f"{-1:6d}", f"{58:6d}{more}", name, "NONE", "04-May-23 10:45:47", "Throughput -1", "NONE"]
+        lines += [f"{1:5d}{0:10d}{k:5d}{0:10d} {'NONE':>10}{k:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d}"]
+        kind = 2 if single and not binary else 4
+        lines += [f"{kind:10d}{count:10d}{1:10d}{start:13.5e}{step:13.5e}{0.0:13.5e}"]
+        axes = ((17, "Time", time), (8, "Displacement", unit), (0, "NONE", "NONE"), (0, "NONE", "NONE"))
+        lines += [f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {of:<20}" for what, label, of in axes]
+        rows = (values[i : i + across] for i in range(0, count, across))
+        text = "".join("".join(f"{v:{digits}}" for v in row) + "\n" for row in rows)
+        width = 80 if padded else 0
+        parts.append("".join(f"{line:<{width}}\n" for line in lines).encode("latin-1"))
+        parts.append(values.astype(f"{binary}f8").tobytes() if binary else text.encode())
+        parts.append(f"{f'{-1:6d}':<{width}}\n".encode())
+    return b"".join(parts)
+
+
+def as_uff(record: Record, path: Path, binary: str = "<") -> None:
+    """A record as universal file."""
     pytest.importorskip("pyuff")
-    count, step = len(record.time), 1.0 / record.sampling_rate
-    parts = []
-    for i, name in enumerate(record.channel_names):
-        kind = (
-            f"{58:6d}b{1:6d}{2:6d}{11:12d}{8 * count:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
-            if binary
-            else f"{58:6d}{'':74}"
-        )
-        lines = [f"{-1:6d}", kind, *(f"{text:<80}" for text in (name, "drop", "NONE", "NONE", "NONE"))]
-        lines.append(f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':>10}{1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d} ")
-        lines.append(f"{4:10d}{count:10d}{1:10d}{record.time[0]:13.5e}{step:13.5e}{0.0:13.5e}")
-        for what, label, unit in (
-            (17, "Time", "s"),
-            (8, "Displacement", "m"),
-            (0, "NONE", "NONE"),
-            (0, "NONE", "NONE"),
-        ):
-            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}")
-        parts.append(("\n".join(lines) + "\n").encode())
-        values = record.signals[:, i]
-        if binary:
-            parts.append(values.astype("<f8").tobytes())
-        else:
-            rows = [values[k : k + 4] for k in range(0, count, 4)]
-            parts.append("".join("".join(f"{v:20.11e}" for v in row) + "\n" for row in rows).encode())
-        parts.append(f"{-1:6d}\n".encode())
-    path.write_bytes(b"".join(parts))
+    channels = dict(zip(record.channel_names, record.signals.T, strict=True))
+    path.write_bytes(universal(channels, record.time[0], 1.0 / record.sampling_rate, binary=binary))
 
 
-def _wav(path: Path) -> None:
-    counts = np.rint(READINGS / 500.0 * 2**15).astype("<i2").tobytes()
-    form = struct.pack("<HHIIHH", 1, 4, 5000, 40_000, 8, 16)
-    body = b"WAVEfmt " + struct.pack("<I", len(form)) + form
-    body += b"data" + struct.pack("<I", len(counts)) + counts
+def as_wav(path: Path, readings: np.ndarray, rate: int, bits: int = 16) -> None:
+    """Whole numbers of four channels [µm]; the full scale is 500 µm."""
+    counts = np.rint(readings / 500.0 * 2 ** (bits - 1)).astype(np.int64).ravel()
+    data = b"".join(int(count).to_bytes(bits // 8, "little", signed=True) for count in counts)
+    form = struct.pack("<HHIIHH", 1, 4, rate, rate * bits // 2, bits // 2, bits)
+    body = b"WAVEfmt " + struct.pack("<I", len(form)) + form + b"data" + struct.pack("<I", len(data)) + data
     path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
 
 
-def _comtrade(path: Path, kind: str) -> None:
+def as_comtrade(
+    path: Path, kind: str, table: np.ndarray, rate: int, before: float, offset: float = 0.0
+) -> None:
+    """Four channels [µm] and the speed [Hz] in steps of 0.01, begun `before` [s] the trigger."""
     lines = ["Station,Recorder,1999", "5,5A,0D"]
     for number, name in enumerate([*NAMES, "Speed"], start=1):
         unit = "Hz" if name == "Speed" else "um"
-        lines.append(f"{number},{name},,,{unit},0.01,0,0,-32767,32767,1,1,P")
-    stamps = ["16/10/2019,13:42:07.000000", "16/10/2019,13:42:07.020000"]
-    lines += ["50", "1", f"5000,{COUNT}", *stamps, kind, "1"]
+        lines.append(f"{number},{name},,,{unit},0.01,{offset},0,-32767,32767,1,1,P")
+    stamps = ["16/10/2019,13:42:07.000000", f"16/10/2019,13:42:{7 + before:09.6f}"]
+    lines += ["50", "1", f"{rate},{len(table)}", *stamps, kind, "1"]
     path.with_suffix(".cfg").write_text("\r\n".join(lines) + "\r\n")
-    counts = np.rint(np.column_stack([READINGS, SPEED]) * 100).astype(int)
+    counts, step = np.rint((table - offset) * 100).astype(int), 10**6 // rate
     if kind == "ASCII":
-        rows = [f"{i + 1},{200 * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
-        path.with_suffix(".dat").write_text("\r\n".join(rows) + "\r\n")
-    else:
-        rows_b = [struct.pack("<II5h", i + 1, 200 * i, *row) for i, row in enumerate(counts)]
-        path.with_suffix(".dat").write_bytes(b"".join(rows_b))
+        rows = [f"{i + 1},{step * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
+        path.with_suffix(".dat").write_text("\r\n".join(rows) + "\r\n\x1a")
+        return
+    sign = {"BINARY": "h", "BINARY32": "i", "FLOAT32": "f"}[kind]
+    packed = [struct.pack(f"<II5{sign}", i + 1, step * i, *row) for i, row in enumerate(counts)]
+    path.with_suffix(".dat").write_bytes(b"".join(packed))
+
+
+def _comtrade(path: Path, kind: str) -> None:
+    as_comtrade(path, kind, np.column_stack([READINGS, SPEED]), 5000, 0.02)
 
 
 def _xlsx(path: Path) -> None:
@@ -179,12 +194,6 @@ def _xlsx(path: Path) -> None:
 
 def _npz(path: Path) -> None:
     np.savez(path, t=TIME, speed_Hz=SPEED, **{f"{name}_um": READINGS[:, i] for i, name in enumerate(NAMES)})
-
-
-def _npy(path: Path) -> None:
-    held = io.BytesIO()
-    np.save(held, READINGS)
-    path.write_bytes(held.getvalue())
 
 
 def _hdf5_packed(path: Path) -> None:
@@ -206,8 +215,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "COMTRADE ASCII": ("dat", lambda path: _comtrade(path, "ASCII")),
     "COMTRADE binary": ("dat", lambda path: _comtrade(path, "BINARY")),
     "COMTRADE cfg": ("cfg", lambda path: _comtrade(path, "ASCII")),
-    "WAV": ("wav", _wav),
-    "NPY": ("npy", _npy),
+    "WAV": ("wav", lambda path: as_wav(path, READINGS, 5000)),
+    "NPY": ("npy", lambda path: np.save(path, READINGS)),
     "NPZ": ("npz", _npz),
     "HDF5": ("h5", lambda path: save_record(record(), path)),
     "HDF5 gzip": ("h5", _hdf5_packed),
@@ -215,8 +224,8 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "MAT packed": ("mat", lambda path: _mat(path, packed=True)),
     "MAT 7.3": ("mat", _mat_73),
     "TDMS": ("tdms", lambda path: as_tdms(record(), path)),
-    "UFF text": ("uff", lambda path: as_uff(record(), path, binary=False)),
-    "UFF binary": ("uff", lambda path: as_uff(record(), path, binary=True)),
+    "UFF text": ("uff", lambda path: as_uff(record(), path, binary="")),
+    "UFF binary": ("uff", lambda path: as_uff(record(), path)),
     "Excel": ("xlsx", _xlsx),
 }
 """Suffix and writer of every format by its name."""

@@ -1,14 +1,14 @@
 """One recording as the recorders of many makers export it, written by hand after their documents."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import scipy.io
+from tests.unit.record import every_format
 
 COUNT, STEP, START = 60, 5e-5, -1e-3
 TIME = START + STEP * np.arange(COUNT)
@@ -26,7 +26,7 @@ API = ("VE-101X", "VE-101Y", "VE-102X", "VE-102Y")
 COUNTED = ("CH1", "CH2", "CH3", "CH4")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Export:
     """One file and what it says."""
 
@@ -135,26 +135,21 @@ def _tdms(path: Path) -> None:
 
 
 NI = [
-    Export(maker="NI", form="LVM, no X column", file="a.lvm", content=labview("No")),
-    Export(maker="NI", form="LVM, one X column", file="a.lvm", content=labview("One")),
-    Export(maker="NI", form="LVM, many X columns", file="a.lvm", content=labview("Multi")),
-    Export(maker="NI", form="LVM, decimal comma", file="a.lvm", content=labview("No", decimal=",")),
-    Export(maker="NI", form="LVM, commas between", file="a.lvm", content=labview("One", separator=",")),
-    Export(maker="NI", form="LVM, comments", file="a.lvm", content=labview("One", comments=True)),
+    Export("NI", "LVM, no X column", "a.lvm", labview("No")),
+    Export("NI", "LVM, one X column", "a.lvm", labview("One")),
+    Export("NI", "LVM, many X columns", "a.lvm", labview("Multi")),
+    Export("NI", "LVM, decimal comma", "a.lvm", labview("No", decimal=",")),
+    Export("NI", "LVM, commas between", "a.lvm", labview("One", separator=",")),
+    Export("NI", "LVM, comments", "a.lvm", labview("One", comments=True)),
+    Export("NI", "LVM, segments that follow", "a.lvm", labview("No", segments=(range(25), range(25, COUNT)))),
     Export(
-        maker="NI",
-        form="LVM, segments that follow",
-        file="a.lvm",
-        content=labview("No", segments=(range(25), range(25, COUNT))),
-    ),
-    Export(
-        maker="NI",
-        form="LVM, no head",
-        file="a.lvm",
-        content=_rows(VOLTS, separator="\t").encode(),
+        "NI",
+        "LVM, no head",
+        "a.lvm",
+        _rows(VOLTS, separator="\t").encode(),
         question=r"no row names the 5 columns .*name them in the profile, text\.names = ",
     ),
-    Export(maker="NI", form="TDMS", file="a.tdms", content=_tdms),
+    Export("NI", "TDMS", "a.tdms", _tdms),
 ]
 
 
@@ -236,87 +231,32 @@ def _rigol() -> bytes:
     return (head + _rows(VOLTS, first=lambda i: [str(i)], behind=[""])).encode()
 
 
+BY_NUMBER = {"names": COUNTED, "planes": ("plane 1", "plane 2")}
+CHANNELS, LETTERS = ([f"Channel {sign}" for sign in signs] for signs in ("1234", "ABCD"))
+NUMBERED = BY_NUMBER | {"names": CHANNELS}
+VISION = ("x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n" + _rows(VOLTS)).encode()
+MSO5000 = ("Time(s),CH1(V),CH2(V),CH3(V),CH4(V),\n" + _rows(VOLTS, behind=[""])).encode()
+LECROY = (
+    "LECROYHDO6104,12345,Waveform\nSegments,1,SegmentSize,60\nSegment,TrigTime,TimeSinceSegment1\n"
+    "#1,04-May-2023 10:45:47,0\nTime,Ampl\n" + _rows(VOLTS[:, :1])
+).encode()
+ONE = r"holds 1 channel that can be displacements .*it has Ampl in \?; export the displacements"
 SCOPES = [
-    Export(
-        maker="Tektronix",
-        form="head beside the readings",
-        file="a.csv",
-        content=_tektronix_beside(),
-        names=COUNTED,
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(maker="Tektronix", form="labels", file="a.csv", content=_tektronix(TAGS)),
-    Export(
-        maker="Tektronix",
-        form="no labels",
-        file="a.csv",
-        content=_tektronix([""] * 4),
-        names=COUNTED,
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(
-        maker="Keysight",
-        form="InfiniiVision",
-        file="a.csv",
-        content=("x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n" + _rows(VOLTS)).encode(),
-        names=COUNTED,
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(
-        maker="Keysight",
-        form="Infiniium",
-        file="a.csv",
-        content=_keysight_infiniium(),
-        names=[f"Channel {k}" for k in range(1, 5)],
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(
-        maker="LeCroy",
-        form="one trace",
-        file="a.csv",
-        content=(
-            "LECROYHDO6104,12345,Waveform\nSegments,1,SegmentSize,60\nSegment,TrigTime,TimeSinceSegment1\n"
-            "#1,04-May-2023 10:45:47,0\nTime,Ampl\n" + _rows(VOLTS[:, :1])
-        ).encode(),
-        question=r"holds 1 channel that can be displacements .*it has Ampl in \?; export the displacements",
-    ),
-    Export(
-        maker="Rigol",
-        form="sequence, start and increment",
-        file="a.csv",
-        content=_rigol(),
-        names=COUNTED,
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(
-        maker="Rigol",
-        form="MSO5000",
-        file="a.csv",
-        content=("Time(s),CH1(V),CH2(V),CH3(V),CH4(V),\n" + _rows(VOLTS, behind=[""])).encode(),
-        names=COUNTED,
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(
-        maker="Pico",
-        form="channels A to D",
-        file="a.csv",
-        content=_pico(names=[f"Channel {letter}" for letter in "ABCD"]),
-        names=[f"Channel {letter}" for letter in "ABCD"],
-        planes=("plane 1", "plane 2"),
-    ),
-    Export(maker="Pico", form="semicolons, decimal comma", file="a.csv", content=_pico(";", ",")),
-    Export(
-        maker="Pico",
-        form="text, millivolts",
-        file="a.txt",
-        content=_pico("\t", milli=True),
-        unit="mV",
-        values=VOLTS * 1e3,
-    ),
-    Export(maker="Yokogawa", form="HResolution", file="a.csv", content=_yokogawa()),
-    Export(maker="Yokogawa", form="no blank column", file="a.csv", content=_yokogawa("none")),
-    Export(maker="Yokogawa", form="decimal comma", file="a.csv", content=_yokogawa("", ",")),
-    Export(maker="Yokogawa", form="SampleRate", file="a.csv", content=_yokogawa(key="SampleRate")),
+    Export("Tektronix", "head beside the readings", "a.csv", _tektronix_beside(), **BY_NUMBER),
+    Export("Tektronix", "labels", "a.csv", _tektronix(TAGS)),
+    Export("Tektronix", "no labels", "a.csv", _tektronix([""] * 4), **BY_NUMBER),
+    Export("Keysight", "InfiniiVision", "a.csv", VISION, **BY_NUMBER),
+    Export("Keysight", "Infiniium", "a.csv", _keysight_infiniium(), **NUMBERED),
+    Export("LeCroy", "one trace", "a.csv", LECROY, question=ONE),
+    Export("Rigol", "sequence, start and increment", "a.csv", _rigol(), **BY_NUMBER),
+    Export("Rigol", "MSO5000", "a.csv", MSO5000, **BY_NUMBER),
+    Export("Pico", "channels A to D", "a.csv", _pico(names=LETTERS), **NUMBERED | {"names": LETTERS}),
+    Export("Pico", "semicolons, decimal comma", "a.csv", _pico(";", ",")),
+    Export("Pico", "text, millivolts", "a.txt", _pico("\t", milli=True), unit="mV", values=VOLTS * 1e3),
+    Export("Yokogawa", "HResolution", "a.csv", _yokogawa()),
+    Export("Yokogawa", "no blank column", "a.csv", _yokogawa("none")),
+    Export("Yokogawa", "decimal comma", "a.csv", _yokogawa("", ",")),
+    Export("Yokogawa", "SampleRate", "a.csv", _yokogawa(key="SampleRate")),
 ]
 
 
@@ -355,40 +295,11 @@ def _testlab(path: Path, *, together: bool, label: str = "µm", factor: float = 
 
 
 def universal(
-    *,
-    binary: str = "",
-    padded: bool = True,
-    last_end: bool = True,
-    names: Sequence[str] = TAGS,
-    unit: str = "um",
+    *, last_end: bool = True, names: Sequence[str] = TAGS, unit: str = "um", **form: object
 ) -> bytes:
-    """Dataset 58 for every channel; `binary` is "<" or ">"."""
-    parts: list[bytes] = []
-    for k, name in enumerate(names):
-        order = {"<": 1, ">": 2}.get(binary, 0)
-        kind = (
-            f"{58:6d}b{order:6d}{2:6d}{11:12d}{8 * COUNT:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
-            if binary
-            else f"{58:6d}"
-        )
-        lines = [f"{-1:6d}", kind, name, "NONE", "04-May-23 10:45:47", "Throughput -1", "NONE"]
-        lines.append(
-            f"{1:5d}{0:10d}{k + 1:5d}{0:10d} {'NONE':>10}{k + 1:10d}{1:4d} {'NONE':>10}{0:10d}{0:4d}"
-        )
-        lines.append(f"{4 if binary else 2:10d}{COUNT:10d}{1:10d}{START:13.5e}{STEP:13.5e}{0.0:13.5e}")
-        for what, label, of in (
-            (17, "Time", "s"),
-            (8, "Displacement", unit),
-            (0, "NONE", "NONE"),
-            (0, "NONE", "NONE"),
-        ):
-            lines.append(f"{what:10d}{0:5d}{0:5d}{0:5d} {label:<20} {of:<20}")
-        parts.append("".join(f"{line:<80}\n" if padded else f"{line}\n" for line in lines).encode("latin-1"))
-        values = MICRONS[:, k]
-        text = "".join("".join(f"{v:13.5e}" for v in values[i : i + 6]) + "\n" for i in range(0, COUNT, 6))
-        parts.append(values.astype(f"{binary}f8").tobytes() if binary else text.encode())
-        parts.append(f"{f'{-1:6d}':<80}\n".encode() if padded else f"{-1:6d}\n".encode())
-    content = b"".join(parts)
+    """Dataset 58 for every channel, in single precision where it is text."""
+    channels = dict(zip(names, MICRONS.T, strict=False))
+    content = every_format.universal(channels, START, STEP, unit=unit, single=True, **form)
     return content if last_end else content.rstrip()
 
 
@@ -428,79 +339,31 @@ def comtrade(kind: str, *, single: bool) -> Callable[[Path], None]:
     return write
 
 
-ROUNDED = np.array([[float(f"{v:.5e}") for v in row] for row in MICRONS])
 OF_MICRONS = {"unit": "um", "values": MICRONS}
+TURNING, IN_MIL = (
+    {"speed": True, "unit": unit, "values": MICRONS / k} for unit, k in (("um", 1), ("mil", 25.4))
+)
+COUNTED_TAGS = [f"{k}:{name}" for k, name in enumerate(TAGS, start=1)]
+RUNNERS = {"names": [f"Läufer {name}" for name in TAGS], "planes": ("Läufer NDE", "Läufer DE")}
+ABROAD = universal(unit="µm", names=RUNNERS["names"])
+TOGETHER, APART = (partial(_testlab, together=one) for one in (True, False))
 SIEMENS = [
+    Export("Siemens", "Testlab MAT, channels together", "a.mat", TOGETHER, COUNTED_TAGS, **TURNING),
+    Export("Siemens", "Testlab MAT, channels apart", "a.mat", APART, **TURNING),
+    Export("Siemens", "Testlab MAT, mil", "a.mat", partial(APART, label="mil", factor=1 / 25.4e-6), **IN_MIL),
+    Export("Siemens", "UFF58, padded lines", "a.uff", universal(), **OF_MICRONS),
     Export(
-        maker="Siemens",
-        form="Testlab MAT, channels together",
-        file="a.mat",
-        content=lambda path: _testlab(path, together=True),
-        names=[f"{k}:{name}" for k, name in enumerate(TAGS, start=1)],
-        speed=True,
+        "Siemens",
+        "UFF58, last line without end",
+        "a.unv",
+        universal(padded=False, last_end=False),
         **OF_MICRONS,
     ),
-    Export(
-        maker="Siemens",
-        form="Testlab MAT, channels apart",
-        file="a.mat",
-        content=lambda path: _testlab(path, together=False),
-        speed=True,
-        **OF_MICRONS,
-    ),
-    Export(
-        maker="Siemens",
-        form="Testlab MAT, mil",
-        file="a.mat",
-        content=lambda path: _testlab(path, together=False, label="mil", factor=1 / 25.4e-6),
-        unit="mil",
-        values=MICRONS / 25.4,
-        speed=True,
-    ),
-    Export(maker="Siemens", form="UFF58, padded lines", file="a.uff", content=universal(), **OF_MICRONS),
-    Export(
-        maker="Siemens",
-        form="UFF58, last line without end",
-        file="a.unv",
-        content=universal(padded=False, last_end=False),
-        **OF_MICRONS,
-    ),
-    Export(
-        maker="Siemens",
-        form="UFF58, non-ASCII head",
-        file="a.uff",
-        content=universal(unit="µm", names=[f"Läufer {name}" for name in TAGS]),
-        names=[f"Läufer {name}" for name in TAGS],
-        planes=("Läufer NDE", "Läufer DE"),
-        **OF_MICRONS,
-    ),
-    Export(
-        maker="Siemens", form="UFF58, big-endian", file="a.uff", content=universal(binary=">"), **OF_MICRONS
-    ),
-    Export(
-        maker="Siemens",
-        form="COMTRADE cff, ASCII",
-        file="a.cff",
-        content=comtrade("ASCII", single=True),
-        speed=True,
-        **OF_MICRONS,
-    ),
-    Export(
-        maker="Siemens",
-        form="COMTRADE cff, binary",
-        file="a.cff",
-        content=comtrade("BINARY32", single=True),
-        speed=True,
-        **OF_MICRONS,
-    ),
-    Export(
-        maker="Siemens",
-        form="COMTRADE cfg and dat",
-        file="a.cfg",
-        content=comtrade("ASCII", single=False),
-        speed=True,
-        **OF_MICRONS,
-    ),
+    Export("Siemens", "UFF58, non-ASCII head", "a.uff", ABROAD, **RUNNERS, **OF_MICRONS),
+    Export("Siemens", "UFF58, big-endian", "a.uff", universal(binary=">"), **OF_MICRONS),
+    Export("Siemens", "COMTRADE cff, ASCII", "a.cff", comtrade("ASCII", single=True), **TURNING),
+    Export("Siemens", "COMTRADE cff, binary", "a.cff", comtrade("BINARY32", single=True), **TURNING),
+    Export("Siemens", "COMTRADE cfg and dat", "a.cfg", comtrade("ASCII", single=False), **TURNING),
 ]
 
 
@@ -561,65 +424,22 @@ def _system1() -> bytes:
     return ("\n".join(head) + "\n" + _rows(MICRONS[:, :1], first=lambda i: [f"{1e3 * TIME[i]:.3f}"])).encode()
 
 
-def _wav(path: Path) -> None:
-    counts = np.rint(MICRONS / 500.0 * 2**15).astype("<i2").tobytes()
-    form = struct.pack("<HHIIHH", 1, 4, 20_000, 160_000, 8, 16)
-    body = (
-        b"WAVEfmt " + struct.pack("<I", len(form)) + form + b"data" + struct.pack("<I", len(counts)) + counts
-    )
-    path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
-
-
 KKS = ("10MKA11CY011", "10MKA11CY012", "10MKA21CY011", "10MKA21CY012")
 SPOKEN = ("Lager 1 horizontal", "Lager 1 vertikal", "Lager 2 horizontal", "Lager 2 vertikal")
-IN_MIL = {"unit": "mil", "values": MICRONS / 25.4, "speed": True}
+TAGGED = [f"Ch{k} {tag}" for k, tag in enumerate(API, start=1)]
+POINT = r"holds 1 channel that can be displacements .*it has VE-101X in um; export the"
+SCALE = r"does not tell it: say what it is with 'rotordrop profile a\.wav --full-scale"
+WAVE = partial(every_format.as_wav, readings=MICRONS, rate=20_000)
+BENTLY, API_PLANES, KKS_PLANES = "Bently Nevada", ("VE-101", "VE-102"), ("10MKA11CY01", "10MKA21CY01")
+ROOMS = {"names": SPOKEN, "planes": ("Lager 1", "Lager 2")}
 MONITORS = [
-    Export(
-        maker="Bently Nevada",
-        form="API 670 tags with counters, status",
-        file="a.csv",
-        content=_monitor([f"Ch{k} {tag}" for k, tag in enumerate(API, start=1)]),
-        names=[f"Ch{k} {tag}" for k, tag in enumerate(API, start=1)],
-        planes=("VE-101", "VE-102"),
-        **IN_MIL,
-    ),
-    Export(
-        maker="Bently Nevada",
-        form="KKS tags",
-        file="a.csv",
-        content=_monitor(KKS),
-        names=KKS,
-        planes=("10MKA11CY01", "10MKA21CY01"),
-        **IN_MIL,
-    ),
-    Export(
-        maker="Bently Nevada",
-        form="System 1, one point",
-        file="a.csv",
-        content=_system1(),
-        names=["VE-101X"],
-        question=r"holds 1 channel that can be displacements .*it has VE-101X in um; export the",
-    ),
-    Export(
-        maker="HBK",
-        form="German words for the axes",
-        file="a.txt",
-        content=_monitor(SPOKEN, unit="µm"),
-        names=SPOKEN,
-        planes=("Lager 1", "Lager 2"),
-        speed=True,
-        **OF_MICRONS,
-    ),
-    Export(maker="HBK", form="catman", file="a.txt", content=_catman(), speed=True, **OF_MICRONS),
-    Export(maker="Dewesoft", form="text", file="a.txt", content=_dewesoft(), speed=True, **OF_MICRONS),
-    Export(
-        maker="OROS",
-        form="WAV",
-        file="a.wav",
-        content=_wav,
-        names=[f"channel {k}" for k in range(1, 5)],
-        question=r"does not tell it: say what it is with 'rotordrop profile a\.wav --full-scale",
-    ),
+    Export(BENTLY, "API 670 tags, status", "a.csv", _monitor(TAGGED), TAGGED, planes=API_PLANES, **IN_MIL),
+    Export(BENTLY, "KKS tags", "a.csv", _monitor(KKS), KKS, planes=KKS_PLANES, **IN_MIL),
+    Export(BENTLY, "System 1, one point", "a.csv", _system1(), ["VE-101X"], question=POINT),
+    Export("HBK", "German words for the axes", "a.txt", _monitor(SPOKEN, unit="µm"), **ROOMS, **TURNING),
+    Export("HBK", "catman", "a.txt", _catman(), **TURNING),
+    Export("Dewesoft", "text", "a.txt", _dewesoft(), **TURNING),
+    Export("OROS", "WAV", "a.wav", WAVE, question=SCALE),
 ]
 
 EXPORTS = [*NI, *SCOPES, *SIEMENS, *MONITORS]

@@ -46,7 +46,7 @@ def test_readings_are_those_written_to_the_last_bit(name, tmp_path):
         np.testing.assert_allclose(record.speed_readings, 2 * np.pi * SPEED, rtol=0, atol=1.01 * step)
 
 
-@pytest.mark.parametrize("kept", [0.2, 0.5, 0.8, 0.97])
+@pytest.mark.parametrize("kept", [0.03, 0.2, 0.5, 0.8, 0.97])
 def test_a_file_that_was_cut_says_so(name, kept, tmp_path):
     path = written(name, tmp_path)
     content = path.read_bytes()

@@ -90,8 +90,8 @@ def german(separator, decimal):
 
 
 def trailing(separator, decimal):
-    names = ["Time[s]", *(f"{name}[mm]" for name in NAMES), "Speed[Hz]"]
-    body = rows(separator, decimal, seconds(decimal), scale=1e-3, digits=5)
+    names = ["Time[s]", *(f"{name}[mm]" for name in NAMES), "Speed[rad/s]"]
+    body = rows(separator, decimal, seconds(decimal), speed="376.99112", scale=1e-3, digits=5)
     return lined(separator, [[*names, ""]], [[*row, ""] for row in body]).encode()
 
 

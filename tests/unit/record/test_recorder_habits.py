@@ -2,17 +2,16 @@
 
 import gzip
 import io
-import struct
 import tracemalloc
 
 import numpy as np
 import pytest
+from tests.unit.record.every_format import as_comtrade, as_wav
 
+from rotordrop import check_record, read_record
 from rotordrop.errors import RecordError
-from rotordrop.evidence.quality import check_record
-from rotordrop.record.profile import Clock, Profile, SpeedSource, TextLayout
+from rotordrop.record.profile import Profile, SpeedSource, TextLayout
 from rotordrop.record.readers import read_recording
-from rotordrop.record.record import read_record
 
 NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
 COUNT = 40
@@ -39,40 +38,19 @@ def seconds(i):
     return [f"{i * STEP:.5f}"]
 
 
-def clock(i, comma="."):
-    return f"13:59:59{comma}{999_000 + 50 * i:06d}" if i < 20 else f"14:00:00{comma}{50 * (i - 20):06d}"
-
-
-MICRO = [f"{name} / µm" for name in NAMES]
 WAYS = {
     "status column": table(seconds, extra=[("Status", "OK")]),
     "text columns with commas": table(seconds, separator=",", extra=[("Note", '"a, b"')]),
-    "date and time columns": table(
-        lambda i: ["2019-10-16", clock(i)],
-        names=["Date", "Time", *(f"{n} [um]" for n in NAMES), "Speed [Hz]"],
-    ),
-    "German date and time": table(
-        lambda i: [f"16.10.2019 {clock(i, ',')}"],
-        decimal=",",
-        names=["Zeit", *(f"{n} [µm]" for n in NAMES), "Drehzahl [Hz]"],
-    ),
-    "German date, time apart": table(
-        lambda i: ["16.10.2019", clock(i, ",")],
-        decimal=",",
-        names=["Datum", "Uhrzeit", *(f"{n} [µm]" for n in NAMES), "Drehzahl [Hz]"],
-    ),
     "German date beside seconds": table(
         lambda i: ["16.10.2019", f"{i * STEP:.5f}".replace(".", ",")],
         decimal=",",
         names=["Datum", "Zeit [s]", *(f"{n} [µm]" for n in NAMES), "Drehzahl [Hz]"],
     ),
-    "time of day": table(lambda i: [clock(i)]),
+    "time of day": table(
+        lambda i: [f"13:59:59.{999_000 + 50 * i:06d}" if i < 20 else f"14:00:00.{50 * (i - 20):06d}"]
+    ),
     "thousands with commas": table(seconds, thousands=",", scale=1000, digits=2).replace("[um]", "[nm]"),
     "quoted thousands": table(seconds, separator=",").replace("-126.75", '"-126.75"'),
-    "units behind a slash": table(seconds, names=["t / s", *MICRO, "n / min^-1"]).replace("60.00", "3600.00"),
-    "unit row in brackets": table(seconds, names=["Time", *NAMES, "Speed"]).replace(
-        "Speed\n", "Speed\n(s);(um);(um);(um);(um);(Hz)\n"
-    ),
     "no last line end": table(seconds).rstrip("\n"),
     "rate without a time column": "fs = 20000 Hz\n"
     + table(lambda i: [], names=[*(f"{n} [um]" for n in NAMES), "Speed [Hz]"]),
@@ -112,7 +90,7 @@ def test_a_damaged_row_at_the_start_is_no_header(damaged, wrong, machine, tmp_pa
         read_record(path, machine)
 
 
-def test_missing_rows_show_in_the_counter(machine, tmp_path):
+def test_missing_rows_and_endless_lines_are_told(machine, tmp_path):
     lines = WAYS["counter"].split("\n")
     path = tmp_path / "drop.csv"
     path.write_text("\n".join(lines[:20] + lines[23:]))
@@ -121,18 +99,6 @@ def test_missing_rows_show_in_the_counter(machine, tmp_path):
     found = check_record(record, machine)
     assert next(finding.kind for finding in found if finding.severity == "stop") == "dropped block"
     assert "3 samples are missing" in found[0].message
-
-
-@pytest.mark.parametrize("cut", [1, 2, 3])
-def test_a_last_row_that_is_cut_is_left_out_with_a_word(cut, machine, tmp_path):
-    path = tmp_path / "drop.csv"
-    path.write_text(table(seconds)[: -1 - cut])
-    record = read_record(path, machine)
-    assert len(record.time) == COUNT - 1
-    assert "may be truncated" in record.warnings[0]
-
-
-def test_a_line_without_end_is_refused_at_once(tmp_path):
     path = tmp_path / "drop.csv"
     path.write_text("a;b\n" + "1;" * 1_000_000)
     with pytest.raises(RecordError, match=r"line 2 has 2000000 characters"):
@@ -147,59 +113,47 @@ def test_endless_headers_cost_nothing(header, machine, tmp_path):
         read_record(path, machine)
 
 
-def as_wav(path, bits):
-    scale = 2.0 ** (bits - 1)
-    counts = np.rint(READINGS / 500.0 * scale).astype(np.int64)
-    data = b"".join(int(v).to_bytes(bits // 8, "little", signed=True) for v in counts.ravel())
-    form = struct.pack("<HHIIHH", 1, 4, 20_000, 20_000 * 4 * bits // 8, 4 * bits // 8, bits)
-    body = b"WAVEfmt " + struct.pack("<I", len(form)) + form + b"data" + struct.pack("<I", len(data)) + data
-    path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
-    return counts / scale * 500e-6
-
-
 BY_PROFILE = Profile(
     full_scale="500 um", text=TextLayout(names=tuple(NAMES)), speed=SpeedSource(constant="60 Hz")
 )
 
 
-@pytest.mark.parametrize("bits", [16, 24, 32])
+@pytest.mark.parametrize("bits", [24, 32])
 def test_wav(bits, machine, tmp_path):
     path = tmp_path / "drop.wav"
-    expected = as_wav(path, bits)
+    as_wav(path, READINGS, 20_000, bits)
     record = read_record(path, machine, profile=BY_PROFILE)
-    np.testing.assert_allclose(record.signals, expected, rtol=1e-14)
+    np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=0, atol=500e-6 / 2**bits)
     assert record.sampling_rate == 20_000.0
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(RecordError, match=r"truncated: the block 'data' declares"):
         read_record(path, machine, profile=BY_PROFILE)
 
 
-def test_npz_and_npy(machine, tmp_path):
+def test_npy_with_named_fields(machine, tmp_path):
     time = np.arange(COUNT) * STEP
     columns = {f"{name}_um": READINGS[:, i] for i, name in enumerate(NAMES)}
-    np.savez(tmp_path / "drop.npz", t=time, **columns)
-    fields = np.rec.fromarrays([time, *columns.values()], names=["t", *columns])
-    np.save(tmp_path / "fields.npy", fields)
-    np.save(tmp_path / "matrix.npy", READINGS * 1e-6)
-    plain = BY_PROFILE.model_copy(update={"unit": "m", "time": Clock(step="50 us")})
-    for name, profile in (("drop.npz", None), ("fields.npy", None), ("matrix.npy", plain)):
-        record = read_record(tmp_path / name, machine, profile=profile)
-        np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=1e-15)
-        np.testing.assert_allclose(record.time, time, rtol=0, atol=1e-12)
+    np.save(tmp_path / "fields.npy", np.rec.fromarrays([time, *columns.values()], names=["t", *columns]))
+    record = read_record(tmp_path / "fields.npy", machine)
+    np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=1e-15)
+    np.testing.assert_allclose(record.time, time, rtol=0, atol=1e-12)
 
 
-def test_objects_of_python_are_never_unpacked(tmp_path):
+def test_arrays_that_are_damaged_or_dangerous_are_refused(tmp_path):
     np.save(tmp_path / "evil.npy", np.array([object(), None], dtype=object), allow_pickle=True)
     with pytest.raises(RecordError, match=r"holds Python objects, which are not unpacked"):
         read_recording(tmp_path / "evil.npy", Profile())
-
-
-def test_an_array_that_claims_more_than_the_file_holds(tmp_path):
     head = io.BytesIO()
     np.lib.format.write_array_header_1_0(head, {"descr": "<f8", "fortran_order": False, "shape": (10**15, 4)})
     (tmp_path / "bomb.npy").write_bytes(head.getvalue() + bytes(64))
     with pytest.raises(RecordError, match=r"declares 32000000000000000 bytes and 64 are present"):
         read_recording(tmp_path / "bomb.npy", BY_PROFILE)
+    # Brackets that do not close ended in a traceback of the tokenizer.
+    np.save(tmp_path / "drop.npy", READINGS)
+    content = (tmp_path / "drop.npy").read_bytes()
+    (tmp_path / "drop.npy").write_bytes(content.replace(b"(40, 4), }", b"((40, 4,  "))
+    with pytest.raises(RecordError, match=r"is no intact NPY array"):
+        read_recording(tmp_path / "drop.npy", BY_PROFILE)
 
 
 @pytest.mark.parametrize("suffix", ["csv", "csv.gz", "h5", "mat", "tdms", "uff", "wav", "npy", "npz", "cfg"])
@@ -233,9 +187,7 @@ def test_what_is_no_text_is_refused_by_its_beginning(tmp_path):
 
 def test_gzip_of_any(machine, tmp_path):
     path = tmp_path / "drop.csv.gz"
-    path.write_bytes(gzip.compress(WAYS["status column"].encode()))
-    np.testing.assert_allclose(read_record(path, machine).signals, READINGS * 1e-6, rtol=0, atol=1e-12)
-    path.write_bytes(path.read_bytes()[:-9])
+    path.write_bytes(gzip.compress(WAYS["status column"].encode())[:-9])
     with pytest.raises(RecordError, match=r"drop\.csv\.gz cannot be unpacked: .*copy it again"):
         read_record(path, machine)
     path.write_bytes(gzip.compress(bytes(40 * 2**20)))
@@ -243,59 +195,15 @@ def test_gzip_of_any(machine, tmp_path):
         read_record(path, machine)
 
 
-def as_comtrade(folder, kind):
-    lines = ["Station,Recorder,1999", "5,5A,0D"]
-    for number, name in enumerate([*NAMES, "Speed"], start=1):
-        unit, factor = ("Hz", 0.01) if name == "Speed" else ("um", 0.01)
-        lines.append(f"{number},{name},,,{unit},{factor},-1.5,0,-32767,32767,1,1,P")
-    lines += [
-        "50",
-        "1",
-        f"20000,{COUNT}",
-        "16/10/2019,13:42:07.000000",
-        "16/10/2019,13:42:07.000500",
-        kind,
-        "1",
-    ]
-    (folder / "drop.cfg").write_text("\r\n".join(lines) + "\r\n")
-    counts = np.rint(np.column_stack([READINGS, np.full(COUNT, 60.0)]) * 100 + 150).astype(int)
-    if kind == "ASCII":
-        rows = [f"{i + 1},{50 * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
-        (folder / "drop.dat").write_text("\r\n".join(rows) + "\r\n\x1a")
-    else:
-        sign = {"BINARY": "h", "BINARY32": "i", "FLOAT32": "f"}[kind]
-        rows = [struct.pack(f"<II5{sign}", i + 1, 50 * i, *row) for i, row in enumerate(counts)]
-        (folder / "drop.dat").write_bytes(b"".join(rows))
+WITH_SPEED = np.column_stack([READINGS, np.full(COUNT, 60.0)])
 
 
 @pytest.mark.parametrize("kind", ["ASCII", "BINARY", "BINARY32", "FLOAT32"])
-@pytest.mark.parametrize("named", ["drop.cfg", "drop.dat"])
-def test_comtrade_with_its_scale_factors(kind, named, machine, tmp_path):
-    as_comtrade(tmp_path, kind)
-    record = read_record(tmp_path / named, machine)
+def test_comtrade_with_its_scale_factors(kind, machine, tmp_path):
+    as_comtrade(tmp_path / "drop.cfg", kind, WITH_SPEED, 20_000, 5e-4, -1.5)
+    record = read_record(tmp_path / "drop.cfg", machine)
     np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=0, atol=1e-12)
     np.testing.assert_allclose(record.time, np.arange(COUNT) * STEP - 5e-4, rtol=0, atol=1e-9)
-    data = (tmp_path / "drop.dat").read_bytes()
-    (tmp_path / "drop.dat").write_bytes(data[: len(data) // 2])
-    with pytest.raises(RecordError, match=r"truncated|declares 40 samples|entries where"):
-        read_record(tmp_path / named, machine)
-
-
-def test_excel(machine, tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    book.active.append(["Export of a recorder"])
-    sheet = book.create_sheet("drop")
-    sheet.append(["Time [s]", *(f"{name} [um]" for name in NAMES), "Speed [Hz]", "Status"])
-    for i in range(COUNT):
-        sheet.append([i * STEP, *READINGS[i].tolist(), 60.0, "OK"])
-    path = tmp_path / "drop.xlsx"
-    book.save(path)
-    record = read_record(path, machine)
-    np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=1e-15)
-    path.write_bytes(path.read_bytes()[:-500])
-    with pytest.raises(RecordError, match=r"cannot be read as a workbook"):
-        read_record(path, machine)
 
 
 @pytest.mark.parametrize("key", ["Samples", "Number of samples", "Anzahl Messwerte", "Record length"])
@@ -310,17 +218,8 @@ def test_rows_missing_at_the_end_show_by_the_length_the_header_declares(key, mac
     assert f"declares {COUNT} samples and {COUNT - 8} are present" in told
 
 
-def test_a_damaged_head_of_an_array_is_a_sentence(tmp_path):
-    """Brackets that do not close ended in a traceback of the tokenizer."""
-    np.save(tmp_path / "drop.npy", READINGS)
-    content = (tmp_path / "drop.npy").read_bytes()
-    (tmp_path / "drop.npy").write_bytes(content.replace(b"(40, 4), }", b"((40, 4,  "))
-    with pytest.raises(RecordError, match=r"is no intact NPY array"):
-        read_recording(tmp_path / "drop.npy", BY_PROFILE)
-
-
 def test_a_configuration_with_a_damaged_rate(machine, tmp_path):
-    as_comtrade(tmp_path, "ASCII")
+    as_comtrade(tmp_path / "drop.cfg", "ASCII", WITH_SPEED, 20_000, 5e-4, -1.5)
     text = (tmp_path / "drop.cfg").read_text()
     (tmp_path / "drop.cfg").write_text(text.replace("20000,40", "20000,4°", 1), encoding="latin-1")
     with pytest.raises(RecordError, match=r"line \d+: .*the configuration is damaged"):

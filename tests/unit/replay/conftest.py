@@ -1,7 +1,5 @@
 """The first impacts of a recorded drop with a known truth."""
 
-from __future__ import annotations
-
 import pytest
 from tests.unit.evidence.fall.conftest import contacts as contacts
 from tests.unit.evidence.fall.conftest import drop as drop
@@ -9,11 +7,9 @@ from tests.unit.evidence.fall.conftest import evidence as evidence
 from tests.unit.evidence.fall.conftest import model as model
 from tests.unit.evidence.fall.conftest import truth as truth
 
-from rotordrop.evidence.evidence import Evidence
-from rotordrop.replay.first_impacts import FirstImpacts, first_impacts
-from rotordrop.rotor.parameters import DropModel
+from rotordrop.replay.first_impacts import first_impacts
 
 
 @pytest.fixture(scope="session")
-def problem(evidence: Evidence, model: DropModel) -> FirstImpacts:
+def problem(evidence, model):
     return first_impacts(evidence, model, until=0.045)

@@ -1,21 +1,16 @@
 """Supports from the first impacts of a record with a known truth."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rotordrop import build_drop_model, example_machine
 from rotordrop.errors import IdentificationError
-from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.initial_state import InitialState
-from rotordrop.machine import example_machine
 from rotordrop.physics import columns as L
 from rotordrop.replay.first_impacts import (
-    Directions,
-    FirstImpacts,
     Trial,
     first_impacts,
     influential_directions,
@@ -29,26 +24,28 @@ from rotordrop.replay.support_and_friction import (
     sweep_friction,
     widened_covariance,
 )
-from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import all_unknowns
 
 NINETY = 1.6448536269514722
 
 
-def moved_from_truth(problem: FirstImpacts) -> np.ndarray:
+def moved_from_truth(problem):
     """Start with supports 15 % and 10 % off."""
     x = problem.table.mean.copy()
     x[:6] += np.array([0.15, 0.1, -0.3, -0.1, 0.1, 0.3])
     return x
 
 
-def test_true_parameters_leave_noise(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_the_truth_leaves_noise_in_residual_and_orbit(problem, contacts):
     residual = problem.residual(problem.table.mean, float(contacts.max()) + 2e-3)
     assert 0.6 < float(np.mean(residual**2)) < 1.6
+    count = problem.until(float(contacts.max()) + 2e-3)
+    distance = problem.initial.sensing.at_bearings(problem.difference(problem.table.mean, count))
+    assert float(np.sqrt(np.mean(np.sum(distance**2, axis=-1)))) < 1.2e-6
 
 
-def test_supports_return_to_what_was_put_in(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_supports_return_to_what_was_put_in(problem, contacts):
     x = moved_from_truth(problem)
     for window in (3e-3, 6e-3, 11e-3):
         fit = fit_window(problem, x, float(contacts.max()) + window, tolerance=1e-3)
@@ -67,16 +64,15 @@ def test_supports_return_to_what_was_put_in(problem: FirstImpacts, contacts: np.
         assert true is not None and low - (high - low) < true < high + (high - low), path
 
 
-def test_preload_keeps_its_prior(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_preload_keeps_its_prior(problem, contacts):
     fit = fit_window(problem, problem.table.mean, float(contacts.max()) + 3e-3, iterations=2)
     place = problem.paths.index("NDE.preload")
     assert fit.x[place] == problem.table.mean[place]
     assert fit.covariance[place, place] == pytest.approx(problem.table.sigma[place] ** 2)
 
 
-def test_search_from_several_starts_over_short_windows(
-    problem: FirstImpacts, contacts: np.ndarray, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.slow
+def test_search_from_several_starts_over_short_windows(problem, contacts, monkeypatch):
     monkeypatch.setattr("rotordrop.replay.support_and_friction.WINDOWS", (1.75e-3, 3.25e-3, 5.25e-3, 7.25e-3))
     fit = fit_support(problem, problem, float(contacts.max()), starts=3, threads=2)
     assert len(fit.coarse.windows) == 3 and len(fit.search.windows) == 2
@@ -90,7 +86,7 @@ def test_search_from_several_starts_over_short_windows(
     assert ends and all(first == second for first, second in ends)
 
 
-def test_verdicts_name_bounds_and_what_is_not_determined(problem: FirstImpacts) -> None:
+def test_verdicts_name_bounds_and_what_is_not_determined(problem):
     x = problem.table.mean
     covariance = np.diag((0.1 * problem.table.sigma) ** 2)
     covariance[1, 1] = problem.table.sigma[1] ** 2
@@ -103,7 +99,7 @@ def test_verdicts_name_bounds_and_what_is_not_determined(problem: FirstImpacts) 
     assert identified_values(problem, x, covariance, given=True)[paths[2]].status == "taken over"
 
 
-def moved(problem: FirstImpacts, **values: float) -> Trial:
+def moved(problem, **values):
     """The guesses of the machine file, which need not be the middle of a range, with other values."""
     theta = np.array([one.begin for one in problem.unknowns])
     for path, value in values.items():
@@ -111,21 +107,31 @@ def moved(problem: FirstImpacts, **values: float) -> Trial:
     return Trial(theta, problem.initial.mean)
 
 
-def test_gap_follows_the_sag_of_the_trial_support(problem: FirstImpacts, model: DropModel) -> None:
+def test_trials_follow_sag_rest_and_ratios(problem, model):
     soft, stiff = (problem.rows(moved(problem, **{"NDE.support.stiffness": k})) for k in (0.5e8, 1e8))
     change = soft[:, L.AIR_GAP] - stiff[:, L.AIR_GAP]
     assert change == pytest.approx([-float(model.load_shares[0]) / 1e8, 0.0], abs=1e-12)
-
-
-def test_rest_error_lowers_the_gap_by_itself(problem: FirstImpacts) -> None:
     trial = moved(problem)
     shifted = trial.fall.copy()
     shifted[problem.initial.unknowns.rest] += [0.0, 3e-6, 0.0, -2e-6]
     change = problem.rows(trial._replace(fall=shifted)) - problem.rows(trial)
     assert change[:, L.AIR_GAP] == pytest.approx([-3e-6, 2e-6], abs=1e-15)
+    rows = problem.rows(moved(problem, **{"DE.support.stiffness": 3e8}))
+    assert rows[1, L.SUPPORT_STIFFNESS_X] == pytest.approx(3e8)
+    assert rows[1, L.SUPPORT_STIFFNESS_Y] == pytest.approx(3e8)
+    same = np.arange(rows.shape[1]) != L.AIR_GAP
+    assert rows[0, same] == pytest.approx(problem.rows(moved(problem))[0, same])
+    theta, fall = moved(problem)
+    theta[problem.friction] = np.log(0.08)
+    rows = problem.rows(Trial(theta, fall))
+    assert rows[:, L.FRICTION_DYNAMIC] == pytest.approx([0.08, 0.08])
+    assert rows[:, L.FRICTION_STATIC] == pytest.approx([0.104, 0.104])
+    rows = problem.rows(moved(problem))
+    others = [k for k in range(rows.shape[1]) if k not in (L.AIR_GAP, L.ROTOR_RADIUS)]
+    assert rows[:, others] == pytest.approx(model.parameters.bearing[:, others], rel=1e-12)
 
 
-def test_impossible_values_are_refused_with_the_time(problem: FirstImpacts) -> None:
+def test_impossible_values_are_refused_with_the_time(problem):
     rows, p = problem.rows(moved(problem)), problem.model.parameters
     rows[:, L.RACE_MASS] = np.nan
     unbalance = np.stack([p.unbalance_cos, p.unbalance_sin])
@@ -133,29 +139,7 @@ def test_impossible_values_are_refused_with_the_time(problem: FirstImpacts) -> N
         problem.run(rows, problem.time[:200], problem.start_state, unbalance)
 
 
-def test_a_support_is_as_stiff_in_both_directions(problem: FirstImpacts) -> None:
-    rows = problem.rows(moved(problem, **{"DE.support.stiffness": 3e8}))
-    assert rows[1, L.SUPPORT_STIFFNESS_X] == pytest.approx(3e8)
-    assert rows[1, L.SUPPORT_STIFFNESS_Y] == pytest.approx(3e8)
-    same = np.arange(rows.shape[1]) != L.AIR_GAP
-    assert rows[0, same] == pytest.approx(problem.rows(moved(problem))[0, same])
-
-
-def test_guesses_reproduce_the_machine(problem: FirstImpacts, model: DropModel) -> None:
-    rows = problem.rows(moved(problem))
-    others = [k for k in range(rows.shape[1]) if k not in (L.AIR_GAP, L.ROTOR_RADIUS)]
-    assert rows[:, others] == pytest.approx(model.parameters.bearing[:, others], rel=1e-12)
-
-
-def test_friction_is_one_unknown_with_a_fixed_ratio(problem: FirstImpacts) -> None:
-    theta, fall = moved(problem)
-    theta[problem.friction] = np.log(0.08)
-    rows = problem.rows(Trial(theta, fall))
-    assert rows[:, L.FRICTION_DYNAMIC] == pytest.approx([0.08, 0.08])
-    assert rows[:, L.FRICTION_STATIC] == pytest.approx([0.104, 0.104])
-
-
-def test_a_coarser_basis_starts_from_the_same_motion(problem: FirstImpacts, evidence: Evidence) -> None:
+def test_a_coarser_basis_starts_from_the_same_motion(problem, evidence):
     coarser = build_drop_model(problem.model.machine, Reduction(modes=4, attachment=True))
     coarse = first_impacts(evidence, coarser, until=0.045)
     assert coarse.model.layout.n_dynamic < problem.model.layout.n_dynamic
@@ -166,11 +150,11 @@ def test_a_coarser_basis_starts_from_the_same_motion(problem: FirstImpacts, evid
     assert np.array(places[0]) == pytest.approx(np.array(places[1]), abs=1e-6)
 
 
-def directions_of(problem: FirstImpacts) -> Directions:
+def directions_of(problem):
     return influential_directions(problem.initial, problem.start)
 
 
-def test_directions_and_the_rest_hold_the_whole_covariance(problem: FirstImpacts) -> None:
+def test_directions_and_the_rest_hold_the_whole_covariance(problem):
     directions = directions_of(problem)
     whole = np.hstack([directions.unknowns, directions.remaining])
     scale = np.sqrt(np.diag(problem.initial.covariance))
@@ -178,7 +162,7 @@ def test_directions_and_the_rest_hold_the_whole_covariance(problem: FirstImpacts
     assert product == pytest.approx(problem.initial.covariance / np.outer(scale, scale), abs=1e-8)
 
 
-def test_a_direction_moves_the_start_as_its_unknowns_do(problem: FirstImpacts) -> None:
+def test_a_direction_moves_the_start_as_its_unknowns_do(problem):
     directions, mean = directions_of(problem), problem.initial.mean
     for k in range(directions.unknowns.shape[1]):
         step = 1e-3 * directions.unknowns[:, k]
@@ -192,7 +176,7 @@ def test_a_direction_moves_the_start_as_its_unknowns_do(problem: FirstImpacts) -
             assert np.linalg.norm(found - slope) < 0.02 * np.linalg.norm(slope), k
 
 
-def test_what_the_directions_leave_moves_the_bearings_little(problem: FirstImpacts) -> None:
+def test_directions_hold_the_covariance_and_leave_little(problem, monkeypatch):
     directions = directions_of(problem)
     place, shape = problem.model.layout.modal_y, problem.model.parameters.bearing_shape
     followed = shape @ directions.states[place]
@@ -202,11 +186,6 @@ def test_what_the_directions_leave_moves_the_bearings_little(problem: FirstImpac
     beyond = shape @ (np.array(left) - problem.start_state).T[place] / step
     # standard deviations: unlike the largest column they do not depend on how the rest is cut into columns
     assert np.all(np.linalg.norm(beyond, axis=1) < 0.05 * np.linalg.norm(followed, axis=1))
-
-
-def test_directions_are_those_of_the_covariance_not_of_its_square_root(
-    problem: FirstImpacts, monkeypatch: pytest.MonkeyPatch
-) -> None:
     expected, root = directions_of(problem), problem.initial.square_root()
     turn, _ = np.linalg.qr(np.random.default_rng(1).standard_normal(root.shape))
     monkeypatch.setattr(InitialState, "square_root", lambda state: root @ turn)
@@ -218,7 +197,7 @@ def test_directions_are_those_of_the_covariance_not_of_its_square_root(
     assert found.states / reach == pytest.approx(expected.states / reach, abs=1e-6)
 
 
-def test_friction_sweep_finds_the_coefficient(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_friction_sweep_finds_the_coefficient(problem, contacts):
     swept = sweep_friction(
         problem,
         problem.table.mean,
@@ -233,20 +212,14 @@ def test_friction_sweep_finds_the_coefficient(problem: FirstImpacts, contacts: n
     assert swept.window[1] - swept.window[0] == pytest.approx(33e-3)
 
 
-def test_friction_beyond_the_sweep_is_at_its_bound(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_friction_beyond_the_sweep_is_at_its_bound(problem, contacts):
     swept = sweep_friction(
         problem, problem.table.mean, float(contacts.min()), coefficients=np.array([0.13, 0.15, 0.17])
     )
     assert swept.value.status == "at its bound"
 
 
-def test_orbit_of_the_truth_is_as_far_off_as_noise(problem: FirstImpacts, contacts: np.ndarray) -> None:
-    count = problem.until(float(contacts.max()) + 2e-3)
-    distance = problem.initial.sensing.at_bearings(problem.difference(problem.table.mean, count))
-    assert float(np.sqrt(np.mean(np.sum(distance**2, axis=-1)))) < 1.2e-6
-
-
-def test_refit_takes_the_friction_of_the_sweep(problem: FirstImpacts, contacts: np.ndarray) -> None:
+def test_refit_takes_the_friction_of_the_sweep(problem, contacts):
     start = fit_window(problem, problem.table.mean, float(contacts.max()) + 3e-3, iterations=1)
     swept = sweep_friction(
         problem, start.x, float(contacts.min()), coefficients=np.array([0.09, 0.1, 0.11]), draws=[start.x]
@@ -259,7 +232,7 @@ def test_refit_takes_the_friction_of_the_sweep(problem: FirstImpacts, contacts: 
     assert covariance.shape == (len(x), len(x))
 
 
-def test_a_found_parameter_lies_in_the_middle_of_its_interval() -> None:
+def test_a_found_parameter_lies_in_the_middle_of_its_interval():
     unknowns = all_unknowns(build_drop_model(example_machine("lp400"), "quick"))
     low, high = (np.array([unknown.bounds[side] for unknown in unknowns]) for side in (0, 1))
     problem: Any = SimpleNamespace(unknowns=unknowns, table=SimpleNamespace(lower=low, upper=high))

@@ -1,33 +1,22 @@
 """A small drop with known numbers: two bearings, three impacts, one of them still lasting."""
 
-from __future__ import annotations
-
-from importlib import resources
+import json
 
 import numpy as np
 import pytest
 
-from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimate.methods import Tracked
-from rotordrop.estimate.record_facts import facts_of
-from rotordrop.evidence.evidence import Evidence, read_evidence
-from rotordrop.machine import example_machine
+from rotordrop.estimate.document import estimate_document
 from rotordrop.physics.hertz import LineContact
-from rotordrop.record.record import read_record
-from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.report.estimate_page import estimate_page
 from rotordrop.simulate.certificate import Certificate
 from rotordrop.simulate.result import ContactLog, DropResult
-from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
-from rotordrop.twin.problems import COARSE_BASIS, drop_problem
-from rotordrop.twin.tracked import tracked_drop
-from rotordrop.twin.tracked_estimate import estimate_of
 
 GAPS = (275e-6, 285e-6)
 TIME = np.linspace(0.0, 0.2, 4001)
 
 
 @pytest.fixture
-def drop_result() -> DropResult:
+def drop_result():
     count = len(TIME)
     fall = np.minimum(0.5 * 9.81 * TIME**2, 290e-6)
     displacement = np.zeros((count, 2, 2))
@@ -65,6 +54,7 @@ def drop_result() -> DropResult:
             dissipated_energy=np.array([1.7, 7.6, 0.2]),
             sliding_energy=np.array([1.6, 7.5, 0.2]),
         ),
+        lost=np.zeros((3, 5)),
         bearing_names=("NDE", "DE"),
         state_names=("a", "b"),
         shapes=np.eye(2),
@@ -83,19 +73,24 @@ def drop_result() -> DropResult:
     )
 
 
-@pytest.fixture(scope="session")
-def estimate() -> Estimate:
+@pytest.fixture
+def estimate(bank):
     """The first 20 ms of the bundled record, in one coarse pass."""
-    machine = example_machine("lp400")
-    folder = resources.files("rotordrop").joinpath("examples", "lp400")
-    with resources.as_file(folder.joinpath("drop_060.h5")) as path:
-        record = read_record(path, machine)
-    with resources.as_file(folder.joinpath("drop_060_tail.csv")) as path:
-        tail = read_record(path, machine)
-    evidence = read_evidence(build_drop_model(machine), record, tail, name="drop_060")
-    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), evidence, until=0.02)
-    smoothed = track([problem], CALIBRATED_SCHEDULE[:1]).smoothed[0]
-    drop = tracked_drop(evidence, problem, smoothed, smoothed, 1.0)
-    return estimate_of(
-        drop, Tracked(), facts_of(Evidence(record=record, machine=machine, tail=tail, name="drop_060"))
-    )
+    return bank("begun")
+
+
+def section(content, heading):
+    """The part of a page under a heading."""
+    return next(part for part in content.sections if part.heading == heading)
+
+
+@pytest.fixture(scope="module")
+def page(bank):
+    """The page of it."""
+    return estimate_page(bank("begun"))
+
+
+@pytest.fixture(scope="module")
+def document(bank):
+    """Its document, as it comes back from a file."""
+    return json.loads(json.dumps(estimate_document(bank("begun")), allow_nan=False))

@@ -1,7 +1,5 @@
 """Numbers in a report: one unit per kind, as many digits as the interval justifies, never a bare number."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
@@ -10,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import rotordrop
+from rotordrop.jobs.written import quantity_json
 from rotordrop.known import Known
 from rotordrop.report.quantity import Quantity, with_error, written
 from rotordrop.severity.numbers import SEVERITY
-from rotordrop.web.rows import quantity_json
 
 THIN = "\u202f"
 
@@ -35,41 +33,40 @@ THIN = "\u202f"
         (math.nan, "force", "–"),
     ],
 )
-def test_a_kind_has_one_unit(value: float, kind: str, text: str) -> None:
+def test_a_kind_has_one_unit(value, kind, text):
     assert Quantity(value=value, kind=kind).text == text
 
 
-def test_the_interval_says_how_many_digits_are_meant() -> None:
-    quantity = Quantity(value=3333.086, kind="force", interval_90=(3180.4, 3490.2))
-    assert quantity.text == f"3{THIN}333 N"
-    assert quantity.interval_text == f"3{THIN}180 to 3{THIN}490 N"
-    fine = Quantity(value=275.0432e-6, kind="length", interval_90=(274.61e-6, 275.49e-6))
-    assert fine.text == "275.04 µm"
-    assert fine.interval_text == "274.61 to 275.49 µm"
+@pytest.mark.parametrize(
+    ("value", "kind", "told", "text", "interval"),
+    [
+        (3333.086, "force", {"interval_90": (3180.4, 3490.2)}, "3\u202f333 N", "3\u202f180 to 3\u202f490 N"),
+        (275.0432e-6, "length", {"interval_90": (274.61e-6, 275.49e-6)}, "275.04 µm", "274.61 to 275.49 µm"),
+        (275e-6, "length", {"lower": 270e-6, "upper": 275e-6}, "275.0 µm", "limits 270.0 to 275.0 µm"),
+        (40.0, "mass", {"standard_error": 0.5}, "40.00 kg", "± 0.50 kg (standard error)"),
+        (4.2e-11, "dimensionless", {"interval_90": (0.0, 8.572e-11)}, "4.20 × 10⁻¹¹", "0 to 8.57 × 10⁻¹¹"),
+        (240.0, "force", {"interval_90": (230.0, math.inf)}, "240.0 N", "230.0 N or more"),
+        (240.0, "force", {"interval_90": (-math.inf, 250.0)}, "240.0 N", "250.0 N or less"),
+        (240.0, "force", {"interval_90": (230.0, 250.0)}, "240 N", "230 to 250 N"),
+    ],
+)
+def test_the_interval_says_how_many_digits_are_meant(value, kind, told, text, interval):
+    shown = Quantity(value=value, kind=kind, **told)
+    assert (shown.text, shown.interval_text) == (text, interval)
 
 
-def test_limits_of_the_record_are_shown_as_limits() -> None:
-    gap = Quantity(value=275e-6, kind="length", lower=270e-6, upper=275e-6)
-    assert gap.interval_text == "limits 270.0 to 275.0 µm"
-
-
-def test_an_identified_value_brings_its_interval_along() -> None:
+def test_an_identified_value_brings_its_interval_along():
     known = Known(value=1e8, interval_90=(0.9e8, 1.1e8), standard_error=0.06e8, status="at its bound")
     quantity = Quantity.of(known, "stiffness")
-    assert quantity.interval_text == "90 to 110 N/µm"
-    assert quantity.status == "at its bound"
+    assert (quantity.interval_text, quantity.status) == ("90 to 110 N/µm", "at its bound")
     assert Quantity.of(None, "stiffness").text == "–"
-
-
-def test_a_standard_error_alone_is_named_as_one() -> None:
-    assert Quantity(value=40.0, kind="mass", standard_error=0.5).interval_text == "± 0.50 kg (standard error)"
 
 
 @pytest.mark.parametrize(
     ("value", "places", "text"),
     [(-0.0004, 2, "0.00"), (-12.34, 1, "−12.3"), (1234567.0, 0, f"1{THIN}234{THIN}567"), (0.0, 0, "0")],
 )
-def test_written_numbers(value: float, places: int, text: str) -> None:
+def test_written_numbers(value, places, text):
     assert written(value, places) == text
 
 
@@ -82,7 +79,7 @@ def test_written_numbers(value: float, places: int, text: str) -> None:
         (59.13, math.inf, "about 59.1 Hz"),
     ],
 )
-def test_a_number_has_the_digits_of_its_error(value: float, error: float | None, text: str) -> None:
+def test_a_number_has_the_digits_of_its_error(value, error, text):
     assert with_error(value, error, "Hz") == text
 
 
@@ -103,22 +100,10 @@ def test_a_range_that_stands_for_its_number_has_its_level():
     assert quantity_json(Quantity.of(known, "force", range_only=True))["SI"] == ["90 %: 1.0 to 3.0 N", ""]
 
 
-def test_nothing_is_zero_and_an_interval_without_an_end_goes_on() -> None:
-    tiny = Quantity(value=4.2e-11, kind="dimensionless", interval_90=(0.0, 8.572e-11))
-    assert tiny.interval_text == "0 to 8.57 × 10⁻¹¹"
+def test_a_share_of_a_life_that_no_number_of_drops_uses_up_has_no_digits():
+    life = next(one for one in SEVERITY if one.field.endswith("16281"))
 
-    def interval(low: float, high: float) -> str:
-        return Quantity(value=240.0, kind="force", interval_90=(low, high)).interval_text
-
-    assert interval(230.0, math.inf) == "230.0 N or more"
-    assert interval(-math.inf, 250.0) == "250.0 N or less"
-    assert interval(230.0, 250.0) == "230 to 250 N"
-
-
-def test_a_share_of_a_life_that_no_number_of_drops_uses_up_has_no_digits() -> None:
-    life = next(one for one in SEVERITY if one.field.endswith("segments"))
-
-    def shown(value: float, high: float, *, uncertain: bool = False) -> Quantity:
+    def shown(value, high, *, uncertain=False):
         known = Known(value=value, interval_90=(0.0, high))
         return replace(Quantity.of(known, life.shown_as, range_only=uncertain), places=life.places)
 
@@ -128,7 +113,7 @@ def test_a_share_of_a_life_that_no_number_of_drops_uses_up_has_no_digits() -> No
     assert shown(1.2e-3, 1.5e-3).text == "0.120 %"
 
 
-def test_per_cent_are_written_with_a_blank_everywhere() -> None:
+def test_per_cent_are_written_with_a_blank_everywhere():
     """As numbers and units are, and as tables have them; sentences had "93%"."""
     source = Path(rotordrop.__file__).parent
     wrong = [

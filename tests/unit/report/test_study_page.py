@@ -1,18 +1,16 @@
 """The report on a study: verdict first, what matters, how it is spread, few numbers beside the verdict."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
-from pathlib import Path
+from itertools import combinations
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tests.unit.web.browser import CHROMIUM, Browser
+from tests.unit.web.browser import CHROMIUM
+from tests.unit.web.conftest import browser as browser
 
 from rotordrop.machine import example_machine
-from rotordrop.report.content import ReportContent
 from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.study_page import SHARES, spoken_value, study_page
@@ -25,7 +23,7 @@ FRICTION = "*.friction.dynamic"
 
 
 @pytest.fixture(scope="module")
-def results() -> StudyResults:
+def results():
     """Drops whose peak force follows the friction alone."""
     machine = example_machine("lp400")
     plan = {
@@ -50,28 +48,23 @@ def results() -> StudyResults:
 
 
 @pytest.fixture(scope="module")
-def page(results: StudyResults) -> ReportContent:
+def page(results):
     return study_page(results)
 
 
-def test_what_matters_stands_first_in_words_and_in_one_table(page: ReportContent) -> None:
+def test_what_matters_stands_first_in_words_and_in_one_table(page):
     assert [section.heading for section in page.sections] == ["What matters", "Distribution", "All quantiles"]
     (found,) = page.sections[0].tables
     assert found.rows[0][0] == "dynamic friction coefficient, every bearing"
     assert found.columns[1:3] == ("NDE peak force", "NDE peak stress")
-    share = str(found.rows[0][1])
-    assert int(share.partition(" ")[0]) > 80 > int(str(found.rows[1][1]).partition(" ")[0])
-
-
-def test_a_share_of_the_variance_is_never_below_none(page: ReportContent) -> None:
-    cells = [str(cell) for row in page.sections[0].tables[0].rows for cell in row[1:]]
-    assert any("(0 to" in cell for cell in cells)
+    shares = [int(str(row[1]).partition(" ")[0]) for row in found.rows[:2]]
+    assert shares[0] > 80 > shares[1]
+    cells = [str(cell) for row in found.rows for cell in row[1:]]
+    assert any("(0 to" in cell for cell in cells)  # a share of the variance is never below none
     assert not any("-" in cell for cell in cells)
 
 
-def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(
-    page: ReportContent, results: StudyResults
-) -> None:
+def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(page, results):
     chart = page.sections[1].figures[0].chart
     counted, below = (next(one for one in chart.data if one.yaxis == axis) for axis in ("y", "y3"))
     assert_allclose(np.sum(counted.y[:-1]), 100.0, rtol=1e-6)
@@ -83,58 +76,41 @@ def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(
     assert_allclose(lines, [quantile(values, share).value for share in SHARES])
 
 
-def test_the_verdict_begins_with_the_loads_and_whirl_that_never_was_is_one_line(
-    page: ReportContent, results: StudyResults
-) -> None:
+def test_the_verdict_begins_with_the_loads_and_whirl_that_never_was_is_one_line(page, results):
     rare = page.summary[0].rows[0][3]
-    assert isinstance(rare, Quantity)
     first = page.verdict[0].text
     assert first.startswith("NDE: 99 % of the drops stay below a peak force of ")
     assert rare.text in first and rare.interval_text in first
     assert page.verdict[1].text.startswith("DE: 99 % of the drops")
     assert sum("whirl" in one.text for one in page.verdict) == 1
-    never, once = (study_page(one, ["speed"]) for one in (results, whirled(results)))
+    share = np.where(np.arange(DROPS) == 7, 0.4, 0.0)
+    whirled = replace(results, numbers={**results.numbers, "NDE.backward_whirl": share})
+    never, once = (study_page(one, ["speed"]) for one in (results, whirled))
     count = [len(one.sections[2].figures) for one in (never, once)]
     assert count == [3, 4]  # no figure of what happened in no drop
     assert any(one.text.startswith("NDE: 0.5 %") and one.level == "warning" for one in once.verdict)
 
 
-def whirled(results: StudyResults) -> StudyResults:
-    """The same drops, one of them in backward whirl."""
-    share = np.zeros(DROPS)
-    share[7] = 0.4
-    return replace(results, numbers={**results.numbers, "NDE.backward_whirl": share})
-
-
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")
-def test_labels_of_the_percentiles_do_not_collide(results: StudyResults, tmp_path: Path) -> None:
+def test_labels_of_the_percentiles_do_not_collide(results, browser, tmp_path):
     """Half of the drops are alike, so that all but one percentile lie at one value."""
     force = np.where(np.arange(DROPS) < 0.6 * DROPS, 2000.0, 2400.0) + np.linspace(0.0, 0.1, DROPS)
     close = replace(results, numbers={**results.numbers, "NDE.peak_force": force})
     write_page(study_page(close), tmp_path / "study.html")
-    browser = Browser(tmp_path / "profile")
-    try:
-        browser.open(f"file://{tmp_path / 'study.html'}")
-        browser.until("Number(document.documentElement.getAttribute('data-drawn')) >= 2")
-        boxes = browser.evaluate(
-            "[...document.querySelector('.chart').querySelectorAll('.annotation-text')]"
-            ".filter(one => one.textContent.endsWith('%')).map(one => one.getBoundingClientRect())"
-            ".map(one => [one.left, one.top, one.right, one.bottom])"
-        )
-        quiet = browser.messages()
-    finally:
-        browser.close()
+    browser.open(f"file://{tmp_path / 'study.html'}")
+    browser.until("Number(document.documentElement.getAttribute('data-drawn')) >= 2")
+    boxes = browser.evaluate(
+        "[...document.querySelector('.chart').querySelectorAll('.annotation-text')]"
+        ".filter(one => one.textContent.endsWith('%')).map(one => one.getBoundingClientRect())"
+        ".map(one => [one.left, one.top, one.right, one.bottom])"
+    )
     assert len(boxes) == 6
-    apart = [
-        one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
-        for k, one in enumerate(boxes)
-        for other in boxes[:k]
-    ]
-    assert all(apart)
-    assert quiet == []
+    for one, other in combinations(boxes, 2):
+        assert one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+    assert browser.messages() == []
 
 
-def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page: ReportContent) -> None:
+def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page):
     (summary,) = page.summary
     assert len(summary.rows) <= 5
     cells = [cell for row in summary.rows for cell in row if isinstance(cell, Quantity)]
@@ -151,11 +127,11 @@ def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page
         (FRICTION, "dynamic friction coefficient, every bearing"),
     ],
 )
-def test_a_varied_value_is_named_in_words(name: str, words: str) -> None:
+def test_a_varied_value_is_named_in_words(name, words):
     assert spoken_value(example_machine("lp400"), name) == words
 
 
-def test_against_a_value_every_drop_is_a_point(results: StudyResults) -> None:
+def test_against_a_value_every_drop_is_a_point(results):
     """Quantiles alone hid that a cell holds four drops."""
     drawn = study_page(results, [FRICTION]).sections[2].figures[0].chart.data
     points = [one for one in drawn if one.name == "a drop"]

@@ -1,10 +1,7 @@
 """The terminal summary: plain text where colours are not wanted, and no control characters from names."""
 
-from __future__ import annotations
-
 import io
 
-import pytest
 from rich.console import Console
 
 from rotordrop.report.content import Card, KeyFigure, ReportContent, Statement, Table
@@ -14,7 +11,7 @@ from rotordrop.report.terminal import print_summary, summary_console
 ESCAPE = "\x1b"
 
 
-def content(name: str = "LP-400") -> ReportContent:
+def content(name="LP-400"):
     peak = Quantity(value=3333.0, kind="force", interval_90=(3180.0, 3490.0))
     stress = Quantity(value=1.805e9, kind="pressure")
     return ReportContent(
@@ -29,34 +26,28 @@ def content(name: str = "LP-400") -> ReportContent:
     )
 
 
-def printed(report: ReportContent) -> str:
+def printed(report):
     stream = io.StringIO()
     print_summary(report, summary_console(stream))
     return stream.getvalue()
 
 
-def test_all_numbers_with_unit_and_interval_are_printed() -> None:
+def test_all_numbers_with_unit_and_interval_are_printed():
     text = printed(content())
-    for part in (
-        "Drop of LP-400",
-        "This record is simulated.",
-        "warning: Clipping on channel A.",
-        "3333 N",
-        "90 %: 3180 to 3490 N",
-        "1805 MPa",
-        "270.0 µm",
-    ):
+    for part in ("Drop of LP-400", "This record is simulated.", "warning: Clipping on channel A."):
         assert part in text
+    for number in ("3333 N", "(3180 to 3490 N)", "1805 MPa", "270.0 µm"):
+        assert number in text
 
 
-def test_there_is_no_ansi_when_the_output_is_not_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_there_is_no_ansi_when_the_output_is_not_a_terminal(monkeypatch):
     for name in ("FORCE_COLOR", "TTY_COMPATIBLE", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
     assert ESCAPE not in printed(content())
 
 
-def test_no_color_is_obeyed_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    def colours(stream: io.StringIO) -> list[str]:
+def test_no_color_is_obeyed_on_a_terminal(monkeypatch):
+    def colours(stream):
         console = Console(file=stream, force_terminal=True, color_system="standard", highlight=False)
         print_summary(content(), console)
         return [code for code in ("[33m", "[1;33m") if code in stream.getvalue()]
@@ -67,7 +58,7 @@ def test_no_color_is_obeyed_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> No
     assert not colours(io.StringIO())
 
 
-def test_a_name_cannot_repaint_the_terminal_or_bring_markup() -> None:
+def test_a_name_cannot_repaint_the_terminal_or_bring_markup():
     text = printed(content(f"{ESCAPE}[2Jgone{ESCAPE}]0;title\x07 [bold]x[/bold]"))
     assert ESCAPE not in text
     assert "\x07" not in text

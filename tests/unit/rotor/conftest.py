@@ -1,23 +1,20 @@
 """Rotors of the model tests."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from rotordrop.machine import Machine
 from rotordrop.physics.timoshenko import round_section
-from rotordrop.rotor.assembly import PointMass, RotorFE, assemble, build_rotor_fe
+from rotordrop.rotor.assembly import PointMass, assemble, build_rotor_fe
 
 
 @pytest.fixture(scope="session")
-def paper_fe(paper: Machine) -> RotorFE:
+def paper_fe(paper):
     """Its finite elements."""
     return build_rotor_fe(paper)
 
 
 @pytest.fixture(scope="session")
-def overhung() -> RotorFE:
+def overhung():
     """A rotor of ten elements with a heavy disc at one end and a small one inside, without damping."""
     section = round_section(0.06, 0.02, 2.1e11, 0.3, 7850.0)
     discs = [

@@ -1,8 +1,6 @@
 """The machine of the paper with magnets and controllers that hold it."""
 
-from __future__ import annotations
-
-from rotordrop.machine import Machine, example_machine
+from rotordrop.machine import example_machine
 
 MAGNET = {
     "turns": 200,
@@ -23,7 +21,7 @@ CONTROLLER = {
 }
 
 
-def looped_machine(magnet: dict | None = None, controller: dict | None = None) -> Machine:
+def looped_machine(magnet=None, controller=None):
     """The machine, with other entries of magnets and controllers."""
     paper = example_machine("paper")
     tables = {"magnet": MAGNET | (magnet or {}), "controller": CONTROLLER | (controller or {})}

@@ -4,18 +4,14 @@ Slow, without any flat array of the kernel, ball by ball with the angles the pap
 right-hand side and the flattening of the parameters.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.rotor.parameters import DropModel
-from rotordrop.simulate.case import DropCase
 
 
-def derivative(model: DropModel, case: DropCase, t: float, state: np.ndarray) -> np.ndarray:
+def derivative(model, case, t, state):
     """Derivative of a state up to and including the rotor angle, for a rotor without magnets."""
     machine, basis, layout = model.machine, model.basis, model.layout
     m, bearings = layout.n_modes, machine.touchdown_bearings
@@ -56,7 +52,7 @@ def derivative(model: DropModel, case: DropCase, t: float, state: np.ndarray) ->
     return rate
 
 
-def bearing_motion(model, b, row, place, velocity, state, rate, force) -> float:
+def bearing_motion(model, b, row, place, velocity, state, rate, force):
     """Add what one bearing does to rotor, race and support; returns the torque on the rotor [N m]."""
     bearing, layout = model.machine.touchdown_bearings[b], model.layout
     race, support = layout.race.start + 2 * b, layout.support.start + 2 * b
@@ -92,7 +88,7 @@ def bearing_motion(model, b, row, place, velocity, state, rate, force) -> float:
     return -friction * (bore - float(bearing.air_gap))
 
 
-def contact(bearing, place, velocity, omega, omega_i) -> tuple[np.ndarray, float]:
+def contact(bearing, place, velocity, omega, omega_i):
     """Force of the rotor on the race [N] and friction force [N], positive if it drives the race."""
     radius = math.hypot(*place)
     depth = radius - float(bearing.air_gap)
@@ -110,7 +106,7 @@ def contact(bearing, place, velocity, omega, omega_i) -> tuple[np.ndarray, float
     return pressing * normal + friction * tangent, friction
 
 
-def coefficient(law, slip: float) -> float:
+def coefficient(law, slip):
     """Stribeck coefficient with the sign of the slip; the cubic near zero from its conditions."""
     static, dynamic = float(law.static), float(law.dynamic)
     speed, smooth, decay = abs(slip), float(law.smoothing_speed), float(law.stribeck_speed)
@@ -124,7 +120,7 @@ def coefficient(law, slip: float) -> float:
     return math.copysign(value, slip)
 
 
-def ball_force(bearing, shift) -> np.ndarray:
+def ball_force(bearing, shift):
     """Elastic force of all balls on the race [N], ball by ball with its contact angle."""
     constants = bearing_constants(bearing.bearing)
     total = np.zeros(2)
@@ -141,7 +137,7 @@ def ball_force(bearing, shift) -> np.ndarray:
     return total
 
 
-def vertical_stiffness(bearing, weight: float) -> float:
+def vertical_stiffness(bearing, weight):
     """Tangent stiffness [N/m] straight down under a weight [N], by bisection and a central difference."""
     low, high = 0.0, 50e-6
     for _ in range(60):

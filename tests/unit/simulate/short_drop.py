@@ -1,12 +1,8 @@
 """A drop of 2 ms with a contact at both bearings, short enough for the interpreter."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from rotordrop.machine import example_machine
-from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.simulate.case import DropCase, PlacedStart
+from rotordrop import DropCase, PlacedStart, build_drop_model, example_machine
 
 START = PlacedStart(
     displacement=np.array([[20e-6, -270e-6], [-30e-6, -278e-6]]),
@@ -15,6 +11,6 @@ START = PlacedStart(
 CASE = DropCase(speed=2.0 * np.pi * 60.0, duration=0.002, output_step=1e-4, start=START)
 
 
-def model() -> DropModel:
+def model():
     """The reference machine with 6 + 2 modes per plane."""
     return build_drop_model(example_machine("paper"), "quick")

@@ -1,16 +1,13 @@
 """How much of a clearance a drop uses: against the motion itself, on the page, in JSON and in a study."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from rotordrop.machine import loads_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.report.simulate_page import simulate_page
-from rotordrop.report.simulation_numbers import simulation_numbers
-from rotordrop.simulate.clearances import clearance_uses
-from rotordrop.study.quantities import column_of, columns_of, row_of
+from rotordrop.report.simulate_page import simulate_page, simulation_numbers
+from rotordrop.simulate.used import clearance_uses
+from rotordrop.study.quantities import columns_of, row_of
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +22,7 @@ def sealed(paper, drop):
     return loads_machine(text)
 
 
-def test_use_is_the_largest_travel_at_the_node(sealed, drop):
+def test_use_is_the_largest_travel_at_the_node_and_none_without_clearances(sealed, drop, paper):
     wide, seal = clearance_uses(sealed, drop)
     radius = np.linalg.norm(drop.displacement[:, 0], axis=-1)
     assert seal.travel == pytest.approx(radius.max(), rel=1e-12)
@@ -33,9 +30,6 @@ def test_use_is_the_largest_travel_at_the_node(sealed, drop):
     assert seal.share == pytest.approx(1.0 / 0.999, rel=1e-9)
     moved = drop.at_nodes([wide.node])[:, 0]
     assert wide.share == pytest.approx(np.max(np.linalg.norm(moved, axis=-1)) / 2e-3, rel=1e-12)
-
-
-def test_a_machine_without_clearances_has_none(paper, drop):
     assert clearance_uses(paper, drop) == ()
     assert "clearances" not in simulation_numbers(drop, paper)
     assert not any("travel_over_gap" in column.name for column in columns_of(paper))
@@ -55,15 +49,12 @@ def test_page_and_document_say_who_touches(sealed, drop):
     assert entry["travel_over_gap"] > 1.0
 
 
-def test_a_study_keeps_the_share_of_every_clearance(sealed, quick, drop):
+def test_a_study_keeps_the_share_of_every_clearance_and_varies_a_gap_by_its_name(sealed, quick, drop):
     names = [column.name for column in columns_of(sealed)]
     row = row_of(quick.with_machine(sealed), drop)
     assert len(row) == len(names)
     assert row[names.index("NDE_seal.travel_over_gap")] == pytest.approx(1.0 / 0.999, rel=1e-9)
-    assert column_of(sealed, "wide.travel_over_gap").unit == "1"
-
-
-def test_a_gap_is_varied_by_its_name(sealed):
+    assert {q.name: q.unit for q in columns_of(sealed)}["wide.travel_over_gap"] == "1"
     wider = sealed.with_values({"clearances.wide.gap": "3 mm"})
     assert float(wider.clearances[0].gap) == pytest.approx(3e-3)
     assert loads_machine(machine_text(wider)) == wider

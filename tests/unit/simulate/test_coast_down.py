@@ -1,7 +1,5 @@
 """A whole coast-down: standstill, energy, statistics, bounded memory, kill and resume to the last bit."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from dataclasses import replace
@@ -10,20 +8,22 @@ import h5py
 import numpy as np
 import pytest
 
+from rotordrop import (
+    CoastDownCase,
+    DropCase,
+    build_drop_model,
+    example_machine,
+    simulate_coast_down,
+    simulate_drop,
+)
 from rotordrop.errors import OutputError, SimulationError
-from rotordrop.machine import example_machine
 from rotordrop.physics import columns as L
 from rotordrop.rotor.assembly import build_rotor_fe
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate import _coast_loop as C
-from rotordrop.simulate.case import DropCase
 from rotordrop.simulate.checkpoint import part_path, work_folder
-from rotordrop.simulate.coast_down import simulate_coast_down
-from rotordrop.simulate.coast_down_case import CoastDownCase
 from rotordrop.simulate.coast_down_certificate import compare_coast_downs
 from rotordrop.simulate.coast_down_file import is_coast_down, load_coast_down, open_samples
-from rotordrop.simulate.drop import simulate_drop
 
 TURN = 2.0 * math.pi
 DECELERATION = 0.11
@@ -50,11 +50,6 @@ def stopped(model, slow):
     return simulate_coast_down(model, slow)
 
 
-def samples_of(path):
-    with h5py.File(path, "r") as file:
-        return {name: file[name][()] for name in file if isinstance(file[name], h5py.Dataset)}
-
-
 def test_the_first_instants_are_those_of_a_drop(model):
     """The same equations as simulate_drop: only the windows, the file and the events are new."""
     case = CoastDownCase(speed=60.0 * TURN, duration=0.02, settled_scheme=False)
@@ -72,48 +67,34 @@ def test_the_first_instants_are_those_of_a_drop(model):
     assert coast.windows.speed[-1] == pytest.approx(drop.speed[-1], rel=1e-7)
 
 
-def test_the_rotor_stops_and_never_runs_backwards(stopped, slow, tmp_path, model):
+def test_the_rotor_stops_when_dry_drag_says_and_never_runs_backwards(stopped, slow, tmp_path, model):
+    """Rotor and races together under linear and dry drag: t = ln(1 + λω₀/d)/λ, from the first grip on."""
     assert stopped.finished
     assert 0.5 < stopped.standstill_time < 10.0
     assert stopped.end_time == pytest.approx(stopped.standstill_time + slow.rest, abs=slow.output_step)
     assert "stood still after" in stopped.outcome
     simulate_coast_down(model, slow, output=tmp_path / "c.h5")
-    speed = samples_of(tmp_path / "c.h5")["speed"]
+    with h5py.File(tmp_path / "c.h5") as file:
+        speed = file["speed"][()]
     assert np.all(speed >= 0.0)
     after = np.arange(speed.size) * slow.output_step > stopped.standstill_time
     assert np.all(speed[after] == 0.0)
     assert speed[~after][-1] == pytest.approx(slow.stop_speed, rel=0.2)
-
-
-def test_dry_drag_sets_the_time_of_standstill(model, stopped, slow):
-    """Rotor and races together under linear and dry drag: t = ln(1 + λω₀/d)/λ, from the first grip on."""
     parameters = model.parameters
     races = parameters.bearing
     turning = parameters.spin[0] + races[:, L.RACE_INERTIA].sum()
-    dry = (
-        float(np.sum(races[:, L.DRAG_COEFFICIENT] * model.load_shares * 0.5 * races[:, L.PITCH_DIAMETER]))
-        / turning
-    )
+    arms = 0.5 * races[:, L.PITCH_DIAMETER]
+    dry = float(np.sum(races[:, L.DRAG_COEFFICIENT] * model.load_shares * arms)) / turning
     linear = DECELERATION * parameters.spin[0] / turning
     gripped = slow.speed * parameters.spin[0] / turning
     expected = math.log1p(linear * gripped / dry) / linear
     assert stopped.standstill_time == pytest.approx(expected, rel=0.05)
 
 
-def test_a_rotor_without_race_drag_slows_for_ever_and_says_so(model):
-    free = model.with_values({"NDE.race.drag_coefficient": 0.0, "DE.race.drag_coefficient": 0.0})
-    result = simulate_coast_down(free, CoastDownCase(speed=2.0, longest=0.4))
-    assert not result.finished
-    assert "still turned at" in result.outcome and "0.4 s" in result.outcome
-
-
-def test_energy_is_balanced_to_standstill(stopped):
+def test_energy_is_balanced_to_standstill_and_windows_hold_the_paper_window_and_then_seconds(stopped):
     assert stopped.energy_residual < 1e-5 * abs(stopped.energy_scale)
     assert stopped.dissipated == pytest.approx(float(np.sum(stopped.windows.dissipated)), rel=1e-3)
     assert 0.0 < stopped.contact_energy.sum() < stopped.dissipated
-
-
-def test_windows_hold_the_paper_window_and_then_seconds(stopped):
     windows = stopped.windows
     assert windows.start[:3] == pytest.approx([0.0, 0.2, 1.0], abs=1e-12)
     assert np.all(np.diff(windows.quantile, axis=-1) >= 0.0)
@@ -126,7 +107,7 @@ def test_windows_hold_the_paper_window_and_then_seconds(stopped):
     assert "within the first 200 ms" in found[0].sentence()
 
 
-def test_the_settled_scheme_agrees_with_the_runge_kutta_pair(model, slow):
+def test_the_settled_scheme_agrees_with_the_runge_kutta_pair_and_is_given_up_when_it_errs(model, slow):
     case = replace(slow, speed=8.0, duration=2.0)
     cheap = simulate_coast_down(model, case)
     exact = simulate_coast_down(model, replace(case, settled_scheme=False))
@@ -139,14 +120,11 @@ def test_the_settled_scheme_agrees_with_the_runge_kutta_pair(model, slow):
     assert difference.high_force_change < 1e-4
     assert difference.speed_change < 1e-6
     assert difference.agrees
-
-
-def test_the_settled_scheme_is_given_up_when_it_errs(model, slow):
     strict = simulate_coast_down(model, replace(slow, duration=1.1, settled_error=1e-16))
     assert not strict.windows.settled.any()
 
 
-def test_kill_and_resume_is_bit_identical(model, slow, tmp_path):
+def test_kill_and_resume_is_bit_identical_and_another_run_is_refused(model, slow, tmp_path):
     whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
     simulate_coast_down(model, slow, output=whole)
     assert simulate_coast_down(model, slow, output=cut, windows_at_most=1) is None
@@ -156,9 +134,6 @@ def test_kill_and_resume_is_bit_identical(model, slow, tmp_path):
     assert simulate_coast_down(model, slow, output=cut, resume=True) is not None
     assert not work_folder(cut).exists()
     assert whole.read_bytes() == cut.read_bytes()
-
-
-def test_resuming_another_run_is_refused(model, slow, tmp_path):
     output = tmp_path / "c.h5"
     simulate_coast_down(model, slow, output=output, windows_at_most=1)
     with pytest.raises(OutputError, match=r"c\.h5\.partial holds an unfinished run; add --resume"):
@@ -231,9 +206,13 @@ def test_impossible_cases_are_refused(changes, words):
         CoastDownCase(**({"speed": 10.0} | changes))
 
 
-def test_a_machine_without_drag_is_refused(slow):
+def test_machines_without_any_drag_are_refused_and_without_that_of_races_slow_for_ever(slow, model):
     with pytest.raises(SimulationError, match=r"has no aerodynamic drag: speed\.aero_linear.*--drag-from"):
         simulate_coast_down(example_machine("lp400"), slow)
+    free = model.with_values({"NDE.race.drag_coefficient": 0.0, "DE.race.drag_coefficient": 0.0})
+    result = simulate_coast_down(free, CoastDownCase(speed=2.0, longest=0.4))
+    assert not result.finished
+    assert "still turned at" in result.outcome and "0.4 s" in result.outcome
 
 
 def test_drag_is_a_torque_whichever_way_it_is_given(model):

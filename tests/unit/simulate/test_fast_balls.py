@@ -1,20 +1,20 @@
 """Drops with balls that have inertia: the table, its derivative, the books of energy, limits, refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import a_state, assert_jacobian
 
+from rotordrop import load_result, simulate_drop
 from rotordrop.errors import MachineFileError, SimulationError, UsageError
 from rotordrop.machine import example_machine, example_path, loads_machine
 from rotordrop.machine.saving import machine_text
+from rotordrop.physics import columns as L
 from rotordrop.physics.ball_table import PLACES, fast_energy, fast_force, fast_loads
 from rotordrop.physics.fast_balls import FastBalls, ball_equilibrium, centred_balls
 from rotordrop.rotor.parameters import FASTEST, build_drop_model
+from rotordrop.simulate._rhs import scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, StateStart
-from rotordrop.simulate.drop import simulate_drop
-from rotordrop.simulate.result import load_result
+from rotordrop.track.forces import FORCE, STRESS, bearing_values
 
 TEXT = example_path("small").read_text(encoding="utf-8")
 PLACE = "preload = { guess"
@@ -57,7 +57,7 @@ def test_the_table_holds_what_the_balls_do(example, share):
 @pytest.mark.parametrize("spin", [0.4, -0.9, 0.02])
 def test_force_and_exchange_are_slopes_of_the_energy(fast, spin):
     p, omega, h = fast.parameters, spin * NOMINAL, 1e-9
-    grid, table, balls = _parts(p)
+    grid, table, balls = p.bearing[0, L.FAST : L.FAST_END], p.ball_table[0], p.balls[0]
 
     def energy(x, y, w):
         return fast_energy(grid, table, balls, x, y, w)
@@ -73,18 +73,15 @@ def test_force_and_exchange_are_slopes_of_the_energy(fast, spin):
         assert by_spin == pytest.approx(turned, rel=1e-2, abs=1e-12)
 
 
-def _parts(p):
-    from rotordrop.physics import columns as L
-
-    return p.bearing[0, L.FAST : L.FAST_END], p.ball_table[0], p.balls[0]
-
-
-def test_slow_balls_give_the_force_of_the_drop_model(fast, slow):
+def test_slow_balls_give_the_force_of_the_drop_model_also_to_a_rotor_that_stands_still(fast, slow):
     state = a_state(fast, np.array([12e-6, 18e-6]), 0.0)
     case = DropCase(speed=NOMINAL, start=StateStart(state=state), duration=1e-5, reduction="quick")
     one, other = simulate_drop(fast, case), simulate_drop(slow, case)
     assert one.bearing_force[0] == pytest.approx(other.bearing_force[0], rel=2e-6)
     assert one.max_stress[0] == pytest.approx(other.max_stress[0], rel=1e-5)
+    case = DropCase(speed=0.0, duration=0.012, reduction="quick", start=CentredStart(), tolerance=1e-8)
+    one, other = simulate_drop(fast, case), simulate_drop(slow, case)
+    assert np.max(np.abs(one.bearing_force - other.bearing_force)) < 1e-3 * np.max(other.bearing_force)
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.5, 0.98, -0.6])
@@ -119,41 +116,31 @@ def test_the_outer_race_carries_more_once_the_race_is_fast(fast, slow, tmp_path)
     assert np.array_equal(load_result(tmp_path / "drop.h5").race_stress, drop.race_stress)
 
 
-def test_a_rotor_that_stands_still_falls_as_before(fast, slow):
-    case = DropCase(speed=0.0, duration=0.012, reduction="quick", start=CentredStart(), tolerance=1e-8)
-    one, other = simulate_drop(fast, case), simulate_drop(slow, case)
-    assert np.max(np.abs(one.bearing_force - other.bearing_force)) < 1e-3 * np.max(other.bearing_force)
-
-
-def test_the_key_is_written_and_read_again():
+def test_the_key_is_read_again_and_a_check_says_what_springs_would_leave():
+    """As of one whose balls have no inertia."""
     machine = loads_machine(WITH)
     assert machine.touchdown_bearings[0].bearing.ball_inertia
     assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
-
-
-def test_a_check_of_such_a_machine_says_what_springs_would_leave():
-    """As of one whose balls have no inertia; it was a traceback."""
     (*_, left), (*_, of_slow) = (
         loads_machine(text).touchdown_bearings[0].bearing.numbers().figures(100.0) for text in (WITH, TEXT)
     )
     assert left == of_slow and 0.0 < left.value < 1.0
 
 
-def test_springs_and_overspeed_are_refused(fast):
+def test_springs_overspeed_and_loads_of_every_ball_are_refused(fast):
     both = WITH.replace(PLACE, f'preload_kind = "spring"\n{PLACE}')
     with pytest.raises(MachineFileError, match=r"ball_inertia = true goes with a rigid preload today"):
         loads_machine(both)
     with pytest.raises(SimulationError, match=r"is beyond the .* 1\.25 times the nominal speed"):
         simulate_drop(fast, DropCase(speed=1.3 * NOMINAL, duration=0.01))
+    result = simulate_drop(fast.machine, DropCase(speed="60 Hz", duration=2e-3, reduction="quick"))
+    with pytest.raises(UsageError, match="race_stress of the drop"):
+        result.ball_loads(fast.machine, 0)
 
 
 @pytest.mark.parametrize("spin", [0.0, 0.9])
 def test_an_estimate_has_force_and_stress_of_the_drop(fast, slow, spin):
     """Of the filter's state: those that the simulated drop has there, and those of slow balls otherwise."""
-    from rotordrop.physics import columns as L
-    from rotordrop.simulate._rhs import scratch_of
-    from rotordrop.track.forces import FORCE, STRESS, bearing_values
-
     assert fast.machine.not_estimated == ""
     state = a_state(fast, np.array([12e-6, 18e-6]), spin)
     case = DropCase(speed=NOMINAL, start=StateStart(state=state), duration=1e-5, reduction="quick")
@@ -166,9 +153,3 @@ def test_an_estimate_has_force_and_stress_of_the_drop(fast, slow, spin):
         force, stress = np.linalg.norm(drop.bearing_force[0, 0]), drop.max_stress[0, 0]
         assert (out[FORCE] == pytest.approx(force, rel=1e-5)) == same
         assert (out[STRESS] == pytest.approx(stress, rel=1e-4)) == same
-
-
-def test_loads_of_every_ball_are_refused_not_those_of_slow_ones(fast):
-    result = simulate_drop(fast.machine, DropCase(speed="60 Hz", duration=2e-3, reduction="quick"))
-    with pytest.raises(UsageError, match="race_stress of the drop"):
-        result.ball_loads(fast.machine, 0)

@@ -1,17 +1,14 @@
 """Bearings that warm: books of heat and energy, stretches, springs, fast balls, resumed runs, refusals."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from rotordrop import build_drop_model, load_result, simulate_coast_down, simulate_drop
 from rotordrop.elements.table import row_of
-from rotordrop.errors import MachineFileError, RecordError, UsageError
-from rotordrop.evidence.evidence import insisted
+from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
@@ -19,18 +16,12 @@ from rotordrop.physics import thermal
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.fast_balls import FastBalls, centred_balls
 from rotordrop.report.coast_down_page import coast_down_page
-from rotordrop.report.simulate_page import simulate_page
-from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.report.simulate_page import simulate_page, simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate import _rhs as R
 from rotordrop.simulate import heat
-from rotordrop.simulate.case import DropCase, StateStart
-from rotordrop.simulate.coast_down import simulate_coast_down
-from rotordrop.simulate.coast_down_case import CoastDownCase
+from rotordrop.simulate.case import CoastDownCase, DropCase, StateStart
 from rotordrop.simulate.coast_down_file import load_coast_down
-from rotordrop.simulate.drop import simulate_drop
-from rotordrop.simulate.result import load_result
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.quantities import row_of as row_of_drop
 
@@ -38,15 +29,14 @@ COLD = example_path("small").read_text(encoding="utf-8")
 NOMINAL = float(loads_machine(COLD).speed.nominal)
 
 
-def text_of(table: str = "", bearing: str = "") -> str:
+def text_of(table="", bearing=""):
     """The small machine with bearings that warm, and more under 'bearing'."""
-    warm = COLD.replace(
-        "[touchdown_bearings.support]", f"[touchdown_bearings.thermal]\n{table}\n[touchdown_bearings.support]"
-    )
+    support = "[touchdown_bearings.support]"
+    warm = COLD.replace(support, f"[touchdown_bearings.thermal]\n{table}\n{support}")
     return warm.replace("preload = { guess", f"{bearing}\npreload = {{ guess")
 
 
-def model_of(table: str = "", bearing: str = ""):
+def model_of(table="", bearing=""):
     return build_drop_model(loads_machine(text_of(table, bearing)), "quick")
 
 
@@ -94,12 +84,18 @@ def test_without_the_way_outwards_all_heat_stays():
     assert warmth == pytest.approx(8.0e5 / 8.0 + np.array([1.5625, -0.9375]) * 1.0, rel=1e-6)
 
 
-def test_heat_is_what_was_lost_at_its_places_and_energy_closes(drop):
+def test_heat_is_what_was_lost_at_its_places_warms_race_and_sleeve_and_raises_the_preload(drop):
     lost = drop.lost[:-1]
     assert drop.heat.taken == pytest.approx(np.sum(lost, axis=1), rel=1e-9)
     assert drop.heat.gone + drop.heat.held == pytest.approx(drop.heat.taken, rel=1e-9)
     assert np.all(lost[:, R.SLIDING] > 1.0)
     assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
+    warmth = drop.heat.temperature[-1, 0]
+    assert warmth[thermal.SKIN] > warmth[thermal.RACE] > warmth[thermal.OUTER] > 0.0
+    assert drop.heat.preload[0, 0] == pytest.approx(156.0, rel=1e-9)
+    assert np.all(np.diff(drop.heat.preload[:, 0]) > -1e-3)
+    assert drop.heat.preload[-1, 0] > 1.02 * drop.heat.preload[0, 0]
+    assert drop.heat.growth[-1, 0] > 0.0
 
 
 def test_the_work_of_growth_is_booked(monkeypatch):
@@ -111,15 +107,6 @@ def test_the_work_of_growth_is_booked(monkeypatch):
     assert left_out.energy_residual > 2e-5 * left_out.energy_scale
 
 
-def test_sliding_warms_race_and_sleeve_alike_and_the_preload_rises(drop):
-    warmth = drop.heat.temperature[-1, 0]
-    assert warmth[thermal.SKIN] > warmth[thermal.RACE] > warmth[thermal.OUTER] > 0.0
-    assert drop.heat.preload[0, 0] == pytest.approx(156.0, rel=1e-9)
-    assert np.all(np.diff(drop.heat.preload[:, 0]) > -1e-3)
-    assert drop.heat.preload[-1, 0] > 1.02 * drop.heat.preload[0, 0]
-    assert drop.heat.growth[-1, 0] > 0.0
-
-
 def test_stretches_half_as_long_change_next_to_nothing(warm, drop, monkeypatch):
     monkeypatch.setattr(heat, "WARMED", 0.5 * heat.WARMED)
     monkeypatch.setattr(heat, "SHORTEST", 0.5 * heat.SHORTEST)
@@ -129,7 +116,7 @@ def test_stretches_half_as_long_change_next_to_nothing(warm, drop, monkeypatch):
     assert finer.peak_force(0)[0] == pytest.approx(drop.peak_force(0)[0], rel=1e-3)
 
 
-def test_parts_that_do_not_grow_leave_the_drop_as_it_is():
+def test_parts_that_do_not_grow_and_cold_bearings_leave_the_drop_as_it_is():
     """But for the drag of the preload: without any drag all is as in a cold bearing."""
     still = 'expansion = "0 1/K"\nball_expansion = "0 1/K"\n'
     smooth = [
@@ -141,9 +128,6 @@ def test_parts_that_do_not_grow_leave_the_drop_as_it_is():
     assert other.heat.taken[0] > 0.0
     assert other.peak_force(0)[0] == pytest.approx(one.peak_force(0)[0], rel=1e-5)
     assert other.race_speed[-1] == pytest.approx(one.race_speed[-1], rel=1e-6)
-
-
-def test_cold_bearings_have_no_part_in_it():
     p = build_drop_model(loads_machine(COLD), "quick").parameters
     assert heat.warmed(p, p.memory, np.zeros(1)) is p
     assert len(p.memory) == 0
@@ -153,12 +137,15 @@ def test_cold_bearings_have_no_part_in_it():
     assert np.all(np.isnan(mixed.heat.temperature[:, 0]))
 
 
-def test_springs_keep_the_preload():
+def test_springs_keep_the_preload_and_fast_balls_close_their_energy():
     sprung, rigid = (turning(model_of(HOT, f'preload_kind = "{kind}"')) for kind in ("spring", "rigid"))
     risen = [one.heat.preload[-1, 0] - one.heat.preload[0, 0] for one in (sprung, rigid)]
     assert risen[1] > 60.0
     assert 0.0 < risen[0] < 0.25 * risen[1]
     assert sprung.certificate.energy_residual < 2e-6 * sprung.certificate.energy_scale
+    fast = turning(model_of(bearing="ball_inertia = true"))
+    assert fast.certificate.energy_residual < 2e-6 * fast.certificate.energy_scale
+    assert fast.heat.preload[0, 0] == pytest.approx(164.7, rel=1e-3)
 
 
 @pytest.mark.parametrize(("warmth", "share"), [(0.0, 0.0), (4.0, 0.0), (4.0, 0.8), (-2.0, 0.6)])
@@ -180,12 +167,6 @@ def test_warm_fast_balls_are_those_of_shifted_grooves(warmth, share):
     assert heat.preload_of(0, now, state)[0] == pytest.approx(wanted, rel=2e-3)
 
 
-def test_a_drop_with_fast_balls_closes_its_energy():
-    fast = turning(model_of(bearing="ball_inertia = true"))
-    assert fast.certificate.energy_residual < 2e-6 * fast.certificate.energy_scale
-    assert fast.heat.preload[0, 0] == pytest.approx(164.7, rel=1e-3)
-
-
 @pytest.mark.parametrize("warmth", [0.0, 80.0])
 def test_no_preload_stops_a_race_at_once(warm, warmth):
     """The drag of a pair that runs away builds up over so much speed that it is not stiff."""
@@ -199,28 +180,38 @@ def test_no_preload_stops_a_race_at_once(warm, warmth):
     assert row[L.DRAG_SPEED] < (1.0 if warmth else 0.03)
 
 
-def test_a_warm_sleeve_closes_the_gap_and_a_warm_race_opens_it(warm):
+def test_a_warm_sleeve_closes_the_gap_and_warmth_all_through_keeps_the_preload_of_steel_balls(warm):
     p = warm.parameters
     entries, gap = p.bearing[0, L.THERMAL : L.THERMAL_END], p.bearing[0, L.AIR_GAP]
     for nodes, change in (((thermal.SLEEVE,), -12e-6 * 10.0 * (0.02 - gap)), ((1, 2), 12e-6 * 10.0 * 0.02)):
         warmth = np.zeros(thermal.N_NODES)
         warmth[list(nodes)] = 10.0
         assert thermal.gap_growth(entries, warmth, 0.02, 0.02 - gap) == pytest.approx(change, rel=1e-12)
-
-
-def test_a_bearing_that_is_warm_all_through_keeps_the_preload_of_steel_balls():
     steel = model_of(bearing='ball_material = "steel"').parameters
     even = np.full(thermal.N_NODES, 25.0)
     assert thermal.growth(steel.bearing[0, L.THERMAL : L.THERMAL_END], even) == pytest.approx(0.0, abs=1e-15)
 
 
-def test_it_is_kept_with_the_result(drop, tmp_path, warm):
+def test_it_is_kept_with_the_result_and_said_of_a_drop(drop, tmp_path, warm):
     drop.save(tmp_path / "drop.h5")
     found = load_result(tmp_path / "drop.h5").heat
     assert np.array_equal(found.temperature, drop.heat.temperature)
     assert found.sentence(0, "NDE") == drop.heat.sentence(0, "NDE")
     with pytest.raises(UsageError, match="the balls of NDE warm"):
         drop.ball_loads(warm.machine, "NDE")
+    page = simulate_page(drop, warm.machine)
+    (section,) = [one for one in page.sections if one.heading == "Heat"]
+    assert len(section.figures[0].chart.data) == 2 * (thermal.N_NODES + 1)
+    numbers = simulation_numbers(drop, warm.machine)["heat"]["NDE"]
+    assert numbers["race_K"]["largest"] == pytest.approx(np.max(drop.heat.race(0)), rel=1e-12)
+    assert numbers["preload_N"]["end"] == drop.heat.preload[-1, 0]
+    assert numbers["heat_J"]["taken"] == pytest.approx(np.sum(drop.lost[0]), rel=1e-9)
+    (said,) = [one for one in page.verdict if one.text.startswith("NDE: the race reaches")]
+    assert said.text == numbers["statement"]
+    assert said.level == "good"
+    kept = dict(zip((one.name for one in columns_of(warm.machine)), row_of_drop(warm, drop), strict=True))
+    assert kept["DE.heat.preload"] == drop.heat.preload[-1, 1]
+    assert kept["NDE.heat.race"] == numbers["race_K"]["largest"]
 
 
 COASTING = 'nominal = "500 Hz"\naero_time_constant = "8 s"'
@@ -234,7 +225,7 @@ def coasting():
 CASE = CoastDownCase(speed=NOMINAL, duration=1.4)
 
 
-def test_a_coast_down_with_heat_is_resumed_to_the_last_bit(coasting, tmp_path):
+def test_a_coast_down_with_heat_is_resumed_to_the_last_bit_and_said(coasting, tmp_path):
     whole = simulate_coast_down(coasting, CASE, output=tmp_path / "whole.h5")
     assert simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", windows_at_most=2) is None
     resumed = simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", resume=True)
@@ -244,14 +235,15 @@ def test_a_coast_down_with_heat_is_resumed_to_the_last_bit(coasting, tmp_path):
     assert whole.energy_residual < 1e-6 * whole.energy_scale
     assert np.array_equal(load_coast_down(tmp_path / "cut.h5").heat.preload, whole.heat.preload)
     assert "preload of a row 156 N" in whole.as_json()["heat"]["NDE"]["statement"]
+    result = simulate_coast_down(coasting, replace(CASE, duration=0.1))
+    page = coast_down_page(result, coasting.machine)
+    assert [one.heading for one in page.sections].count("Heat") == 1
+    assert any(one.text.startswith("DE: the race reaches") for one in page.verdict)
 
 
-def test_a_settled_rotor_warms_by_what_it_loses():
+def test_a_settled_rotor_warms_by_what_it_loses(coasting):
     """The scheme for settled rotors books by places too, with all that is lost."""
-    slow = text_of().replace('nominal = "500 Hz"', COASTING)
-    model = build_drop_model(loads_machine(slow), "quick")
-    case = CoastDownCase(speed=0.02 * NOMINAL, duration=8.0)
-    result = simulate_coast_down(model, case)
+    result = simulate_coast_down(coasting, CoastDownCase(speed=0.02 * NOMINAL, duration=8.0))
     assert np.any(result.windows.settled[:, 0] > 0.9)
     assert float(np.sum(result.heat.taken)) == pytest.approx(result.dissipated, rel=2e-2)
     assert result.energy_residual < 1e-5 * result.energy_scale
@@ -266,10 +258,8 @@ def test_what_check_says_of_a_pair_without_a_steady_state():
     assert [one.bearing for one in said] == ["NDE", "DE"]
     assert "no steady state" in said[0].message
     better = loads_machine(text_of('ball_conductance = "40 W/K"'))
-    assert not [
-        one for one in machine_warnings(better, summarise_machine(better)) if one.kind == "thermal runaway"
-    ]
-    assert not [one for one in machine_warnings(machine, summary) if one.kind == "frictional heat"]
+    assert "thermal runaway" not in {one.kind for one in machine_warnings(better, summarise_machine(better))}
+    assert "frictional heat" not in {one.kind for one in machine_warnings(machine, summary)}
 
 
 def test_a_parameter_moves_its_columns_and_is_a_row_of_the_table():
@@ -306,28 +296,6 @@ def test_a_sleeve_has_no_heat():
         loads_machine(f"{head}{text}\n{rest[contact:race]}{rest[support:]}")
 
 
-def test_a_record_is_not_estimated_with_it(warm):
-    told = r"bearing 'NDE' of the machine .* warms, with which a record cannot be estimated yet: a drop"
-    with pytest.raises(RecordError, match=told):
-        insisted(SimpleNamespace(machine=warm.machine))
-
-
-def test_what_is_said_of_a_drop(drop, warm):
-    page = simulate_page(drop, warm.machine)
-    (section,) = [one for one in page.sections if one.heading == "Heat"]
-    assert len(section.figures[0].chart.data) == 2 * (thermal.N_NODES + 1)
-    numbers = simulation_numbers(drop, warm.machine)["heat"]["NDE"]
-    assert numbers["race_K"]["largest"] == pytest.approx(np.max(drop.heat.race(0)), rel=1e-12)
-    assert numbers["preload_N"]["end"] == drop.heat.preload[-1, 0]
-    assert numbers["heat_J"]["taken"] == pytest.approx(np.sum(drop.lost[0]), rel=1e-9)
-    (said,) = [one for one in page.verdict if one.text.startswith("NDE: the race reaches")]
-    assert said.text == numbers["statement"]
-    assert said.level == "good"
-    kept = dict(zip((one.name for one in columns_of(warm.machine)), row_of_drop(warm, drop), strict=True))
-    assert kept["DE.heat.preload"] == drop.heat.preload[-1, 1]
-    assert kept["NDE.heat.race"] == numbers["race_K"]["largest"]
-
-
 @pytest.mark.parametrize(
     ("preload", "race", "grade", "told"),
     [
@@ -350,10 +318,3 @@ def test_the_verdict_on_a_race(preload, race, grade, told):
     ((text, said),) = found.sentences(("NDE",))
     assert said == grade
     assert re.search(told, text), text
-
-
-def test_what_is_said_of_a_coast_down(coasting):
-    result = simulate_coast_down(coasting, replace(CASE, duration=0.1))
-    page = coast_down_page(result, coasting.machine)
-    assert [one.heading for one in page.sections].count("Heat") == 1
-    assert any(one.text.startswith("DE: the race reaches") for one in page.verdict)

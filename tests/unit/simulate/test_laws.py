@@ -1,17 +1,14 @@
 """Laws every drop obeys: symmetry, rotation, similarity, energy, weight, friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rotordrop import build_drop_model, simulate_drop
 from rotordrop.physics import columns as L
-from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, PlacedStart, StateStart
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
 from rotordrop_bench.settled import settled_coordinates
 
@@ -24,15 +21,15 @@ def turned(vectors, angle):
     return vectors @ np.array([[c, s], [-s, c]])
 
 
-def with_parameters(model: DropModel, **arrays) -> DropModel:
+def turned_start(start, angle):
+    return PlacedStart(displacement=turned(start.displacement, angle), velocity=turned(start.velocity, angle))
+
+
+def with_parameters(model, **arrays):
     return replace(model, parameters=model.parameters._replace(**arrays))
 
 
-def weightless(model: DropModel) -> DropModel:
-    return with_parameters(model, gravity=np.zeros_like(model.parameters.gravity))
-
-
-def with_columns(model: DropModel, values: dict[int, float]) -> DropModel:
+def with_columns(model, values):
     bearing = model.parameters.bearing.copy()
     for column, value in values.items():
         bearing[:, column] = value
@@ -43,13 +40,11 @@ def with_columns(model: DropModel, values: dict[int, float]) -> DropModel:
 def test_turning_the_start_turns_the_drop(quick, pitches):
     """Without gravity nothing tells directions apart but the balls, which repeat every pitch."""
     angle = pitches * 2.0 * np.pi / 23
-    model = weightless(quick)
+    model = with_parameters(quick, gravity=np.zeros_like(quick.parameters.gravity))
     start = PlacedStart(
         displacement=np.array([[0.0, -2e-4], [1e-4, 1e-4]]), velocity=np.array([[0.05, -0.08], [-0.06, 0.05]])
     )
-    other = replace(
-        start, displacement=turned(start.displacement, angle), velocity=turned(start.velocity, angle)
-    )
+    other = turned_start(start, angle)
     p = model.parameters
     c, s = np.cos(angle), np.sin(angle)
     ahead = with_parameters(
@@ -67,11 +62,7 @@ def test_turning_the_start_turns_the_drop(quick, pitches):
 
 def test_turning_the_start_under_gravity_does_not_turn_the_drop(quick, skewed_start):
     case = DropCase(speed=SPEED, duration=0.01, start=skewed_start)
-    other = replace(
-        skewed_start,
-        displacement=turned(skewed_start.displacement, np.pi / 2),
-        velocity=turned(skewed_start.velocity, np.pi / 2),
-    )
+    other = turned_start(skewed_start, np.pi / 2)
     one, two = simulate_drop(quick, case), simulate_drop(quick, replace(case, start=other))
     assert np.max(np.abs(two.displacement - turned(one.displacement, np.pi / 2))) > 1e-4
 
@@ -97,9 +88,8 @@ def test_mirroring_speed_place_unbalance_and_sleeve_mirrors_the_drop(paper, skew
     model = build_drop_model(paper.with_values(phases), "quick")
     other = build_drop_model(paper.with_values({k: -v for k, v in phases.items()}), "quick")
     case = DropCase(speed=SPEED, duration=0.01, tolerance=1e-10, start=skewed_start)
-    image = replace(
-        skewed_start, displacement=skewed_start.displacement * mirror, velocity=skewed_start.velocity * mirror
-    )
+    start = skewed_start
+    image = PlacedStart(displacement=start.displacement * mirror, velocity=start.velocity * mirror)
     one = simulate_drop(model, case)
     two = simulate_drop(other, replace(case, speed=-SPEED, start=image))
     assert len(one.contacts) > 0
@@ -108,7 +98,7 @@ def test_mirroring_speed_place_unbalance_and_sleeve_mirrors_the_drop(paper, skew
     assert two.friction_force == pytest.approx(-one.friction_force, abs=1e-3)
 
 
-def scaled_by_mass(model: DropModel, factor: float) -> DropModel:
+def scaled_by_mass(model, factor):
     """All masses, stiffnesses and dampings times a factor: the same motion, other forces."""
     p, root = model.parameters, np.sqrt(factor)
     bearing, spin = p.bearing.copy(), p.spin.copy()
@@ -131,7 +121,7 @@ def scaled_by_mass(model: DropModel, factor: float) -> DropModel:
     )
 
 
-def test_a_machine_of_three_times_the_mass_and_stiffness_moves_the_same(quick):
+def test_similar_machines_take_the_same_path(quick):
     case = DropCase(speed=SPEED, duration=0.02, tolerance=1e-9)
     one, two = simulate_drop(quick, case), simulate_drop(scaled_by_mass(quick, 3.0), case)
     peak = np.max(one.bearing_force_magnitude)
@@ -139,9 +129,16 @@ def test_a_machine_of_three_times_the_mass_and_stiffness_moves_the_same(quick):
     assert two.bearing_force / 3.0 == pytest.approx(one.bearing_force, abs=1e-6 * peak)
     assert two.max_stress == pytest.approx(3.0 * one.max_stress, rel=1e-6)
     assert two.certificate.energy_scale == pytest.approx(3.0 * one.certificate.energy_scale, rel=1e-6)
+    factor = 2.0
+    case = DropCase(speed=SPEED, duration=0.02, tolerance=1e-9)
+    slow = replace(case, speed=SPEED / factor, duration=factor * 0.02, output_step=factor * 1e-5)
+    one, two = simulate_drop(quick, case), simulate_drop(slowed_down(quick, factor), slow)
+    assert two.displacement == pytest.approx(one.displacement, abs=5e-11)
+    assert two.speed * factor == pytest.approx(one.speed, rel=1e-9)
+    assert two.bearing_force * factor**2 == pytest.approx(one.bearing_force, abs=5e-3)
 
 
-def slowed_down(model: DropModel, factor: float) -> DropModel:
+def slowed_down(model, factor):
     """Every frequency divided by a factor, gravity by its square: the same path, more slowly."""
     p = model.parameters
     bearing, spin = p.bearing.copy(), p.spin.copy()
@@ -164,50 +161,18 @@ def slowed_down(model: DropModel, factor: float) -> DropModel:
     )
 
 
-def test_a_machine_of_half_the_frequencies_takes_the_same_path(quick):
-    factor = 2.0
-    case = DropCase(speed=SPEED, duration=0.02, tolerance=1e-9)
-    slow = replace(case, speed=SPEED / factor, duration=factor * 0.02, output_step=factor * 1e-5)
-    one, two = simulate_drop(quick, case), simulate_drop(slowed_down(quick, factor), slow)
-    assert two.displacement == pytest.approx(one.displacement, abs=5e-11)
-    assert two.speed * factor == pytest.approx(one.speed, rel=1e-9)
-    assert two.bearing_force * factor**2 == pytest.approx(one.bearing_force, abs=5e-3)
-
-
-def lossless(model: DropModel) -> DropModel:
-    p = model.parameters
-    spin = p.spin.copy()
-    spin[L.AERO_TIME_CONSTANT] = np.inf
-    columns = [
-        L.CONTACT_DAMPING, L.FRICTION_STATIC, L.FRICTION_DYNAMIC, L.BEARING_DAMPING, L.DRAG_COEFFICIENT,
-        L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y,
-    ]  # fmt: skip
-    without = with_columns(model, dict.fromkeys(columns, 0.0))
-    still = np.zeros_like(p.unbalance_cos)
-    return with_parameters(
-        without, damping=np.zeros_like(p.damping), unbalance_cos=still, unbalance_sin=still, spin=spin
-    )
-
-
-def test_without_losses_the_energy_is_kept(quick):
-    result = simulate_drop(lossless(quick), DropCase(speed=SPEED, duration=0.05, tolerance=1e-9))
-    layout = quick.layout
-    assert len(result.contacts) > 6
-    assert np.all(result.contacts.dissipated_energy == 0.0)
-    assert result.state[-1, layout.dissipated] == 0.0
-    assert result.certificate.energy_residual < 1e-5 * 0.5 * 59.5 * np.max(np.abs(np.diff(
-        result.displacement[:, 0, 1]) / 1e-5)) ** 2  # fmt: skip
-
-
-def test_losses_are_counted(drop, quick):
+def test_losses_are_counted_and_no_contact_force_is_negative_or_acts_without_indentation(drop, quick):
     """Stored, dissipated and supplied energy balance, and no contact gains energy."""
     assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
     assert np.all(drop.contacts.dissipated_energy > 0.0)
     lost = drop.state[:, quick.layout.dissipated]
     assert np.min(np.diff(lost)) > -1e-9  # between steps the interpolation may fall by as much
+    assert np.min(drop.contact_force) == 0.0
+    assert np.all((drop.contact_force > 0.0) <= (drop.indentation > 0.0))
+    assert np.max(drop.contact_force) > 1000.0
 
 
-def test_at_rest_the_bearings_carry_the_weight(paper, quick):
+def test_at_rest_the_bearings_carry_the_weight_and_a_heavily_damped_drop_settles_there(paper, quick):
     state = quick.layout.zeros()
     state[: quick.layout.n_coordinates] = settled_coordinates(quick)
     case = DropCase(
@@ -219,9 +184,6 @@ def test_at_rest_the_bearings_carry_the_weight(paper, quick):
     assert np.sum(result.bearing_force[..., 1], axis=1) == pytest.approx(weight, rel=1e-5)
     assert result.contact_force[0] == pytest.approx(quick.load_shares, rel=1e-6)
     assert np.max(np.abs(result.displacement - result.displacement[0])) < 1e-12
-
-
-def test_a_heavily_damped_drop_settles_there(paper, quick):
     columns = {L.FRICTION_STATIC: 0.0, L.FRICTION_DYNAMIC: 0.0, L.CONTACT_DAMPING: 3.0}
     model = with_columns(quick, columns | {L.SUPPORT_DAMPING_X: 1e5, L.SUPPORT_DAMPING_Y: 1e5})
     model = with_parameters(model, damping=np.full_like(quick.parameters.damping, 50.0))
@@ -232,7 +194,7 @@ def test_a_heavily_damped_drop_settles_there(paper, quick):
     assert result.displacement[-1, :, 1] == pytest.approx(shape @ rest[model.layout.modal_y], abs=2e-8)
 
 
-def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.0, 0.0), depth=20e-6):
+def contact_on_race(model, azimuth, speed, velocity=(0.0, 0.0), depth=20e-6):
     """Force [N] of the rotor on each race when it stands at a depth in a direction, races at rest."""
     layout = model.layout
     case = DropCase(speed=speed, spin="coasting")
@@ -244,10 +206,8 @@ def contact_on_race(model: DropModel, azimuth: float, speed: float, velocity=(0.
     moving = rigid_amplitudes(model, positions, np.tile(velocity, (len(nodes), 1)))
     state = layout.zeros()
     state[layout.modal_x], state[layout.modal_y] = place[:, 0], place[:, 1]
-    state[layout.velocity_of(layout.modal_x)], state[layout.velocity_of(layout.modal_y)] = (
-        moving[:, 0],
-        moving[:, 1],
-    )
+    for k, part in enumerate((layout.modal_x, layout.modal_y)):
+        state[layout.velocity_of(part)] = moving[:, k]
     state[layout.rotor_speed] = speed
     rate, work = layout.zeros(), scratch_of(p)
     drop_derivative(0.0, state, p, rate, work)
@@ -289,20 +249,11 @@ def test_the_race_is_never_pulled(quick, azimuth):
     assert np.all(slow @ away < 0.0)
 
 
-def test_no_contact_force_is_negative_or_acts_without_indentation(drop):
-    assert np.min(drop.contact_force) == 0.0
-    assert np.all((drop.contact_force > 0.0) <= (drop.indentation > 0.0))
-    assert np.max(drop.contact_force) > 1000.0
-
-
-def test_free_fall_is_a_parabola(quick):
+def test_free_fall_is_a_parabola_and_a_dragged_race_takes_momentum(quick):
     result = simulate_drop(quick, DropCase(speed=0.0, duration=0.005, start=CentredStart(), spin="coasting"))
     expected = -0.5 * 9.81 * result.time**2
     assert result.displacement[:, :, 1] == pytest.approx(np.column_stack([expected, expected]), abs=1e-12)
-
-
-def test_the_race_that_is_dragged_takes_the_momentum_the_rotor_loses(quick):
-    """Angular momentum: what friction takes from the rotor drives the races."""
+    # Angular momentum: what friction takes from the rotor drives the races.
     model = with_columns(quick, {L.DRAG_COEFFICIENT: 0.0})
     result = simulate_drop(model, DropCase(speed=SPEED, duration=0.02, spin="coasting", tolerance=1e-8))
     p = model.parameters

@@ -1,20 +1,16 @@
 """Drops onto touchdown bearings without preload: deep grooves of class C3, and a pair that just touches."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
+from rotordrop import DropCase, build_drop_model, simulate_drop
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.report.simulate_page import simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
-from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate.case import DropCase
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop_bench.settled import settled_coordinates
 
 B6016 = (
@@ -35,14 +31,6 @@ def loose(bearing, first=0.0):
 @pytest.fixture(scope="module", params=[B6016, TOUCHING], ids=["6016 C3", "15 deg, 0 N"])
 def bearing(request):
     return request.param
-
-
-def test_the_class_gives_clearance_with_its_range():
-    balls = loose(B6016).touchdown_bearings[0].bearing
-    assert float(balls.clearance) == pytest.approx(38e-6)
-    assert balls.clearance.range == pytest.approx((25e-6, 51e-6))
-    assert "ISO 5753" in balls.clearance.source
-    assert (balls.arrangement, float(balls.preload)) == ("single", 0.0)
 
 
 @pytest.mark.parametrize("first", [0.0, 5.0, 180.0 / 14.0])
@@ -80,7 +68,7 @@ def test_a_drop_onto_loose_bearings_keeps_its_energy_and_ends_on_the_weight(bear
     assert pressure == pytest.approx(np.sqrt(per_length / line.compliance / np.pi / line.radius), rel=0.01)
 
 
-def test_a_loose_race_lies_on_its_balls_before_the_drop_and_stays_there():
+def test_a_loose_race_lies_on_its_balls_before_the_drop_and_a_preloaded_one_has_no_weight():
     model = build_drop_model(loose(B6016), "quick")
     result = simulate_drop(model, DropCase(speed=200.0, duration=0.004))
     assert np.max(result.contact_force) == 0.0
@@ -89,9 +77,6 @@ def test_a_loose_race_lies_on_its_balls_before_the_drop_and_stays_there():
     assert np.max(np.abs(lowest - lowest[0])) < 1e-10
     carried = result.bearing_force[-1, :, 1]
     assert carried == pytest.approx(model.parameters.bearing[:, L.RACE_WEIGHT], rel=1e-3)
-
-
-def test_a_preloaded_race_has_no_weight():
     assert np.all(build_drop_model(scaled_machine(60.0), "quick").parameters.bearing[:, L.RACE_WEIGHT] == 0.0)
 
 

@@ -1,30 +1,24 @@
 """Drops on soft mounts: the description reaches the kernel, the derivative is right, energy closes."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jacobian
 
+from rotordrop import DropCase, Known, simulate_drop
 from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError, UsageError
-from rotordrop.known import Known
 from rotordrop.machine import example_path, load_machine, loads_machine
 from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.physics import columns as L
-from rotordrop.report.simulate_page import simulate_page
-from rotordrop.report.simulate_summary import simulate_summary
-from rotordrop.report.simulation_numbers import simulation_numbers
+from rotordrop.report.simulate_page import simulate_page, simulate_summary, simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
-from rotordrop.simulate.case import DropCase
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
-from rotordrop.simulate.ribbons import ribbon_uses
+from rotordrop.simulate.used import ribbon_uses
 from rotordrop.twin.tracked_parameters import never_used_up
 
 STOP = '{ kind = "stop", gap = "8 um", stiffness = "5e8 N/m" }'
@@ -33,8 +27,8 @@ O_RING = (
     '{ kind = "maxwell", branches = [{ stiffness = "4e7 N/m", time = "3 ms" }, '
     '{ stiffness = "6e7 N/m", time = "0.3 ms" }] }'
 )
-
-
+FOUNDATION = {"share": 0.1, "frequency": 600.0, "damping_ratio": 0.03}
+FOUNDATION = {f"DE.support.foundation_{name}": value for name, value in FOUNDATION.items()}
 TEXT = example_path("small").read_text(encoding="utf-8")
 HEAD = '[[touchdown_bearings]]\nname = "DE"'
 
@@ -43,6 +37,15 @@ def mounted(*elements, text=TEXT):
     """The small machine with a mount under its DE bearing."""
     assert HEAD in text
     return loads_machine(text.replace(HEAD, f"{HEAD}\nmount = [{', '.join(elements)}]"))
+
+
+ELEMENT = r"touchdown_bearings\[2\]\.mount\[1\]"
+
+
+def relaxing(*times):
+    """Branches of equal stiffness with relaxation times [ms]."""
+    branches = ", ".join(f'{{ stiffness = "4e6 N/m", time = "{time} ms" }}' for time in times)
+    return f'{{ kind = "maxwell", branches = [{branches}] }}'
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +58,7 @@ def small():
 def test_jacobian_agrees_with_finite_differences(elements, foundation):
     machine = mounted(*elements)
     if foundation:
-        values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
-        machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+        machine = machine.with_values(FOUNDATION)
     model = build_drop_model(machine, "quick")
     state = a_state(model, np.array([-40e-6, 15e-6]), 0.98)
     state[model.layout.support][-2:] = 9e-6, -4e-6  # beyond the stop
@@ -65,7 +67,7 @@ def test_jacobian_agrees_with_finite_differences(elements, foundation):
     assert_jacobian(model, state)
 
 
-def test_energy_closes_and_a_stop_out_of_reach_changes_nothing(small):
+def test_energy_closes_a_stop_takes_what_the_spring_leaves_and_out_of_reach_changes_nothing(small):
     case = DropCase(speed=SPEED, duration=0.03)
     plain = simulate_drop(small, case)
     far = simulate_drop(mounted('{ kind = "stop", gap = "5 mm" }'), case)
@@ -73,9 +75,6 @@ def test_energy_closes_and_a_stop_out_of_reach_changes_nothing(small):
     assert np.array_equal(plain.displacement, far.displacement)
     assert not np.array_equal(plain.displacement, near.displacement)
     assert near.certificate.energy_residual < 1e-6 * near.certificate.energy_scale
-
-
-def test_a_stop_takes_the_load_that_the_spring_leaves(small):
     load = float(build_drop_model(small, "quick").load_shares[1])
     spring = float(small.touchdown_bearings[1].support.stiffness)
     gap = 0.5 * load / spring
@@ -83,19 +82,13 @@ def test_a_stop_takes_the_load_that_the_spring_leaves(small):
     assert spring * held.support[1] + 5e8 * (held.support[1] - gap) == pytest.approx(load, rel=1e-12)
 
 
-def test_a_mount_is_written_and_read_again():
+def test_mounts_are_read_again_varied_and_estimated():
     machine = mounted(STOP, RIBBON, O_RING)
     assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
-
-
-def test_a_guess_makes_an_unknown_and_a_given_value_none():
     machine = mounted('{ kind = "stop", gap = { guess = "20 um", range = ["10 um", "40 um"] } }')
     (gap,) = [one for one in structure_unknowns(build_drop_model(machine, "quick")) if "gap" in one.path]
     assert gap.path == "DE.mount.stop.gap"
     assert np.exp(gap.mean + 1.645 * gap.sigma) == pytest.approx(40e-6, rel=1e-3)
-
-
-def test_a_branch_is_varied_and_estimated_by_its_number():
     machine = mounted(O_RING.replace('"3 ms"', '{ guess = "3 ms", range = ["2 ms", "4 ms"] }'))
     model = build_drop_model(machine, "quick")
     paths = {one.path: one for one in structure_unknowns(model) if "maxwell" in one.path}
@@ -112,8 +105,7 @@ def test_a_branch_is_varied_and_estimated_by_its_number():
 def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
     machine = mounted('{ kind = "stop", gap = { guess = "20 um", range = ["10 um", "40 um"] } }')
     if foundation:
-        values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
-        machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+        machine = machine.with_values(FOUNDATION)
     model = build_drop_model(machine, "quick")
     unknowns = {one.path: one for one in structure_unknowns(model)}
     gap, means = unknowns["DE.mount.stop.gap"], np.zeros((5, model.layout.size))
@@ -135,10 +127,7 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
     ("element", "message"),
     [
         ('{ kind = "stop" }', r"gap"),
-        (
-            '{ kind = "stop", gap = "0 um" }',
-            r"^142:33: touchdown_bearings\[2\]\.mount\[1\]\.gap: .*a length must be positive",
-        ),
+        ('{ kind = "stop", gap = "0 um" }', rf"^142:33: {ELEMENT}\.gap: .*a length must be positive"),
         (
             '\n{ kind = "stop", gap = "0.1 mm" },\n{ kind = "ribbon", slip_force = "0 N" }',
             r"^144:33: .*'515 N'",
@@ -149,9 +138,7 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
             r"^145:33: touchdown_bearings\[2\]\.mount\[1\]\.branches\[2\]\.time: .*descend",
         ),
         (
-            '{ kind = "maxwell", branches = ['
-            + ", ".join(f'{{ stiffness = "4e6 N/m", time = "{time} ms" }}' for time in (8, 4, 2, 1))
-            + "] }",
+            relaxing(8, 4, 2, 1),
             r"4 branches; 3 .* are the most: join the two whose times are closest",
         ),
         (
@@ -164,11 +151,7 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
         ),
         ('{ kind = "spring", gap = "20 um" }', r"a spring has no 'gap'"),
         ('{ kind = "ribbon", stiffness = "2e7 N/m" }', r"has a 'stiffness' already, and so does this ribbon"),
-        (
-            '{ kind = "maxwell", branches = [{ stiffness = "4e6 N/m", time = "3 ms" }, '
-            '{ stiffness = "4e6 N/m", time = "30 ms" }] }',
-            r"the relaxation times do not descend: .*3.00 ms and 30.0 ms",
-        ),
+        (relaxing(3, 30), r"the relaxation times do not descend: .*3.00 ms and 30.0 ms"),
     ],
 )
 def test_mounts_that_cannot_be_are_refused(element, message):
@@ -176,40 +159,28 @@ def test_mounts_that_cannot_be_are_refused(element, message):
         mounted(element)
 
 
-def test_a_slip_force_needs_a_stiffness_and_a_bad_one_is_found_where_it_was_written():
+def test_mounts_are_read_where_they_stand_and_name_their_states():
     start = TEXT.index(HEAD)
     lines = [line for line in TEXT[start:].splitlines() if not line.startswith('stiffness = { guess = "8e7')]
-    with pytest.raises(
-        MachineFileError, match=r"'slip_force' but no stiffness; give its 'friction_stiffness'"
-    ):
+    with pytest.raises(MachineFileError, match=r"'slip_force' but no stiffness; give its 'friction_st"):
         mounted('{ kind = "ribbon", slip_force = "1.5 kN" }', text=TEXT[:start] + "\n".join(lines))
-    with pytest.raises(
-        MachineFileError, match=r"^142:41: touchdown_bearings\[2\]\.mount\[1\]\.stiffness: -10"
-    ):
+    with pytest.raises(MachineFileError, match=rf"^142:41: {ELEMENT}\.stiffness: -10"):
         mounted('{ kind = "spring", stiffness = "-10 MN/m" }', text=TEXT[:start] + "\n".join(lines))
-
-
-def test_a_mount_below_a_table_of_its_bearing_is_sent_above_it():
     at = TEXT.index("[touchdown_bearings.support]", TEXT.index(HEAD)) + len("[touchdown_bearings.support]\n")
-    with pytest.raises(
-        MachineFileError,
-        match=r"'mount' is no key of 'support'; it belongs to 'touchdown_bearings': write it above the "
-        r"header of the table 'support'",
-    ):
+    told = (
+        r"'mount' is no key of 'support'; .* 'touchdown_bearings': write it above the header of .* 'support'"
+    )
+    with pytest.raises(MachineFileError, match=told):
         loads_machine(f"{TEXT[:at]}mount = [{STOP}]\n{TEXT[at:]}")
-
-
-def test_states_of_a_mount_have_names():
     machine = mounted(RIBBON, O_RING)
-    values = {"foundation_share": 0.1, "foundation_frequency": 600.0, "foundation_damping_ratio": 0.03}
-    machine = machine.with_values({f"DE.support.{name}": value for name, value in values.items()})
+    machine = machine.with_values(FOUNDATION)
     names = build_drop_model(machine, "quick").layout.names(machine.touchdown_bearings)
     assert not [name for name in names if name.startswith("further state")]
     for name in ("mount DE ribbon x", "mount DE branch 2 y", "foundation DE y velocity"):
         assert names.count(name) == 1
 
 
-def test_a_ribbon_says_what_it_bore_and_its_slip_takes_the_energy_that_damping_leaves():
+def test_ribbons_say_what_they_bore_and_whether_they_slipped():
     slack = RIBBON.replace("1.5 kN", "150 N")
     machine = mounted(slack)
     drop = simulate_drop(machine, DropCase(speed=SPEED, duration=0.03, output_step=2e-6, reduction="quick"))
@@ -223,13 +194,10 @@ def test_a_ribbon_says_what_it_bore_and_its_slip_takes_the_energy_that_damping_l
     assert 0.95 < use.share < 1.001 and 0.0 < use.slipped < 0.03 and use.first_slip > 0.0
     numbers = simulation_numbers(drop, machine)["ribbons"]["DE"]
     assert numbers["dissipated_J"] == use.dissipated and numbers["slip_force_N"] == pytest.approx(150.0)
-    said = [one.text for one in simulate_summary(drop, machine).verdict[:3]]
-    assert any("DE: the ribbon of the mount bore at most" in text and "slipped for" in text for text in said)
+    said = " ".join(one.text for one in simulate_summary(drop, machine).verdict[:3])
+    assert "DE: the ribbon of the mount bore at most" in said and "slipped for" in said
     (section,) = [one for one in simulate_page(drop, machine).sections if one.heading == "Ribbons"]
     assert len(section.tables[0].rows) == 1
-
-
-def test_a_ribbon_that_holds_is_said_to_hold():
     machine = mounted(RIBBON.replace("1.5 kN", "15 kN"))
     drop = simulate_drop(machine, DropCase(speed=SPEED, duration=0.02, reduction="quick"))
     (use,) = ribbon_uses(machine, drop)
@@ -253,8 +221,6 @@ def test_a_mistyped_ribbon_is_doubted_and_named_where_a_drop_breaks_off(tmp_path
     assert not doubts(mounted(RIBBON, O_RING, STOP))
     file = tmp_path / "machine.toml"
     save_machine(machine, file)
-    assert run(["check", str(file)]) == 0
-    assert "values look wrong: ribbon stiffness (DE), slip of the ribbon (DE)" in capsys.readouterr().out
     out = ["--report", str(tmp_path / "drop.html"), "--duration", "100 ms"]
     assert run(["simulate", str(file), "--speed", "300 Hz", *out]) == 5
     told = capsys.readouterr()
@@ -263,7 +229,7 @@ def test_a_mistyped_ribbon_is_doubted_and_named_where_a_drop_breaks_off(tmp_path
     assert (tmp_path / "drop.html").exists()
 
 
-def test_check_says_what_a_bearing_has_and_counts_a_ribbon_with_its_support(tmp_path, capsys):
+def test_a_summary_counts_a_ribbon_with_its_support_and_a_stop_pressed_shut():
     machine = mounted(RIBBON, STOP.replace("8 um", "80 um"))
     summary = summarise_machine(machine)
     support, rest = machine.bearing("DE").support, summary.bearings[1]
@@ -273,13 +239,5 @@ def test_check_says_what_a_bearing_has_and_counts_a_ribbon_with_its_support(tmp_
     assert rest.equivalent_stiffness == pytest.approx(in_series)
     warned = {one.bearing: one for one in machine_warnings(machine, summary) if "resonance" in one.kind}
     assert "the support by itself with a ribbon that sticks resonates at 628 Hz" in warned["DE"].message
-    file = tmp_path / "machine.toml"
-    push = '\n[[loads]]\nnode = 3\ndirection = "0 deg"\nforce = "5 N"\n'
-    file.write_text(machine_text(machine) + push, encoding="utf-8")
-    assert run(["check", str(file), "--all"]) == 0
-    told = capsys.readouterr().out
-    assert "DE has a mount (ribbon, stop); its support counts with a ribbon that sticks." in told
-    assert "NDE has" not in told and "landing sleeve" not in told
-    assert "loads 1, speed exponent" in told and "loads 2" not in told
     pressed = summarise_machine(mounted('{ kind = "stop", gap = "0.3 um" }')).bearings[1]
     assert pressed.beside_support == ("a stop pressed shut",)

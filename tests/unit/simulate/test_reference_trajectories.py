@@ -1,18 +1,12 @@
 """Trajectories of an independent code: 12 modes, full finite elements, and the presets against these."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rotordrop.machine import Machine
-from rotordrop.rotor.parameters import build_drop_model
+from rotordrop import DropCase, build_drop_model, simulate_drop
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.simulate.case import DropCase, PlacedStart
-from rotordrop.simulate.drop import simulate_drop
-from rotordrop.simulate.result import DropResult
 
 pytestmark = pytest.mark.acceptance
 
@@ -34,15 +28,13 @@ ABSOLUTE = {
 STRESS = "max_inner_race_stress"
 
 
-def simulated(
-    machine: Machine, reduction: object, tolerance: float, duration: float, start: PlacedStart
-) -> DropResult:
+def simulated(machine, reduction, tolerance, duration, start):
     model = build_drop_model(machine, reduction)
     case = DropCase(speed=SPEED, duration=duration, tolerance=tolerance, start=start)
     return simulate_drop(model, case)
 
 
-def deviations(result: DropResult, reference: dict[str, np.ndarray], prefix: str) -> dict[str, float]:
+def deviations(result, reference, prefix):
     rows = np.round(reference[f"{prefix}t"] / 1e-5).astype(int)
     found = {
         name: float(np.max(np.abs(getattr(result, name)[rows] - reference[f"{prefix}{name}"])))
@@ -53,47 +45,36 @@ def deviations(result: DropResult, reference: dict[str, np.ndarray], prefix: str
     return found
 
 
-def too_large(found: dict[str, float]) -> dict[str, float]:
+def too_large(found):
     limits = ABSOLUTE | {STRESS: 1e-6}
     return {name: value for name, value in found.items() if not value <= limits[name]}
 
 
 @pytest.fixture(scope="module")
-def twelve(paper, reference_start) -> DropResult:
-    return simulated(paper, Reduction(modes=12, attachment=False), 1e-11, 0.2, reference_start)
-
-
-@pytest.fixture(scope="module")
-def twelve_reference() -> dict[str, np.ndarray]:
+def twelve_reference():
     with np.load(FOLDER / "drop_60hz_12_modes.npz") as file:
         return dict(file)
 
 
 @pytest.fixture(scope="module")
-def full_reference() -> dict[str, np.ndarray]:
+def full_reference():
     with np.load(FOLDER / "drop_60hz_full_fe.npz") as file:
         return dict(file)
 
 
-def test_twelve_modes_over_the_first_20_ms(twelve, twelve_reference):
+def test_twelve_modes_and_full_finite_elements_follow_the_reference(
+    twelve_reference, paper, reference_start, full_reference
+):
+    twelve = simulated(paper, Reduction(modes=12, attachment=False), 1e-11, 0.2, reference_start)
     assert too_large(deviations(twelve, twelve_reference, "fine_")) == {}
-
-
-def test_twelve_modes_over_the_whole_drop_with_its_friction(twelve, twelve_reference):
     found = deviations(twelve, twelve_reference, "")
     assert found["displacement"] < 1e-7
     assert found["friction_force"] < 5.0
     assert found["race_speed"] < 0.01
-
-
-def test_twelve_modes_reach_the_stated_peaks(twelve, twelve_reference):
     first = twelve.time <= 0.02 + 1e-9
     peaks = np.max(twelve.bearing_force_magnitude[first], axis=0)
     assert peaks == pytest.approx(twelve_reference["fine_peak_bearing_force"], abs=0.01)
     assert peaks == pytest.approx([2840.0, 4858.0], abs=1.0)
-
-
-def test_full_finite_elements(paper, reference_start, full_reference):
     result = simulated(paper, "full", 1e-10, 0.02, reference_start)
     assert too_large(deviations(result, full_reference, "fine_")) == {}
 

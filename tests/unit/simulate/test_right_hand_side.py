@@ -1,17 +1,13 @@
 """The compiled right-hand side against plain equations, its derivative against finite differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.unit.simulate import plain_equations
 
+from rotordrop import DropCase, PlacedStart, build_drop_model, simulate_drop
 from rotordrop.physics import columns as L
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
-from rotordrop.simulate.case import DropCase, PlacedStart
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.levitation import rigid_amplitudes, start_of_drop
 
 SPEED = 2.0 * np.pi * 60.0
@@ -19,6 +15,7 @@ CASE = DropCase(speed=SPEED)
 
 # One bearing, both, none; sliding fast, slowly (below the smoothing speed), backwards.
 DEPTHS = {"flight": (-40e-6, -20e-6), "one bearing": (15e-6, -20e-6), "both bearings": (12e-6, 18e-6)}
+STEPS = {L.POSITION: 1e-9, L.INTERNAL: 1e-9, L.VELOCITY: 1e-6}
 SLIPS = {"fast": 0.0, "slow": 0.98, "sticking": 0.99995, "backwards": 1.3}
 
 
@@ -132,14 +129,10 @@ def both_jacobians(model, state, case):
     jacobian, numeric = np.zeros((size, size)), np.zeros((size, size))
     drop_jacobian(0.003, state, parameters, jacobian)
     for column in range(size):
-        step = _step(model, column)
+        step = STEPS.get(model.layout.kinds[column], 1e-4)
         up, down = state.copy(), state.copy()
         up[column] += step
         down[column] -= step
         difference = kernel_derivative(model, up, case) - kernel_derivative(model, down, case)
         numeric[:, column] = difference[:size] / (2.0 * step)
     return jacobian, numeric
-
-
-def _step(model, column):
-    return {L.POSITION: 1e-9, L.INTERNAL: 1e-9, L.VELOCITY: 1e-6}.get(model.layout.kinds[column], 1e-4)

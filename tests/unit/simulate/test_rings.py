@@ -1,11 +1,10 @@
 """Drops on pairs whose preload springs make: derivative, energy, symmetry and limits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jacobian, mirrored_drops
 
+from rotordrop import DropCase, build_drop_model, simulate_drop
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
@@ -13,11 +12,8 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import ring
 from rotordrop.physics.ball_set import COSINE, COUNT, DAMPING, row_axial_damping
 from rotordrop.physics.ring import preload_force, seat_on_springs
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
-from rotordrop.simulate.case import DropCase
-from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.losses import losses
 
 TEXT = example_path("small").read_text(encoding="utf-8")
@@ -47,7 +43,7 @@ def test_jacobian_agrees_with_finite_differences(way, bearing):
     assert np.max(np.abs(numeric[rings.start + 1])) > 1e6
 
 
-def test_energy_closes_and_the_fit_takes_some():
+def test_energy_closes_the_fit_takes_some_and_the_first_peak_falls():
     case = DropCase(speed=SPEED, duration=0.03)
     model = build_drop_model(sprung(), "quick")
     drop = simulate_drop(model, case)
@@ -57,6 +53,12 @@ def test_energy_closes_and_the_fit_takes_some():
     assert free.certificate.energy_residual < 1e-6 * free.certificate.energy_scale
     assert np.max(np.abs(drop.ring_travel("DE"))) < np.max(np.abs(free.ring_travel("DE")))
     assert losses(model, drop).total == pytest.approx(drop.state[-1, model.layout.dissipated], rel=1e-5)
+    case = DropCase(speed=SPEED, duration=0.02, reduction="quick")
+    texts = ("fit_friction = 0.0", "fit_friction = 0.15", "fit_friction = 0.4")
+    free, usual, tight = (simulate_drop(sprung(text), case).peak_force("DE")[0] for text in texts)
+    rigid = simulate_drop(loads_machine(TEXT), case).peak_force("DE")[0]
+    assert free < usual < tight < 1.02 * rigid
+    assert free < 0.93 * rigid
 
 
 @pytest.mark.parametrize("way", [0.0, 30e-6, -10e-6])
@@ -92,42 +94,12 @@ def test_rings_swing_out_in_flight_without_friction_of_their_fit(part):
     )
 
 
-def test_stiff_springs_are_rigid_spacers():
+def test_stiff_springs_are_rigid_spacers_and_hold_the_rows_that_the_preload_pressed():
     """The race comes to rest where rigid spacers leave it, and no ring moves."""
     stiff = sprung('spring_rate = "1e17 N/m"').touchdown_bearings[0].bearing.numbers()
     rigid = loads_machine(TEXT).touchdown_bearings[0].bearing.numbers()
     for load in (50.0, 500.0, 3000.0):
         assert stiff.deflection(load)[0] == pytest.approx(rigid.deflection(load)[0], rel=1e-9)
-
-
-def test_a_drop_on_stiff_springs_is_one_on_spacers():
-    case = DropCase(speed=SPEED, duration=0.012, reduction="quick", tolerance=1e-8)
-    rigid = simulate_drop(loads_machine(TEXT), case)
-    gap = [
-        np.max(np.abs(simulate_drop(sprung(f'spring_rate = "{rate} N/m"', bearing="DE"), case).bearing_force
-                      - rigid.bearing_force))
-        for rate in (1e10, 1e11)
-    ]  # fmt: skip
-    assert gap[1] < 0.2 * gap[0] < 0.02 * np.max(np.abs(rigid.bearing_force))
-
-
-def test_the_first_peak_falls_and_friction_gives_some_back():
-    case = DropCase(speed=SPEED, duration=0.02, reduction="quick")
-    texts = ("fit_friction = 0.0", "fit_friction = 0.15", "fit_friction = 0.4")
-    free, usual, tight = (simulate_drop(sprung(text), case).peak_force("DE")[0] for text in texts)
-    rigid = simulate_drop(loads_machine(TEXT), case).peak_force("DE")[0]
-    assert free < usual < tight < 1.02 * rigid
-    assert free < 0.93 * rigid
-
-
-def test_a_mirrored_drop_is_the_mirror():
-    one, other = mirrored_drops(sprung())
-    way = one.ring_travel("DE")
-    assert way == pytest.approx(other.ring_travel("DE"), rel=1e-6, abs=1e-5 * np.max(np.abs(way)))
-    assert one.bearing_force[..., 0] == pytest.approx(-other.bearing_force[..., 0], rel=1e-5, abs=0.1)
-
-
-def test_springs_hold_the_rows_that_the_preload_pressed():
     bearing = sprung().touchdown_bearings[0].bearing
     numbers = bearing.numbers()
     assert preload_force(numbers.rings(), numbers.entries()) == pytest.approx(
@@ -137,7 +109,15 @@ def test_springs_hold_the_rows_that_the_preload_pressed():
     assert np.max(np.abs(at_rest)) < 1e-12
 
 
-def test_ball_loads_follow_the_rings():
+def test_a_drop_on_stiff_springs_is_one_on_spacers_and_ball_loads_follow_the_rings():
+    case = DropCase(speed=SPEED, duration=0.012, reduction="quick", tolerance=1e-8)
+    rigid = simulate_drop(loads_machine(TEXT), case)
+    gap = [
+        np.max(np.abs(simulate_drop(sprung(f'spring_rate = "{rate} N/m"', bearing="DE"), case).bearing_force
+                      - rigid.bearing_force))
+        for rate in (1e10, 1e11)
+    ]  # fmt: skip
+    assert gap[1] < 0.2 * gap[0] < 0.02 * np.max(np.abs(rigid.bearing_force))
     case = DropCase(speed=SPEED, duration=0.012, reduction="quick")
     machine = sprung()
     drop = simulate_drop(machine, case)
@@ -145,7 +125,14 @@ def test_ball_loads_follow_the_rings():
     assert np.max(loads, axis=(1, 2)) == pytest.approx(drop.max_ball_load[:, 1], rel=1e-9)
 
 
-def test_springs_are_written_and_read_again():
+def test_a_mirrored_drop_is_the_mirror():
+    one, other = mirrored_drops(sprung())
+    way = one.ring_travel("DE")
+    assert way == pytest.approx(other.ring_travel("DE"), rel=1e-6, abs=1e-5 * np.max(np.abs(way)))
+    assert one.bearing_force[..., 0] == pytest.approx(-other.bearing_force[..., 0], rel=1e-5, abs=0.1)
+
+
+def test_springs_need_a_preload_and_are_written_and_read_again():
     machine = sprung('spring_rate = "2e7 N/m"', "fit_friction = { guess = 0.2, range = [0.1, 0.3] }")
     again = loads_machine(machine_text(machine))
     assert again.touchdown_bearings == machine.touchdown_bearings
@@ -154,6 +141,10 @@ def test_springs_are_written_and_read_again():
     assert not any(
         "fit" in one.path for one in structure_unknowns(build_drop_model(loads_machine(TEXT), "quick"))
     )
+    guess = 'guess = "156 N", range = ["100 N", "220 N"]'
+    text = TEXT.replace(PLACE, f"{SPRING}\n{PLACE}").replace(guess, 'value = "0 N"')
+    with pytest.raises(MachineFileError, match=r"springs press the rings together, but the preload is zero"):
+        loads_machine(text)
 
 
 @pytest.mark.parametrize(
@@ -172,11 +163,3 @@ def test_springs_are_written_and_read_again():
 def test_what_does_not_go_together_is_refused(line, message):
     with pytest.raises(MachineFileError, match=message):
         loads_machine(TEXT.replace(PLACE, f"{line}\n{PLACE}"))
-
-
-def test_springs_need_a_preload():
-    text = TEXT.replace(PLACE, f"{SPRING}\n{PLACE}").replace(
-        'guess = "156 N", range = ["100 N", "220 N"]', 'value = "0 N"'
-    )
-    with pytest.raises(MachineFileError, match=r"springs press the rings together, but the preload is zero"):
-        loads_machine(text)

@@ -1,26 +1,17 @@
 """Drops in which the rotor touches its housing, and mounts their stops: forces, energy, log, what is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.unit.simulate.test_right_hand_side import mirrored_drops
 
-from rotordrop.errors import MachineFileError, RecordError
-from rotordrop.evidence.evidence import read_evidence
-from rotordrop.machine import example_machine, example_path, loads_machine
+from rotordrop import DropCase, build_drop_model, load_result, simulate_drop
+from rotordrop.errors import MachineFileError
+from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import touch
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
-from rotordrop.report.simulate_summary import simulate_summary
-from rotordrop.report.simulation_numbers import simulation_numbers
-from rotordrop.rotor.parameters import build_drop_model
-from rotordrop.simulate.case import DropCase
-from rotordrop.simulate.clearances import clearance_uses
-from rotordrop.simulate.drop import simulate_drop
+from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
 from rotordrop.simulate.losses import losses
-from rotordrop.simulate.result import load_result
+from rotordrop.simulate.used import clearance_uses
 
 TEXT = example_path("small").read_text(encoding="utf-8")
 HEAD = '[[touchdown_bearings]]\nname = "DE"'
@@ -34,9 +25,8 @@ def sealed(*lines, gap=None, text=TEXT):
     machine = loads_machine(text)
     node = (machine.touchdown_bearings[0].node + machine.touchdown_bearings[1].node) // 2
     widest = max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    of = (
-        f'\n[[clearances]]\nname = "seal"\nnode = {node}\ngap = "{widest + 5e-6 if gap is None else gap} m"\n'
-    )
+    gap = widest + 5e-6 if gap is None else gap
+    of = f'\n[[clearances]]\nname = "seal"\nnode = {node}\ngap = "{gap} m"\n'
     return loads_machine(text + of + "\n".join(lines) + "\n")
 
 
@@ -50,7 +40,7 @@ def drop(rubbed):
     return simulate_drop(build_drop_model(rubbed, "quick"), CASE)
 
 
-def test_energy_closes_by_place(rubbed, drop):
+def test_energy_closes_by_place_and_the_log_is_that_of_the_motion_and_of_the_file(rubbed, drop, tmp_path):
     assert drop.certificate.energy_residual < 1e-6 * drop.certificate.energy_scale
     found = losses(build_drop_model(rubbed, "quick"), drop)
     assert found.total == pytest.approx(
@@ -58,9 +48,6 @@ def test_energy_closes_by_place(rubbed, drop):
     )
     logged = float(np.sum(drop.contacts_at("seal").dissipated_energy))
     assert 0.0 < found.rubbing == pytest.approx(logged, rel=1e-3)
-
-
-def test_the_log_is_that_of_the_motion(rubbed, drop):
     (use,) = clearance_uses(rubbed, drop)
     radius = np.linalg.norm(drop.at_nodes([use.node])[:, 0], axis=-1)
     log = use.contacts
@@ -70,14 +57,26 @@ def test_the_log_is_that_of_the_motion(rubbed, drop):
     for start, end in zip(log.start, log.end, strict=True):
         inside |= (drop.time > start) & ~(drop.time >= end)
     assert np.array_equal(inside, radius > use.gap)
+    drop.save(tmp_path / "drop.h5")
+    again = load_result(tmp_path / "drop.h5")
+    assert again.further_names == ("seal",)
+    assert np.array_equal(again.contacts_at("seal").impulse, drop.contacts_at("seal").impulse)
+    assert np.array_equal(again.contacts.impulse, drop.contacts.impulse)
 
 
-def test_a_housing_out_of_reach_changes_nothing():
+def test_a_housing_out_of_reach_changes_nothing_and_one_in_reach_is_said(rubbed, drop):
     plain = simulate_drop(loads_machine(TEXT), CASE)
     far = simulate_drop(sealed(RUB, gap=5e-3), CASE)
     assert np.array_equal(plain.displacement, far.displacement)
     assert np.array_equal(plain.contacts.impulse, far.contacts.impulse)
     assert len(far.contacts_at("seal")) == 0
+    (said,) = [one for one in simulate_summary(drop, rubbed).verdict if one.text.startswith("seal")]
+    assert said.level == "bad"
+    assert "touches the housing" in said.text and " N at most" in said.text
+    entry = simulation_numbers(drop, rubbed)["clearances"]["seal"]
+    assert entry["contacts"] == len(drop.contacts_at("seal"))
+    assert entry["peak_force_N"] == np.max(drop.contacts_at("seal").peak_force)
+    assert entry["first_contact_s"] == drop.contacts_at("seal").start[0]
 
 
 def test_friction_brakes_the_rotor_and_a_mirrored_drop_is_the_mirror(rubbed):
@@ -88,25 +87,14 @@ def test_friction_brakes_the_rotor_and_a_mirrored_drop_is_the_mirror(rubbed):
     assert abs(one.speed[-1]) < smooth.speed[-1]
 
 
-def test_page_and_document_say_what_happens(rubbed, drop):
-    (said,) = [one for one in simulate_summary(drop, rubbed).verdict if one.text.startswith("seal")]
-    assert said.level == "bad"
-    assert "touches the housing" in said.text and " N at most" in said.text
-    entry = simulation_numbers(drop, rubbed)["clearances"]["seal"]
-    assert entry["contacts"] == len(drop.contacts_at("seal"))
-    assert entry["peak_force_N"] == np.max(drop.contacts_at("seal").peak_force)
-    assert entry["first_contact_s"] == drop.contacts_at("seal").start[0]
-
-
 def test_a_stop_is_logged_and_told_with_its_force():
     def stopped(gap):
         mount = f'mount = [{{ kind = "stop", gap = "{gap} um" }}]'
         machine = loads_machine(TEXT.replace(HEAD, f"{HEAD}\n{mount}"))
         drop = simulate_drop(machine, CASE)
         (use,) = clearance_uses(machine, drop)
-        (said,) = [
-            one for one in simulate_summary(drop, machine).verdict if one.text.startswith("DE: the mount")
-        ]
+        verdict = simulate_summary(drop, machine).verdict
+        (said,) = [one for one in verdict if one.text.startswith("DE: the mount")]
         return machine, drop, use, said, simulation_numbers(drop, machine)["stops"]["DE"]
 
     machine, drop, use, said, entry = stopped(8)
@@ -117,23 +105,13 @@ def test_a_stop_is_logged_and_told_with_its_force():
     pressed = f"{1e6 * (use.travel - use.gap):.3g} µm"
     assert said.level == "warning" and "reached its stop at 8.00 µm" in said.text
     assert f"it pressed it by {pressed}." in said.text and "%" not in said.text
-    content = simulate_summary(drop, machine)
-    assert content.verdict[1].text == said.text
-    figures = {figure.label: figure for figure in content.cards[1].figures}
+    figures = {figure.label: figure for figure in simulate_summary(drop, machine).cards[1].figures}
     assert figures["Peak force on the stop"].value.value == use.peak_force
     assert entry["contacts"] == len(use.contacts) and entry["travel_over_gap"] == use.share
     assert len(drop.contacts) == len(drop.contacts.of_bearing(0)) + len(drop.contacts.of_bearing(1))
     *_, use, said, entry = stopped(500)
     assert said.level == "good" and "never reaches its stop" in said.text
     assert entry["contacts"] == 0 and entry["peak_force_N"] == 0.0
-
-
-def test_further_contacts_are_saved(drop, tmp_path):
-    drop.save(tmp_path / "drop.h5")
-    again = load_result(tmp_path / "drop.h5")
-    assert again.further_names == ("seal",)
-    assert np.array_equal(again.contacts_at("seal").impulse, drop.contacts_at("seal").impulse)
-    assert np.array_equal(again.contacts.impulse, drop.contacts.impulse)
 
 
 def test_the_contact_is_written_and_varied_by_name(rubbed):
@@ -148,14 +126,6 @@ def test_the_contact_is_written_and_varied_by_name(rubbed):
     assert float(rubbed.clearances[0].radius) == 0.5 * outer
 
 
-def test_an_estimate_of_such_a_machine_is_refused():
-    text = f'[[clearances]]\nname = "seal"\nnode = 9\ngap = "1 mm"\n{RUB}\n'
-    machine = loads_machine(machine_text(example_machine("lp400")) + text)
-    record = read_record(example_record_path("lp400_drop_060"), machine)
-    with pytest.raises(RecordError, match=r"clearance 'seal' of the machine .* has a 'stiffness'.* Leave it"):
-        read_evidence(build_drop_model(machine, "quick"), record)
-
-
 @pytest.mark.parametrize(
     ("line", "message"),
     [
@@ -168,8 +138,5 @@ def test_an_estimate_of_such_a_machine_is_refused():
 def test_contacts_that_cannot_be_are_refused(line, message):
     with pytest.raises(MachineFileError, match=message):
         sealed(line)
-
-
-def test_a_seal_below_the_air_gap_is_refused():
     with pytest.raises(MachineFileError, match=r"'seal' .* is used up before the rotor reaches"):
         sealed(RUB, gap=50e-6)

@@ -1,28 +1,24 @@
 """Lines of synthetic coast-downs are found where they are and named rightly or not at all."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.ndimage import binary_closing
-from tests.unit.spectrum.synthetic import CoastDown
+from tests.unit.spectrum.synthetic import CoastDown, found_line
 
 from rotordrop.errors import RecordError
 from rotordrop.series import closed
-from rotordrop.spectrum._found_line import FoundLine, path_range
+from rotordrop.spectrum._found_line import path_range
 from rotordrop.spectrum.candidates import (
-    Candidate,
     mains_candidates,
     mode_candidate,
     order_candidates,
     pendulum_candidate,
 )
-from rotordrop.spectrum.detection import median_of_known
-from rotordrop.spectrum.line_settings import LineSettings
-from rotordrop.spectrum.lines import Line, find_lines
+from rotordrop.spectrum.detection import LineSettings, median_of_known
+from rotordrop.spectrum.lines import find_lines
 
 SETTINGS = LineSettings(highest_frequency=450.0)
 AIR_GAP = 285e-6
@@ -32,11 +28,11 @@ KNOWN = (*order_candidates(), *mains_candidates(), pendulum_candidate("pendulum"
 class Drawn:
     """A coast-down with lines drawn at random, and the truth about them."""
 
-    def __init__(self, seed: int, *, unbalance: float, whirl: bool) -> None:
+    def __init__(self, seed, *, unbalance, whirl):
         self.random = np.random.default_rng(1000 + seed)
         self.down = CoastDown(seed=seed)
-        self.names: dict[float, str | None] = {}
-        self.candidates: list[Candidate] = list(KNOWN)
+        self.names = {}
+        self.candidates = list(KNOWN)
         self._taken = [29, 58, 87, 116, 145, *range(50, 301, 50), *range(60, 361, 60)]
         floor = self.down.floor()
         growth = self.random.choice([0.0, 1.0, 2.0])
@@ -57,36 +53,29 @@ class Drawn:
         if self.whirl is not None:
             self.down.add_whirl(self.whirl, 250e-6, 0.3, 1.5)
 
-    def _free(self) -> float:
+    def _free(self):
         while True:
             frequency = self.random.uniform(12.0, 420.0)
             if min(abs(frequency - taken) for taken in self._taken) > 6.0:
                 self._taken.append(frequency)
                 return frequency
 
-    def _steady(self, frequency: float, decades: float, name: str | None) -> None:
+    def _steady(self, frequency, decades, name):
         amplitude = self.down.floor() * 10 ** self.random.uniform(0.6, decades)
         decay = self.random.choice([15.0, 40.0, math.inf])
         self.down.add_steady(frequency, amplitude, decay_time=decay)
         self.names[frequency] = name
 
-    def truth(self) -> list[tuple[str, float]]:
+    def truth(self):
         """Kind and place of every line above three times the floor."""
         least = 3.0 * self.down.floor()
         orders = [("order", k) for k, a in self.down.orders.items() if a >= least]
         return orders + [("steady", f) for f, a in self.down.steady.items() if a >= least]
 
-    def search(self) -> tuple[Line, ...]:
-        return find_lines(
-            {"DE": self.down.xy},
-            self.down.sampling_rate,
-            self.down.recorded(),
-            candidates=self.candidates,
-            air_gap=AIR_GAP,
-            settings=SETTINGS,
-        )
+    def search(self):
+        return self.down.lines(self.down.recorded(), candidates=self.candidates, air_gap=AIR_GAP)
 
-    def right_name(self, line: Line) -> bool:
+    def right_name(self, line):
         """Whether a name is true: it must belong to a line that is there."""
         for k in self.down.orders:
             if line.label == f"{k:g}X":
@@ -101,10 +90,6 @@ class Drawn:
         return k > 0 and abs(line.frequency - k * self.swing) <= 0.3 * k
 
 
-def place(line: Line) -> float | None:
-    return line.order if line.kind == "order" else line.frequency
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["usual", "8 times unbalance", "whirl"])
 def test_lines_are_found_and_none_is_named_wrongly(kind):
@@ -115,7 +100,10 @@ def test_lines_are_found_and_none_is_named_wrongly(kind):
         lines = case.search()
         for what, value in case.truth():
             near = 0.002 * value if what == "order" else 0.5
-            seen = any(line.kind == what and abs(place(line) - value) <= near for line in lines)
+            seen = any(
+                line.kind == what and abs((line.order if what == "order" else line.frequency) - value) <= near
+                for line in lines
+            )
             wanted, found = wanted + 1, found + seen
             missed += [] if seen else [(seed, what, value)]
         wrong = [(line.label, line.frequency) for line in lines if line.named and not case.right_name(line)]
@@ -126,7 +114,7 @@ def test_lines_are_found_and_none_is_named_wrongly(kind):
 
 
 @pytest.fixture(scope="module")
-def typical() -> tuple[CoastDown, tuple[Line, ...]]:
+def typical():
     down = CoastDown(seed=7)
     down.add_order(1.0, 4e-6, growth=2.0)
     down.add_order(1.5, 0.4e-6)
@@ -145,13 +133,13 @@ def typical() -> tuple[CoastDown, tuple[Line, ...]]:
     return down, lines
 
 
-def named(lines: tuple[Line, ...], label: str) -> Line:
+def named(lines, label):
     chosen = [line for line in lines if line.label == label]
     assert len(chosen) == 1, [line.label for line in lines]
     return chosen[0]
 
 
-def test_amplitudes_are_zero_to_peak_in_both_planes(typical):
+def test_amplitudes_drift_and_names_of_a_typical_coast_down(typical):
     _, lines = typical
     rub = named(lines, "1.5X")
     assert rub.amplitude_xy["DE"] == pytest.approx((0.4e-6, 0.28e-6), rel=0.05)
@@ -159,98 +147,57 @@ def test_amplitudes_are_zero_to_peak_in_both_planes(typical):
     assert rub.forward["DE"] == pytest.approx(0.34e-6, rel=0.05)
     assert rub.backward["DE"] == pytest.approx(0.06e-6, rel=0.3)
     assert "sign of rub" in rub.reason
-
-
-def test_pendulum_and_its_harmonic_are_named_with_their_drift(typical):
-    _, lines = typical
     swing = named(lines, "pendulum")
     assert 28.6 < swing.drift[0] < swing.drift[1] < 29.2
     assert swing.path.frequency_at([35.0]) == pytest.approx([29.11], abs=0.05)
     assert named(lines, "pendulum, harmonic 2").frequency == pytest.approx(2.0 * swing.frequency, abs=0.3)
-
-
-def test_hum_stands_still_to_a_hundredth_of_a_hertz(typical):
-    _, lines = typical
     hum = named(lines, "mains hum 50 Hz")
     assert hum.frequency == pytest.approx(50.0, abs=0.01)
     assert hum.width < 0.5
-
-
-def test_a_mode_known_only_roughly_gives_a_question_not_a_name(typical):
-    _, lines = typical
     line = next(line for line in lines if abs(line.frequency - 134.2) < 0.5)
     assert not line.named
     assert line.label == "unnamed (bending mode 1?)"
     assert line.as_json()["candidates"][0]["name"] == "bending mode 1"
 
 
-def test_constant_speed_leaves_the_kind_open():
+def test_constant_speed_leaves_the_kind_open_and_a_broad_line_is_not_called_hum():
+    """Noise in a band about 50 Hz: something is there, but no power grid."""
     down = CoastDown(duration=8.0, time_constant=1e6, seed=3)
     down.add_order(1.0, 5e-6)
-    lines = find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), candidates=KNOWN, settings=SETTINGS)
+    lines = down.lines(candidates=KNOWN)
     line = max(lines, key=lambda one: one.amplitude)
     assert line.kind == "undecided"
     assert not line.named
     assert "1X" in line.label and "mains hum 60 Hz" in line.label
-
-
-def test_noise_alone_has_no_lines():
-    for seed in range(3):
-        down = CoastDown(seed=seed)
-        assert find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), settings=SETTINGS) == ()
-
-
-def test_no_plane_and_unequal_planes_are_refused():
-    with pytest.raises(RecordError, match="no plane given"):
-        find_lines({}, 1000.0, None)
-
-
-def test_a_broad_line_is_not_called_hum():
-    """Noise in a band about 50 Hz: something is there, but no power grid."""
     down = CoastDown(seed=11)
     wander = np.cumsum(down.random.standard_normal(down.time.size)) * 0.04
     down.xy[:, 0] += 2e-6 * np.cos(2.0 * math.pi * 50.0 * down.time + wander)
-    lines = find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), candidates=KNOWN, settings=SETTINGS)
+    lines = down.lines(candidates=KNOWN)
     assert any(abs(line.frequency - 50.0) < 3.0 for line in lines)
     assert not any("mains" in line.label for line in lines if line.named)
 
 
-def test_medians_leave_out_what_is_unknown():
-    values = np.random.default_rng(0).random((9, 50, 2))
-    values[values < 0.4] = np.nan
-    assert median_of_known(values) == pytest.approx(np.nanmedian(values, axis=0), nan_ok=True)
-
-
-def test_a_brief_line_has_a_frequency_only_while_it_is_there() -> None:
-    """Frames beside it see no line; a line of the whole signal keeps its frequency to both ends."""
+def test_noise_and_brief_lines_are_told_as_what_they_are():
+    for seed in range(3):
+        down = CoastDown(seed=seed)
+        assert down.lines() == ()
+    with pytest.raises(RecordError, match="no plane given"):
+        find_lines({}, 1000.0, None)
+    # Frames beside it see no line; a line of the whole signal keeps its frequency to both ends.
     time = np.linspace(0.0, 40.0, 401)
-    line = FoundLine(
-        kind="steady",
-        frequency=92.0,
-        frequency_error=0.1,
-        order=None,
-        order_error=None,
-        drift=(0.0, 0.0),
-        width=0.5,
-        amplitude=np.zeros(2),
-        forward=np.zeros(1),
-        backward=np.zeros(1),
-        floor=1e-8,
-        ratio=30.0,
-        first_seen=5.0,
-        last_seen=8.0,
-        existence=1.0,
-        time=time,
-        path=np.full(401, 92.0),
-        power=np.zeros(401, dtype=np.float32),
-        brief=True,
-    )
+    line = found_line("steady", 92.0, time, first_seen=5.0, last_seen=8.0, brief=True)
     at = np.array([3.9, 4.1, 6.0, 8.9, 9.1])
     assert line.frequency_at(at) == pytest.approx([np.inf, 92.0, 92.0, 92.0, np.inf])
     assert replace(line, brief=False).frequency_at(at) == pytest.approx(np.full(5, 92.0))
     unit = np.ones((3, 5))
     low, high = path_range(line, np.array([2.0, 6.5, 20.0]), np.full(3, 1.0), unit)
     assert low == pytest.approx([np.inf, 92.0, np.inf]) and high == pytest.approx([np.inf, 92.0, np.inf])
+
+
+def test_medians_leave_out_what_is_unknown():
+    values = np.random.default_rng(0).random((9, 50, 2))
+    values[values < 0.4] = np.nan
+    assert median_of_known(values) == pytest.approx(np.nanmedian(values, axis=0), nan_ok=True)
 
 
 @pytest.mark.parametrize("gap", [1, 2, 7, 40])

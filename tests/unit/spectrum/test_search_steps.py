@@ -1,80 +1,46 @@
 """Steps of the search for lines, each against what is known of its input."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import norm
-from tests.unit.spectrum.synthetic import TURN, CoastDown
+from tests.unit.spectrum.synthetic import TURN, CoastDown, found_line
 
-from rotordrop.spectrum import coast_down, lines
-from rotordrop.spectrum._clock import View
-from rotordrop.spectrum._found_line import FoundLine
+from rotordrop.spectrum import lines
 from rotordrop.spectrum._search import BRIEF, LineSearch
-from rotordrop.spectrum.candidates import (
-    bearing_defect_candidates,
-    mode_candidate,
-    order_candidates,
-    pendulum_candidate,
+from rotordrop.spectrum._views import View
+from rotordrop.spectrum.candidates import bearing_defect_candidates, mode_candidate, pendulum_candidate
+from rotordrop.spectrum.detection import (
+    DetectionSettings,
+    FramePower,
+    LineSettings,
+    clearest_peak,
+    half_power_width,
 )
-from rotordrop.spectrum.coast_down_law import inflation
-from rotordrop.spectrum.detection import DetectionSettings, clearest_peak, half_power_width
-from rotordrop.spectrum.indentation import find_settling
-from rotordrop.spectrum.line_settings import LineSettings
-from rotordrop.spectrum.line_spectra import FramePower
 from rotordrop.spectrum.lines import SWING_ERROR, find_lines, harmonics_of, name_lines
 from rotordrop.spectrum.naming import LineEvidence, density_of
+from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
 SETTINGS = LineSettings(highest_frequency=450.0)
 
 
-def search(signal: Any, rate: float, profile: Any = None, settings: LineSettings = SETTINGS) -> LineSearch:
+def search(signal, rate, profile=None, settings=SETTINGS):
     return LineSearch(signal, rate, profile, start_time=0.0, settings=settings, highest_frequency=450.0)
-
-
-def taken(kind: str, frequency: float, ratio: float, time: Any) -> Any:
-    """A line that was taken out, at a frequency that stands still."""
-    return FoundLine(
-        kind=kind,  # type: ignore[arg-type]
-        frequency=frequency,
-        frequency_error=0.01,
-        order=None,
-        order_error=None,
-        drift=(frequency, frequency),
-        width=0.0,
-        amplitude=np.zeros(2),
-        forward=np.zeros(1),
-        backward=np.zeros(1),
-        floor=1e-8,
-        ratio=ratio,
-        first_seen=float(time[0]),
-        last_seen=float(time[-1]),
-        existence=0.999,
-        time=time,
-        path=np.full(len(time), frequency),
-        power=np.zeros(len(time), dtype=np.float32),
-        brief=False,
-    )
 
 
 @pytest.mark.parametrize("length", [0.25, 4.0])
 @pytest.mark.parametrize(("kind", "widths"), [("steady", 2.0), ("order", None)])
-def test_no_line_is_looked_for_where_one_was_taken_out(
-    length: float, kind: str, widths: float | None
-) -> None:
+def test_no_line_is_looked_for_where_one_was_taken_out(length, kind, widths):
     """A steady line blocks two widths of a frame or of the extraction, whichever is wider; an order that
     passes leaves what its strength leaves."""
     seeker = search(np.zeros((8000, 2)), 1000.0)
     place = np.arange(0.0, 200.0, 0.05)
     frames = FramePower(time=np.array([2.0, 4.0]), coordinate=place, power=np.ones((2, len(place), 2)))
     view = View(frames=frames, of_orders=False, length=np.full(2, length), share=1.0)
-    line = taken(kind, 100.0, 1e4, seeker._clock.time)
+    line = found_line(kind, 100.0, seeker._clock.time, ratio=1e4)
     seeker.found = [line]
     free = seeker._free(view)
     blocked = place[~free[0] & (place > 50.0)]
@@ -84,7 +50,7 @@ def test_no_line_is_looked_for_where_one_was_taken_out(
     assert np.array_equal(free[0], free[1]) and not free[0][place < SETTINGS.lowest_frequency].any()
 
 
-def test_another_kind_of_line_is_better_only_if_it_holds_more_power() -> None:
+def test_another_kind_of_line_is_better_only_if_it_holds_more_power():
     """The rival has 1.35 times the amplitude half of the time: nine tenths of the power."""
     down = CoastDown(duration=4.0, time_constant=40.0)
     seeker = search(down.xy, down.sampling_rate, down.exact())
@@ -93,14 +59,14 @@ def test_another_kind_of_line_is_better_only_if_it_holds_more_power() -> None:
     own, half = np.ones((count, 1), dtype=complex), np.arange(count) % 2 == 0
     assert 1.35**2 / 2.0 < 1.0 < 1.5**2 / 2.0
     for amplitude, better in ((1.35, False), (1.5, True)):
-        rival: Any = SimpleNamespace(value=np.where(half[:, None], amplitude, 0.0).astype(complex))
-        seeker._clock.extract = lambda *_, given=rival: given  # type: ignore[method-assign]
-        view: Any = SimpleNamespace(of_orders=False)
-        envelope: Any = SimpleNamespace(value=own)
+        rival = SimpleNamespace(value=np.where(half[:, None], amplitude, 0.0).astype(complex))
+        seeker._clock.extract = lambda *_, given=rival: given
+        view = SimpleNamespace(of_orders=False)
+        envelope = SimpleNamespace(value=own)
         assert seeker._better_otherwise(envelope, view, 0.5, spoken) == better
 
 
-def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is() -> None:
+def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is():
     down = CoastDown(duration=20.0, noise=0.1e-6)
     down.xy[:, 0] += 2e-6 * np.cos(TURN * 134.2 * down.time)
     down.add_whirl(77.0, 100e-6, 15.0, 16.5)
@@ -114,14 +80,12 @@ def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is() -> None:
 
 
 @pytest.mark.parametrize(("steady", "multiple"), [(200.0, 1.0), (200.0, -2.0), (20.0, -1.0)])
-def test_a_sum_or_difference_of_a_steady_line_and_an_order_is_found_on_its_path(
-    steady: float, multiple: float
-) -> None:
+def test_a_sum_or_difference_of_a_steady_line_and_an_order_is_found_on_its_path(steady, multiple):
     """As a bearing with play makes them; a difference below zero is seen at its positive frequency."""
     down = CoastDown(duration=14.0, time_constant=20.0, noise=0.05e-6)
     phase = TURN * steady * down.time + multiple * down.angle + 0.3
     down.xy[:, 0] += 3e-6 * np.cos(TURN * steady * down.time) + 0.5e-6 * np.cos(phase)
-    found = find_lines({"DE": down.xy}, down.sampling_rate, down.exact(), settings=SETTINGS)
+    found = down.lines()
     (line,) = (one for one in found if one.kind == "combination")
     path = np.abs(steady + multiple * down.speed / TURN)
     assert line.frequency == pytest.approx(path.mean(), rel=0.1)  # weighted by power
@@ -132,11 +96,11 @@ def test_a_sum_or_difference_of_a_steady_line_and_an_order_is_found_on_its_path(
     assert partner.frequency == pytest.approx(steady, abs=0.02)
 
 
-def test_a_signal_keeps_its_times_when_its_beginning_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_keeps_its_times_when_its_beginning_is_skipped(monkeypatch):
     """A slow ramp is its own clock: what is searched begins at the time it is said to begin."""
-    seen: list[tuple[float, float]] = []
+    seen = []
 
-    def looked_at(signal: Any, rate: float, profile: Any, *, start_time: float, **_: Any) -> Any:
+    def looked_at(signal, rate, profile, *, start_time, **_):
         seen.append((float(signal[0, 0]), start_time))
         assert (signal[200, 0] - signal[0, 0]) * rate == pytest.approx(200.0, rel=1e-3)
         return SimpleNamespace(run=list)
@@ -149,7 +113,7 @@ def test_a_signal_keeps_its_times_when_its_beginning_is_skipped(monkeypatch: pyt
     assert first == pytest.approx(start, abs=5e-5)  # a sample lasts 0.2 ms
 
 
-def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch() -> None:
+def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch():
     dice = np.random.default_rng(5)
     power = dice.exponential(1e-16, size=(40, 400, 2))
     power[30:, 200, 1] = 4e-14
@@ -165,7 +129,7 @@ def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch() -> None:
 
 
 @pytest.mark.parametrize("line", [1, 2, 3, 10])
-def test_the_width_of_a_triangle_is_half_its_foot(line: int) -> None:
+def test_the_width_of_a_triangle_is_half_its_foot(line):
     """Linear between its lines, so exact wherever it stands; cut off at an edge, as wide as it is seen."""
     power = np.maximum(1.0 - np.abs(np.arange(20.0) - line) / 3.2, 0.0)
     left = min(1.6, line)
@@ -173,53 +137,18 @@ def test_the_width_of_a_triangle_is_half_its_foot(line: int) -> None:
     assert half_power_width(power[::-1], 19 - line) == pytest.approx(left + 1.6)
 
 
-def test_a_harmonic_is_looked_for_where_the_swing_was_while_the_line_was_strong() -> None:
+def test_a_harmonic_is_looked_for_where_the_swing_was_while_the_line_was_strong():
     """Weighted by power: at 10 Hz with three times the amplitude, as long at 20 Hz."""
-    swing: Any = SimpleNamespace(path=np.array([10.0] * 50 + [20.0] * 50), frequency_error=0.01)
-    line: Any = SimpleNamespace(power=np.repeat(np.float32([9e-12, 1e-12]), 50))
+    swing = SimpleNamespace(path=np.array([10.0] * 50 + [20.0] * 50), frequency_error=0.01)
+    line = SimpleNamespace(power=np.repeat(np.float32([9e-12, 1e-12]), 50))
     first, *_ = harmonics_of(line, [("pendulum", swing), ("itself", line)])
     assert first.value == pytest.approx(2.0 * 11.0)
     assert first.tolerance >= 2.0 * SWING_ERROR
-    silent: Any = SimpleNamespace(power=np.zeros(100, dtype=np.float32))
+    silent = SimpleNamespace(power=np.zeros(100, dtype=np.float32))
     assert harmonics_of(silent, [("pendulum", swing)]) == []
 
 
-def test_lines_of_another_plane_are_no_neighbours_of_an_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    down = CoastDown(duration=6.0)
-    signal = coast_down.CoastDownSignal(
-        planes={"DE": down.xy, "NDE": down.xy},
-        air_gap={"DE": 285e-6, "NDE": 285e-6},
-        sampling_rate=down.sampling_rate,
-        start_time=0.0,
-        profile=down.exact(),
-        speed_time=None,
-        speed=None,
-        recorded=True,
-    )
-    given: list[Any] = []
-
-    def tracked(*_: Any, steady_lines: Any, **__: Any) -> Any:
-        given.append(list(steady_lines))
-        return None
-
-    monkeypatch.setattr(coast_down, "track_orders", tracked)
-    monkeypatch.setattr(coast_down, "find_resonances", lambda *_, **__: ())
-    kinds = (("here", "steady", "DE"), ("there", "steady", "NDE"), ("sum", "combination", "DE"))
-    known: Any = [SimpleNamespace(path=p, kind=k, forward={plane: 1e-6}) for p, k, plane in kinds]
-    known.append(SimpleNamespace(path="1X", kind="order", forward={"DE": 1e-6}))
-    settled = find_settling(down.xy, down.sampling_rate, air_gap=285e-6)
-    coast_down._plane(signal, "DE", down.xy, settled, known, (), coast_down.WaterfallChoice())
-    assert given == [["here", "sum"]]
-
-
-def test_orders_are_explained_as_what_they_are() -> None:
-    reasons = {candidate.name: candidate.reason for candidate in order_candidates(4)}
-    assert reasons["1X"] == "unbalance and runout"
-    assert all("harmonic of the rotor speed" in reasons[f"{k}X"] for k in (2, 3, 4))
-    assert all("rub" in reasons[f"{k + 0.5:g}X"] for k in range(4))
-
-
-def test_defect_frequencies_are_those_published_for_a_6205() -> None:
+def test_defect_frequencies_are_those_published_for_a_6205():
     """Nine balls, pitch 1.537 in, balls 0.3126 in: Case Western Reserve University, bearing data center."""
     published = {
         "cage": 0.39828,
@@ -227,17 +156,9 @@ def test_defect_frequencies_are_those_published_for_a_6205() -> None:
         "inner-race defect": 5.4152,
         "ball defect": 4.7135,
     }
-    found = {
-        candidate.name: candidate
-        for candidate in bearing_defect_candidates(
-            "DE",
-            ball_count=9,
-            ball_diameter=0.3126,
-            pitch_diameter=1.537,
-            contact_angle=0.0,
-            race_speed_ratio=(1.0, 1.0),
-        )
-    }
+    balls = {"ball_count": 9, "ball_diameter": 0.3126, "pitch_diameter": 1.537, "contact_angle": 0.0}
+    candidates = bearing_defect_candidates("DE", **balls, race_speed_ratio=(1.0, 1.0))
+    found = {candidate.name: candidate for candidate in candidates}
     for what, value in published.items():
         assert found[f"DE {what}"].value == pytest.approx(value, rel=2e-3), what
     outer, inner = found["DE outer-race defect"].value, found["DE inner-race defect"].value
@@ -245,7 +166,7 @@ def test_defect_frequencies_are_those_published_for_a_6205() -> None:
     assert outer == pytest.approx(9.0 * found["DE cage"].value)
 
 
-def test_residuals_that_follow_each_other_count_for_fewer() -> None:
+def test_residuals_that_follow_each_other_count_for_fewer():
     """Of a first-order process of correlation 0.6, one in four; independent or alternating ones all."""
     dice = np.random.default_rng(2)
     noise = dice.standard_normal(200_000)
@@ -260,25 +181,16 @@ def test_residuals_that_follow_each_other_count_for_fewer() -> None:
 
 
 @pytest.mark.parametrize("offset", [-1.4, -0.9, 0.0, 0.3, 1.1])
-def test_a_candidate_is_an_even_chance_within_its_tolerance_seen_through_the_error(offset: float) -> None:
+def test_a_candidate_is_an_even_chance_within_its_tolerance_seen_through_the_error(offset):
     candidate = mode_candidate("mode", 100.0, 1.0)
-    line = LineEvidence(
-        kind="steady",
-        frequency=100.0 + offset,
-        frequency_error=0.4,
-        order=0.0,
-        order_error=math.inf,
-        roundness=0.0,
-        radius=1e-6,
-        plane="DE",
-        band=400.0,
-        order_band=20.0,
-    )
+    seen = {"kind": "steady", "frequency": 100.0 + offset, "frequency_error": 0.4, "order": 0.0}
+    seen |= {"order_error": math.inf, "roundness": 0.0, "radius": 1e-6, "plane": "DE"}
+    line = LineEvidence(**seen, band=400.0, order_band=20.0)
     expected = (norm.cdf((offset + 1.0) / 0.4) - norm.cdf((offset - 1.0) / 0.4)) / 2.0
     assert density_of(line, candidate) == pytest.approx(expected, rel=1e-9)
 
 
-def test_the_average_over_frames_is_that_of_the_power() -> None:
+def test_the_average_over_frames_is_that_of_the_power():
     """Half of the frames at 3 µm, half at 4 µm."""
     rate, points = 20000.0, 2048
     time = np.arange(8 * points) / rate
@@ -290,19 +202,14 @@ def test_the_average_over_frames_is_that_of_the_power() -> None:
     assert found.average()[50] == pytest.approx(math.sqrt(0.5 * (9.0 + 16.0)) * 1e-6, rel=1e-9)
 
 
-def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide() -> None:
+def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide():
     """In two seconds the speed hardly falls: no line is known to stand still, yet 57.4 Hz is 2 × 28.7 Hz."""
     time = np.arange(0.0, 2.0, 1e-3)
+    turning = np.array([5e-5])
+    strong = {"forward": turning, "backward": turning, "power": np.ones(len(time), np.float32)}
     swing, twice = (
-        replace(
-            taken("undecided", frequency, 1e3, time),
-            order=frequency / 60.0,
-            order_error=0.003,
-            forward=np.array([5e-5]),
-            backward=np.array([5e-5]),
-            power=np.ones(len(time), dtype=np.float32),
-        )
-        for frequency in (28.7, 57.4)
+        found_line("undecided", hertz, time, ratio=1e3, order=hertz / 60.0, order_error=0.003, **strong)
+        for hertz in (28.7, 57.4)
     )
     known = (pendulum_candidate("pendulum", 28.3, 29.8),)
     names = [line.label for line in name_lines([("DE", swing), ("DE", twice)], known, 285e-6, (450.0, 20.0))]

@@ -1,56 +1,59 @@
 """A drop model with a start in contact, and the bundled record as an estimation problem."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
-from rotordrop.evidence.evidence import Evidence, read_evidence
-from rotordrop.machine import Machine
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import read_record
-from rotordrop.rotor.parameters import DropModel, build_drop_model
-from rotordrop.track.problem import DropProblem
-from rotordrop.track.smoother import Forward, PassSettings, Smoothed, forward, smooth
+from rotordrop import build_drop_model, example_record_path, read_record
+from rotordrop.evidence.evidence import read_evidence
+from rotordrop.track.smoother import PassSettings, forward, smooth
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem
 
 
 @pytest.fixture(scope="session")
-def model(lp400: Machine) -> DropModel:
+def model(lp400):
     """It with 6 + 2 modes per plane."""
     return build_drop_model(lp400, COARSE_BASIS)
 
 
 @pytest.fixture(scope="session")
-def prepared(lp400: Machine) -> Evidence:
+def prepared(lp400):
     """The bundled record with its power-off and its settled tail."""
     record = read_record(example_record_path("lp400_drop_060"), lp400)
     tail = read_record(example_record_path("lp400_drop_060_tail"), lp400)
     return read_evidence(build_drop_model(lp400), record, tail, name="drop_060")
 
 
-@pytest.fixture(scope="session")
-def flight(model: DropModel, prepared: Evidence) -> DropProblem:
-    """The first 3 ms of it: free flight, without any contact."""
-    return drop_problem(model, prepared, until=0.003)
+def flight_of(machine, prepared):
+    """The first 3 ms of a record of a machine: free flight, without any contact."""
+    return drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+
+
+def place_of(problem, path):
+    """Where an unknown stands in the estimate."""
+    return problem.n_dynamic + [unknown.path for unknown in problem.unknowns].index(path)
 
 
 @pytest.fixture(scope="session")
-def impacts(model: DropModel, prepared: Evidence) -> DropProblem:
+def flight(lp400, prepared):
+    return flight_of(lp400, prepared)
+
+
+@pytest.fixture(scope="session")
+def impacts(model, prepared):
     """The first 25 ms of it, with the first impacts at both bearings."""
     return drop_problem(model, prepared, until=0.025)
 
 
 @pytest.fixture(scope="session")
-def impacts_filtered(impacts: DropProblem) -> Forward:
+def impacts_filtered(impacts):
     return forward(impacts, PassSettings(impulse=3e-3, share=0.03))
 
 
 @pytest.fixture(scope="session")
-def impacts_smoothed(impacts_filtered: Forward) -> Smoothed:
+def impacts_smoothed(impacts_filtered):
     return smooth(impacts_filtered)
 
 
 @pytest.fixture
-def random() -> np.random.Generator:
+def random():
     return np.random.default_rng(5)

@@ -1,23 +1,19 @@
 """Filter and smoother against plain textbook ones, and what must hold through impacts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rotordrop.arrays import Array
+from rotordrop.errors import IdentificationError
 from rotordrop.track import _propagation as P
 from rotordrop.track import smoother
-from rotordrop.track._covariance import is_covariance, pack, unpack
-from rotordrop.track.calibration import filtered_chain, handed_on, smoothed_chain, smoothed_means_of_chain
-from rotordrop.track.problem import WATCHED, DropProblem, private_copy
+from rotordrop.track._arrays import is_covariance, pack, unpack
+from rotordrop.track.calibration import filtered_chain, prior_of_next, smoothed_chain, smoothed_means_of_chain
+from rotordrop.track.problem import WATCHED, private_copy
 from rotordrop.track.smoother import (
     PassSettings,
-    Smoothed,
-    Storage,
     fastest_frequency,
     forward,
     smooth,
@@ -30,7 +26,7 @@ SETTINGS = PassSettings(impulse=1e-3, share=0.01)
 class PlainFilter:
     """Kalman filter as in textbooks: full matrices, readings one by one, Joseph form, nothing clever."""
 
-    def __init__(self, problem: DropProblem, settings: PassSettings = SETTINGS) -> None:
+    def __init__(self, problem, settings=SETTINGS):
         self.problem = problem
         dt = float(problem.time[1] - problem.time[0])
         self.numbers = settings.for_sampling(dt, fastest_frequency(problem))
@@ -128,27 +124,27 @@ class PlainFilter:
 
 
 @pytest.fixture(scope="module")
-def plain(flight: DropProblem) -> PlainFilter:
+def plain(flight):
     return PlainFilter(flight).run()
 
 
 @pytest.fixture(scope="module")
-def filtered(flight: DropProblem):
+def filtered(flight):
     return forward(flight, SETTINGS)
 
 
-def deviations_of(covariance: np.ndarray) -> np.ndarray:
+def deviations_of(covariance):
     """Standard deviations; one for what is known exactly (the rotor angle at the beginning)."""
     variance = np.diag(covariance)
     return np.sqrt(np.where(variance > 0.0, variance, 1.0))
 
 
-def in_deviations(difference: np.ndarray, covariance: np.ndarray) -> float:
+def in_deviations(difference, covariance):
     """Largest difference in standard deviations of the estimate."""
     return float(np.max(np.abs(difference) / deviations_of(covariance)))
 
 
-def follows(filtered, plain) -> None:
+def follows(filtered, plain):
     """Whether means and covariances of a filter are those of the plain one."""
     for i in range(filtered.done):
         assert in_deviations(filtered.means[i] - plain.means[i], plain.covariances[i]) < 1e-6
@@ -157,7 +153,7 @@ def follows(filtered, plain) -> None:
         assert np.abs(difference).max() < 1e-6
 
 
-def smooths(smoothed, plain) -> None:
+def smooths(smoothed, plain):
     """Whether those of a smoother are those of the plain one."""
     means, covariances = plain.smoothed()
     for i in range(0, len(means), 5):
@@ -167,27 +163,21 @@ def smooths(smoothed, plain) -> None:
         assert np.abs(difference).max() < 1e-3
 
 
-def test_the_forward_filter_is_the_plain_one(flight, plain, filtered):
+def test_forward_and_backward_pass_are_the_plain_filter_and_smoother(flight, plain, filtered):
     assert filtered.done == len(flight.time) == 60
     follows(filtered, plain)
     innovations, sizes = np.array(plain.innovations).T
     used = np.isfinite(filtered.innovations)
     np.testing.assert_allclose(filtered.innovations[used], innovations, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(filtered.innovation_variances[used], sizes, rtol=1e-6)
-
-
-def test_likelihood_and_size_are_those_of_the_innovations(plain, filtered):
     innovations, sizes = np.array(plain.innovations).T
     expected = 0.5 * np.sum(innovations**2 / sizes + np.log(sizes))
     assert filtered.negative_log_likelihood == pytest.approx(expected, rel=1e-9)
     assert filtered.nis == pytest.approx(np.mean(innovations**2 / sizes), rel=1e-6)
-
-
-def test_the_backward_pass_is_the_plain_smoother(flight, plain, filtered):
     smooths(smooth(filtered, kept=range(filtered.done)), plain)
 
 
-def with_slow_noise(problem: DropProblem) -> DropProblem:
+def with_slow_noise(problem):
     """The problem with two sensors whose noise is not white, one of them with two parts."""
     variances, whole = np.array([4e-13, 9e-14, 1e-13]), problem.variances.copy()
     form = problem.sensor_form._replace(
@@ -228,7 +218,7 @@ def test_a_packed_covariance_comes_back_whole(random):
     np.testing.assert_array_equal(back, whole)
 
 
-def all_of(smoothed: Smoothed) -> list[np.ndarray]:
+def all_of(smoothed):
     """Everything that a backward pass gives."""
     covariances = [smoothed.covariance(sample) for sample in smoothed.kept]
     return [
@@ -242,15 +232,13 @@ def all_of(smoothed: Smoothed) -> list[np.ndarray]:
 
 
 @pytest.mark.parametrize("length", [2, 7, 29, 58, 59, 60])
-def test_a_pass_in_stretches_has_the_bits_of_a_whole_one(flight, filtered, length, monkeypatch):
-    """Also where a stretch ends at the last sample, or one before it."""
+def test_a_pass_in_segments_has_the_bits_of_a_whole_one(flight, filtered, length, monkeypatch):
     kept = (0, length, 2 * length - 1, 59)
     kept = tuple(sample for sample in kept if sample < 60)
     whole = smooth(filtered, watched=flight.watched, kept=kept)
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
-    storage = Storage()
-    parts = forward(flight, SETTINGS, storage=storage)
-    assert len(parts.starts) == math.ceil(59 / length)
+    monkeypatch.setattr(smoother, "_segment_length", lambda _: length)
+    parts = forward(flight, SETTINGS)
+    assert len(parts.checkpoints) == math.ceil(59 / length)
     for one, other in (
         (parts.means, filtered.means),
         (parts.innovations, filtered.innovations),
@@ -258,21 +246,20 @@ def test_a_pass_in_stretches_has_the_bits_of_a_whole_one(flight, filtered, lengt
         (parts.covariance(length - 1), filtered.covariance(length - 1)),
     ):
         np.testing.assert_array_equal(one, other)
-    for again in (storage, None, storage):  # at hand, filtered again, and where another stretch is at hand
-        found = smooth(parts, watched=flight.watched, kept=kept, storage=again)
-        for one, other in zip(all_of(found), all_of(whole), strict=True):
-            np.testing.assert_array_equal(one, other)
+    for one, other in zip(
+        all_of(smooth(parts, watched=flight.watched, kept=kept)), all_of(whole), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("length", [10, 12, 24, 25])
 def test_a_pass_that_loses_the_drop_is_smoothed_to_where_it_got(flight, length, monkeypatch):
-    """Also where it is lost with the first sample of a stretch."""
     readings = flight.readings.copy()
     readings[25] = 1e3
     far = replace(flight, readings=readings)
     whole = forward(far, SETTINGS)
     assert whole.done == 25
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    monkeypatch.setattr(smoother, "_segment_length", lambda _: length)
     parts = forward(far, SETTINGS)
     assert parts.done == 25
     np.testing.assert_array_equal(parts.last, whole.last)
@@ -281,46 +268,24 @@ def test_a_pass_that_loses_the_drop_is_smoothed_to_where_it_got(flight, length, 
 
 
 def test_memory_for_the_smoother_does_not_grow_with_the_drop(flight, monkeypatch):
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: 5)
-    used = {}
-    for samples in (20, 60):
-        chosen = slice(0, samples)
-        part = replace(
-            flight, time=flight.time[chosen], readings=flight.readings[chosen], speed=flight.speed[chosen]
-        )
-        storage = Storage(900_000)
-        smooth(forward(part, SETTINGS, storage=storage), storage=storage)
-        used[samples] = storage.size
-    assert used[20] == used[60] <= 900_000
+    monkeypatch.setattr(smoother, "_segment_length", lambda _: 5)
+    passes = [forward(flight, SETTINGS, samples=samples, memory=900_000) for samples in (20, 60)]
+    assert [list(one.segments) for one in passes] == [[0, 1, 2, 3], [7, 8, 9, 10, 11]]
+    assert all(0 < one.size_of_segments <= 900_000 for one in passes)
 
 
-def test_a_pass_in_the_memory_of_another_is_the_same(flight, filtered):
-    """Shorter, then whole: nothing of the pass before is left in what the next one gives."""
-    storage = Storage()
-    first = forward(flight, SETTINGS, samples=25, storage=storage)
-    again = forward(flight, SETTINGS, storage=storage)
-    shorter = forward(flight, SETTINGS, samples=25, storage=storage)
-    for one, count in ((first, 25), (shorter, 25)):
-        np.testing.assert_array_equal(one.covariance(24), filtered.covariance(24))
-        np.testing.assert_array_equal(
-            smooth(one, storage=storage).means, smooth(forward(flight, SETTINGS, samples=count)).means
-        )
-    np.testing.assert_array_equal(smooth(again, storage=storage).means, smooth(filtered).means)
-
-
-def test_the_last_sample_has_nothing_to_be_smoothed(filtered):
+def test_a_later_sample_only_narrows(filtered, flight):
     smoothed = smooth(filtered)
     np.testing.assert_array_equal(smoothed.means[-1], filtered.means[-1])
     np.testing.assert_allclose(smoothed.covariance(filtered.done - 1), filtered.last, rtol=1e-6)
-
-
-def test_a_later_sample_only_narrows(flight, filtered):
     smoothed = smooth(filtered, kept=(0, 20, 40))
     for i in (0, 20, 40):
         before, after = np.diag(filtered.covariance(i)), np.diag(smoothed.covariance(i))
         assert np.all(after <= before * (1.0 + 1e-6))
         assert np.all(after >= 0.0)
         assert np.all(after[before > 0.0] > 0.0)
+    with pytest.raises(IndexError, match=r"sample 7 was not kept; kept are \[0, 59\]"):
+        smooth(filtered).covariance(7)
 
 
 def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, random):
@@ -329,11 +294,6 @@ def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, ra
     np.testing.assert_allclose(
         smoothed.watched[30], gradients @ smoothed.covariance(30) @ gradients.T, rtol=1e-8
     )
-
-
-def test_a_covariance_that_was_not_kept_is_refused(filtered):
-    with pytest.raises(IndexError, match=r"sample 7 was not kept; kept are \[0, 59\]"):
-        smooth(filtered).covariance(7)
 
 
 def test_the_watched_rows_are_deflection_offset_displacement_and_what_parts_rotor_and_race(flight):
@@ -356,7 +316,6 @@ def test_the_watched_rows_are_deflection_offset_displacement_and_what_parts_roto
 
 
 def test_missing_readings_are_left_out(flight):
-    """Without any reading of a channel its gain and offset stay as they were before."""
     readings = flight.readings.copy()
     readings[:, 2] = np.nan
     readings[10:20] = np.nan
@@ -424,7 +383,7 @@ def test_with_a_reference_the_estimate_is_linear_in_the_readings(flight, filtere
         assert in_deviations(whole - 2.0 * half, filtered.covariance(i)) < 1e-5
 
 
-def quiet(problem: DropProblem) -> DropProblem:
+def quiet(problem):
     """The problem without any drift: what the drops share is a constant."""
     still = np.zeros_like(problem.targets.drift)
     return replace(problem, targets=problem.targets._replace(drift=still, late_drift=still))
@@ -433,10 +392,10 @@ def quiet(problem: DropProblem) -> DropProblem:
 NOISELESS = PassSettings(impulse=0.0, share=0.0, spin_noise=0.0, speed_noise=0.0)
 
 
-def linear_readings(problem: DropProblem, reference: np.ndarray):
+def linear_readings(problem, reference):
     """All readings as a linear function of the estimate at the first sample: matrix, values, deviations."""
     found = forward(problem, NOISELESS, reference=reference)
-    kept = found.stretch(0, Storage())
+    kept = found.filter_segment(0, problem.covariance.copy(), keep=True)[1]
     n, s = len(problem.mean), problem.n_dynamic
     columns = s + len(problem.unknowns)
     deviation = np.eye(n)  # of the estimate at sample i from its reference, by that at sample 0
@@ -445,13 +404,14 @@ def linear_readings(problem: DropProblem, reference: np.ndarray):
     for i in range(found.done):
         if i > 0:
             F = np.eye(n)
-            F[:s, :columns] = kept.transitions[i]
-            ahead = propagated(problem, reference[i - 1], i)
+            F[:s, :columns] = kept.F[i]
+            step = PlainFilter(problem, NOISELESS)
+            ahead = step._predicted(i, reference[i - 1], np.zeros((n, n)))[0][:s]
             deviation, shift = F @ deviation, F @ shift
             shift[:s] += ahead - reference[i, :s]
             shift[s:] += reference[i - 1, s:] - reference[i, s:]
         for c in range(problem.n_channels + 1):
-            row = kept.rows[i, c]
+            row = kept.H[i, c]
             if not row.any():
                 continue
             value, expected, variance = expected_reading(problem, reference[i], i, c)
@@ -461,12 +421,7 @@ def linear_readings(problem: DropProblem, reference: np.ndarray):
     return np.array(rows), np.array(left), np.array(sigma)
 
 
-def propagated(problem: DropProblem, at: np.ndarray, i: int) -> np.ndarray:
-    step = PlainFilter(problem, NOISELESS)
-    return step._predicted(i, at, np.zeros((len(at), len(at))))[0][: problem.n_dynamic]
-
-
-def expected_reading(problem: DropProblem, at: np.ndarray, i: int, c: int):
+def expected_reading(problem, at, i, c):
     values = {}
     for number, (value, function, _, variance) in enumerate(PlainFilter(problem)._readings(i)):
         values[number] = (value, function(at)[1], variance)
@@ -485,7 +440,7 @@ def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
     drops = [first, second]
     filtered = filtered_chain(drops, NOISELESS, references, 0.003)
     chained = smoothed_chain(drops, filtered)
-    alone = [means[0] for means in smoothed_means_of_chain(drops, filtered, [Storage(), Storage()])]
+    alone = [means[0] for means in smoothed_means_of_chain(drops, filtered)]
 
     n = len(first.mean)
     places = [np.arange(n), np.zeros(n, dtype=int)]
@@ -526,7 +481,6 @@ def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
 
 
 def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
-    """A second drop knows the offsets from the first, but nothing of its remanent force or its start."""
     first = quiet(flight)
     chained = filtered_chain([first, first], NOISELESS, [None, None], 0.003)
     paths = [unknown.path for unknown in first.unknowns]
@@ -541,16 +495,10 @@ def test_what_belongs_to_one_drop_does_not_reach_the_other(flight):
     assert start[offset] < 0.98 * alone[offset]
 
 
-def test_a_machine_too_far_from_the_record_is_refused(flight):
-    from rotordrop.errors import IdentificationError
-
+def test_what_leaves_its_place_ends_the_pass(flight):
     broken = replace(flight, mean=np.full_like(flight.mean, np.inf))
-    with pytest.raises(IdentificationError, match=r"lost the drop after 0 of 60 samples.*Check air gap"):
+    with pytest.raises(IdentificationError, match=r"diverged after 0 of 60 samples.*Check air gap"):
         filtered_chain([broken], SETTINGS, [None], 0.003)
-
-
-def test_a_race_that_leaves_its_place_ends_the_pass(flight):
-    """The filter stops where its estimate is no longer a bearing, instead of going on with any number."""
     far = flight.mean.copy()
     far[flight.model.layout.race.start] = 5e-3
     assert forward(flight, SETTINGS, mean=far).done == 0
@@ -560,11 +508,10 @@ def test_a_race_that_leaves_its_place_ends_the_pass(flight):
 
 
 def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch):
-    """First without the reference, then with larger unknown impulses; the size that followed is kept."""
     asked = []
 
-    def giving_up(problem, settings, *, mean, covariance, reference=None, samples=None, keep, storage=None):
-        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples, keep=keep)
+    def giving_up(problem, settings, *, mean, covariance, reference, samples, memory):
+        result = forward(problem, settings, mean=mean, covariance=covariance, samples=samples, memory=memory)
         asked.append((settings.impulse, reference is not None))
         return result if settings.impulse > 2.0 * SETTINGS.impulse else replace(result, done=3)
 
@@ -575,7 +522,7 @@ def test_a_pass_that_loses_the_drop_is_repeated_more_loosely(flight, monkeypatch
     assert found.impulse == 8.0 * impulse
 
 
-def with_gaps(problem: DropProblem) -> DropProblem:
+def with_gaps(problem):
     """The problem without its first and last readings, and without some of one channel."""
     readings = problem.readings.copy()
     readings[[0, -1]] = np.nan
@@ -583,104 +530,62 @@ def with_gaps(problem: DropProblem) -> DropProblem:
     return replace(problem, readings=readings)
 
 
-def lost_at(problem: DropProblem, sample: int) -> DropProblem:
+def lost_at(problem, sample):
     """The problem with a reading that nothing follows."""
     readings = problem.readings.copy()
     readings[sample] = 1e3
     return replace(problem, readings=readings)
 
 
-def unlike(means: Array, smoothed: Smoothed) -> float:
+def unlike(means, smoothed):
     """Largest distance of means from smoothed ones, in standard deviations of the drop's parameters."""
     deviation = np.sqrt(np.diag(smoothed.covariance(smoothed.filtered.parameter_sample)))
     known = deviation > 0.0
     return float((np.abs(means - smoothed.means)[:, known] / deviation[known]).max())
 
 
-@pytest.mark.parametrize("length", [7, 60, 142])
-@pytest.mark.parametrize("case", ["plain", "slow noise", "gaps", "late drift", "lost"])
-def test_means_alone_are_those_of_the_whole_smoother(
-    impacts: DropProblem, case: str, length: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In stretches held, in part held and filtered again, with and without a trajectory to linearise at."""
+CASES = ("plain", "slow noise", "gaps", "late drift", "lost")
+
+
+@pytest.mark.parametrize(
+    ("case", "length"),
+    [
+        *(("plain", length) for length in (7, 60, 142)),
+        *((case, 60) for case in CASES[1:]),
+        *(pytest.param(case, length, marks=pytest.mark.slow) for case in CASES[1:] for length in (7, 142)),
+    ],
+)
+def test_means_alone_are_those_of_the_whole_smoother(impacts, case, length, monkeypatch):
     changed = {"slow noise": with_slow_noise, "gaps": with_gaps, "lost": lambda one: lost_at(one, 300)}
     problem = changed.get(case, lambda one: one)(impacts)
     settings = replace(SETTINGS, learning_end=0.012) if case == "late drift" else SETTINGS
     score = np.full(len(problem.mean), 0.3) / np.sqrt(np.diag(problem.covariance) + 1e-30)
     score[np.diag(problem.covariance) == 0.0] = 0.0
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: length)
+    monkeypatch.setattr(smoother, "_segment_length", lambda _: length)
     reference = None
     for _ in range(1 if case == "lost" else 2):
         whole = smooth(forward(problem, settings, reference=reference), score)
-        for storage in (Storage(), Storage(0)):
-            kept = forward(problem, settings, reference=reference, keep="means", storage=storage)
+        for memory in (64_000_000, 0, None):
+            kept = forward(problem, settings, reference=reference, memory=memory)
             assert kept.done == (300 if case == "lost" else len(problem.time))
-            for memory in (storage, None):
-                means, before = smooth_means(kept, score, storage=memory)
+            for _again in range(2):
+                means, before = smooth_means(kept, score)
                 assert unlike(means, whole) < 2e-3
                 size = np.abs(whole.score_0).max()
                 assert before == pytest.approx(whole.score_0, rel=1e-6, abs=1e-6 * size)
         reference = whole.means
 
 
-def test_means_and_covariances_can_share_their_memory(impacts, monkeypatch):
-    """Neither takes for its own what the other has left."""
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: 60)
-    storage = Storage(6_000_000)
-    kept = forward(impacts, SETTINGS, keep="means", storage=storage)
-    whole = smooth(kept)
-    for _ in range(2):
-        assert unlike(smooth_means(kept, storage=storage)[0], whole) < 2e-3
-        np.testing.assert_array_equal(smooth(kept, storage=storage).means, whole.means)
-
-
 def test_means_of_a_chain_are_those_of_its_smoother(impacts, monkeypatch):
-    """Also where its first drop is lost half way: what was known before the loss is handed on."""
-    monkeypatch.setattr(smoother, "_stretch_length", lambda _: 60)
+    monkeypatch.setattr(smoother, "_segment_length", lambda _: 60)
     drops = [lost_at(impacts, 300), impacts]
     filtered = filtered_chain(drops, SETTINGS, [None, None], 0.025)
-    alone = smoothed_means_of_chain(drops, filtered, [Storage(), Storage()])
+    alone = smoothed_means_of_chain(drops, filtered)
     for means, smoothed in zip(alone, smoothed_chain(drops, filtered), strict=True):
         assert unlike(means, smoothed) < 2e-3
     whole = filtered_chain([impacts], SETTINGS, [None], 0.025)[0]
     shared = impacts.machine_indices
-    handed = handed_on(filtered[0], impacts)[1]
+    handed = prior_of_next(filtered[0], impacts)[1]
     known = whole.covariance(filtered[0].done - 1)
     assert filtered[0].done == 300
     np.testing.assert_allclose(np.diag(handed)[shared], np.diag(known)[shared], rtol=1e-6)
-
-
-def test_a_pass_that_goes_on_gives_the_bits_of_one_in_one_go(impacts: DropProblem) -> None:
-    whole = forward(impacts, SETTINGS)
-    cut, count = 200, len(impacts.time)
-
-    def part(samples: slice) -> DropProblem:
-        return replace(
-            impacts,
-            time=impacts.time[samples],
-            readings=impacts.readings[samples],
-            speed=impacts.speed[samples],
-        )
-
-    first = forward(part(slice(0, cut + 1)), SETTINGS)
-    then = forward(part(slice(cut, count)), SETTINGS, after=first)
-    np.testing.assert_array_equal(first.means, whole.means[: cut + 1])
-    np.testing.assert_array_equal(then.means, whole.means[cut:])
-    np.testing.assert_array_equal(then.innovations[1:], whole.innovations[cut + 1 :])
-    assert then.negative_log_likelihood + first.negative_log_likelihood == pytest.approx(
-        whole.negative_log_likelihood
-    )
-    alone, behind = smooth_means(then)[0][1:], smooth(then, kept=(50,))
-    away, deviation = np.abs(alone - behind.means[1:]), np.sqrt(np.diag(behind.covariance(50)))
-    assert np.max(away[:, deviation > 0.0] / deviation[deviation > 0.0]) < 2e-3
-    # backwards in four parts, of the last of which nothing but what it says of the others is wanted
-    smoothed = smooth(whole, watched=impacts.watched, kept=())
-    middle = count - cut - 50
-    late = smooth(then, kept=(), part=(middle, count - cut), carried=True)
-    score, information = late.score_0, late.information_0
-    for filtered, begin, end in ((then, 1, middle), (first, 100, cut + 1), (first, 0, 100)):
-        back = smooth(filtered, score, information, watched=impacts.watched, kept=(), part=(begin, end))
-        score, information = back.score_0, back.information_0
-        there = slice(begin + (cut if filtered is then else 0), end + (cut if filtered is then else 0))
-        np.testing.assert_array_equal(back.means[begin:end], smoothed.means[there])
-        np.testing.assert_array_equal(back.watched[begin:end], smoothed.watched[there])

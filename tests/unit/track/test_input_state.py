@@ -1,7 +1,5 @@
 """Forces from the rotor's own motion, for a rotor pushed by known pulses without any contact law."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 from rotordrop.errors import IdentificationError
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
-from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate._rhs import scratch_of
 from rotordrop.track import _propagation as P
 from rotordrop.track.forces import bearing_values, stress_at_force
@@ -20,7 +17,7 @@ from rotordrop.track.input_state import (
     corrections_by_record,
     input_state_estimate,
 )
-from rotordrop.track.problem import DropProblem, private_copy
+from rotordrop.track.problem import private_copy
 
 DT = 5e-5
 COUNT = 800
@@ -31,7 +28,7 @@ PULSES = (  # bearing, direction (x, y), middle [s], duration [s], peak [N]
 )
 
 
-def true_force(t: float, n_b: int) -> np.ndarray:
+def true_force(t, n_b):
     """Force of the rotor on the races [N], shape (B, 2): half sines squared."""
     force = np.zeros((n_b, 2))
     for b, direction, middle, duration, peak in PULSES:
@@ -40,7 +37,7 @@ def true_force(t: float, n_b: int) -> np.ndarray:
     return force
 
 
-def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarray:
+def pushed_rotor(model, speed, start):
     """Modal amplitudes and velocities, shape (N, 4m), of the rotor under the pulses."""
     p = model.parameters
     m, shapes = len(p.eigenvalue), p.bearing_shape
@@ -66,19 +63,23 @@ def pushed_rotor(model: DropModel, speed: float, start: np.ndarray) -> np.ndarra
     return np.array(states)
 
 
+def moved_by_pulses(flight):
+    """The same of the rotor that flies in a problem."""
+    m = flight.model.layout.n_modes
+    start = np.concatenate([flight.mean[: 2 * m], np.zeros(2 * m)])
+    return pushed_rotor(flight.model, float(flight.mean[flight.model.layout.rotor_speed]), start)
+
+
 @pytest.fixture(scope="module")
-def pushed(flight: DropProblem) -> tuple[DropProblem, SensorCorrections, np.ndarray]:
+def pushed(flight):
     """Readings of the pushed rotor with noise, a gate that opens at the pulses, true force."""
     return recorded_pushes(flight, every=1)
 
 
-def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, SensorCorrections, np.ndarray]:
+def recorded_pushes(flight, every):
     """The pushed rotor with every so manieth reading, the noise density of the readings the same."""
-    model, layout = flight.model, flight.model.layout
-    m, n_b = layout.n_modes, layout.n_bearings
-    start = np.zeros(4 * m)
-    start[: 2 * m] = flight.mean[: 2 * m]
-    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)[::every]
+    m, n_b = flight.model.layout.n_modes, flight.model.layout.n_bearings
+    states = moved_by_pulses(flight)[::every]
     time = DT * np.arange(COUNT)[::every]
     variances = flight.variances / every
     noise = np.sqrt(variances) * np.random.default_rng(3).standard_normal((len(time), flight.n_channels))
@@ -102,7 +103,12 @@ def recorded_pushes(flight: DropProblem, every: int) -> tuple[DropProblem, Senso
     return problem, corrections, force
 
 
-def peaks_of(force: np.ndarray, dt: float = DT) -> list[np.ndarray]:
+def largest(force):
+    """Largest force of every bearing [N]."""
+    return np.hypot(*force.transpose(2, 0, 1)).max(axis=0)
+
+
+def peaks_of(force, dt=DT):
     """Largest force vector within every pulse."""
     found = []
     for b, _, middle, duration, _ in PULSES:
@@ -118,13 +124,12 @@ def test_the_peaks_of_known_pulses_are_found_back(pushed):
     for estimate, pulse in zip(peaks_of(found.force), PULSES, strict=True):
         true = pulse[4] * np.array(pulse[1])
         assert np.hypot(*(estimate - true)) < 0.2 * pulse[4]
-    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.12)
+    np.testing.assert_allclose(found.peak, largest(force), rtol=0.12)
     np.testing.assert_array_equal(found.magnitude.max(axis=0), found.peak)
     assert np.all(np.isnan(found.mean_late))  # the record ends before
 
 
 def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
-    """The twin's own force at a deflection leads back to the twin's own stress there."""
     problem, corrections, _ = pushed
     theta = corrections.theta
     p = private_copy(problem.model.parameters)
@@ -144,7 +149,6 @@ def test_the_peak_stress_is_that_of_the_bearing_under_the_peak_force(pushed):
 
 
 def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
-    """Nothing of the twin enters: gains within 1 per cent, gaps within their prior, and the same peaks."""
     problem, _, force = pushed
     own = corrections_by_record(problem)
     motion = at_bearings(problem, (problem.readings - own.offsets) / (1.0 + own.gain_errors))
@@ -152,16 +156,13 @@ def test_without_the_twin_the_record_itself_opens_the_gate(pushed):
     assert np.all((own.reach > 100e-6) & (own.reach < 0.96 * problem.mean[problem.gap_entries]))
     opened = replace(own, reach=np.zeros(2))  # this rotor is pushed where no race is
     found = input_state_estimate(problem, opened)
-    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)
+    np.testing.assert_allclose(found.peak, largest(force), rtol=0.15)
 
 
 def test_the_gate_leaves_room_for_a_rotor_that_bends_beside_the_line_through_its_sensors(flight):
     """However well the gap is known: pushed by some kN this rotor stands off that line by over 10 µm."""
     model, layout = flight.model, flight.model.layout
-    m = layout.n_modes
-    start = np.zeros(4 * m)
-    start[: 2 * m] = flight.mean[: 2 * m]
-    states = pushed_rotor(model, float(flight.mean[layout.rotor_speed]), start)
+    m, states = layout.n_modes, moved_by_pulses(flight)
     line = at_bearings(flight, states[:, : 2 * m] @ flight.sensor_rows[:, : 2 * m].T)
     shapes = model.parameters.bearing_shape.T
     path = np.stack([states[:, :m] @ shapes, states[:, m : 2 * m] @ shapes], axis=-1)
@@ -180,18 +181,16 @@ def test_fewer_readings_of_the_same_information_give_the_same_forces(flight, pus
     thin, thin_lent, thin_force = recorded_pushes(flight, every)
     found = input_state_estimate(thin, thin_lent)
     assert found.turn == pytest.approx(whole.turn, rel=0.35)
-    for one, other, pulse in zip(
-        peaks_of(found.force, every * DT), peaks_of(whole.force), PULSES, strict=True
-    ):
+    peaks = peaks_of(found.force, every * DT), peaks_of(whole.force)
+    for one, other, pulse in zip(*peaks, PULSES, strict=True):
         assert np.hypot(*(one - other)) < 0.15 * pulse[4]
-    assert np.sqrt(np.mean((found.force - thin_force) ** 2)) < 2.0 * np.sqrt(
-        np.mean((whole.force - force) ** 2)
-    )
+    apart, usual = np.mean((found.force - thin_force) ** 2), np.mean((whole.force - force) ** 2)
+    assert np.sqrt(apart) < 2.0 * np.sqrt(usual)
 
 
 def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
     problem, corrections, force = recorded_pushes(flight, 1)
-    true = np.hypot(*force.transpose(2, 0, 1)).max(axis=0)
+    true = largest(force)
     found = input_state_estimate(problem, corrections)
     assert np.all(np.abs(found.peak - true) < found.peak_error * true)
     noise = np.random.default_rng(4).standard_normal(problem.readings.shape)
@@ -200,13 +199,12 @@ def test_the_stated_error_holds_the_peak_and_grows_with_noise(flight):
     )
     poor = input_state_estimate(worse, corrections)
     assert np.all(np.abs(poor.peak - true) < poor.peak_error * true)
-    assert np.all(poor.put_back > 1.5 * found.put_back)
+    assert np.all(poor.reinserted > 1.5 * found.reinserted)
     assert np.all(poor.peak_error > found.peak_error)
     np.testing.assert_allclose(poor.stress_error, np.hypot(0.015, 0.4 * poor.peak_error), rtol=0.2)
 
 
 def test_a_loose_race_opens_the_gate_by_its_play(flight):
-    """The race lies on its balls: above it, rotor and race touch nearer to the centre."""
     tight = corrections_by_record(flight)
     machine = flight.model.machine
     bearing = machine.touchdown_bearings[0]
@@ -225,23 +223,17 @@ def test_a_force_that_no_bearing_carries_is_refused(pushed):
         stress_at_force(problem, theta, 0, np.array([0.0, -1e12]))
 
 
-def test_impulses_are_those_of_the_pulses(pushed):
+def test_impulses_are_those_of_the_pulses_with_nothing_between(pushed):
     problem, corrections, force = pushed
     found = input_state_estimate(problem, corrections)
     np.testing.assert_allclose(
         DT * found.force.sum(axis=0), DT * force.sum(axis=0), atol=0.05 * DT * np.abs(force).sum(axis=0).max()
     )
-
-
-def test_in_flight_the_force_is_held_at_zero(pushed):
     problem, corrections, force = pushed
     found = input_state_estimate(problem, corrections)
     flying = np.abs(force).max(axis=2) == 0.0
     assert np.count_nonzero(flying) > 1000
     assert found.magnitude[flying].max() < 0.05 * found.peak.max()
-
-
-def test_missing_readings_are_bridged(pushed):
     problem, corrections, _ = pushed
     readings = problem.readings.copy()
     readings[400:405] = np.nan
@@ -254,7 +246,6 @@ def test_missing_readings_are_bridged(pushed):
 
 
 def test_slow_noise_of_the_sensors_is_no_force(flight):
-    """Told of it, the estimate is nearer to the true forces than with white noise of the same size."""
     problem, corrections, force = recorded_pushes(flight, 1)
     decay, size = 0.98, 4e-6
     random = np.random.default_rng(8)
@@ -270,4 +261,4 @@ def test_slow_noise_of_the_sensors_is_no_force(flight):
     taken_for_white = input_state_estimate(white, corrections)
     error, other = (np.sqrt(np.mean((one.force - force) ** 2)) for one in (found, taken_for_white))
     assert error < 0.8 * other, (error, other)
-    np.testing.assert_allclose(found.peak, np.hypot(*force.transpose(2, 0, 1)).max(axis=0), rtol=0.15)
+    np.testing.assert_allclose(found.peak, largest(force), rtol=0.15)

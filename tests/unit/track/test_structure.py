@@ -1,12 +1,12 @@
-"""What a machine may have beyond the usual model: laws of its equations and what the filter makes of it."""
-
-from __future__ import annotations
+"""What a machine may have beyond the usual model, springs included: laws, and what the filter makes of it."""
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.unit.track.conftest import flight_of
 from tests.unit.track.test_propagation import (
     advanced,
     finite_differences,
@@ -15,21 +15,21 @@ from tests.unit.track.test_propagation import (
     theta_of,
 )
 
+from rotordrop import DropCase, Known, build_drop_model, simulate_drop
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import UsageError
-from rotordrop.evidence.evidence import Evidence
-from rotordrop.known import Known
-from rotordrop.machine import Machine, loads_machine
+from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics import support
-from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.physics.ring import row_rigidity
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.simulate.case import DropCase
-from rotordrop.simulate.drop import simulate_drop
-from rotordrop.track.problem import DropProblem
+from rotordrop.track.calibration import BLIND_SCHEDULE, is_inconsistent, track
+from rotordrop.track.forces import force_history
+from rotordrop.track.problem import RecordedDrop, build_problem, sensor_rows
 from rotordrop.track.sensor_form import add_seen, lag_step
-from rotordrop.twin.problems import COARSE_BASIS, drop_problem
+from rotordrop.track.smoother import fastest_frequency
+from rotordrop.twin.problems import COARSE_BASIS
 
 STRUCTURE = {
     "support.coupling": 0.2,
@@ -43,7 +43,7 @@ STRUCTURE = {
 }
 
 
-def structured(machine: Machine, status: str = "guess") -> Machine:
+def structured(machine, status="guess"):
     """The machine with a stiffer rotor, slow clock, side force, turned and cubic supports, oval sleeves."""
     values = {
         f"{bearing.name}.{path}": Known(value=value, status=status)
@@ -54,7 +54,7 @@ def structured(machine: Machine, status: str = "guess") -> Machine:
     return machine.with_values(values | {path: Known(value=v, status=status) for path, v in others.items()})
 
 
-def sensing(machine: Machine) -> Machine:
+def sensing(machine):
     """The machine whose sensors lag, see across, move with the housing and stand beside their nodes."""
     values = {"time_constant": 8e-5, "cross_axis": 0.02, "follows_housing": 0.3, "plane_offset": 4e-3}
     return machine.with_values(
@@ -69,7 +69,7 @@ def sensing(machine: Machine) -> Machine:
 # the support
 
 
-def form_of(**entries: float) -> np.ndarray:
+def form_of(**entries):
     form = np.zeros(support.N_ENTRIES)
     for name, value in entries.items():
         form[getattr(support, name)] = value
@@ -119,24 +119,18 @@ def test_a_support_loses_what_its_force_does_beyond_that_of_its_springs():
         assert (np.array(forces[0]) - forces[1]) / 2e-7 == pytest.approx(slope, rel=1e-6)
 
 
-def test_a_softening_spring_never_pulls():
-    form = form_of(CUBIC=-1e9)
-    for x in (1e-6, 1e-5, 1e-4, 5e-4):
-        assert support.support_force(form, 1e8, 1e8, 0.0, 0.0, x, 0.0, 0.0, 0.0)[0] > 0.0
+@pytest.mark.parametrize("x", [1e-6, 1e-5, 1e-4, 5e-4])
+def test_a_softening_spring_never_pulls(x):
+    assert support.support_force(form_of(CUBIC=-1e9), 1e8, 1e8, 0.0, 0.0, x, 0.0, 0.0, 0.0)[0] > 0.0
 
 
-def test_a_drop_on_such_supports_keeps_its_books(lp400):
-    """What is stored and what is lost, in spring, foundation and dampers, add up."""
-    result = simulate_drop(structured(lp400), DropCase(speed=2.0 * math.pi * 60.0, duration=0.05))
-    plain = simulate_drop(lp400, DropCase(speed=2.0 * math.pi * 60.0, duration=0.05))
+def test_supports_beyond_springs_keep_books_and_plain_ones_their_bits(lp400):
+    case = DropCase(speed=2.0 * math.pi * 60.0, duration=0.05)
+    result, plain = simulate_drop(structured(lp400), case), simulate_drop(lp400, case)
     assert result.certificate is not None
     assert result.certificate.energy_residual < 1e-6 * result.certificate.energy_scale
     apart = np.abs(result.bearing_force - plain.bearing_force).max()
     assert apart > 0.05 * np.abs(plain.bearing_force).max()
-
-
-def test_a_support_without_form_is_the_plain_one_bit_by_bit(lp400):
-    """Neutral entries change nothing but rounding; without any no term of them is computed."""
     model = build_drop_model(lp400, "quick")
     assert not model.parameters.bearing[:, L.SUPPORT_FORM : L.SUPPORT_FORM_END].any()
     assert model.layout.further == () and model.layout.sensor_own == 0
@@ -150,7 +144,7 @@ def test_a_support_without_form_is_the_plain_one_bit_by_bit(lp400):
 
 
 @pytest.fixture(scope="module")
-def described(lp400: Machine) -> Machine:
+def described(lp400):
     """The machine with nothing said of what spins with its races."""
     return loads_machine(re.sub(r"\[touchdown_bearings\.race\]\n(?:\w.*\n)*", "", machine_text(lp400)))
 
@@ -171,14 +165,17 @@ def test_an_extension_adds_unknowns_and_a_machine_file_holds_them(described, ext
         assert low <= found[path].mean < high and (found[path].scope == "drop") == of_record, path
 
 
-def test_a_foundation_is_given_whole(lp400):
+def test_half_of_a_foundation_or_of_the_lags_is_refused(lp400, prepared):
     with pytest.raises(UsageError, match=r"'foundation_share' but no 'foundation_frequency'"):
         lp400.with_values({"NDE.support.foundation_share": 0.1})
+    machine = lp400.with_values({f"sensors.{lp400.sensors[0].name}.time_constant": 5e-5})
+    with pytest.raises(UsageError, match="1 of 4 sensors have a 'time_constant'"):
+        flight_of(machine, prepared)
 
 
 def test_what_both_sensors_of_a_plane_see_across_is_a_turn_and_has_a_prior_of_its_own(lp400, prepared):
     machine = next(e for e in EXTENSIONS if e.name == "cross-axis sensitivity").added_to(lp400)
-    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+    problem = flight_of(machine, prepared)
     names = [sensor.name for sensor in machine.sensors if sensor.node == machine.sensors[0].node]
     at = [problem.n_dynamic + k for k, u in enumerate(problem.unknowns) if u.owner in names]
     block = problem.covariance[np.ix_(at, at)]
@@ -191,8 +188,8 @@ def test_what_both_sensors_of_a_plane_see_across_is_a_turn_and_has_a_prior_of_it
 
 
 @pytest.fixture(scope="module")
-def extended_flight(lp400: Machine, prepared: Evidence) -> DropProblem:
-    return drop_problem(build_drop_model(structured(lp400), COARSE_BASIS), prepared, until=0.003)
+def extended_flight(lp400, prepared):
+    return flight_of(structured(lp400), prepared)
 
 
 @pytest.mark.parametrize("indentation", [-60e-6, 8e-6])  # what the sleeves take of it leaves some
@@ -207,7 +204,6 @@ def test_the_sensitivity_of_such_a_machine_is_that_of_finite_differences(extende
 
 
 def test_of_a_slow_clock_a_sample_lasts_longer(extended_flight):
-    """A second of the record that lasts 1.01 s: the rotor turns by 1 % more from sample to sample."""
     problem, layout = extended_flight, extended_flight.model.layout
     turns = []
     for slow in (0.0, 0.01):
@@ -219,8 +215,8 @@ def test_of_a_slow_clock_a_sample_lasts_longer(extended_flight):
 
 
 @pytest.fixture(scope="module")
-def lagging(lp400: Machine, prepared: Evidence) -> DropProblem:
-    return drop_problem(build_drop_model(sensing(lp400), COARSE_BASIS), prepared, until=0.003)
+def lagging(lp400, prepared):
+    return flight_of(sensing(lp400), prepared)
 
 
 def test_a_lag_follows_a_straight_line_exactly(lagging):
@@ -248,7 +244,7 @@ def test_the_sensitivity_of_a_lag_is_that_of_finite_differences(lagging, random)
     before = problem.mean[:n].copy()
     before[:s] += 1e-5 * random.standard_normal(s)
 
-    def stepped(start: np.ndarray) -> np.ndarray:
+    def stepped(start):
         after = start.copy()
         after[:s] = motion @ start[:s]
         lag_step(start, after, problem.sensor_form, 5e-5, np.zeros((s, n)))
@@ -269,18 +265,16 @@ def test_the_sensitivity_of_a_lag_is_that_of_finite_differences(lagging, random)
 
 def test_sensors_read_as_their_form_says(lp400, prepared):
     """The reading predicted is that of the machine by hand: across, with the housing, beside the node."""
-    machine = sensing(lp400)
-    machine = machine.model_copy(
-        update={"sensors": tuple(s.model_copy(update={"time_constant": None}) for s in machine.sensors)}
-    )
-    problem = drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
+    seen = sensing(lp400)
+    prompt = tuple(one.model_copy(update={"time_constant": None}) for one in seen.sensors)
+    machine = seen.model_copy(update={"sensors": prompt})
+    problem = flight_of(machine, prepared)
     layout, basis = problem.model.layout, problem.model.basis
     state = np.random.default_rng(2).standard_normal(problem.n_dynamic) * 1e-5
     sensor = machine.sensors[0]
     z = np.asarray(problem.model.fe.node_positions)
-    slope = (basis.node_row(sensor.node + 1) - basis.node_row(sensor.node - 1)) / (
-        z[sensor.node] - z[sensor.node - 2]
-    )
+    slope = basis.node_row(sensor.node + 1) - basis.node_row(sensor.node - 1)
+    slope = slope / (z[sensor.node] - z[sensor.node - 2])
     rows = basis.node_row(sensor.node) + 4e-3 * slope, basis.node_row(sensor.node)
     (x, y), (plain_x, plain_y) = ((row @ state[layout.modal_x], row @ state[layout.modal_y]) for row in rows)
     b = problem.model.bearing_names.index(sensor.bearing)
@@ -293,18 +287,59 @@ def test_sensors_read_as_their_form_says(lp400, prepared):
     assert seen == pytest.approx(expected, rel=1e-9)
 
 
-def test_some_sensors_with_a_time_constant_and_some_without_are_refused(lp400, prepared):
-    machine = lp400.with_values({f"sensors.{lp400.sensors[0].name}.time_constant": 5e-5})
-    with pytest.raises(UsageError, match="1 of 4 sensors have a 'time_constant'"):
-        drop_problem(build_drop_model(machine, COARSE_BASIS), prepared, until=0.003)
-
-
 def test_before_the_first_contact_unknown_impulses_are_small_where_a_lift_may_last(lp400, prepared):
     machine = next(e for e in EXTENSIONS if e.name == "long remanence").added_to(lp400)
-    model = build_drop_model(machine, COARSE_BASIS)
-    problem = drop_problem(model, prepared, until=0.003)
+    problem = flight_of(machine, prepared)
     contact = prepared.power_off.contact - prepared.power_off.value
     assert problem.first_contact == pytest.approx(contact, abs=1e-3)
     assert problem.impulse_in_fall < 2e-4
-    usual = drop_problem(build_drop_model(lp400, COARSE_BASIS), prepared, until=0.003)
-    assert usual.impulse_in_fall == math.inf
+    assert flight_of(lp400, prepared).impulse_in_fall == math.inf
+
+
+SPRINGS = 'preload_kind = "spring"\nspring_rate = "1e5 N/m"\nfit_friction = 0.0\npreload = { guess'
+SPEED, NOISE = 900.0, 0.3e-6
+
+
+@pytest.mark.slow
+def test_rings_without_friction_in_their_fits_are_followed():
+    text = example_path("small").read_text(encoding="utf-8").replace("preload = { guess", SPRINGS)
+    model = build_drop_model(loads_machine(text), COARSE_BASIS)
+    case = DropCase(speed=SPEED, duration=0.03, output_step=50e-6)
+    drop = simulate_drop(model, case)
+    seen = drop.state[:, : model.layout.n_dynamic] @ sensor_rows(model).T
+    noise = NOISE * np.random.default_rng(1).standard_normal(seen.shape)
+    touched = np.any(drop.contact_force > 0.0, axis=1)
+    recorded = RecordedDrop(
+        time=drop.time,
+        readings=seen + noise,
+        noise=np.full(seen.shape[1], NOISE),
+        initial_speed=SPEED,
+        initial_speed_error=1.0,
+        speed=np.full(len(drop.time), np.nan),
+        tail_level=None,
+        first_contact=float(drop.time[touched][0]),
+    )
+    problem = build_problem(model, recorded, until=0.03)
+    fit = track([problem], BLIND_SCHEDULE[:4])
+    assert not is_inconsistent(fit)
+    forces = force_history(problem, fit.smoothed[0])
+    for b in range(2):
+        window = drop.time <= forces.time[-1]
+        peak = np.max(drop.bearing_force_magnitude[window, b])
+        assert np.max(forces.magnitude[:, b]) == pytest.approx(peak, rel=0.1)
+
+
+def test_a_light_ring_sets_the_steps_of_the_filter():
+    """Its frequency on balls at eight times their load; a heavy one is slower than the race."""
+    text = example_path("small").read_text(encoding="utf-8")
+
+    def fastest(*lines):
+        machine = loads_machine(text.replace("preload = { guess", "\n".join((*lines, "preload = { guess"))))
+        return fastest_frequency(SimpleNamespace(model=build_drop_model(machine, COARSE_BASIS)))
+
+    spring = 'preload_kind = "spring"'
+    light = fastest(spring, 'ring_mass = "4 g"')
+    assert fastest(spring, 'ring_mass = "1 g"') == pytest.approx(2.0 * light, rel=1e-6)
+    assert light > fastest() == fastest(spring, 'ring_mass = "4 kg"')
+    stiffness = row_rigidity(loads_machine(text).touchdown_bearings[0].bearing.numbers().constants)
+    assert light == pytest.approx((2.0 * stiffness / 4e-3) ** 0.5, rel=1e-6)

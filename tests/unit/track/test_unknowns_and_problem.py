@@ -1,22 +1,19 @@
 """Priors of the unknowns, what the settled tail says about them, and the readings of the levitated phase."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.unit.track.conftest import flight_of, place_of
 
+from rotordrop import build_drop_model, example_machine, read_record
 from rotordrop.elements.table import EXTENSIONS, parameter
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
-from rotordrop.record.record import read_record
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior
 from rotordrop.track.problem import (
@@ -26,14 +23,14 @@ from rotordrop.track.problem import (
     apply_tail,
     build_problem,
     settled_displacement,
+    transferred,
 )
-from rotordrop.track.transfer import transferred
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, recorded_drop
 
 NO_TAIL = Missing(reason="none was given")
 
 
-def unknown_of(machine: Machine, path: str):
+def unknown_of(machine, path):
     return next(u for u in all_unknowns(build_drop_model(machine, COARSE_BASIS)) if u.path == path)
 
 
@@ -44,10 +41,7 @@ def unknown_of(machine: Machine, path: str):
     ("quantity", "expected"),
     [
         (Known(value=1e8, status="guess", range=(0.5e8, 2e8)), math.log(4.0) / (2 * NINETY)),
-        (
-            Known(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)),
-            math.log(11 / 9) / (2 * NINETY),
-        ),
+        (Known(value=1e8, status="estimated", interval_90=(0.9e8, 1.1e8)), math.log(11 / 9) / (2 * NINETY)),
         (
             Known(value=1e8, status="estimated", interval_90=(0.99e8, 1.01e8), range=(0.5e8, 2e8)),
             math.log(101 / 99) / (2 * NINETY),
@@ -72,14 +66,11 @@ def test_the_machine_file_sets_the_priors(lp400):
     assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
     damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
     assert damping.sigma == parameter("contact.damping").given_sigma
-
-
-def test_a_gap_that_is_only_given_may_still_be_wrong(lp400):
-    given = unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap")
+    given = unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap")  # may still be wrong
     assert given.sigma == pytest.approx(parameter("air_gap").given_sigma * 260e-6)
 
 
-def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
+def test_preload_and_ratios_are_estimated_as_they_are_stated(lp400):
     unknown = unknown_of(lp400, "NDE.preload")
     bearing = lp400.bearing("NDE").bearing
     constants = bearing_constants(bearing)
@@ -87,21 +78,13 @@ def test_the_preload_is_estimated_by_the_axial_offset_it_belongs_to(lp400):
     assert unknown.value_of(unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
     ends = [unknown.value_of(unknown.mean + s * NINETY * unknown.sigma) for s in (-1.0, 1.0)]
     assert ends == pytest.approx([370.0, 760.0], rel=1e-6)
-
-
-def test_a_ratio_is_stated_as_a_ratio(lp400):
     anisotropy = unknown_of(lp400, "NDE.support.anisotropy")
-    assert anisotropy.value_of(0.0) == pytest.approx(1.0)
-    assert anisotropy.value_of(math.log(1.1)) == pytest.approx(1.1)
-
-
-def test_a_number_beyond_its_bounds_is_stated_as_the_model_took_it(lp400):
-    """A race inertia is followed up to four times what was inferred; what lies beyond has no effect."""
+    assert [anisotropy.value_of(math.log(one)) for one in (1.0, 1.1)] == pytest.approx([1.0, 1.1])
     inertia = unknown_of(lp400, "DE.race.inertia")
     assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(4.0 * math.exp(inertia.mean))
 
 
-def race_errors(machine: Machine) -> np.ndarray:
+def race_errors(machine):
     """Prior covariance of mass and inertia of the race at NDE, of their logarithms."""
     model = build_drop_model(machine, COARSE_BASIS)
     unknowns = all_unknowns(model)
@@ -112,7 +95,6 @@ def race_errors(machine: Machine) -> np.ndarray:
 
 
 def test_a_race_that_is_heavier_than_inferred_is_as_much_harder_to_turn(lp400):
-    """Mass and inertia follow from the same size: their ratio is known better than either."""
     unstated = {"NDE.race.mass": Known(value=0.3, status="inferred", range=(0.24, 0.375))}
     inertia = Known(value=6e-4, status="inferred", range=(6e-4 / 1.41, 6e-4 * 1.41))
     both = race_errors(lp400.with_values(unstated | {"NDE.race.inertia": inertia}))
@@ -124,7 +106,6 @@ def test_a_race_that_is_heavier_than_inferred_is_as_much_harder_to_turn(lp400):
 
 
 def test_a_race_of_which_nobody_said_what_spins_along_may_be_heavier_and_begins_so(lp400):
-    """A carrier of 2.5 times the ring moved a peak by 12 %; a search from the ring alone did not see it."""
     rings = next(one for one in EXTENSIONS if one.name == "ring masses")
     assert rings.values(lp400) == {}  # its masses are stated
     inferred = Known(value=0.3, status="inferred", range=(0.24, 0.375), unit="kg")
@@ -139,7 +120,7 @@ def test_a_race_of_which_nobody_said_what_spins_along_may_be_heavier_and_begins_
     assert "NDE 0.690 kg (0.660 to 0.720)" in rings.found(unstated, found, 300.0)
 
 
-def test_what_a_drop_owns_is_not_shared(flight):
+def test_what_a_drop_owns_is_not_shared_and_friction_drifts(flight):
     scopes = {u.path: u.scope for u in flight.unknowns}
     assert scopes["unbalance.0.cosine"] == scopes["NDE.remanent_force.y"] == "drop"
     assert scopes["speed.aero_time_constant"] == scopes["remanence.time_constant"] == "drop"
@@ -150,16 +131,6 @@ def test_what_a_drop_owns_is_not_shared(flight):
         assert (start + k in shared) == (unknown.scope == "machine")
     assert {start + n_p + i for i in range(2 * n_c)} <= shared
     assert not shared & {start + n_p + i for i in range(2 * n_c, 4 * n_c)}  # runout turns with the drop
-
-
-def test_a_machine_without_magnets_has_no_remanent_force(lp400):
-    bare = lp400.model_copy(update={"ambs": ()})
-    paths = {u.path for u in all_unknowns(build_drop_model(bare, COARSE_BASIS))}
-    assert not any("remanen" in path for path in paths)
-    assert "NDE.air_gap" in paths
-
-
-def test_friction_drifts_and_late_in_a_drop_faster(flight):
     by_path = {u.path: (u, i) for i, u in enumerate(flight.unknowns)}
     friction, i = by_path["NDE.friction.dynamic"]
     stiffness, k = by_path["NDE.support.stiffness"]
@@ -172,13 +143,14 @@ def test_friction_drifts_and_late_in_a_drop_faster(flight):
     assert by_path["NDE.preload"][0].parameter.drift == 0.0
 
 
-def test_the_aerodynamic_constant_has_a_start_even_when_nobody_knows_it(lp400):
+def test_unknowns_are_there_with_and_without_magnets_and_drag(lp400):
+    bare = lp400.model_copy(update={"ambs": ()})
+    paths = {u.path for u in all_unknowns(build_drop_model(bare, COARSE_BASIS))}
+    assert not any("remanen" in path for path in paths)
+    assert "NDE.air_gap" in paths
     assert lp400.speed.aero_time_constant is None
     assert aero_time_constant(lp400) == 10.0
-    known = lp400.model_copy(
-        update={"speed": lp400.speed.model_copy(update={"aero_time_constant": Known(value=7.0)})}
-    )
-    assert aero_time_constant(known) == 7.0
+    assert aero_time_constant(lp400.with_values({"speed.aero_time_constant": 7.0})) == 7.0
 
 
 # the problem
@@ -191,9 +163,7 @@ def test_sensors_start_from_what_the_machine_says(lp400, prepared):
             "sensors.S_NDE_A.offset": Known(value=4e-6, status="estimated", interval_90=(3e-6, 5e-6)),
         }
     )
-    problem = drop_problem(
-        build_drop_model(known, COARSE_BASIS), prepared.with_facts(settled_level=NO_TAIL), until=0.003
-    )
+    problem = flight_of(known, prepared.with_facts(settled_level=NO_TAIL))
     gain = problem.n_dynamic + len(problem.unknowns)
     offset = gain + problem.n_channels
     sigma = np.sqrt(np.diag(problem.covariance))
@@ -205,25 +175,22 @@ def test_sensors_start_from_what_the_machine_says(lp400, prepared):
     assert sigma[offset + 1] == pytest.approx(0.04 * 250e-6)
 
 
-def test_the_rotor_starts_where_the_sensors_see_it_with_its_computed_sag(flight):
+def test_the_rotor_starts_where_the_sensors_see_it_with_their_noise(flight, prepared):
     predicted = flight.sensor_rows @ flight.mean[: flight.n_dynamic]
     first = flight.readings[:10].mean(axis=0)
     np.testing.assert_allclose(predicted, first, atol=1e-6)
     bending = flight.mean[flight.model.layout.modal_y][2:]
     assert np.abs(bending).max() > 0.0
     assert np.all(flight.mean[flight.model.layout.modal_x][2:] == 0.0)
+    noise = prepared.noise(0.003)
+    np.testing.assert_allclose(flight.variances, noise**2 + NOISE_FLOOR**2)
+    assert np.all((noise > 0.2e-6) & (noise < 1e-6))
 
 
 def test_a_record_without_speed_is_refused(model, prepared):
     mute = replace(prepared.record, speed=None, speed_time=None, speed_readings=None)
     with pytest.raises(RecordError, match=r"the record drop_060 has no rotor speed.*profile"):
         read_evidence(model, mute, name="drop_060")
-
-
-def test_the_noise_of_the_levitated_part_is_that_of_the_channels(flight, prepared):
-    noise = prepared.noise(0.003)
-    np.testing.assert_allclose(flight.variances, noise**2 + NOISE_FLOOR**2)
-    assert np.all((noise > 0.2e-6) & (noise < 1e-6))
 
 
 # the settled tail
@@ -242,7 +209,6 @@ def height_at_sensors(problem, theta):
 
 
 def test_the_rotor_settles_below_the_gap_by_its_indentation(loose):
-    """Between the sensors and the bearings there are 30 mm of a rotor that bends by micrometres."""
     theta = loose.mean[loose.parameter_slice]
     level = settled_displacement(loose, theta)[1]
     assert np.all((level > -300e-6) & (level < -250e-6))
@@ -256,20 +222,18 @@ def test_the_rotor_settles_below_the_gap_by_its_indentation(loose):
 
 
 def test_the_tail_ties_gap_and_offset(loose):
-    """A tail 8 µm lower than expected is shared by gap and offsets; their sum is known, each is not."""
     theta = loose.mean[loose.parameter_slice]
     tail = height_at_sensors(loose, theta)
     angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
     lower = tail - 8e-6 * np.sin(angles)
     mean, covariance = loose.mean.copy(), loose.covariance.copy()
     apply_tail(loose, lower, mean, covariance)
-    paths = [u.path for u in loose.unknowns]
-    gap = loose.n_dynamic + paths.index("NDE.air_gap")
-    offsets = loose.n_dynamic + len(paths) + loose.n_channels + np.arange(2)
+    gap = place_of(loose, "NDE.air_gap")
+    offsets = loose.n_dynamic + len(loose.unknowns) + loose.n_channels + np.arange(2)
     assert mean[gap] - loose.mean[gap] > 2e-6
     down = -np.sum(mean[offsets]) / (2.0 * math.sin(math.pi / 4))
     gains = mean[offsets - loose.n_channels] @ (np.sin(angles[:2]) ** 2 * tail[:2] / np.sin(angles[:2]))
-    stiff = loose.n_dynamic + paths.index("NDE.support.stiffness")
+    stiff = place_of(loose, "NDE.support.stiffness")
     assert abs(mean[stiff] - loose.mean[stiff]) < 0.05
     explained = (mean[gap] - loose.mean[gap]) + down - gains
     assert explained == pytest.approx(8e-6, abs=1.5e-6)
@@ -280,25 +244,21 @@ def test_the_tail_ties_gap_and_offset(loose):
     row[gap], row[offsets] = -1.0, np.array([0.5, 0.5]) / math.sin(math.pi / 4)
     row[offsets - loose.n_channels] = row[offsets] * tail[:2]
     assert math.sqrt(row @ covariance @ row) < 1.5e-6
-    assert (
-        np.linalg.eigvalsh(covariance / np.outer(np.maximum(sigma, 1e-12), np.maximum(sigma, 1e-12)))[0]
-        > -1e-8
-    )
+    unit = np.maximum(sigma, 1e-12)
+    assert np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0] > -1e-8
 
 
 def test_the_tail_says_less_of_a_gap_where_a_landing_sleeve_may_be_oval(lp400, prepared, loose):
-    """Nobody knows on which place of it the rotor has come to rest."""
     oval = {
         f"{b.name}.landing_sleeve.oval": Known(value=20e-6, status="guess") for b in lp400.touchdown_bearings
     }
-    model = build_drop_model(lp400.with_values(oval), COARSE_BASIS)
-    problem = drop_problem(model, prepared.with_facts(settled_level=NO_TAIL), until=0.003)
+    problem = flight_of(lp400.with_values(oval), prepared.with_facts(settled_level=NO_TAIL))
     theta = problem.mean[problem.parameter_slice]
     gained = []
     for one in (loose, problem):
         mean, covariance = one.mean.copy(), one.covariance.copy()
         apply_tail(one, height_at_sensors(problem, theta), mean, covariance)
-        gap = one.n_dynamic + [u.path for u in one.unknowns].index("NDE.air_gap")
+        gap = place_of(one, "NDE.air_gap")
         gained.append(1.0 / covariance[gap, gap] - 1.0 / one.covariance[gap, gap])
     assert gained[1] < 0.5 * gained[0]
 
@@ -313,7 +273,6 @@ def test_a_rotor_held_aside_by_friction_says_nothing_about_the_gap(loose):
 
 
 def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepared):
-    """With one of two sensors gone the tail must not tie the gap to the height it cannot see."""
     three = lp400.model_copy(update={"sensors": lp400.sensors[:3]})
     record = prepared.record
     prepared = prepared.with_facts(
@@ -321,25 +280,20 @@ def test_a_single_sensor_in_a_plane_cannot_tell_height_from_aside(lp400, prepare
         levitated=prepared.levitated.of_channels(range(3)),
         settled_level=NO_TAIL,
     )
-    problem = drop_problem(build_drop_model(three, COARSE_BASIS), prepared, until=0.003)
+    problem = flight_of(three, prepared)
     mean, covariance = problem.mean.copy(), problem.covariance.copy()
     angles = np.array([float(sensor.angle) for sensor in three.sensors])
     tail = height_at_sensors(problem, mean[problem.parameter_slice])
     apply_tail(problem, tail + 20e-6 * np.cos(angles), mean, covariance)
-    paths = [u.path for u in problem.unknowns]
+    variances = []
     for name, limit in (("NDE", 1e-6), ("DE", 15e-6)):
-        gap = problem.n_dynamic + paths.index(f"{name}.air_gap")
-        change = abs(mean[gap] - problem.mean[gap])
-        sigma = math.sqrt(covariance[gap, gap])
-        assert change < limit
-        assert change < sigma
-    lost = problem.n_dynamic + paths.index("DE.air_gap")
-    seen = problem.n_dynamic + paths.index("NDE.air_gap")
-    assert covariance[lost, lost] > 3.0 * covariance[seen, seen]
+        gap = place_of(problem, f"{name}.air_gap")
+        variances.append(covariance[gap, gap])
+        assert abs(mean[gap] - problem.mean[gap]) < min(limit, math.sqrt(variances[-1]))
+    assert variances[1] > 3.0 * variances[0]
 
 
 def test_the_settled_level_is_that_of_the_lowest_point_of_the_sway(lp400, prepared):
-    """A rotor that sways along its race by 40 µm lies higher in the mean than at the bottom."""
     sensing, rest = prepared.sensing, prepared.rest
     time = np.arange(3000) * 1e-3
     angle = 0.14 * np.sin(2.0 * np.pi * 29.0 * time)
@@ -364,7 +318,6 @@ def fast(lp400):
 
 
 def test_hum_at_60_hz_is_no_noise_of_the_twin(lp400, fast):
-    """1.5 µm of it once stayed in the readings and counted as 1.1 µm of noise."""
     record = fast.record
     hum = 1.5e-6 * np.cos(2.0 * np.pi * 60.0 * record.time[:, None] + np.arange(4))
     noisy = replace(record, signals=record.signals + hum)
@@ -396,17 +349,14 @@ def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared
     means = flight.mean + 1e-5 * random.standard_normal((7, len(flight.mean)))
     moved = transferred(flight, fine, means)
     assert moved.shape == (7, len(fine.mean))
-    for node in (1, 5, 17, 26, 33):
-        for part in ("modal_x", "modal_y"):
-            one, two = (getattr(p.model.layout, part) for p in (flight, fine))
-            for a, b in (
-                (one, two),
-                (flight.model.layout.velocity_of(one), fine.model.layout.velocity_of(two)),
-            ):
+    layouts = flight.model.layout, fine.model.layout
+    for part in ("modal_x", "modal_y"):
+        one, two = (getattr(layout, part) for layout in layouts)
+        for a, b in ((one, two), (layouts[0].velocity_of(one), layouts[1].velocity_of(two))):
+            for node in (1, 5, 17, 26, 33):
                 before = means[:, a] @ flight.model.basis.node_row(node)
                 after = moved[:, b] @ fine.model.basis.node_row(node)
                 np.testing.assert_allclose(after, before, rtol=0.02, atol=1e-7)
-    layouts = flight.model.layout, fine.model.layout
     for part in ("race", "support", "race_spin"):
         np.testing.assert_array_equal(
             means[:, getattr(layouts[0], part)], moved[:, getattr(layouts[1], part)]
@@ -414,25 +364,20 @@ def test_a_transferred_trajectory_keeps_the_motion_of_every_node(lp400, prepared
     np.testing.assert_array_equal(means[:, flight.n_dynamic :], moved[:, fine.n_dynamic :])
 
 
-def test_a_trajectory_carried_to_the_same_basis_is_the_same(flight, random):
+def test_a_trajectory_carried_over_is_the_same_but_for_other_priors(flight, random, lp400, prepared):
     means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
     np.testing.assert_allclose(transferred(flight, flight, means), means, rtol=1e-9, atol=1e-16)
-
-
-def test_an_unknown_that_another_prior_holds_begins_there(lp400, prepared, flight, random):
-    """Carried along, the mass of a race stayed in the minimum in which the narrow prior had held it."""
     heavier = Known(value=0.6, status="guess", range=(0.24, 1.5), unit="kg")
-    wide = build_drop_model(lp400.with_values({"NDE.race.mass": heavier}), COARSE_BASIS)
-    problem = drop_problem(wide, prepared, until=0.003)
+    problem = flight_of(lp400.with_values({"NDE.race.mass": heavier}), prepared)
     means = flight.mean + 1e-5 * random.standard_normal((3, len(flight.mean)))
     moved = transferred(flight, problem, means)
-    at = [one.path for one in flight.unknowns].index("NDE.race.mass") + flight.n_dynamic
+    at = place_of(flight, "NDE.race.mass")
     np.testing.assert_allclose(moved[:, at], problem.start[at])
     others = np.arange(len(flight.mean)) != at
     np.testing.assert_allclose(moved[:, others], means[:, others], rtol=1e-9, atol=1e-16)
 
 
-def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machine) -> None:
+def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400):
     bound = Known(value=1.0, status="estimated", interval_90=(1.0, 1.0))
     unknowns = all_unknowns(
         build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
@@ -441,8 +386,7 @@ def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400: Machi
     assert sigma == parameter("contact.exponent").least_sigma
 
 
-def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers() -> None:
-    """It was lost "after 0 samples": a negative load has no contact frequency, and NaN went through."""
+def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers():
     machine = example_machine("lp400")
     bearings = machine.touchdown_bearings
     beside = machine.changed(touchdown_bearings=(bearings[0], bearings[1].changed(node=12)))

@@ -1,41 +1,26 @@
 """A calibration from guesses: parameters near the truth, what is determined, what is confounded."""
 
-from __future__ import annotations
-
 import math
-from pathlib import Path
 
 import pytest
+from tests.bank import handed_out
 
+from rotordrop import load_machine, save_machine
 from rotordrop.elements.table import parameter, row_of
-from rotordrop.machine import Machine, load_machine
-from rotordrop.machine.saving import save_machine
 from rotordrop.rotor.unknowns import prior
-from rotordrop.twin.calibrated import Calibration, calibrate_machine, calibration_json
+from rotordrop.twin.calibrated import calibration_json
 from rotordrop.twin.search import is_calibrated
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED
-from rotordrop_bench import HiddenMachine, SyntheticDrop, synthesize_drop
 
 BEARINGS = ("NDE", "DE")
-OTHER_SPEED = 2.0 * math.pi * 150.0
-SEED = 4
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def calibration(known: Machine, hidden: HiddenMachine, synthetic: SyntheticDrop) -> Calibration:
-    """The hidden machine calibrated blind on two short drops."""
-    second = synthesize_drop(hidden, OTHER_SPEED, 10 * SEED + 1, duration=0.09, tolerance=1e-7, name="second")
-    return calibrate_machine(
-        known,
-        [synthetic.record, second.record],
-        [synthetic.tail, second.tail],
-        names=["hidden_060", "hidden_150"],
-    )
+calibration = handed_out("calibration")
 
 
-def test_supports_and_gaps_come_near_the_truth(calibration: Calibration, hidden: HiddenMachine) -> None:
+def test_supports_and_gaps_come_near_the_truth_from_guesses(calibration, hidden, known):
     assert calibration.consistent, calibration.sentence()
     for bearing in hidden.machine.touchdown_bearings:
         for path, limit in (("stiffness", 0.03), ("mass", 0.03), ("damping", 0.15)):
@@ -46,9 +31,6 @@ def test_supports_and_gaps_come_near_the_truth(calibration: Calibration, hidden:
             assert low < true < high, (bearing.name, path)
         gap = calibration.values[f"{bearing.name}.air_gap"].value
         assert gap == pytest.approx(float(bearing.air_gap), abs=3e-6)
-
-
-def test_the_guesses_were_further_off(known: Machine, hidden: HiddenMachine) -> None:
     apart = [
         abs(float(guess.support.stiffness) / float(true.support.stiffness) - 1.0)
         for guess, true in zip(known.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True)
@@ -56,7 +38,7 @@ def test_the_guesses_were_further_off(known: Machine, hidden: HiddenMachine) -> 
     assert max(apart) > 0.1
 
 
-def test_the_calibrated_machine_loads_again(calibration: Calibration, known: Machine, tmp_path: Path) -> None:
+def test_the_calibrated_machine_loads_and_says_what_was_determined(calibration, known, tmp_path):
     save_machine(calibration.machine, tmp_path / "calibrated.toml")
     again = load_machine(tmp_path / "calibrated.toml")
     assert is_calibrated(again) and not is_calibrated(known)
@@ -65,20 +47,6 @@ def test_the_calibrated_machine_loads_again(calibration: Calibration, known: Mac
             assert quantity.source == "calibrated on hidden_060, hidden_150"
             assert quantity.interval_90 is not None
             assert quantity.interval_90[0] < float(quantity) < quantity.interval_90[1]
-
-
-def test_each_drop_says_how_its_magnets_lifted(calibration: Calibration, synthetic: SyntheticDrop) -> None:
-    """What a virtual repeat draws the lift of another drop from."""
-    origin = calibration.machine.calibration
-    assert origin is not None
-    assert [len(drop.lift) for drop in origin.drops] == [2, 2]
-    carried = calibration.machine.rotor.mass * float(calibration.machine.gravity) / 2.0
-    for lift, true in zip(origin.drops[0].lift, synthetic.truth["remanent_force"], strict=True):
-        assert abs(lift.up - true["vertical_N"] / carried) < 4.0 * lift.up_error < 0.4
-        assert abs(lift.sideways - true["x_N"] / carried) < 4.0 * lift.sideways_error
-
-
-def test_what_the_records_determine_and_what_not(calibration: Calibration) -> None:
     verdicts = {entry.path: entry.verdict for entry in calibration.identifiability}
     for name in BEARINGS:
         for path in ("support.stiffness", "support.mass", "support.damping", "friction.dynamic"):
@@ -90,16 +58,28 @@ def test_what_the_records_determine_and_what_not(calibration: Calibration) -> No
             assert entry.posterior_sigma <= 1.0001 * entry.prior_sigma
 
 
-def test_stiffness_and_mass_are_confounded_and_a_hammer_test_separates_them(calibration: Calibration) -> None:
+def test_drops_keep_their_lift_and_sensors_their_gain(calibration, synthetic, hidden):
+    origin = calibration.machine.calibration
+    assert origin is not None
+    assert [len(drop.lift) for drop in origin.drops] == [2, 2]
+    carried = calibration.machine.rotor.mass * float(calibration.machine.gravity) / 2.0
+    for lift, true in zip(origin.drops[0].lift, synthetic.truth["remanent_force"], strict=True):
+        assert abs(lift.up - true["vertical_N"] / carried) < 4.0 * lift.up_error < 0.4
+        assert abs(lift.sideways - true["x_N"] / carried) < 4.0 * lift.sideways_error
+    for sensor in calibration.machine.sensors:
+        found = calibration.values[f"sensors.{sensor.name}.gain"]
+        assert float(sensor.gain) == found.value == pytest.approx(1.0, abs=0.05)
+        assert found.standard_error is not None and found.standard_error < 0.02
+        assert float(sensor.offset) == calibration.values[f"sensors.{sensor.name}.offset"].value
+
+
+def test_confounded_values_are_said_in_the_document_too(calibration):
     pairs = {frozenset((pair.first, pair.second)): pair for pair in calibration.confounded}
     pair = pairs[frozenset(("NDE.support.stiffness", "NDE.support.mass"))]
     assert pair.correlation > 0.9
     assert "hammer test" in pair.way_out
-
-
-def test_the_document_says_the_same(calibration: Calibration) -> None:
     written = calibration_json(calibration)
-    assert set(written["values"]) == set(calibration.values)  # type: ignore[call-overload]
+    assert set(written["values"]) == set(calibration.values)
     assert written["sentence"] == calibration.sentence()
     found = [entry.verdict for entry in calibration.identifiability].count("determined")
     assert calibration.sentence().startswith(f"{found} of {len(calibration.identifiability)} parameters are")
@@ -108,8 +88,7 @@ def test_the_document_says_the_same(calibration: Calibration) -> None:
         assert calibration.values[entry.path].status == entry.verdict
 
 
-def test_what_the_records_do_not_determine_stays_a_guess(calibration: Calibration, known: Machine) -> None:
-    """Else the next estimate would call it known: with an interval that the filter's random walk made."""
+def test_what_the_records_do_not_determine_stays_a_guess(calibration, known):
     undetermined = {e.path for e in calibration.identifiability if e.verdict in NOT_DETERMINED}
     assert {"NDE.race.inertia", "DE.race.inertia"} <= undetermined
     for b, bearing in enumerate(calibration.machine.touchdown_bearings):
@@ -117,11 +96,3 @@ def test_what_the_records_do_not_determine_stays_a_guess(calibration: Calibratio
         assert inertia.status == "guess" and inertia.range is not None
         sigma = prior(parameter("race.inertia"), inertia).sigma
         assert sigma == pytest.approx(prior(parameter("race.inertia"), before).sigma, rel=1e-6)
-
-
-def test_every_sensor_has_the_gain_that_was_fitted(calibration: Calibration, hidden: HiddenMachine) -> None:
-    for sensor in calibration.machine.sensors:
-        found = calibration.values[f"sensors.{sensor.name}.gain"]
-        assert float(sensor.gain) == found.value == pytest.approx(1.0, abs=0.05)
-        assert found.standard_error is not None and found.standard_error < 0.02
-        assert float(sensor.offset) == calibration.values[f"sensors.{sensor.name}.offset"].value

@@ -1,17 +1,14 @@
 """The joint distribution in a calibrated file says no more than its intervals, and keeps the correlations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from rotordrop import build_drop_model, example_machine
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import example_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import bearing_unknowns, correlate
 from rotordrop.twin.calibrated import as_filed
 from rotordrop.twin.joint_covariance import joint_covariance
@@ -59,7 +56,17 @@ def spread_of(problem, mean, covariance, known):
     return joint_covariance(problem.model, fitted, mean[3:], covariance[3:, 3:], known)
 
 
-def test_spreads_are_those_of_the_intervals(problem, covariance):
+def place(problem, path):
+    return next(k for k, one in enumerate(problem.unknowns) if one.path == path)
+
+
+@pytest.fixture(scope="module")
+def spread(problem, covariance):
+    """What a file holds of the fit as it is."""
+    return spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+
+
+def test_spreads_are_those_of_intervals_above_zero(problem, covariance):
     known = as_filed(problem.model.machine, stated(problem, covariance, 1.5))
     spread = spread_of(problem, middle(problem), covariance, known)
     sigma = np.sqrt(np.diag(spread.matrix))
@@ -68,19 +75,12 @@ def test_spreads_are_those_of_the_intervals(problem, covariance):
         k = spread.paths.index(path)
         width = np.log(high / low) if spread.logarithmic[k] else high - low
         assert sigma[k] == pytest.approx(width / (2.0 * NINETY), rel=1e-6)
-
-
-def test_a_value_that_came_out_as_zero_is_left_out(problem, covariance):
     known = stated(problem, covariance, 1.0)
     known["DE.support.damping"] = Known(value=0.0, interval_90=(0.0, 500.0))
     spread = spread_of(problem, middle(problem), covariance, known)
     assert "DE.support.damping" not in spread.paths and "NDE.support.damping" in spread.paths
     assert np.all(np.isfinite(spread.matrix))
-
-
-def test_a_preload_far_below_its_prior_stays_above_zero(problem, covariance):
-    """Eight deviations below its prior the rows of balls would part: a fit of a wrong model went there."""
-    k = next(k for k, one in enumerate(problem.unknowns) if one.path == "DE.preload")
+    k = place(problem, "DE.preload")
     preload = problem.unknowns[k]
     theta = preload.mean - 12.0 * preload.sigma
     known = stated(problem, covariance, 1.0) | {"DE.preload": identified(preload, theta, 0.3 * preload.sigma)}
@@ -91,10 +91,8 @@ def test_a_preload_far_below_its_prior_stays_above_zero(problem, covariance):
     assert np.all(np.isfinite(spread_of(problem, mean, covariance, known).matrix))
 
 
-def test_correlations_are_those_of_the_fit(problem, covariance):
-    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
-    paths = [one.path for one in problem.unknowns]
-    i, j = (paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
+def test_correlations_are_those_of_the_fit(problem, covariance, spread):
+    i, j = (place(problem, f"NDE.support.{name}") for name in ("stiffness", "mass"))
     a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
     matrix = spread.matrix
     found = matrix[a, b] / np.sqrt(matrix[a, a] * matrix[b, b])
@@ -102,29 +100,19 @@ def test_correlations_are_those_of_the_fit(problem, covariance):
     assert found == pytest.approx(whole[i, j] / np.sqrt(whole[i, i] * whole[j, j]))
 
 
-def test_the_horizontal_support_follows_the_vertical_one(problem, covariance):
-    """Its logarithm is the sum of two: stiffness and ratio."""
-    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
+def test_correlations_follow_the_fit_and_what_goes_with_it(problem, covariance, spread):
     assert "NDE.support.anisotropy" not in spread.paths
     a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "stiffness_horizontal"))
-    paths = [one.path for one in problem.unknowns]
-    i, j = (3 + paths.index(f"NDE.support.{name}") for name in ("stiffness", "anisotropy"))
+    i, j = (3 + place(problem, f"NDE.support.{name}") for name in ("stiffness", "anisotropy"))
     expected = covariance[i, i] + covariance[j, j] + 2.0 * covariance[i, j]
     assert spread.matrix[b, b] == pytest.approx(expected, rel=1e-6)
     assert spread.matrix[a, a] == pytest.approx(covariance[i, i], rel=1e-6)
-
-
-def test_contact_stiffness_is_that_of_the_fitted_exponent(problem, covariance):
-    """The force at the typical indentation varies as fitted, whatever exponent is drawn."""
-
-    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     machine = problem.model.machine
     depth = machine.touchdown_bearings[0].contact.typical_depth(float(np.mean(problem.model.load_shares)))
     k, n = (spread.paths.index(f"NDE.contact.{name}") for name in ("stiffness", "exponent"))
     along = np.zeros(len(spread.paths))
     along[k], along[n] = 1.0, float(machine.touchdown_bearings[0].contact.exponent) * np.log(depth)
-    paths = [one.path for one in problem.unknowns]
-    i = 3 + paths.index("NDE.contact.stiffness")
+    i = 3 + place(problem, "NDE.contact.stiffness")
     assert along @ spread.matrix @ along == pytest.approx(covariance[i, i], rel=0.02)
 
 
@@ -133,28 +121,20 @@ def calibrated_in_file(problem, spread):
     return replace(problem.model, machine=problem.model.machine.model_copy(update={"calibration": origin}))
 
 
-def test_a_later_drop_begins_with_the_correlations_of_the_fit(problem, covariance):
-    """Through the file and back, whatever its values mean, and with the variances that its intervals say."""
-    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
+def test_correlations_are_handed_on_and_changed_values_err_alone(problem, covariance, spread):
+    joint = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.5))
     unknowns = [replace(one, calibrated=True) for one in problem.unknowns]
     sigma = 1.0 + np.arange(len(unknowns))
     block = np.diag(sigma**2)
-    correlate(calibrated_in_file(problem, spread), unknowns, block)
+    correlate(calibrated_in_file(problem, joint), unknowns, block)
     fitted = covariance[3:, 3:]
     own = np.sqrt(np.diag(fitted))
     assert block / np.outer(sigma, sigma) == pytest.approx(fitted / np.outer(own, own), abs=1e-6)
-
-
-def test_a_value_changed_since_errs_alone(problem, covariance):
-    spread = spread_of(problem, middle(problem), covariance, stated(problem, covariance, 1.0))
     unknowns = [replace(one, calibrated=k != 2) for k, one in enumerate(problem.unknowns)]
     block = np.eye(len(unknowns))
     correlate(calibrated_in_file(problem, spread), unknowns, block)
     assert np.count_nonzero(block[2]) == 1 and np.count_nonzero(block[1]) > 2
     assert np.linalg.eigvalsh(block).min() > 0.0
-
-
-def test_a_file_without_a_joint_distribution_correlates_nothing(problem):
     block = np.eye(len(problem.unknowns))
     correlate(problem.model, problem.unknowns, block)
     assert (block == np.eye(len(problem.unknowns))).all()

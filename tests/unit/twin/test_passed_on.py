@@ -1,7 +1,5 @@
 """Numbers that one part finds and another writes: none is lost, doubled or taken for another on the way."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,15 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop import Known, build_drop_model, example_machine
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest
 from rotordrop.estimate.bearing_values import equivalent_stiffness
 from rotordrop.estimate.later_motion import RESOLVED, later_motion
-from rotordrop.known import Known
-from rotordrop.machine import example_machine
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns
 from rotordrop.twin.calibrated import CONFOUNDED, confounded_of, values_of
 from rotordrop.twin.tracked_parameters import (
@@ -33,7 +29,7 @@ SENSORS = 4
 
 
 @pytest.fixture(scope="module")
-def problem() -> Any:
+def problem():
     """The unknowns of a machine, behind five entries of the motion and before gains and offsets."""
     model = build_drop_model(example_machine("lp400"), "quick")
     unknowns = all_unknowns(model)
@@ -51,8 +47,7 @@ def problem() -> Any:
     )
 
 
-def test_the_first_contact_is_as_deep_as_the_motion_in_its_time() -> None:
-    """Before it the rotor turns further out, and after it, too."""
+def test_the_first_contact_is_as_deep_as_the_motion_in_its_time():
     time = np.arange(0.0, 0.1, 1e-3)
     path = np.zeros((100, 2))
     path[:, 1] = -250e-6
@@ -64,7 +59,7 @@ def test_the_first_contact_is_as_deep_as_the_motion_in_its_time() -> None:
     assert (found.start, found.end) == (0.02, 0.03)
 
 
-def test_the_rest_of_a_record_is_compared_where_it_has_readings() -> None:
+def test_the_rest_of_a_record_is_compared_where_it_has_readings():
     time = np.arange(-0.01, 0.4, 1e-3)
     motion = np.zeros((len(time), 3, 2))
     motion[:, :, 1] = -100e-6
@@ -79,16 +74,14 @@ def test_the_rest_of_a_record_is_compared_where_it_has_readings() -> None:
     assert (found.first, found.later) == pytest.approx((300e-6, 330e-6))
     assert (found.first_time, found.later_time) == pytest.approx((time[early], time[late]))
     assert found.larger
+    assert not later_motion(("NDE", "DE", "MID"), time, motion, 0.2, 10e-6)[0].larger
 
 
-def test_a_gap_ends_at_zero_and_nothing_else_does() -> None:
+def test_gaps_end_at_zero_and_widening_at_the_prior(problem):
     gap, mass = parameter("air_gap"), parameter("support.mass")
     for interval, inside in (((-3e-6, -1e-6), (0, 0)), ((-1e-6, 5e-6), (0, 5e-6)), ((2e-6, 5e-6),) * 2):
         assert within_bounds(gap, interval) == inside
         assert within_bounds(mass, interval) == interval
-
-
-def test_a_parameter_is_widened_up_to_its_prior_and_never_narrowed(problem: Any) -> None:
     for unknown in problem.unknowns:
         for share, factor in ((0.1, 2.0), (0.8, 1.25), (1.0, 1.0), (1.5, 1.0), (0.0, 2.0)):
             found = parameter_widening(unknown, share * unknown.sigma, 2.0)
@@ -96,7 +89,7 @@ def test_a_parameter_is_widened_up_to_its_prior_and_never_narrowed(problem: Any)
             assert parameter_widening(unknown, share * unknown.sigma, 1.0) == 1.0
 
 
-def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
+def test_sensor_errors_are_those_at_the_end_of_the_drop(problem):
     size = problem.n_dynamic + len(problem.unknowns) + 2 * SENSORS
     first = size - 2 * SENSORS
     dice = np.random.default_rng(3)
@@ -115,8 +108,7 @@ def test_sensor_errors_are_those_at_the_end_of_the_drop(problem: Any) -> None:
 
 
 @pytest.mark.parametrize("done", [3, 2])
-def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem: Any, done: int) -> None:
-    """From prior to fit where the filter followed the drop; the prior alone where it lost it."""
+def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem, done):
     size = problem.n_dynamic + len(problem.unknowns) + 2 * SENSORS
     dice = np.random.default_rng(5)
     prior, prior_sigma = dice.normal(size=size), dice.uniform(0.01, 0.5, size)
@@ -127,7 +119,7 @@ def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem: An
         filtered=SimpleNamespace(done=done, means=np.zeros((3, size))),
     )
     known = SimpleNamespace(**vars(problem), mean=prior, covariance=np.diag(prior_sigma**2))
-    found = sensor_errors(known, smoothed, fits=False, widening=2.0)  # type: ignore[arg-type]
+    found = sensor_errors(known, smoothed, fits=False, widening=2.0)
     first = size - 2 * SENSORS
     for c, one in enumerate(found):
         for at, value in ((first + c, one.gain_error), (first + SENSORS + c, one.offset)):
@@ -145,7 +137,7 @@ def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem: An
             assert value.interval_90 == pytest.approx((low, high))
 
 
-def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
+def test_a_calibrated_gain_undoes_the_error_of_the_sensor():
     """A sensor that reads (1 + g) times the motion needs the gain 1 / (1 + g); its error by differences."""
     names = ("A", "B")
     machine = SimpleNamespace(sensors=tuple(SimpleNamespace(name=name) for name in names))
@@ -173,8 +165,7 @@ def test_a_calibrated_gain_undoes_the_error_of_the_sensor() -> None:
             assert high - low == pytest.approx(2.0 * NINETY * (value.standard_error or math.nan))
 
 
-def test_what_is_called_confounded_is_what_correlates(problem: Any) -> None:
-    """A pair at -0.95, a parameter and an offset at 0.92, and a pair at 0.6 that is not mentioned."""
+def test_what_is_called_confounded_is_what_correlates(problem):
     first, unknowns = problem.n_dynamic, problem.unknowns
     sensors = problem.model.machine.sensors
     offset = first + len(unknowns) + problem.n_channels
@@ -192,8 +183,7 @@ def test_what_is_called_confounded_is_what_correlates(problem: Any) -> None:
     assert all(abs(pair.correlation) > CONFOUNDED and pair.way_out for pair in found)
 
 
-def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the nodes of the sensors if the file holds all of them, at the bearings otherwise."""
+def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch):
     machine = example_machine("lp400")
     nodes = {sensor.bearing: f"node {sensor.node}" for sensor in machine.sensors}
     assert set(nodes) == {"NDE", "DE"}
@@ -215,14 +205,13 @@ def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch: pytes
     assert seen.profile.speed_at([0.0])[0] == pytest.approx(300.0) and not seen.recorded
 
 
-def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None:
-    """The bearing at the preload that was found, not that of the file; both widths of both parts."""
+def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls():
     machine = example_machine("lp400")
     support = Known(value=80e6, status="determined", interval_90=(78e6, 82e6), unit="N/m")
     preload = Known(value=700.0, status="determined", interval_90=(500.0, 900.0), unit="N")
     found = equivalent_stiffness(machine, 0, 300.0, support, preload)
 
-    def series(held: float, stiffness: float) -> float:
+    def series(held, stiffness):
         name = machine.touchdown_bearings[0].name
         bearing = machine.with_values({f"{name}.preload": held}).touchdown_bearings[0]
         races = numbers_of(bearing).tangent_stiffness(300.0)
@@ -236,7 +225,7 @@ def test_the_equivalent_stiffness_is_as_unsure_as_what_holds_the_balls() -> None
     assert high - low > 1.1 * (series(700.0, 82e6) - series(700.0, 78e6))
 
 
-def test_the_verdict_on_a_parameter_goes_by_how_much_of_its_prior_is_left() -> None:
+def test_the_verdict_on_a_parameter_goes_by_how_much_of_its_prior_is_left():
     shares = (0.0, 0.29, 0.31, 0.69, 0.71, 1.0)
     said = [determination(share) for share in shares]
     assert said[:2] == ["determined"] * 2

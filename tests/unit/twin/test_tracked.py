@@ -1,7 +1,5 @@
 """The tracked twin on a record of known truth: right within its intervals, also when much is missing."""
 
-from __future__ import annotations
-
 import gc
 import json
 import math
@@ -17,21 +15,26 @@ import jsonschema
 import numpy as np
 import pytest
 
-from rotordrop.errors import IdentificationError, RecordError, UsageError
+from rotordrop import (
+    Known,
+    Tracked,
+    build_drop_model,
+    estimate_drop,
+    estimate_drops,
+    example_machine,
+    example_record_path,
+    load_machine,
+    read_record,
+)
+from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.bearing_drop import LATE, Origin
 from rotordrop.estimate.document import combined, estimate_document
-from rotordrop.estimate.estimate import Estimate, Verdict
+from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import Drop, estimate_schema
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
-from rotordrop.estimation import Tracked, estimate_drop, estimate_drops
 from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
-from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine, load_machine
 from rotordrop.physics import columns
-from rotordrop.record.examples import example_record_path
-from rotordrop.record.record import Record, read_record
-from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import bearing_unknowns
 from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
@@ -39,12 +42,12 @@ from rotordrop.track.input_state import corrections_by_record, input_state_estim
 from rotordrop.twin.allowances import MODEL_FORCE_SIGMA, MODEL_MEAN_FORCE_SIGMA
 from rotordrop.twin.problems import Drops, drop_problem, tail_first
 from rotordrop.twin.search import Search, track_drops
-from rotordrop.twin.tracked import TrackedDrop, followed_drops, tracked_drop
+from rotordrop.twin.tracked import followed_drops, tracked_drop
 from rotordrop.twin.tracked_estimate import cross_checked, estimate_of
 from rotordrop.twin.tracked_loads import (
+    DIVERGED_WIDENING,
     INCONSISTENT,
     INCONSISTENT_WIDENING,
-    LOST_WIDENING,
     OF_CROSS_CHECK,
     check_without_contact_law,
     is_beyond_factor,
@@ -57,10 +60,10 @@ from rotordrop.twin.tracked_parameters import (
     UNDETERMINED,
     fitted_values,
     gap_of_record,
-    is_lost,
+    is_impossible_gap,
     parameters,
 )
-from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.score import score_estimate
 
 BEARINGS = ("NDE", "DE")
@@ -70,23 +73,23 @@ NINETY = 1.6448536269514722
 LIMITS = {"peak_force_N": 0.03, "peak_stress_Pa": 0.015, "mean_force_0p15_0p2_N": 0.03}
 
 
-def document(drop: Estimate) -> dict[str, Any]:
+def document(drop):
     written: dict[str, Any] = json.loads(json.dumps(estimate_document(drop), allow_nan=False))
     return written
 
 
-def number(drop: Estimate, name: str, field: str) -> Known:
+def number(drop, name, field):
     bearing = drop.bearing(name)
     peaks = {"peak_force_N": bearing.peak_force.known, "peak_stress_Pa": bearing.peak_stress.known}
     return peaks[field] if field in peaks else bearing.values[field]
 
 
-def half_widths(drop: Estimate, field: str) -> list[float]:
+def half_widths(drop, field):
     intervals = [number(drop, name, field).interval_90 for name in BEARINGS]
     return [0.5 * (one[1] - one[0]) for one in intervals if one is not None]
 
 
-def assert_right(drop: Estimate, truth: SyntheticDrop, factor: float = 1.0) -> None:
+def assert_right(drop, truth, factor=1.0):
     scores = score_estimate(document(drop), truth.truth, drop=drop.name)["bearings"]
     for name in BEARINGS:
         for field, limit in LIMITS.items():
@@ -94,34 +97,22 @@ def assert_right(drop: Estimate, truth: SyntheticDrop, factor: float = 1.0) -> N
             assert scores[name][field]["covered"], (name, field)
 
 
-def assert_right_or_wide(drop: Estimate, truth: SyntheticDrop) -> None:
-    scores = score_estimate(document(drop), truth.truth, drop=drop.name)["bearings"]
-    for name in BEARINGS:
-        for field in LIMITS:
-            assert scores[name][field]["covered"], (name, field)
+def told_of(drop, machine, made):
+    evidence = Evidence(record=made.record, machine=machine, tail=made.tail, name="hidden_060")
+    return estimate_of(drop, Tracked(), facts_of(evidence))
 
 
-def test_loads_of_a_calibrated_machine_come_within_their_intervals(
-    tracked: Estimate, calibrated: Machine, synthetic: SyntheticDrop
-) -> None:
+def test_loads_and_large_impacts_come_within_their_intervals(tracked, calibrated, synthetic, quick):
     assert tracked.consistent, tracked.sentence
     assert_right(tracked, synthetic)
     peaks = [number(tracked, name, "peak_force_N").value for name in BEARINGS]
     assert np.all(np.array(half_widths(tracked, "peak_force_N")) < 0.08 * np.array(peaks))
-
-
-def test_every_large_impact_is_found_and_half_of_them_within_five_per_cent(
-    tracked: Estimate, calibrated: Machine, synthetic: SyntheticDrop
-) -> None:
     impacts = score_estimate(document(tracked), synthetic.truth)["impacts"]
     for name in BEARINGS:
         found = impacts[name]
         assert found["true_impacts"] > 3 and found["found"] == found["true_impacts"]
         assert found["median_absolute_error"] < 0.05
         assert np.max(np.abs(found["relative_errors"])) < 0.25
-
-
-def test_one_pass_agrees_with_three(tracked: Estimate, quick: Estimate) -> None:
     for name in BEARINGS:
         for field, limit in LIMITS.items():
             assert number(quick, name, field).value == pytest.approx(
@@ -131,9 +122,7 @@ def test_one_pass_agrees_with_three(tracked: Estimate, quick: Estimate) -> None:
         assert times[0] == pytest.approx(times[1], abs=1e-4)
 
 
-def test_estimated_orbit_has_the_shape_of_the_true_one_to_half_a_micrometre(
-    workshop: TrackedDrop, tracked: Estimate, synthetic: SyntheticDrop
-) -> None:
+def test_estimated_orbit_has_the_shape_of_the_true_one_to_half_a_micrometre(workshop, tracked, synthetic):
     true = synthetic.histories["bearing_displacement"]
     start, rate = float(synthetic.histories["t0"]), float(synthetic.histories["fs"])
     late = tracked.drop_instant.value - float(synthetic.truth["t_off_in_record_s"])
@@ -147,7 +136,7 @@ def test_estimated_orbit_has_the_shape_of_the_true_one_to_half_a_micrometre(
             assert np.mean(inside) > 0.9
 
 
-def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Machine) -> None:
+def test_document_follows_the_published_schema(tracked, calibrated):
     validator = jsonschema.Draft202012Validator(estimate_schema())
     one = document(tracked)
     validator.validate(one)
@@ -159,13 +148,7 @@ def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Ma
         assert not validator.is_valid({**one, wrong: 1.0}), wrong
         bearings = {name: {**entry, wrong: 1.0} for name, entry in one["bearings"].items()}
         assert not validator.is_valid({**one, "bearings": bearings}), wrong
-    assert (one["method"], one["record"]) == ("tracked", "hidden_060")
-    assert one["speed_Hz"] == pytest.approx(60.0, rel=1e-3)
-    instant = tracked.drop_instant
-    assert (one["drop_instant_s"], one["drop_instant_interval_90_s"]) == (
-        instant.value,
-        [*instant.interval_90],
-    )
+    assert one["record"] == "hidden_060"
     assert Drop.of(one, "here", "a test").as_json() == one
     for name in BEARINGS:
         for impact in one["bearings"][name]["impacts"]:
@@ -177,7 +160,7 @@ def test_document_follows_the_published_schema(tracked: Estimate, calibrated: Ma
                 assert low <= impact[field]["value"] <= high
 
 
-def test_energies_of_the_impacts_hold_the_truth(tracked: Estimate, synthetic: SyntheticDrop) -> None:
+def test_energies_of_the_impacts_hold_the_truth(tracked, synthetic):
     """The error of the friction coefficient is in them: sliding takes nearly all of the energy."""
     true = synthetic.result.contacts
     held = []
@@ -192,11 +175,10 @@ def test_energies_of_the_impacts_hold_the_truth(tracked: Estimate, synthetic: Sy
     assert len(held) > 10 and np.mean(held) >= 0.85
 
 
-def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop: TrackedDrop) -> None:
-    """Small errors of samples cancel, large ones lengthen the force."""
+def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop):
     forces = workshop.forces
 
-    def by_record(size: float) -> float:
+    def by_record(size):
         scaled = replace(forces, magnitude_sigma=size * forces.magnitude_sigma)
         mean = twin_loads(scaled, 0, 1.0).means["mean_force_0p15_0p2_N"]
         allowance = mean.allowance_90 or 0.0
@@ -212,26 +194,21 @@ def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop: Tracked
     assert by_record(100.0) == pytest.approx(math.hypot(100.0 * cancelled, lengthened), rel=1e-2)
 
 
-def test_impulses_of_the_impacts_add_up_to_the_impulse_of_the_force(
-    workshop: TrackedDrop, tracked: Estimate
-) -> None:
+def test_impulses_add_up_and_carry_the_weight(workshop, tracked):
     """Force times time over the whole drop, from the contact force, impact by impact."""
     dt = float(workshop.forces.time[1] - workshop.forces.time[0])
     for b, name in enumerate(BEARINGS):
         whole = dt * float(np.sum(workshop.forces.contact_force[:, b]))
         parts = sum(impact.impulse.value for impact in tracked.bearing(name).impacts)
         assert parts == pytest.approx(whole, rel=1e-9)
-
-
-def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
-    """Momentum: the bearings push up the weight and what the centre of mass gained, to 0.3 per cent."""
+    # Momentum: the bearings push up the weight and what the centre of mass gained, to 0.3 per cent.
     model, forces = workshop.problem.model, workshop.forces
     time, dt = forces.time, float(forces.time[1] - forces.time[0])
     mass, shares = float(model.fe.total_mass), np.asarray(model.load_shares)
     height = forces.displacement[..., 1] @ (shares / shares.sum())  # of the centre, by the law of the lever
     late = np.flatnonzero(time > 0.1)
 
-    def speed(at: int) -> float:
+    def speed(at):
         near = slice(at - 20, at + 20)  # 2 ms: longer than a contact
         return float(np.polyfit(time[near], height[near], 1)[0])
 
@@ -241,7 +218,7 @@ def test_vertical_impulse_carries_the_weight(workshop: TrackedDrop) -> None:
     assert up - weight == pytest.approx(mass * (speed(last) - speed(first)), abs=0.003 * weight)
 
 
-def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
+def followed(machine, item):
     search = Search(drops=Drops(evidence=(item,), calibrate_only=False), progress=None)
     fit = track_drops(search, machine, quick=True).fit
     drop = tracked_drop(item, fit.problems[0], fit.smoothed[0], fit.smoothed[0], 1.0)
@@ -249,9 +226,8 @@ def followed(machine: Machine, item: Evidence) -> tuple[TrackedDrop, Estimate]:
     return drop, estimate_of(drop, Tracked(quick=True), facts)
 
 
-def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(
-    calibrated: Machine, workshop: TrackedDrop, quick: Estimate, synthetic: SyntheticDrop
-) -> None:
+@pytest.mark.slow
+def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(calibrated, workshop, quick, synthetic):
     record = synthetic.record
     signals = record.signals.copy()
     start = int(np.searchsorted(record.time, quick.drop_instant.value + 0.06))
@@ -271,10 +247,9 @@ def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(
     assert drop.nis is not None and math.isfinite(drop.nis)
 
 
-def test_a_machine_that_lost_a_sensor_is_still_estimated(
-    calibrated: Machine, quick: Estimate, synthetic: SyntheticDrop
-) -> None:
-    def without(record: Record) -> Record:
+@pytest.mark.slow
+def test_a_machine_that_lost_a_sensor_is_still_estimated(calibrated, quick, synthetic):
+    def without(record):
         return replace(record, signals=np.delete(record.signals, 1, axis=1), sensors=left)
 
     left = tuple(sensor for i, sensor in enumerate(calibrated.sensors) if i != 1)
@@ -289,9 +264,8 @@ def test_a_machine_that_lost_a_sensor_is_still_estimated(
     assert_right(drop, synthetic, factor=2.0)
 
 
-def test_without_tail_and_levitated_part_less_is_known(
-    calibrated: Machine, workshop: TrackedDrop, quick: Estimate, synthetic: SyntheticDrop
-) -> None:
+@pytest.mark.slow
+def test_without_tail_and_levitated_part_less_is_known(calibrated, workshop, quick, synthetic):
     record = synthetic.record
     kept = record.time >= quick.drop_instant.value - 1e-9
     cut = replace(
@@ -317,14 +291,13 @@ def test_without_tail_and_levitated_part_less_is_known(
     assert np.all(variance[0] > variance[1])  # of the offsets, which the tail ties
 
 
-def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
-    known: Machine, calibrated: Machine, quick: Estimate
-) -> None:
+@pytest.mark.slow
+def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(known, calibrated, quick):
     elsewhere = hidden_machine(known, SEED, "sensor planes 30 mm off")
     record = synthesize_drop(elsewhere, SPEED, 10 * SEED, duration=0.22, tolerance=1e-7, name="moved")
     drop = estimate_drop(calibrated, record.record, tail=record.tail, method=Tracked(quick=True))
     assert drop.verdict in (Verdict.WIDENED, Verdict.REPLACED) and not drop.consistent
-    assert drop.sentence.startswith("The model is not consistent with the record")
+    assert drop.sentence.startswith("The model does not follow the record")
     checks = {check.name: check for check in drop.cross_check}
     for name in BEARINGS:
         peak, check = drop.bearing(name).peak_force, checks[f"{name} peak force"]
@@ -337,7 +310,7 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
         band, at = drop.bearing(name).force_band, int(np.argmax(drop.bearing(name).force.values))
         assert band is not None  # the drawn band says what the headline says
         assert (band.lower[at], band.upper[at]) == pytest.approx(peak.interval_90, rel=0.02)
-    assert_right_or_wide(drop, record)
+    assert_right(drop, record, factor=math.inf)
     for name, half in zip(BEARINGS, half_widths(drop, "peak_force_N"), strict=True):
         least = NINETY * MODEL_FORCE_SIGMA * number(drop, name, "peak_force_N").value
         assert half >= INCONSISTENT_WIDENING * least
@@ -351,19 +324,19 @@ def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(
             assert row.estimate.interval_90[1] >= row.prior.interval_90[1]
 
 
-def test_a_record_without_speed_is_refused(calibrated: Machine, synthetic: SyntheticDrop) -> None:
-    mute = replace(synthetic.record, speed=None, speed_time=None, speed_readings=None)
-    with pytest.raises(RecordError, match="the record mute has no rotor speed; expected one"):
-        read_evidence(build_drop_model(calibrated), mute, name="mute")
-
-
-def test_as_many_tails_as_records_are_needed(calibrated: Machine, synthetic: SyntheticDrop) -> None:
+def test_a_tail_for_every_record_and_a_check_for_every_drop_are_needed(calibrated, synthetic, workshop):
     with pytest.raises(UsageError, match="0 tails for 1 records; expected one, or None, for each"):
         estimate_drops(calibrated, [synthetic.record], [])
+    failed = (
+        Check(name="directions", passed=False, message="one direction"),
+        Check(name="innovation size", passed=False, message="innovations 9 × expected"),
+    )
+    with pytest.raises(IdentificationError, match=r"record hidden_060 .*nothing can check its force"):
+        told_of(replace(workshop, checks=failed), calibrated, synthetic)
 
 
 @pytest.mark.slow
-def test_a_single_drop_from_guesses_without_a_tail_is_not_led_astray() -> None:
+def test_a_single_drop_from_guesses_without_a_tail_is_not_led_astray():
     """Truth of the record: 3333.1 and 3618.5 N, air gaps of 275 and 288 µm against guesses of 250 µm."""
     machine = example_machine("lp400")
     drop = estimate_drop(machine, read_record(example_record_path("lp400_drop_060"), machine))
@@ -373,9 +346,7 @@ def test_a_single_drop_from_guesses_without_a_tail_is_not_led_astray() -> None:
         assert number(drop, name, "air_gap_m").value == pytest.approx(gap, abs=8e-6)
 
 
-def test_gaps_without_a_tail_start_where_the_first_forces_act(
-    known: Machine, synthetic: SyntheticDrop
-) -> None:
+def test_gaps_and_tails_belong_to_no_single_drop(known, synthetic):
     model = build_drop_model(known, "quick")
     item = read_evidence(build_drop_model(known), synthetic.record)
     started = drop_problem(model, item)
@@ -385,9 +356,6 @@ def test_gaps_without_a_tail_start_where_the_first_forces_act(
         assert abs(started.mean[entry] - true) < 15e-6
         guess = known.bearing(name).air_gap
         assert started.mean[entry] != float(guess)
-
-
-def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: SyntheticDrop) -> None:
     model = build_drop_model(known)
     without = read_evidence(model, synthetic.record)
     having = read_evidence(model, synthetic.record, synthetic.tail)
@@ -402,23 +370,20 @@ def test_a_tail_of_any_drop_serves_the_whole_chain(known: Machine, synthetic: Sy
     ("nis", "factor", "diverged", "inconsistent"),
     [(0.95, 1.0, False, False), (1.3, 1.0, False, True), (0.95, 8.0, False, True), (0.95, 1.0, True, True)],
 )
-def test_a_fit_inconsistent_with_the_record_is_noticed(
-    nis: float, factor: float, diverged: bool, inconsistent: bool
-) -> None:
+def test_a_fit_inconsistent_with_the_record_is_noticed(nis, factor, diverged, inconsistent):
     drops = [
         SimpleNamespace(nis=one, done=3 - lost, means=range(3)) for one, lost in ((0.9, 0), (nis, diverged))
     ]
     fit = TrackedDrops(
         problems=(),
-        filtered=tuple(drops),  # type: ignore[arg-type]
+        filtered=tuple(drops),
         trajectories=(),
         noise_factors=(1.0, factor),
     )
     assert is_inconsistent(fit) == inconsistent
 
 
-def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: TrackedDrop) -> None:
-    """White innovations do not show a wrong contact law; seen with bearings that have play."""
+def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop):
     forces = workshop.forces
     magnitude = forces.magnitude.copy()
     magnitude[:, 0] *= 3.0
@@ -437,7 +402,7 @@ def test_a_peak_far_from_the_cross_check_is_not_called_consistent(workshop: Trac
     assert cross_checked(wrong, Tracked(quick=True)) == (wrong, None)
 
 
-def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDrop) -> None:
+def test_a_bearing_with_play_is_cross_checked_however_quick(workshop):
     model = workshop.problem.model
     first, *others = model.machine.touchdown_bearings
     play = {"clearance": Known(value=20e-6), "preload": Known(value=0.0)}
@@ -449,12 +414,13 @@ def test_a_bearing_with_play_is_cross_checked_however_quick(workshop: TrackedDro
     assert cross_checked(workshop, Tracked(quick=True))[1] is None
 
 
-def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop, tracked: Estimate) -> None:
-    problem, forces = workshop.problem, workshop.forces
-    check = input_state_estimate(problem, corrections_by_record(problem))
+def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop, tracked, check):
+    forces = workshop.forces
     own = twin_loads(forces, 0, 1.0)
     assert not is_beyond_factor(own.peak_force.value, check, 0)
     assert is_beyond_factor(2.1 * float(check.peak[0]), check, 0)
+    assert not is_beyond_factor(3000.0, replace(check, peak=np.full(2, math.nan)), 0)
+    assert not is_beyond_factor(0.0, check, 0)
     held = widened_to_cross_check(own, check, 0)
     assert (held.peak_force.value, held.peak_force.time) == (own.peak_force.value, own.peak_force.time)
 
@@ -463,7 +429,7 @@ def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop
     assert given.peak_force.value == check.peak[0] == given.force.values.max()
     assert given.peak_force.known.status == OF_CROSS_CHECK
     low, high = given.peak_force.interval_90 or (math.nan, math.nan)
-    half = LOST_WIDENING * check.peak_error[0]
+    half = DIVERGED_WIDENING * check.peak_error[0]
     assert (low, high) == pytest.approx(((1.0 - half) * check.peak[0], (1.0 + half) * check.peak[0]))
     assert given.force_band.upper.max() == pytest.approx(high)
     assert low < own.peak_force.value < high
@@ -473,10 +439,7 @@ def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop: TrackedDrop
         assert given.means[field].value == pytest.approx(number(tracked, "NDE", field).value, rel=limit)
 
 
-def test_what_a_lost_twin_says_does_not_enter_the_cross_check(
-    workshop: TrackedDrop, calibrated: Machine, synthetic: SyntheticDrop
-) -> None:
-    """Gains of 30 %, gaps of -500 micrometres and a rotor that is nowhere near: nothing of it comes back."""
+def test_what_a_lost_twin_says_does_not_enter_the_cross_check(workshop, calibrated, synthetic):
     problem, smoothed = workshop.problem, workshop.smoothed
     means = smoothed.means.copy()
     means[:, problem.gap_entries] = -500e-6
@@ -488,8 +451,7 @@ def test_what_a_lost_twin_says_does_not_enter_the_cross_check(
     check = input_state_estimate(problem, corrections)
     failed = Check(name="sensor errors", passed=False, message="gain departs by 30 prior standard deviations")
     drop = replace(workshop, smoothed=lost, checks=(failed,))
-    facts = facts_of(Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="lost"))
-    estimate = estimate_of(drop, Tracked(), facts)
+    estimate = told_of(drop, calibrated, synthetic)
     assert estimate.verdict is Verdict.REPLACED and not estimate.consistent
     for b, name in enumerate(BEARINGS):
         bearing = estimate.bearing(name)
@@ -501,57 +463,32 @@ def test_what_a_lost_twin_says_does_not_enter_the_cross_check(
         assert gap.interval_90[0] >= 0.0 and gap.status == OF_CROSS_CHECK
         row = next(p for p in estimate.parameters if p.path == f"{name}.air_gap")
         assert row.estimate == gap and not bearing.impacts
-    assert_right_or_wide(estimate, synthetic)
+    assert_right(estimate, synthetic, factor=math.inf)
     assert all(one.replaced for one in estimate.cross_check)
     jsonschema.Draft202012Validator(estimate_schema()).validate(document(estimate))
 
 
-def test_a_gap_that_no_machine_has_is_lost(workshop: TrackedDrop) -> None:
+def test_a_gap_that_no_machine_has_is_lost(workshop):
     problem = workshop.problem
     own = gap_of_record(problem, 0)
-    assert not is_lost(problem, own, 0)
-    assert is_lost(problem, replace(own, value=-1e-6), 0)
-    far = float(problem.mean[problem.gap_entries[0]]) + 4.0 * math.sqrt(
-        problem.covariance[problem.gap_entries[0], problem.gap_entries[0]]
-    )
-    assert is_lost(problem, replace(own, value=far), 0)
+    assert not is_impossible_gap(problem, own, 0)
+    assert is_impossible_gap(problem, replace(own, value=-1e-6), 0)
+    k = problem.gap_entries[0]
+    far = float(problem.mean[k]) + 4.0 * math.sqrt(problem.covariance[k, k])
+    assert is_impossible_gap(problem, replace(own, value=far), 0)
 
 
-def test_a_drop_that_nothing_can_check_is_refused(
-    workshop: TrackedDrop, calibrated: Machine, synthetic: SyntheticDrop
-) -> None:
-    failed = (
-        Check(name="directions", passed=False, message="one direction"),
-        Check(name="innovation size", passed=False, message="innovations 9 × expected"),
-    )
-    facts = facts_of(Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="blind"))
-    with pytest.raises(IdentificationError, match=r"record hidden_060 .*nothing can check its force"):
-        estimate_of(replace(workshop, checks=failed), Tracked(), facts)
-
-
-def test_an_estimate_keeps_no_array_of_the_filter(workshop: TrackedDrop, tracked: Estimate) -> None:
-    """What is kept of a drop is a few megabytes; the covariances of its filter are hundreds."""
-    kept = len(pickle.dumps(replace(tracked, record=None, machine=None, drop_instant=None)))  # type: ignore[arg-type]
+def test_what_an_estimate_keeps_of_filter_and_cross_check(workshop, tracked):
+    kept = len(pickle.dumps(replace(tracked, record=None, machine=None, drop_instant=None)))
     samples, estimated = workshop.smoothed.means.shape
     assert kept < 10e6 < 0.1 * samples * estimated**2 * 4
-
-
-def test_the_cross_check_made_while_the_passes_run_is_that_made_alone(workshop: TrackedDrop) -> None:
     assert workshop.cross_check is not None
     begun, alone = workshop.without_contact_law(), check_without_contact_law(workshop.problem)
     np.testing.assert_array_equal(begun.force, alone.force)
     np.testing.assert_array_equal(begun.stress, alone.stress)
 
 
-def test_nothing_is_replaced_by_a_cross_check_that_found_nothing(workshop: TrackedDrop) -> None:
-    check = input_state_estimate(workshop.problem, corrections_by_record(workshop.problem))
-    assert not is_beyond_factor(3000.0, replace(check, peak=np.full(2, math.nan)), 0)
-    assert not is_beyond_factor(0.0, check, 0)
-
-
-def test_the_cross_check_of_the_late_mean_has_the_time_its_name_says(
-    workshop: TrackedDrop, tracked: Estimate
-) -> None:
+def test_the_cross_check_of_the_late_mean_has_the_time_its_name_says(workshop, tracked, check):
     late = (workshop.forces.time >= 0.15) & (workshop.forces.time <= 0.2)
     checks = {check.name: check for check in tracked.cross_check}
     for b, name in enumerate(BEARINGS):
@@ -559,16 +496,13 @@ def test_the_cross_check_of_the_late_mean_has_the_time_its_name_says(
         assert checks[f"{name} force of the mean, 150 to 200 ms"].estimate.value == pytest.approx(vector)
         mean = workshop.forces.magnitude[late, b].mean()
         assert number(tracked, name, "mean_force_0p15_0p2_N").value == pytest.approx(mean)
-    check = input_state_estimate(workshop.problem, corrections_by_record(workshop.problem))
     held = widened_to_cross_check(twin_loads(workshop.forces, 0, 1.0), check, 0)
     low, high = held.means["mean_force_0p15_0p2_N"].interval_90 or (math.nan, math.nan)
     assert low <= 0.95 * check.mean_magnitude_late[0] * (1.0 + 1e-9)
     assert high >= 1.05 * check.mean_magnitude_late[0] * (1.0 - 1e-9)
 
 
-def test_a_force_that_turns_does_not_stretch_the_mean_of_its_size(workshop: TrackedDrop) -> None:
-    """The cross-check's mean vector may be many times the twin's where both have the same mean magnitude."""
-    check = input_state_estimate(workshop.problem, corrections_by_record(workshop.problem))
+def test_a_force_that_turns_does_not_stretch_the_mean_of_its_size(workshop, check):
     own = twin_loads(workshop.forces, 0, 1.0)
     turning = replace(check, mean_late=8.0 * check.mean_late)
     held, same = (
@@ -577,8 +511,7 @@ def test_a_force_that_turns_does_not_stretch_the_mean_of_its_size(workshop: Trac
     assert held == same and max(held.high / own.means["mean_force_0p15_0p2_N"].value, 1.0) < 1.2
 
 
-def test_an_impact_that_the_end_of_the_window_cuts_says_so(workshop: TrackedDrop, tracked: Estimate) -> None:
-    """Its peak is still to come: what was read of it is a lower limit, and no interval is stated."""
+def test_an_impact_that_the_end_of_the_window_cuts_says_so(workshop, tracked):
     whole = max(tracked.bearing("NDE").impacts, key=lambda one: one.peak_force.value)
     samples = int(np.searchsorted(workshop.forces.time, whole.start + 0.3 * (whole.peak_time - whole.start)))
     forces = workshop.forces
@@ -596,7 +529,8 @@ def test_an_impact_that_the_end_of_the_window_cuts_says_so(workshop: TrackedDrop
     assert all(one.end > one.start and one.peak_force.interval_90 for one in others)
 
 
-def test_several_drops_are_given_out_one_by_one(calibrated: Machine, synthetic: SyntheticDrop) -> None:
+@pytest.mark.slow
+def test_several_drops_are_given_out_one_by_one(calibrated, synthetic):
     item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail)
     drops = followed_drops(calibrated, [item, replace(item, name="two")], quick=True)
     kept = [weakref.ref(drop.smoothed) for drop in drops]
@@ -604,8 +538,8 @@ def test_several_drops_are_given_out_one_by_one(calibrated: Machine, synthetic: 
     assert [one() for one in kept] == [None, None]
 
 
-def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
-    """1.8 m, 130 kg, a plane at mid-span: from guesses NIS was 13 and air gaps 185 and 152 µm."""
+@pytest.mark.slow
+def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss():
     machine = load_machine(Path(__file__).parents[2] / "machines" / "long_rotor.toml")
     made = synthesize_drop(hidden_machine(machine, 1), 2.0 * math.pi * 120.0, 10, duration=0.1, name="long")
     evidence = read_evidence(build_drop_model(machine), made.record, made.tail)
@@ -620,8 +554,7 @@ def test_a_third_sensor_plane_of_a_long_rotor_is_no_loss() -> None:
         assert theta[paths.index(f"{name}.air_gap")] == pytest.approx(gap, abs=2e-6)
 
 
-def test_an_inertia_that_a_bounded_drag_stands_in_for_is_not_determined(workshop: TrackedDrop) -> None:
-    """A sixth of the true inertia was "determined" where the drag went far beyond its bound."""
+def test_an_inertia_that_a_bounded_drag_stands_in_for_is_not_determined(workshop):
     problem, smoothed = workshop.problem, workshop.smoothed
     at = smoothed.filtered.parameter_sample
     mean, covariance = smoothed.means[at].copy(), smoothed.covariance(at)
@@ -636,34 +569,26 @@ def test_an_inertia_that_a_bounded_drag_stands_in_for_is_not_determined(workshop
     assert found[drag].status == "at its bound" and found[inertia].status == UNDETERMINED
     bound = math.exp(problem.unknowns[drag].bounds[1])
     assert found[drag].value == pytest.approx(bound) and found[drag].low < 0.5 * bound
-    prior = problem.unknowns[inertia]
-    assert found[inertia].low < math.exp(prior.mean - prior.sigma) and found[inertia].high > math.exp(
-        prior.mean + prior.sigma
-    )
+    prior, stated = problem.unknowns[inertia], found[inertia]
+    assert stated.low < math.exp(prior.mean - prior.sigma)
+    assert stated.high > math.exp(prior.mean + prior.sigma)
 
 
-def test_a_race_whose_mass_nobody_states_is_an_unknown(workshop: TrackedDrop) -> None:
-    """Rings 2.3 times as heavy as inferred moved a peak by 7.6 % while the mass was taken for known."""
+def test_a_race_whose_mass_nobody_states_is_an_unknown(workshop):
     machine = example_machine("lp400").with_values(
         {"NDE.race.mass": Known(value=0.31, status="inferred", range=(0.155, 0.62))}
     )
-    unknown = next(
-        u for u in bearing_unknowns(build_drop_model(machine, "quick"), 0) if u.path == "NDE.race.mass"
-    )
+    unknowns = bearing_unknowns(build_drop_model(machine, "quick"), 0)
+    unknown = next(one for one in unknowns if one.path == "NDE.race.mass")
     assert unknown.value_of(unknown.mean + NINETY * unknown.sigma) == pytest.approx(0.62)
     assert unknown.sets("bearing", columns.RACE_MASS)
     found = parameters(workshop.problem, workshop.smoothed, fits=True, widening=1.0)
     assert "race.mass_kg" in {one.row.field for one in found}
 
 
-def test_what_is_noted_widens_every_interval(
-    workshop: TrackedDrop, tracked: Estimate, calibrated: Machine, synthetic: SyntheticDrop
-) -> None:
+def test_what_is_noted_widens_every_interval(workshop, tracked, calibrated, synthetic):
     noted = Check(name="parameters", passed=True, message="3.8", note="followed all the same", widening=1.6)
-    facts = facts_of(
-        Evidence(record=synthetic.record, machine=calibrated, tail=synthetic.tail, name="hidden_060")
-    )
-    wider = estimate_of(replace(workshop, checks=(*workshop.checks, noted)), Tracked(), facts)
+    wider = told_of(replace(workshop, checks=(*workshop.checks, noted)), calibrated, synthetic)
     assert wider.verdict is Verdict.CONSISTENT and "followed all the same" in wider.notes
     for field in ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N"):
         for much, one in zip(half_widths(wider, field), half_widths(tracked, field), strict=True):
@@ -672,11 +597,9 @@ def test_what_is_noted_widens_every_interval(
     assert many.high - many.value == pytest.approx(1.6 * (few.high - few.value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["hold", "spikes"])
-def test_damaged_samples_are_left_out_and_the_rest_is_estimated(
-    calibrated: Machine, synthetic: SyntheticDrop, quick: Estimate, fault: str
-) -> None:
-    """2 ms without news were refused, and 20 samples off by 40 µm made every interval six times as wide."""
+def test_damaged_samples_are_left_out_and_the_rest_is_estimated(calibrated, synthetic, quick, fault):
     record, signals = synthetic.record, synthetic.record.signals.copy()
     if fault == "hold":
         first = int(np.searchsorted(record.time, 0.030))

@@ -1,9 +1,8 @@
-"""The document and the page of a tracked estimate: every number is that of its source."""
-
-from __future__ import annotations
+"""Document, page and intervals of a tracked estimate, whose left is no better than its right."""
 
 import json
 import math
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,25 +10,37 @@ import pytest
 
 from rotordrop.elements.table import published, rows
 from rotordrop.estimate.document import estimate_document
-from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.later_motion import RESOLVED
-from rotordrop.known import Known
+from rotordrop.evidence.evidence import read_evidence
+from rotordrop.evidence.impacts import shortest_flight
+from rotordrop.known import NINETY, Known
 from rotordrop.report.estimate_page import estimate_page
 from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.twin.tracked import TrackedDrop
-from rotordrop_bench import SyntheticDrop
+from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.track.forces import ForceHistory, force_history
+from rotordrop.track.input_state import InputEstimate
+from rotordrop.track.problem import build_problem
+from rotordrop.track.smoother import PassSettings, forward, smooth
+from rotordrop.twin.problems import COARSE_BASIS, recorded_drop
+from rotordrop.twin.tracked_loads import (
+    loads_of_cross_check,
+    race_moved,
+    widened_to,
+    widened_to_cross_check,
+    with_interval,
+)
 
 BEARINGS = ("NDE", "DE")
 
 
-@pytest.fixture(scope="module")
-def document(tracked: Estimate) -> dict[str, Any]:
+@pytest.fixture
+def document(tracked):
     written: dict[str, Any] = json.loads(json.dumps(estimate_document(tracked), allow_nan=False))
     return written
 
 
-def same(written: dict[str, Any], known: Known) -> bool:
+def same(written, known):
     error, interval = written.get("standard_error"), written.get("interval_90")
     return (
         written["value"] == known.value
@@ -39,9 +50,7 @@ def same(written: dict[str, Any], known: Known) -> bool:
     )
 
 
-def test_the_head_names_the_drop(
-    document: dict[str, Any], tracked: Estimate, workshop: TrackedDrop, synthetic: SyntheticDrop
-) -> None:
+def test_the_head_names_the_drop(document, tracked, workshop, synthetic):
     assert document["machine"] == workshop.problem.model.machine.name
     assert document["record_sha256"] == synthetic.record.sha256
     assert document["speed_Hz"] == pytest.approx(60.0, abs=0.05)
@@ -59,7 +68,7 @@ def test_the_head_names_the_drop(
     assert document["verdict"] == tracked.verdict.value and judged["sentence"] == tracked.sentence
 
 
-def test_peaks_and_means_are_those_of_the_filter(document: dict[str, Any], workshop: TrackedDrop) -> None:
+def test_peaks_and_means_are_those_of_the_filter(document, workshop):
     forces = workshop.forces
     late = (forces.time >= 0.15) & (forces.time <= 0.2)
     for b, name in enumerate(BEARINGS):
@@ -75,9 +84,7 @@ def test_peaks_and_means_are_those_of_the_filter(document: dict[str, Any], works
         assert statistics["mean"] == pytest.approx(forces.stress[:, b].mean(), rel=1e-3)
 
 
-def test_every_impact_lasts_as_long_as_the_indentation(
-    document: dict[str, Any], workshop: TrackedDrop
-) -> None:
+def test_every_impact_lasts_as_long_as_the_indentation(document, workshop):
     forces = workshop.forces
     dt = float(forces.time[1] - forces.time[0])
     for b, name in enumerate(BEARINGS):
@@ -101,7 +108,7 @@ def test_every_impact_lasts_as_long_as_the_indentation(
         assert np.array_equal(covered, inside)
 
 
-def test_innovations_are_those_of_the_displacement_channels(tracked: Estimate, workshop: TrackedDrop) -> None:
+def test_innovations_are_those_of_the_displacement_channels(tracked, workshop):
     """Reading minus prediction over its deviation: squares near one where the model fits."""
     found, filtered = tracked.innovations, workshop.judged
     assert found is not None
@@ -116,29 +123,24 @@ def test_innovations_are_those_of_the_displacement_channels(tracked: Estimate, w
         assert np.nanmin(found.deviation[:, c]) >= noise * (1.0 - 1e-9)
 
 
-def test_the_rest_of_the_record_is_compared_above_the_noise(
-    document: dict[str, Any], tracked: Estimate
-) -> None:
+def test_the_rest_of_the_record_is_compared_above_the_noise(document, tracked):
     noise = math.sqrt(np.mean([one.noise**2 for one in tracked.sensors]))
     assert {one["bearing"] for one in document["later_motion"]} == set(BEARINGS)
     for one in document["later_motion"]:
         assert one["resolved"] == pytest.approx(RESOLVED * noise)
         radius = tracked.bearing(one["bearing"]).motions[0].radial.values
-        assert one["first"] == pytest.approx(np.nanmax(radius), abs=0.5e-6)
+        assert one["first"] == pytest.approx(
+            np.nanmax(radius), abs=15e-6
+        )  # the rotor bends beside its sensors
         assert 0.2 < one["later_time"] < 0.23
         assert one["larger"] == (one["later"] > one["first"] + one["resolved"])
 
 
-def test_every_row_of_the_table_arrives_in_document_and_page(
-    document: dict[str, Any], tracked: Estimate
-) -> None:
+def test_every_row_of_the_table_arrives_in_document_and_page(document, tracked):
     page = estimate_page(tracked)
     html = render_page(page)
     (shown,) = (section for section in page.sections if section.heading == "Parameters")
-    machine, *_ = shown.tables
-    of_machine = [one for one in tracked.parameters if one.scope == "machine"]
-    table = {one.path: line for one, line in zip(of_machine, machine.rows, strict=True)}
-    assert all(one.owner in str(table[one.path][0]) for one in of_machine)
+    lines = [line for one in shown.tables[:2] for line in one.rows]
     written = {entry["path"]: entry for entry in document["parameters"]}
     assert list(written) == [one.path for one in tracked.parameters]
     for name in BEARINGS:
@@ -153,11 +155,15 @@ def test_every_row_of_the_table_arrives_in_document_and_page(
                 assert same(written[known.path]["estimate"], known.estimate)
                 assert known.prior is not None and same(written[known.path]["prior"], known.prior)
                 assert known.estimate == values[field]
-                _, before, after, verdict = table[known.path]
-                assert isinstance(before, Quantity) and before.value == known.prior.value
-                assert isinstance(after, Quantity) and after.value == known.estimate.value
+                line, after = next(
+                    (line, cell)
+                    for line in lines
+                    for cell in line[2:-1]
+                    if isinstance(cell, Quantity) and cell.value == known.estimate.value
+                )
+                assert isinstance(line[1], Quantity) and line[1].value == known.prior.value
                 assert after.interval_90 == known.estimate.interval_90
-                assert verdict == ("" if known.estimate.status == "determined" else known.estimate.status)
+                assert known.estimate.status == "determined" or known.estimate.status in line[-1]
         for row in rows("bearing"):
             assert row.path_of(name) in written or row.field in values, row.path
             assert row.path_of(name) not in written or row.label.lower() in html.lower(), row.label
@@ -167,7 +173,7 @@ def test_every_row_of_the_table_arrives_in_document_and_page(
         assert entry["noise_m"] == one.noise and one.sensor in html
 
 
-def test_the_cross_check_stands_beside_what_it_checks(document: dict[str, Any], tracked: Estimate) -> None:
+def test_the_cross_check_stands_beside_what_it_checks(document, tracked):
     assert len(document["cross_check"]) == len(tracked.cross_check) == 3 * len(BEARINGS)
     for entry, one in zip(document["cross_check"], tracked.cross_check, strict=True):
         assert (entry["name"], entry["estimate"], entry["cross_check"]) == (
@@ -181,3 +187,126 @@ def test_the_cross_check_stands_beside_what_it_checks(document: dict[str, Any], 
         field = {"peak force": "peak_force_N", "peak stress": "peak_stress_Pa"}.get(what)
         if field is not None:
             assert entry["estimate"] == document["bearings"][name][field]["value"]
+
+
+def test_magnitudes_end_at_zero_and_hold_what_the_model_leaves_out():
+    assert with_interval(100.0, 200.0).interval_90 == pytest.approx((0.0, 100.0 + NINETY * 200.0))
+    assert with_interval(-5.0, 1.0).interval_90 == pytest.approx((-5.0 - NINETY, -5.0 + NINETY))
+    held = widened_to(with_interval(100.0, 10.0), 3.0, 0.15).interval_90
+    assert held == pytest.approx((100.0 - NINETY * 10.0, 345.0))
+    known = with_interval(100.0, 5.0, 2.0, "N", left_out=3.0)
+    assert known.allowance_90 == pytest.approx(2.0 * NINETY * 3.0)
+    assert with_interval(100.0, 5.0).allowance_90 is None
+    assert widened_to(known, 3.0, 0.15).allowance_90 is None  # the cross-check made it as wide as it is
+
+
+def check_of(force, time):
+    """A cross-check of one bearing that found this force (N, 2) [N]."""
+    magnitude, one = np.hypot(*force.T)[:, None], np.ones(1)
+    late = (time >= 0.15) & (time <= 0.2)
+    return InputEstimate(
+        time=time,
+        turn=1e4,
+        force=force[:, None, :],
+        sigma=np.zeros((len(time), 1, 2)),
+        magnitude=magnitude,
+        peak=magnitude.max(axis=0),
+        reinserted=0.0 * one,
+        peak_error=0.1 * one,
+        stress=1e9 * np.cbrt(magnitude / 1e3),
+        peak_stress=1e9 * np.cbrt(magnitude.max(axis=0) / 1e3),
+        stress_error=0.1 * one,
+        mean_late=np.hypot(*force[late].mean(axis=0)) * one,
+        mean_magnitude_late=magnitude[late].mean(axis=0),
+    )
+
+
+def test_means_widen_by_preload_and_not_by_noise():
+    time = np.arange(0.0, 0.2005, 5e-5)
+    noisy = np.array([0.0, 23.0]) + 20.0 * np.random.default_rng(0).standard_normal((len(time), 2))
+    stated = loads_of_cross_check(check_of(noisy, time), 0).means["mean_force_0p15_0p2_N"]
+    assert stated.value > 30.0 and stated.low < 23.0 < stated.high
+    turning = 30.0 * np.column_stack([np.cos(300.0 * time), np.sin(300.0 * time)])
+    whirl = loads_of_cross_check(check_of(turning, time), 0).means["mean_force_0p15_0p2_N"]
+    assert whirl.high > 30.0  # with a mean vector near zero, all of it may be noise
+    assert whirl.low == pytest.approx(0.95 * float(check_of(turning, time).mean_late[0]))
+    time = np.arange(0.0, 0.2005, 5e-5)
+    check = check_of(np.tile([0.0, 23.0], (len(time), 1)), time)
+    own = loads_of_cross_check(check, 0)
+    preload = Known(value=679.0, interval_90=(42.0, 1046.0), unit="N")
+    stress = widened_to_cross_check(own, check, 0, preload).means["mean_stress_Pa"]
+    value = own.means["mean_stress_Pa"].value
+    assert stress.low == pytest.approx(0.9 * (42.0 / 679.0) ** (1 / 3) * value)
+    assert stress.high >= 1.1 * (1046.0 / 679.0) ** (1 / 3) * value * (1.0 - 1e-9)
+
+
+def test_an_impact_is_sure_whose_flight_is_one_with_the_race_nearer_and_farther():
+    gap, step, error = Known(value=300e-6, unit="m"), 5e-5, 0.5e-6
+    time = np.arange(0.0, 0.1, step)
+    flight = shortest_flight(gap.value)
+    touching = np.zeros(len(time), dtype=bool)
+    begins = (0.008, 0.009 + flight, 0.010 + 3.0 * flight)
+    for begin in begins:
+        touching |= (time >= begin) & (time < begin + 1e-3)
+    off = np.minimum.reduce([np.abs(time - at) for begin in begins for at in (begin, begin + 1e-3)])
+    blank = {one.name: np.zeros((len(time), 1)) for one in fields(ForceHistory)}
+    place = np.zeros((len(time), 1, 2))
+    place[:, 0, 1] = -np.linspace(0.0, 310e-6, len(time))
+    forces = ForceHistory(
+        **{
+            **blank,
+            "time": time,
+            "displacement": place,
+            "displacement_sigma": np.full_like(place, 2e-6),
+            # the rotor nears the race and leaves it by 10 mm/s
+            "indentation": (np.where(touching, 1.0, -1.0) * 0.01 * (off + 0.3 * step))[:, None],
+            "indentation_sigma": np.full((len(time), 1), error),
+        }
+    )
+    seen = race_moved(forces, 0, gap, 1.0, 0.0)
+    assert seen["count_interval_90"] == (2, 3)
+    low, high = seen["contact_from_interval_90"]
+    moved = NINETY * error / 0.01 + step
+    assert begins[2] - moved - step < low < begins[2] < high <= begins[2] + moved + step
+    assert seen["largest"].value == pytest.approx(310e-6)
+    assert seen["largest"].high == pytest.approx(310e-6 + NINETY * math.hypot(2e-6, 0.008 * 310e-6))
+    sharp = replace(forces, indentation_sigma=np.zeros((len(time), 1)))
+    assert race_moved(sharp, 0, gap, 1.0, 0.0)["count_interval_90"] in ((2, 3), (2, 2))
+    assert race_moved(forces, 0, gap, 20.0, 0.0)["count_interval_90"][1] >= 3
+
+
+UNTIL = 0.025
+
+
+def mirrored(machine):
+    """The machine seen in a mirror: a sensor at 45° looks along 135°."""
+    sensors = []
+    for sensor in machine.sensors:
+        across = -math.cos(float(sensor.angle))
+        plane = (other for other in machine.sensors if other.node == sensor.node)
+        (angle,) = (other.angle for other in plane if math.isclose(math.cos(float(other.angle)), across))
+        sensors.append(sensor.model_copy(update={"angle": angle}))
+    return machine.model_copy(update={"sensors": tuple(sensors)})
+
+
+def first_impacts(machine, drop, spin):
+    """Forces over the first impacts."""
+    seen = recorded_drop(read_evidence(build_drop_model(machine), drop.record, drop.tail), UNTIL)
+    turned = replace(seen, initial_speed=spin * seen.initial_speed, speed=spin * seen.speed)
+    problem = build_problem(build_drop_model(machine, COARSE_BASIS), turned, until=UNTIL)
+    smoothed = smooth(forward(problem, PassSettings(impulse=3e-3, share=0.03)), watched=problem.watched)
+    return force_history(problem, smoothed)
+
+
+def test_a_mirrored_record_gives_the_mirrored_force(calibrated, synthetic):
+    """x to -x with the spin reversed: no law knows left from right."""
+    one = first_impacts(calibrated, synthetic, 1.0)
+    other = first_impacts(mirrored(calibrated), synthetic, -1.0)
+    peak = one.magnitude.max()
+    assert peak > 1000.0
+    assert np.abs(one.force[..., 0]).max() > 100.0
+    assert other.force[..., 0] == pytest.approx(-one.force[..., 0], abs=1e-5 * peak)
+    assert other.force[..., 1] == pytest.approx(one.force[..., 1], abs=1e-5 * peak)
+    assert other.magnitude_sigma == pytest.approx(one.magnitude_sigma, abs=1e-5 * peak)
+    same_spin = first_impacts(mirrored(calibrated), synthetic, 1.0)
+    assert np.abs(same_spin.force[..., 0] + one.force[..., 0]).max() > 1e-3 * peak

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import select
@@ -84,7 +83,7 @@ class Browser:
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
-    def until(self, expression: str, patience: float = 120.0) -> None:
+    def until(self, expression: str, patience: float = 600.0) -> None:
         end = time.monotonic() + patience
         while time.monotonic() < end:
             if self.evaluate(f"Boolean({expression})"):
@@ -111,9 +110,6 @@ class Browser:
             "objectId"
         ]
         self.call("DOM.setFileInputFiles", files=[str(file) for file in files], objectId=node)
-
-    def picture(self, file: Path, **more: Any) -> None:
-        file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png", **more)["data"]))
 
     def colours(self, scheme: str) -> None:
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])

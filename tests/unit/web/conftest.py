@@ -1,6 +1,3 @@
-from __future__ import annotations
-
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -8,20 +5,20 @@ import pytest
 from tests.unit.web.browser import Browser
 from tests.unit.web.serving import Served
 
-from rotordrop.web.workspace import Workspace
+from rotordrop.jobs.workspace import Workspace
 
 PACKAGE = Path(str(resources.files("rotordrop")))
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(tmp_path_factory):
     server = Served(Workspace(tmp_path_factory.mktemp("served")))
     yield server
     server.stop()
 
 
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[Served]:
+def server(tmp_path):
     """A page with an empty workspace."""
     one = Served(Workspace(tmp_path / "space"))
     yield one
@@ -29,14 +26,14 @@ def server(tmp_path: Path) -> Iterator[Served]:
 
 
 @pytest.fixture
-def browser(tmp_path: Path) -> Iterator[Browser]:
+def browser(tmp_path):
     page = Browser(tmp_path / "profile")
     yield page
     page.close()
 
 
 @pytest.fixture(scope="session")
-def files() -> dict[str, Path | tuple[str, bytes]]:
+def files():
     """The bundled machine, record and tail, as they are dropped on the page."""
     return {
         "machine": PACKAGE / "machine" / "examples" / "lp400.toml",

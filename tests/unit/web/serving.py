@@ -10,12 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import uvicorn
-
-from rotordrop.web.app import make_app
-from rotordrop.web.connection import configured
-from rotordrop.web.server import listening_at
-from rotordrop.web.workspace import Workspace
+from rotordrop.jobs.workspace import Workspace
+from rotordrop.web.server import listening_at, server_of
 
 
 @dataclass
@@ -36,14 +32,12 @@ class Answer:
 class Served:
     """A running server; `ask` carries host, origin and token of the own page unless told otherwise."""
 
-    def __init__(self, space: Workspace, port: int = 0, log: str | None = None) -> None:
+    def __init__(self, space: Workspace, port: int = 0) -> None:
         socket = listening_at(port)
         self.space, self.port = space, socket.getsockname()[1]
-        self.app = make_app(space, port=self.port, log=log)
+        self._server = server_of(space, socket)
+        self._server.config.timeout_graceful_shutdown = 1
         self.token = space.token()
-        config = configured(self.app)
-        config.timeout_graceful_shutdown = 1
-        self._server = uvicorn.Server(config)
         self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [socket]}, daemon=True)
         self._thread.start()
         while not self._server.started:
@@ -62,7 +56,7 @@ class Served:
         headers: list[tuple[str, str]] | None = None,
         **more: str,
     ) -> Answer:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=600)
         own = [("Host", f"127.0.0.1:{self.port}"), ("X-Rotordrop-Token", self.token)]
         try:
             connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
@@ -84,11 +78,11 @@ class Served:
         number = self.order("/api/jobs", {"name": "drop", "options": options}).told["id"]
         for role, file in files.items():
             name, content = (file.name, file.read_bytes()) if isinstance(file, Path) else file
-            done = self.ask("PUT", f"/api/jobs/{number}/files/{role}?name={name}", content)
+            done = self.put(number, role, name, content)
             assert done.status == 201, done.text
         return str(number)
 
-    def settled(self, number: str, verb: str, patience: float = 120.0) -> dict[str, Any]:
+    def settled(self, number: str, verb: str, patience: float = 600.0) -> dict[str, Any]:
         """Wait until a computation has ended, whatever the end."""
         until = time.monotonic() + patience
         while time.monotonic() < until:
@@ -97,6 +91,27 @@ class Served:
                 return dict(state)
             time.sleep(0.05)
         raise TimeoutError(f"{verb} of {number}")
+
+    def done(self, number: str, verb: str, told: object = None) -> Any:
+        """Ask for a computation, wait until it is done, and give its page, where it has one."""
+        assert self.order(f"/api/jobs/{number}/{verb}", told).status == 202
+        state = self.settled(number, verb)
+        assert state["state"] == "done", state
+        page = self.ask("GET", f"/api/jobs/{number}/{verb}/page")
+        return page.told if page.status == 200 else None
+
+    def failed(self, number: str, verb: str, told: object = None) -> str:
+        """Ask for a computation that cannot be done; what it says."""
+        self.order(f"/api/jobs/{number}/{verb}", told)
+        state = self.settled(number, verb)
+        assert state["state"] == "failed", state
+        return str(state["error"])
+
+    def document(self, number: str, verb: str) -> Any:
+        return self.ask("GET", f"/api/jobs/{number}/{verb}/document").told
+
+    def put(self, number: str, role: str, name: str, content: bytes) -> Answer:
+        return self.ask("PUT", f"/api/jobs/{number}/files/{role}?name={name}", content)
 
     def stop(self) -> None:
         self._server.should_exit = True

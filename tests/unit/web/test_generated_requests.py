@@ -1,50 +1,19 @@
 """Requests made from the table of operations, sound and unsound: none ends in an error of the server."""
 
-from __future__ import annotations
-
 import json
 import random
 from urllib.parse import quote
 
 import pytest
 
+from rotordrop.jobs.runner import Runner
 from rotordrop.web.app import OPERATIONS
 
-EACH = 500
+EACH = 40
 ODD = [
-    *(
-        "",
-        "0",
-        "-1",
-        "1e308",
-        "1e-320",
-        "nan",
-        "inf",
-        "-inf",
-        "0x10",
-        "4000",
-        "100",
-        "99",
-        "4001",
-        "1_0",
-        "١",
-    ),
-    *("null", "true", "[]", "{}", "a" * 3000, "😀", "\x00", "\u202e", "..", "../..", "%", "%zz", "'", '"'),
-    *(
-        "y0",
-        "x0",
-        "y0,y1",
-        "force 0",
-        "drop",
-        "a.csv",
-        "a.gz",
-        ".csv",
-        "look",
-        "estimate",
-        "machine",
-        "record",
-    ),
-    *("<script>", ";", "&", " "),
+    *"0 -1 1e308 1e-320 nan inf -inf 0x10 4000 100 99 4001 1_0 ١ null true [] {} 😀 .. ../.. % %zz".split(),
+    *"' \" y0 x0 y0,y1 drop a.csv a.gz .csv look estimate machine record <script> ; &".split(),
+    *("", " ", "force 0", "a" * 3000, "\x00", "\u202e"),
 ]
 BODIES = [
     *(b"", b"{}", b"[]", b"null", b"{", b"\xff\xfe", b'{"name": 5}', b'{"options": []}', b"9" * 16000),
@@ -53,13 +22,14 @@ BODIES = [
 ]
 
 
-def _filled(template: str, job: str, generator: random.Random) -> str:
+def _filled(template, job, generator):
     parts = {
         "job": [job, job, job, "0" * 16, *ODD],
         "verb": ["look", "look", "estimate", "waterfall", *ODD],
         "role": ["machine", "record", "tail", "beside", *ODD],
         "name": ["page.js", "page.css", *ODD],
-        "ticket": ["a", *ODD],
+        "run": ["0" * 16, *ODD],
+        "key": ["a" * 64, *ODD],
     }
     for name, values in parts.items():
         safe = "%" if generator.random() < 0.1 else ""
@@ -69,14 +39,11 @@ def _filled(template: str, job: str, generator: random.Random) -> str:
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=lambda one: f"{one.method} {one.path}")
 def test_no_request_ends_in_an_error_of_the_server(served, files, operation, monkeypatch):
-    from rotordrop.web.running import Runner
-
     monkeypatch.setattr(Runner, "_begin", lambda *_: None)  # what is asked for waits: no child per request
     job = served.new_job({"record": files["record"]})
     generator = random.Random(operation.path + operation.method)
-    seen: dict[int, int] = {}
     for number in range(EACH):
-        if number % 50 == 49 and served.ask("GET", f"/api/jobs/{job}").status == 404:
+        if number % 10 == 9 and served.ask("GET", f"/api/jobs/{job}").status == 404:
             job = served.new_job({"record": files["record"]})
         path = _filled(operation.path, job, generator)
         asked = [
@@ -88,8 +55,6 @@ def test_no_request_ends_in_an_error_of_the_server(served, files, operation, mon
         body = generator.choice(BODIES) if operation.method in ("POST", "PUT") else None
         answer = served.ask(operation.method, path, body)
         assert answer.status < 500, (operation.method, path, body, answer.text)
-        seen[answer.status] = seen.get(answer.status, 0) + 1
-    assert sum(seen.values()) == EACH
-    assert json.loads(served.ask("GET", "/api/jobs").body)["quota"] > 0
+    assert json.loads(served.ask("GET", "/api/jobs").body)["jobs"] != []
     for one in served.ask("GET", "/api/jobs").told["jobs"]:
         served.ask("DELETE", f"/api/jobs/{one['id']}")

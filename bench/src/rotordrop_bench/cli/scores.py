@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,13 +48,9 @@ def score(
             text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above {above} found"
             median = impacts["median_absolute_error"]
             out.print(text if median is None else f"{text}, median error of their peaks {percent(median)}")
-        coverage = scores["coverage"]
-        if coverage["intervals"]:
-            out.print(
-                f"{coverage['covered']} of {coverage['intervals']} intervals of 90 % hold the true value."
-            )
-        else:
-            out.print("The estimate states no interval.")
+        held, count = scores["coverage"]["covered"], scores["coverage"]["intervals"]
+        words = f"{held} of {count} intervals of 90 % hold the true value."
+        out.print(words if count else "The estimate states no interval.")
 
     deliver(scores, json, summarise)
 
@@ -66,7 +63,7 @@ def _scored(scores: dict[str, Any]) -> Table:
 
     named = {field: (row.label, row.kind) for field, row in published().items()}
     named |= {load.field: (load.label, load.kind) for load in LOADS} | _OF_THE_DROP
-    table = _table(f"{scores['name']}: estimate against truth", "quantity", "estimate", "truth", "error")
+    table = new_table(f"{scores['name']}: estimate against truth", "quantity", "estimate", "truth", "error")
     table.add_column("90 % interval")
     parts = {"": scores["drop"]} | {f"{name} ": fields for name, fields in scores["bearings"].items()}
     for where, fields in parts.items():
@@ -83,7 +80,8 @@ def _scored(scores: dict[str, Any]) -> Table:
     return table
 
 
-def _table(title: str, first: str, *others: str) -> Table:
+def new_table(title: str, first: str, *others: str) -> Table:
+    """A table with a title and columns of numbers after the first."""
     from rich import box
     from rich.table import Table
 
@@ -113,20 +111,16 @@ def score_all(
 
     def summarise(out: Console) -> None:
         columns = ("values", "missing", "median", "90 %", "worst", "> 10 %", "covered", "± (90 %)")
-        table = _table(f"DropBench, version {VERSION}", "family", "quantity", *columns)
+        table = new_table(f"DropBench, version {VERSION}", "family", "quantity", *columns)
         table.columns[1].justify = "left"
         family = ""
         for row in scores.rows:
             if not every and row.quantity not in SHOWN:
                 continue
             shares = (row.median, row.ninetieth, row.worst, row.lost, row.covered, row.half_width)
-            table.add_row(
-                row.family if row.family != family else "",
-                row.quantity,
-                str(row.values),
-                str(row.missing),
-                *("" if share is None else percent(share) for share in shares),
-            )
+            numbers = ("" if share is None else percent(share) for share in shares)
+            name = row.family if row.family != family else ""
+            table.add_row(name, row.quantity, str(row.values), str(row.missing), *numbers)
             family = row.family
         out.print(table)
         flagged = sum(drop["consistent"] is False for drop in scores.drops)
@@ -138,7 +132,7 @@ def score_all(
         for name, why in scores.unscored.items():
             out.print(f"{name}: no number: {why}")
 
-    deliver(scores.as_json(), json, summarise)
+    deliver({"bench_version": VERSION, **asdict(scores)}, json, summarise)
 
 
 def percent(share: float, *, sign: bool = False) -> str:

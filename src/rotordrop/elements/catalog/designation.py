@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from rotordrop.elements.catalog.boundary import ClearanceClass
@@ -95,6 +95,8 @@ class Designation:
     """Letters before the series."""
     goes_on: bool
     """Whether anything follows the bore."""
+    unread: tuple[str, ...] = ()
+    """Words of it that change nothing here: cage, seal, accuracy, grease, and what means nothing."""
 
     @property
     def basic(self) -> str:
@@ -115,6 +117,21 @@ def read_designation(text: str) -> Designation | None:
 
     Prefixes and suffixes of cage, seal, accuracy and grease say nothing here and are passed over.
     """
+    read = _read(text)
+    if read is None:
+        return None
+    words = [found for found in re.finditer(r"[A-Za-z0-9]+", text) if not _CORE.search(found[0].upper())]
+    without = {found: _read(f"{text[: found.start()]} {text[found.end() :]}") for found in words}
+    told = replace(read, written="", prefix="", goes_on=True)
+    unread = [
+        found[0]
+        for found, other in without.items()
+        if other is not None and replace(other, written="", prefix="", goes_on=True) == told
+    ]
+    return replace(read, unread=tuple(unread))
+
+
+def _read(text: str) -> Designation | None:
     plain, maker = _without_maker(" ".join(text.upper().replace("_", " ").split()))
     found = _CORE.search(plain)
     if found is None or (found["digit"] and len(found["series"]) != 2):
@@ -188,7 +205,10 @@ def _contact_angle(suffix: str, series: str, prefix: str) -> float | None:
 def _is_hybrid(prefix: str, suffix: str) -> bool:
     if re.match(r"HC|XC|HY|5S", prefix):
         return True
-    return any(re.fullmatch(r"HC(5|P\d\w*|Q\w*)?(C\d\w*)?|SN24\w*|SI3N4|CERAMIC", t) for t in _tokens(suffix))
+    return any(
+        re.fullmatch(r"HC(5|P\d\w*|Q\w*|D[BFT]\w*)?(C\d\w*)?|SN24\w*|SI3N4|CERAMIC", t)
+        for t in _tokens(suffix)
+    )
 
 
 def _ball_size(prefix: str, suffix: str, angular: bool) -> Size:
@@ -215,7 +235,7 @@ def _clearance_class(suffix: str) -> ClearanceClass | None:
 
 def _arrangement(suffix: str) -> Literal["X", "O", "tandem"] | None:
     for token in _tokens(suffix):
-        found = re.match(r"(?:P\d[AS]?|HCP\d[AS]?)?(DB|DF|DT)(?:[A-C]|L|M|H|$)", token)
+        found = re.match(r"(?:HC)?(?:P\d[AS]?)?(DB|DF|DT)(?:[A-C]|L|M|H|$)", token)
         if found:
             return _ARRANGEMENTS[found[1]]
     word = _GLUED.fullmatch((_tokens(suffix) or [""])[0])
@@ -226,7 +246,7 @@ def _coded(
     suffix: str, codes: dict[str, Literal["light", "medium", "heavy"]]
 ) -> Literal["light", "medium", "heavy"] | None:
     for token in _tokens(suffix)[1:]:
-        bare = re.sub(r"^(?:(?:HC)?P\d[AS]?)?(?:D[BFT](?=[ABC]$))?", "", token)
+        bare = re.sub(r"^(?:HC)?(?:P\d[AS]?)?(?:D[BFT](?=[ABC]$))?", "", token)
         bare = re.sub(r"P\d+[A-Z]?$", "", bare)
         bare = f"G{bare}" if re.fullmatch(r"[ABC]", bare) else bare
         if bare in codes:

@@ -21,6 +21,7 @@ from rotordrop.elements.catalog.boundary import (
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
 from rotordrop.known import NINETY
+from rotordrop.require import require
 
 _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
 _FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
@@ -83,7 +84,6 @@ class CatalogueBearing:
     """What the designation said, where it was not found in a maker's list."""
 
 
-@lru_cache(maxsize=256)
 def find_bearing(
     designation: str,
     *,
@@ -102,6 +102,16 @@ def find_bearing(
     LookupError
         When neither is possible; the message names the nearest designations.
     """
+    require(designation, "designation", str, hint="Write it as a text, '7203'")
+    require(static_load_rating, "static_load_rating [N]", float, above=0.0, none=True)
+    require(dynamic_load_rating, "dynamic_load_rating [N]", float, above=0.0, none=True)
+    return _found(designation, static_load_rating, dynamic_load_rating, rigidity)
+
+
+@lru_cache(maxsize=256)
+def _found(
+    designation: str, static: float | None, dynamic: float | None, rigidity: PairRigidity | None
+) -> CatalogueBearing:
     found = _index().get(_key(designation))
     if found is not None:
         return found
@@ -113,7 +123,7 @@ def find_bearing(
         return replace(listed, read=read)
     if _is_mistyped(read):
         raise LookupError(_unknown(designation, _nearest(designation)))
-    return infer_from_designation(read, static_load_rating, dynamic_load_rating, rigidity)
+    return infer_from_designation(read, static, dynamic, rigidity)
 
 
 def search_bearings(text: str) -> list[CatalogueBearing]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.evidence.synchronous import FEWEST_TURNS
 from rotordrop.record.axes import Plane, along_sensors
 from rotordrop.units import fall_time
@@ -50,6 +50,14 @@ class _Change:
     signs: tuple[int, ...]
     order: tuple[int, ...]
 
+    @property
+    def swaps(self) -> bool:
+        return self.order != tuple(sorted(self.order))
+
+    @property
+    def effort(self) -> int:
+        return sum(sign < 0 for sign in self.signs) + 2 * self.swaps
+
     def words(self, names: tuple[str, ...]) -> str:
         inverted = [name for name, sign in zip(names, self.signs, strict=True) if sign < 0]
         moved = [name for name, place in zip(names, self.order, strict=True) if names[place] != name]
@@ -58,15 +66,18 @@ class _Change:
         return ", ".join(parts)
 
 
+AS_DESCRIBED = _Change(signs=(), order=())
+
+
 def _changes(count: int) -> list[_Change]:
-    """No, one or all sensors inverted, combined with no or one pair exchanged; the simplest first."""
+    """One or all sensors inverted, or none, combined with no or one pair exchanged; not as described."""
     signs = [tuple(-1 if i == k else 1 for i in range(count)) for k in range(-1, count)] + [(-1,) * count]
     orders = [tuple(range(count))]
     for a, b in combinations(range(count), 2):
         order = list(range(count))
-        order[a], order[b] = order[b], order[a]
+        order[a], order[b] = b, a
         orders.append(tuple(order))
-    return [_Change(signs=sign, order=order) for order in orders for sign in signs]
+    return [_Change(signs=sign, order=order) for order in orders for sign in signs][1:]
 
 
 def check_ends_named(machine: Machine) -> list[Finding]:
@@ -85,17 +96,8 @@ def check_ends_named(machine: Machine) -> list[Finding]:
             nearest = min(bearings, key=lambda bearing: abs(places[bearing.node - 1] - places[one.node - 1]))
             if named and max(named, key=lambda bearing: len(bearing.name)) is not nearest:
                 findings.append((f"{what} {one.name} at node {one.node}", nearest))
-    if not findings:
-        return []
     seen = ", ".join(f"{what} next to touchdown bearing {near.name}" for what, near in findings)
-    return [
-        Finding(
-            kind=Kind.MACHINE_FILE,
-            message=f"the machine file has {seen}: nodes or names are exchanged",
-            remedy="correct the nodes in the machine file; a drop does not show how parts are named",
-            severity="warning",
-        )
-    ]
+    return [found("names", seen=seen)] if findings else []
 
 
 def check_planes(
@@ -119,25 +121,17 @@ def check_planes(
         Whether the free rotor with the sensors as described explains the fall before the first contact. Then
         what leans later is the rotor, whatever exchange would make it point down.
     """
-    verdicts = [_verdict(plane, sunk, levitated_1x) for plane in planes]
-    if all(verdict == "backward" for verdict in verdicts):
-        return [
-            Finding(
-                kind=Kind.SWAPPED_AXES,
-                message="the fall points down in all planes but the levitated orbit runs against the spin in "
-                "all of them",
-                remedy="either the shaft turns clockwise seen from the DE (x then points the other way), or "
-                "the sensors "
-                "are exchanged in every plane: correct their angles or the map of the channels",
-                severity="stop",
-                channel=", ".join(name for plane in planes for name in plane.names),
-            )
-        ]
+    senses = [_sense(plane, levitated_1x, AS_DESCRIBED) for plane in planes]
+    down = [_tilt(plane, sunk, AS_DESCRIBED) <= MOST_TILT for plane in planes]
+    if all(down) and all(sense < 0 for sense in senses):
+        return [found("all-backward", channel=(name for plane in planes for name in plane.names))]
     findings = []
-    for plane, verdict in zip(planes, verdicts, strict=True):
-        if verdict == "fits":
-            continue
-        findings.append(_plane_finding(plane, verdict, sunk, levitated_1x, fell_straight))
+    for plane, sense, falls in zip(planes, senses, down, strict=True):
+        if falls and sense == 0:
+            names = " and ".join(plane.names)
+            findings.append(found("sense", channel=plane.names, bearing=plane.bearing, names=names))
+        elif not falls or sense < 0:
+            findings.append(_wired_otherwise(plane, falls, sense, sunk, levitated_1x, fell_straight))
     return findings
 
 
@@ -160,37 +154,27 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
         first = int(np.searchsorted(record.time, record.time[begins] - turns * 2.0 * math.pi / speed))
         waves = np.exp(-1j * speed * record.time[first:begins])
         tone = 2.0 * np.mean((record.signals[first:begins] - level) * waves[:, None], axis=0) * record.gains
-    found = check_planes(record.planes, fall_of(record, level, sunk_at), tone)
-    return [one for one in found if tone.any() or one.kind != Kind.SENSE_OF_ORBIT]
+    seen = check_planes(record.planes, fall_of(record, level, sunk_at), tone)
+    return [one for one in seen if tone.any() or one.kind != "sense of the orbit"]
 
 
-def _verdict(plane: Plane, sunk: Array, tone: Tone) -> str:
-    identity = _changes(len(plane.columns))[0]
-    down = _tilt(plane, sunk, identity) <= MOST_TILT
-    sense = _sense(plane, tone, identity)
-    if down and sense == 0:
-        return "undecided"
-    if down:
-        return "fits" if sense > 0 else "backward"
-    return "wrong"
-
-
-def _corrected(plane: Plane, readings: Array, change: _Change) -> Array:
-    """Readings of the plane (S_p,) as they would be had the sensors been wired as described."""
+def _corrected(plane: Plane, readings: Array | Tone, change: _Change) -> Tone:
+    """Motion (x, y) of the plane as it would be read had the sensors been wired as described."""
     own = readings[list(plane.columns)]
-    return np.asarray(own[list(change.order)] * np.array(change.signs))
+    if change != AS_DESCRIBED:
+        own = own[list(change.order)] * np.array(change.signs)
+    return np.asarray(plane.to_planar @ own)
 
 
 def _tilt(plane: Plane, sunk: Array, change: _Change) -> float:
     """Angle between the fall and straight down [deg]."""
-    x, y = plane.to_planar @ _corrected(plane, sunk, change)
+    x, y = _corrected(plane, sunk, change).real
     return float(np.degrees(np.arctan2(abs(x), -y)))
 
 
 def _sense(plane: Plane, tone: Tone, change: _Change) -> int:
     """1 for an orbit with the spin, −1 against it, 0 where it is too flat or small to tell."""
-    own = tone[list(plane.columns)][list(change.order)] * np.array(change.signs)
-    x, y = plane.to_planar @ own
+    x, y = _corrected(plane, tone, change)
     forward, backward = abs(x + 1j * y) / 2, abs(x - 1j * y) / 2
     if max(forward, backward) < _SMALLEST_ORBIT:
         return 0
@@ -199,79 +183,36 @@ def _sense(plane: Plane, tone: Tone, change: _Change) -> int:
     return -1 if backward > CLEAR_ORBIT * forward else 0
 
 
-def _plane_finding(
-    plane: Plane,
-    verdict: str,
-    sunk: Array,
-    tone: Tone,
-    fell_straight: bool,
+def _wired_otherwise(
+    plane: Plane, falls: bool, sense: int, sunk: Array, tone: Tone, fell_straight: bool
 ) -> Finding:
-    names = ", ".join(plane.names)
-    if verdict == "undecided":
-        return Finding(
-            kind=Kind.SENSE_OF_ORBIT,
-            message=f"the levitated orbit at {plane.bearing} is too small or flat to show its sense: "
-            "whether "
-            f"{' and '.join(plane.names)} are exchanged cannot be decided",
-            remedy="make sure by moving the shaft by hand",
-            severity="note",
-            channel=names,
-        )
-    fitting = [
-        change
-        for change in _changes(len(plane.columns))[1:]
-        if _tilt(plane, sunk, change) <= MOST_TILT and _sense(plane, tone, change) >= 0
-    ]
     own = ", ".join(
         f"{name} by {sunk[i] * 1e6:+.3g} µm" for name, i in zip(plane.names, plane.columns, strict=True)
     )
-    tilt = _tilt(plane, sunk, _changes(len(plane.columns))[0])
-    seen = f"the fall changes {own} and so leans {tilt:.0f}° from straight down"
-    if verdict == "backward":
+    seen = f"the fall changes {own} and so leans {_tilt(plane, sunk, AS_DESCRIBED):.0f}° from straight down"
+    if falls:
         seen = f"the fall changes {own}, but the levitated orbit at {plane.bearing} runs against the spin"
+    fitting = [
+        change
+        for change in _changes(len(plane.columns))
+        if _tilt(plane, sunk, change) <= MOST_TILT and _sense(plane, tone, change) >= 0
+    ]
     if not fitting:
-        return _leaning(f"{seen}; no exchange or inversion explains it", names)
-    if fell_straight and _sense(plane, tone, _changes(len(plane.columns))[0]) >= 0:
-        return _leaning(f"{seen}, but before the first contact the rotor falls as described", names)
-    simplest = [change for change in fitting if _effort(change) == min(map(_effort, fitting))]
-    causes = " or ".join(change.words(plane.names) for change in simplest)
-    swapped = all(change.order != tuple(sorted(change.order)) for change in simplest)
-    return Finding(
-        kind=Kind.SWAPPED_AXES if swapped else Kind.INVERTED,
-        message=f"{seen}; it fits with {causes}",
-        remedy="correct polarity or angles of the sensors, or the map of the channels",
-        severity="stop",
-        channel=_named_channels(plane, simplest) or names,
-    )
-
-
-def _leaning(message: str, names: str) -> Finding:
-    """A fall that leans for no reason of wiring: strong friction drives a rotor up the side of its bearing.
-
-    Just the most dangerous drops look so; they must not be refused. Sensors turned to other angles show in
-    the fall before the first contact.
-    """
-    return Finding(
-        kind=Kind.LEANING,
-        message=message,
-        remedy="strong friction drives a rotor sideways like this; make sure that the angles in the machine "
-        "file are right",
-        severity="warning",
-        channel=names,
-    )
-
-
-def _effort(change: _Change) -> int:
-    return sum(sign < 0 for sign in change.signs) + 2 * (change.order != tuple(sorted(change.order)))
-
-
-def _named_channels(plane: Plane, changes: list[_Change]) -> str:
+        why = "; no exchange or inversion explains it"
+        return found("leaning", channel=plane.names, seen=seen, why=why)
+    if fell_straight and sense >= 0:
+        why = ", but before the first contact the rotor falls as described"
+        return found("leaning", channel=plane.names, seen=seen, why=why)
+    least = min(change.effort for change in fitting)
+    simplest = [change for change in fitting if change.effort == least]
+    swapped = all(change.swaps for change in simplest)
     named = [
         name
         for i, name in enumerate(plane.names)
-        if any(change.signs[i] < 0 or change.order[i] != i for change in changes)
+        if any(change.signs[i] < 0 or change.order[i] != i for change in simplest)
     ]
-    return ", ".join(named)
+    causes = " or ".join(change.words(plane.names) for change in simplest)
+    return found("axes" if swapped else "inverted", channel=named, seen=seen, causes=causes)
 
 
 def fall_of(record: Record, level: Array, sunk_at: int) -> Array:

@@ -1,81 +1,29 @@
-"""What the gate has to say about a record."""
+"""What the gate has to say about a record: its sentences stand in ``findings.toml``."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import Literal
+import string
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from typing import Any, Literal
 
 from rotordrop.errors import RecordError
+from rotordrop.units import KINDS, format_quantity, percent
 
 Severity = Literal["stop", "warning", "note"]
 
 _ORDER: tuple[Severity, ...] = ("stop", "warning", "note")
 
 
-class Kind(StrEnum):
-    """What the gate can find, by the names that documents carry."""
-
-    DAMAGE = "damage on reading"
-    MISSING_SAMPLES = "missing samples"
-    DEAD_CHANNEL = "dead channel"
-    STUCK_CHANNEL = "stuck channel"
-    ZEROED = "zeroed block"
-    BRIDGED = "bridged gap"
-    TORN = "damaged block"
-    CLIPPING = "clipping"
-    SPIKES = "spikes"
-    COARSE = "coarse quantisation"
-    BACKWARD_TIME = "non-monotonic time"
-    JITTERED_CLOCK = "jittered clock"
-    SLOW_SAMPLING = "slow sampling"
-    WRONG_RATE = "wrong sampling rate"
-    DROPPED_BLOCK = "dropped block"
-    DUPLICATE_BLOCK = "duplicate block"
-    WRONG_UNIT = "wrong unit factor"
-    WRONG_AIR_GAP = "wrong air gap"
-    NO_SPEED = "speed missing"
-    SPEED_READINGS = "speed readings"
-    DEAD_SPEED = "dead speed"
-    NEGATIVE_SPEED = "negative speed"
-    WRONG_SPEED_UNIT = "wrong speed unit"
-    WRONG_SPEED = "wrong speed"
-    SWAPPED_AXES = "swapped axes"
-    SWAPPED_ENDS = "swapped ends"
-    SWAPPED_CHANNELS = "swapped channels"
-    INVERTED = "inverted polarity"
-    SENSE_OF_ORBIT = "sense of the orbit"
-    LEANING = "leaning fall"
-    LEANING_REST = "leaning rest"
-    TURNED = "turned sensors"
-    UNDECIDED_ENDS = "ends"
-    LATE_CHANNEL = "late channel"
-    WRONG_GAIN = "wrong gain"
-    SATURATION = "soft saturation"
-    LOW_PASS = "recorder low-pass"
-    AC_COUPLING = "AC coupling"
-    SECOND_DROP = "second drop"
-    HUM = "hum"
-    NOISE = "noise"
-    DRIFT = "drift"
-    SHORT = "short record"
-    ENDS_TURNING = "record ends before standstill"
-    NO_PRETRIGGER = "missing pre-trigger"
-    NO_DROP = "no drop in the record"
-    ONE_END = "one end held"
-    NOT_SETTLED = "not settled"
-    TAIL_OFFSET = "tail offset"
-    MACHINE_FILE = "machine file"
-    NOT_LOOKED_AT = "not looked at"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Finding:
     """A fault of a record, or a fault that cannot be ruled out."""
 
-    kind: Kind
-    """Name of the fault."""
+    kind: str
+    """Name of the fault, one of those in ``findings.toml``."""
     message: str
     """What was seen, with the numbers."""
     remedy: str
@@ -91,6 +39,64 @@ class Finding:
         where = f" {self.channel}" if self.channel else ""
         when = f" at {self.time:.6g} s" if self.time is not None else ""
         return f"{self.kind}{where}{when}: {self.message}; {self.remedy}"
+
+
+class _Words(string.Formatter):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if format_spec == "percent":
+            return percent(float(value))
+        return (
+            format_quantity(float(value), format_spec) if format_spec in KINDS else format(value, format_spec)
+        )
+
+
+@cache
+def _table() -> dict[str, dict[str, Any]]:
+    return tomllib.loads(resources.files(__package__).joinpath("findings.toml").read_text(encoding="utf-8"))
+
+
+def found(
+    row: str,
+    said: Mapping[str, Any] | None = None,
+    *,
+    channel: str | Iterable[str] | None = None,
+    time: float | None = None,
+    kind: str | None = None,
+    severity: Severity | None = None,
+    **numbers: Any,
+) -> Finding:
+    """A finding by its row in ``findings.toml``, with what its sentence says [SI where a kind is named].
+
+    Kind and severity are those of the row where none is given.
+    """
+    row_of, words, numbers = _table()[row], _Words(), {**(said or {}), **numbers, "time": time}
+    return Finding(
+        kind=kind or row_of["kind"],
+        message=words.vformat(row_of["says"], (), numbers),
+        remedy=words.vformat(row_of["remedy"], (), numbers),
+        severity=severity or row_of["severity"],
+        channel=channel if channel is None or isinstance(channel, str) else ", ".join(channel),
+        time=time,
+    )
+
+
+_SAME_CHANNEL = ("late channel", "soft saturation")
+
+
+def standing(findings: Iterable[Finding]) -> list[Finding]:
+    """The findings that stand beside the graver kinds to which they yield by ``findings.toml``."""
+    every = list(findings)
+    graver = [one for one in every if one.severity != "note"]
+
+    def explained(one: Finding) -> bool:
+        yields_to = _table()["yields"].get(one.kind, ())
+        same = one.kind in _SAME_CHANNEL
+        return any(o.kind in yields_to and (not same or o.channel == one.channel) for o in graver)
+
+    stand = [one for one in every if not explained(one)]
+    # a fall that leans stops where the sensors look in other directions before the first contact too
+    turned = any(one.kind == "turned sensors" for one in stand)
+    return [replace(one, severity="stop") if turned and one.kind == "leaning fall" else one for one in stand]
 
 
 def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -9,7 +9,6 @@ seen does not pass for a gain.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,10 +16,9 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.evidence.events import planes_at_bearings
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.fall import WRONG_GAIN
-from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.quality.finding import Finding, Severity, found
 from rotordrop.known import NINETY
 from rotordrop.record.axes import planar_of
 from rotordrop.series import runs_of
@@ -56,13 +54,9 @@ _ENOUGH_RATE = 25e3
 _MODEL = 0.02
 """What the rotor of the file leaves out of a flight, as an error of gravity [1]."""
 
-_ONE_FAULT = 4.0
-"""Chi square per degree of freedom that one fault may leave; a touch that was not seen leaves more [1], and
-what is left then only speaks of all channels."""
-
-_CONTRADICT = 0.01
-"""Probability by chance below which flights contradict each other [1] (chosen): then something touched the
-rotor in one of them at least."""
+_CONTRADICT = 4.0
+"""Chi square per degree of freedom by which flights differ, or channels beside one gain, where something
+touched the rotor in one of them at least [1]."""
 
 _OF_REACH = 80.0
 """Percentile of the distance from the levitated place that stands for the race [%]: few rotors fly long."""
@@ -70,19 +64,8 @@ _OF_REACH = 80.0
 _REFUTED = 0.12
 """Error of a gain that flights exclude [1], at which a fall that suspects one is no longer heard."""
 
-_WITNESSES = 2
-"""Flights that show a fault of some channels, each by itself, from which on it is a warning [1]: a touch that
-was not seen looks like a gain of one in one flight, of 28 % at 5.5 standard deviations in one of 298 clean
-drops, and only a second one tells; a touch does not look like all channels."""
-
-_BY_ITSELF = 3.0
-"""Standard deviations from which on a flight shows a fault by itself [1]."""
-
 _LARGEST = 1.0
-"""Largest error of a gain, and tangent of a turn, that are sought [1]: what is more shows in every fall."""
-
-_LEVEL = 0.2
-"""Sine of the angle below which a sensor looks too level to be weighed by gravity [1]."""
+"""Largest error of a gain that is sought [1]: what is more shows in every fall."""
 
 _SEPARABLE = 1e-9
 """Least singular value over the largest one that still tells unknowns apart [1]."""
@@ -99,22 +82,10 @@ class Weighed:
     """Reading over true displacement [1]; 1 with right gains, angles and clock, shape (S,)."""
     covariance: Array
     """Its covariance [1], shape (S, S)."""
-    each: tuple[tuple[Array, Array], ...]
-    """Share and inverse covariance of every flight by itself."""
+    flights: int
+    """How many there are."""
     scatter: float
     """Mean square by which the flights differ, over what their errors let them [1]."""
-    by_chance: float
-    """Probability that flights which nothing touched differ as much [1]."""
-    beside: frozenset[str]
-    """Channels between the touchdown bearings, where the rotor bends more than its model knows."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Fall:
-    """Gravity [m/s²], and the time of a free fall through the gap [s]."""
-
-    gravity: float
-    time: float
 
 
 def weighed(
@@ -125,38 +96,23 @@ def weighed(
         return None
     if machine.pushed:  # by what is not known well enough to weigh sensors with
         return None
-    count = len(record.sensors)
-    seen: list[tuple[Array, Array]] = []
+    gravity, count = float(machine.gravity), len(record.sensors)
     gap = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    fall = _Fall(gravity=float(machine.gravity), time=fall_time(gap, float(machine.gravity)))
-    for window in _flights(record, levitated, drop, fall):
-        found = _weighed_in(record, rotor, levitated, window, fall)
-        if found is None:
-            continue
-        share, covariance = found
-        seen.append((share, np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)))
+    seen: list[tuple[Array, Array]] = []
+    for window in _flights(record, levitated, drop, fall_time(gap, gravity)):
+        one = _weighed_in(record, rotor, levitated, window, gravity, fall_time(gap, gravity))
+        if one is not None:
+            share, covariance = one
+            seen.append((share, np.linalg.inv(covariance + _MODEL**2 * np.eye(count)).astype(np.float64)))
     if not seen:
         return None
-    from scipy.special import gammaincc
-
     error: Array = np.linalg.inv(np.sum([inverse for _, inverse in seen], axis=0)).astype(np.float64)
-    near = planes_at_bearings(machine, record)
     mean = error @ np.sum([inverse @ share for share, inverse in seen], axis=0)
     # sensors read alike in every flight; where the flights differ by more than their errors, something
     # touched the rotor in them, and they know as much less (Birge's ratio)
     apart = sum(float((share - mean) @ inverse @ (share - mean)) for share, inverse in seen)
-    free = (len(seen) - 1) * count
-    scatter = apart / max(free, 1)
-    return Weighed(
-        share=mean,
-        covariance=error * max(scatter, 1.0),
-        each=tuple(seen),
-        scatter=scatter,
-        by_chance=float(gammaincc(0.5 * free, 0.5 * apart)) if free else 1.0,
-        beside=frozenset(
-            name for number, plane in enumerate(record.planes) if number not in near for name in plane.names
-        ),
-    )
+    scatter = apart / max((len(seen) - 1) * count, 1)
+    return Weighed(share=mean, covariance=error * max(scatter, 1.0), flights=len(seen), scatter=scatter)
 
 
 def gains_hold(seen: Weighed) -> bool:
@@ -166,73 +122,28 @@ def gains_hold(seen: Weighed) -> bool:
 
 
 def check_flights(seen: Weighed, record: Record) -> list[Finding]:
-    """Name a gain, or sensors at other angles, by which the rotor falls with something other than g."""
-    off = seen.share - 1.0
+    """Name a gain of all channels, by which the rotor falls with something other than g.
+
+    A touch that was not seen looks like a gain of one channel, not of all.
+    """
+    off, every = seen.share - 1.0, np.ones(len(seen.share))
     precision = np.linalg.inv(seen.covariance)
-    tried = []
-    for kind, channels, shape in _ways(record):
-        size = float(shape @ precision @ off) / float(shape @ precision @ shape)
-        tried.append((size**2 * float(shape @ precision @ shape), size, kind, channels, shape))
-    gained, size, kind, channels, shape = max(tried, key=lambda one: one[0])
-    left = (float(off @ precision @ off) - gained) / (len(off) - 1)
-    gained /= max(left, 1.0)
-    if gained < SURE**2 or not WRONG_GAIN <= abs(size) <= _LARGEST:
+    weight = float(every @ precision @ every)
+    size = float(every @ precision @ off) / weight
+    left = (float(off @ precision @ off) - size**2 * weight) / (len(off) - 1)
+    sure = abs(size) * (weight / max(left, 1.0)) ** 0.5
+    if sure < SURE or not WRONG_GAIN <= abs(size) <= _LARGEST:
         return []
-    common, odd = len(channels) == len(off), max(left, seen.scatter) > _ONE_FAULT
-    if odd and not common:
-        return []
-    names = ", ".join(channels)
-    witnesses = sum(_shown(shape * np.sign(size), *flight) > _BY_ITSELF for flight in seen.each)
-    doubt = (
-        "; no second flight shows it by itself, and a touch that was not seen looks alike"
-        if witnesses < _WITNESSES and not common
-        else "; but the flights contradict each other, and something touched the rotor in one at least"
-        if odd or seen.by_chance < _CONTRADICT
-        else "; between its bearings a rotor that bends otherwise looks alike"
-        if seen.beside.issuperset(channels)
-        else ""
-    )
-    error = abs(size) / gained**0.5
-    seen_as = (
-        f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
-        if kind == Kind.TURNED
-        else f"{names} reading {1.0 + size:.3g} ± {NINETY * error:.2g} (90 %) of what it should"
-    )
-    return [
-        Finding(
-            kind=kind,
-            message=f"in {len(seen.each)} flight(s) between impacts, where nothing but gravity pulls it, "
-            f"the rotor falls as it would with {seen_as}{doubt}",
-            remedy="check the angles of the sensors at that end"
-            if kind == Kind.TURNED
-            else "check sensitivity, gain and unit of the channels, and the sampling rate",
-            severity="note" if doubt else "warning",
-            channel=names,
-        )
-    ]
+    names, error = ", ".join(record.channel_names), NINETY * abs(size) / sure
+    words = f"{names} reading {1.0 + size:.3g} ± {error:.2g} (90 %) of what it should"
+    odd = max(left, seen.scatter) > _CONTRADICT
+    doubt = "; but the flights contradict each other, and something touched the rotor in one at least"
+    severity: Severity | None = "note" if odd else None
+    said = {"count": seen.flights, "words": words, "doubt": doubt if odd else ""}
+    return [found("gain-in-flight", said, channel=names, severity=severity)]
 
 
-def _shown(shape: Array, share: Array, inverse: Array) -> float:
-    """Standard deviations by which one flight shows a fault."""
-    return float(shape @ inverse @ (share - 1.0)) / float(np.sqrt(shape @ inverse @ shape))
-
-
-def _ways(record: Record) -> Iterator[tuple[Kind, tuple[str, ...], Array]]:
-    """Faults by kind and channels, with what they add to the share of gravity per size."""
-    names = record.channel_names
-    yield Kind.WRONG_GAIN, names, np.ones(len(names))
-    for alone, name in zip(np.eye(len(names)), names, strict=True):
-        yield Kind.WRONG_GAIN, (name,), alone
-    unit = record.directions
-    for plane in record.planes:
-        turned, columns = np.zeros(len(names)), list(plane.columns)
-        upright = unit[columns, 1]
-        turned[columns] = unit[columns, 0] / np.where(np.abs(upright) > _LEVEL, upright, np.inf)
-        if np.any(turned):
-            yield Kind.TURNED, plane.names, turned
-
-
-def _flights(record: Record, levitated: LevitatedModel, drop: float, fall: _Fall) -> list[tuple[int, int]]:
+def _flights(record: Record, levitated: LevitatedModel, drop: float, fall: float) -> list[tuple[int, int]]:
     """First samples and counts of the longest stretches with the rotor away from all races."""
     path = planar_of((record.signals - levitated.mean) * record.gains, record.planes)
     away = np.hypot(path[..., 0], path[..., 1])
@@ -246,9 +157,9 @@ def _flights(record: Record, levitated: LevitatedModel, drop: float, fall: _Fall
     starts, lengths = runs_of(afloat)
     rate = record.sampling_rate
     found = [
-        (start, min(length, int(LONGEST * fall.time * rate)))
+        (start, min(length, int(LONGEST * fall * rate)))
         for start, length in zip(starts.tolist(), lengths.tolist(), strict=True)
-        if length >= SHORTEST * fall.time * rate
+        if length >= SHORTEST * fall * rate
     ]
     return sorted(found, key=lambda window: -window[1])[:MOST_FLIGHTS]
 
@@ -258,14 +169,15 @@ def _weighed_in(
     rotor: FreeRotor,
     levitated: LevitatedModel,
     window: tuple[int, int],
-    fall: _Fall,
+    gravity: float,
+    fall: float,
 ) -> tuple[Array, Array] | None:
     """Share of gravity by every sensor in one flight, cut until the free rotor explains it."""
     first, count = window
     thin = max(round(record.sampling_rate / _ENOUGH_RATE), 1)
-    while count >= SHORTEST * fall.time * record.sampling_rate:
+    while count >= SHORTEST * fall * record.sampling_rate:
         inside = slice(first, first + count, thin)
-        share, covariance, residual = _fitted(record, rotor, levitated, inside, fall.gravity)
+        share, covariance, residual = _fitted(record, rotor, levitated, inside, gravity)
         if float(np.mean(residual**2)) < _AT_NOISE:
             return share, covariance
         half, cut = len(residual) // 2, max(int(_SHORTENED * count), thin)

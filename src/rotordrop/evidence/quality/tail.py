@@ -13,7 +13,7 @@ from rotordrop.errors import RecordError, UnsettledError
 from rotordrop.evidence.events import nominal_gaps, planes_at_bearings
 from rotordrop.evidence.evidence import Missing
 from rotordrop.evidence.levitated import MAINS, LevitatedModel
-from rotordrop.evidence.quality.finding import Finding, Kind
+from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.series import noise_by_differences
 from rotordrop.units import format_quantity
@@ -75,26 +75,11 @@ def check_tail(
     if isinstance(still, Missing):
         if not isinstance(still.error, UnsettledError):
             raise still.error or RecordError(still.reason)
-        return [
-            Finding(
-                kind=Kind.NOT_SETTLED,
-                message=f"tail: {still.error.seen}",
-                remedy=still.error.remedy,
-                severity="stop",
-            )
-        ]
+        return [found("not-settled", seen=still.error.seen, way_out=still.error.remedy)]
     path = planar_of(still.along - along_sensors(levitated.mean, still.sensors), still.planes)
     gaps = nominal_gaps(machine, still)
     if _without_level(still, path, gaps, record.window(levitated.start, levitated.end)):
-        return [
-            Finding(
-                kind=Kind.AC_COUPLING,
-                message="tail: the rotor rests where it levitated in all planes, with the noise that the "
-                "record has too: the level is not recorded",
-                remedy="record with DC coupling; a high-pass takes away where the rotor lies",
-                severity="stop",
-            )
-        ]
+        return [found("coupling-of-tail")]
     findings = []
     for number, (plane, gap) in enumerate(zip(still.planes, gaps.tolist(), strict=True)):
         findings += _place(path[:, number], plane, gap)
@@ -138,41 +123,23 @@ def check_rest_in_record(
         order = list(range(len(gaps)))
         order[first], order[second] = second, first
         if np.all(np.abs(_off_the_path(path, np.mean(rest, axis=0)[order], gaps, sag)) <= _OFF_PATH * gaps):
-            names = [record.planes[i].names for i in (first, second)]
-            return [
-                Finding(
-                    kind=Kind.SWAPPED_ENDS,
-                    message=f"tail: the rotor rests {_in_words(seen, record)} where it passed in the last "
-                    f"{_LATE:g} s of the record; with {' and '.join(names[0])} exchanged with "
-                    f"{' and '.join(names[1])} it passed there",
-                    remedy="correct the channel map of the tail",
-                    severity="warning",
-                    channel=", ".join(name for plane in names for name in plane),
-                )
-            ]
-    worst = int(np.argmax(np.abs(off) / gaps))
-    return [
-        Finding(
-            kind=Kind.TAIL_OFFSET,
-            message=f"tail: the rotor rests {_in_words(seen, record)} where it passed in the last "
-            f"{_LATE:g} s of the record",
-            remedy="check the zeros of the sensors between record and tail; the air gap comes from the tail "
-            "and is off by as much",
-            severity="warning",
-            channel=", ".join(record.planes[worst].names),
-        )
-    ]
+            one, other = (record.planes[i].names for i in (first, second))
+            exchanged = {"first": " and ".join(one), "second": " and ".join(other)}
+            words = {"off": _in_words(seen, record), "late": _LATE, **exchanged}
+            return [found("ends-of-tail", words, channel=(*one, *other))]
+    names = record.planes[int(np.argmax(np.abs(off) / gaps))].names
+    return [found("offset", channel=names, off=_in_words(seen, record), late=_LATE)]
 
 
 def _in_words(off: Array, record: Record) -> str:
     """How far the rest lies off in every plane."""
-    found = [
+    words = [
         f"{format_quantity(abs(float(size)), 'length')} {'lower' if size > 0 else 'higher'} at node "
         f"{plane.node}"
         for size, plane in zip(off, record.planes, strict=True)
         if size != 0.0
     ]
-    return ", ".join(found)
+    return ", ".join(words)
 
 
 def _off_the_path(path: Array, rest: Array, gaps: Array, sag: float) -> Array:
@@ -202,44 +169,12 @@ def _without_level(rest: Record, path: Array, gaps: Array, floating: Record) -> 
 def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     x, y = np.mean(path, axis=0)
     depth, lean = float(np.hypot(x, y)), float(np.degrees(np.arctan2(abs(x), -y)))
-    names = ", ".join(plane.names)
     if not DEPTH[0] <= depth / gap <= DEPTH[1]:
-        return [
-            Finding(
-                kind=Kind.WRONG_UNIT,
-                message=f"tail: the rotor rests {format_quantity(depth, 'length')} from its levitated "
-                "position, "
-                f"{depth / gap:.3g} × the nominal air gap of {format_quantity(gap, 'length')}",
-                remedy="correct unit, sensitivity or offset of the tail, or the nominal air gap",
-                severity="stop",
-                channel=names,
-            )
-        ]
-    if _SOME_LEAN < lean <= MOST_LEAN:
-        return [
-            Finding(
-                kind=Kind.LEANING_REST,
-                message=f"tail: the rotor rests {lean:.0f}° from straight below its levitated position "
-                f"(x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm)",
-                remedy="check gains, angles and offsets of this plane, and whether the race is round",
-                severity="warning",
-                channel=names,
-            )
-        ]
-    if lean > MOST_LEAN:
-        return [
-            Finding(
-                kind=Kind.SWAPPED_AXES if lean > _TURNED_LEAN else Kind.TURNED,
-                message=f"tail: the rotor rests at x = {x * 1e6:+.4g} µm, y = {y * 1e6:+.4g} µm from its "
-                "levitated "
-                f"position, {lean:.0f}° from straight below",
-                remedy="correct the polarity or the angles in the machine file, or the channel map of the "
-                "tail",
-                severity="stop",
-                channel=names,
-            )
-        ]
-    return []
+        return [found("unit-of-tail", channel=plane.names, depth=depth, ratio=depth / gap, gap=gap)]
+    if lean <= _SOME_LEAN:
+        return []
+    row = "leaning-rest" if lean <= MOST_LEAN else "turned-tail" if lean <= _TURNED_LEAN else "axes-of-tail"
+    return [found(row, channel=plane.names, lean=lean, x=1e6 * x, y=1e6 * y)]
 
 
 def _without_hum(path: Array, rate: float) -> Array:
@@ -260,14 +195,4 @@ def _swing(path: Array, plane: Plane, rate: float) -> list[Finding]:
     slope = float(np.degrees(np.arctan2(abs(vectors[1, 1]), abs(vectors[0, 1]))))
     if slope <= MOST_LEAN:
         return []
-    return [
-        Finding(
-            kind=Kind.SWAPPED_CHANNELS,
-            message=f"tail: at node {plane.node} the rotor swings by {format_quantity(size, 'length')} at "
-            f"{slope:.0f}° to the "
-            "level, but it can only swing along the race",
-            remedy="a channel of this plane is inverted or belongs to the other end; correct the channel map",
-            severity="stop",
-            channel=", ".join(plane.names),
-        )
-    ]
+    return [found("swing", channel=plane.names, node=plane.node, size=size, slope=slope)]

@@ -31,8 +31,9 @@ GROUP = "rotordrop.readers"
 LARGEST = 2**30
 """Largest file that is read [byte] (chosen): it is held in memory, as text several times over."""
 
+_TEXT = "delimited:read_delimited"
 _FORMATS = {
-    "csv txt tsv asc dat log prn": "delimited:read_delimited",
+    "csv txt tsv asc dat log prn": _TEXT,
     "lvm": "lvm:read_lvm",
     "h5 hdf5": "hdf5:read_hdf5",
     "mat": "matlab:read_matlab",
@@ -48,12 +49,17 @@ _FORMATS = {
 
 _SUPPLIED = {name: place for names, place in _FORMATS.items() for name in names.split()}
 
-_UNPACKED = 32 * 2**20
-"""Bytes that any file packed by gzip may hold (chosen), and …"""
+_BEGINS = {
+    b"\x89HDF": "h5", b"MATLAB": "mat", b"TDSm": "tdms", b"RIFF": "wav", b"\x93NUMPY": "npy",
+    b"|CF,": "imc FAMOS", b"DIAEXT": "DIAdem", b"DIADEM": "DIAdem", b"MDF ": "ASAM MDF", b"PAR1": "Parquet",
+    b"ARROW1": "Feather", b"FEA1": "Feather", b"PK\x03\x04": "ZIP", b"\xd0\xcf\x11\xe0": "old Excel (.xls)",
+    b"%PDF": "PDF", b"<?xml": "XML (TDM)", b"DATASET ": "DADiSP", b"SQLite": "SQLite",
+}  # fmt: skip
+"""How files begin whose suffix does not tell what they are: formats that are read, and others by name."""
 
-_UNPACKED_PER_BYTE = 16
-"""… this many times its own (chosen): noisy readings pack three to six times, and a text takes eight times
-its bytes to be read."""
+_UNPACKED, _UNPACKED_PER_BYTE = 32 * 2**20, 16
+"""Bytes that any file packed by gzip may hold, or so many times its own (chosen): noisy readings pack three
+to six times, and a text takes eight times its bytes to be read."""
 
 
 def read_recording(path: Path, profile: Profile) -> Recording:
@@ -76,10 +82,8 @@ def refuse_large(path: Path) -> None:
     """Refuse a file that is too large to be held in memory."""
     size = path.stat().st_size
     if size > LARGEST:
-        raise RecordError(
-            f"the recording {path} has {size / 1e9:.3g} GB, at most {LARGEST / 1e9:.3g} GB are read; export "
-            "the seconds around the drop, or fewer channels"
-        )
+        words = f"the recording {path} has {size / 1e9:.3g} GB, at most {LARGEST / 1e9:.3g} GB are read"
+        raise RecordError(f"{words}; export the seconds around the drop, or fewer channels")
 
 
 def find_reader(name: str, path: Path) -> Reader:
@@ -89,13 +93,19 @@ def find_reader(name: str, path: Path) -> Reader:
         return cast("Reader", added[name].load())
     if name == "gz":
         return read_gzip
+    if _SUPPLIED.get(name, _TEXT) == _TEXT:
+        with path.open("rb") as stream:
+            begin = stream.read(8)
+        inside = next((kind for sign, kind in _BEGINS.items() if begin.startswith(sign)), name)
+        if inside != name and inside not in _SUPPLIED:
+            words = "which is not read; export it as text, MAT, TDMS, HDF5 or universal file"
+            raise RecordError(f"{path} is a file of the format {inside}, {words}")
+        name = inside
     if name in _SUPPLIED:
         module, function = _SUPPLIED[name].split(":")
         return cast("Reader", getattr(import_module(f"rotordrop.record.readers.{module}"), function))
-    raise RecordError(
-        f"{path}: no reader for {name or 'a file without suffix'!r}; known are {', '.join(known_formats())}; "
-        "name one as 'format' in the profile"
-    )
+    words = f"no reader for {name or 'a file without suffix'!r}; known are {', '.join(known_formats())}"
+    raise RecordError(f"{path}: {words}; name one as 'format' in the profile")
 
 
 def known_formats() -> tuple[str, ...]:

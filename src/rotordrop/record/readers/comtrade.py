@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers import refuse_large
-from rotordrop.record.recording import Recording, spelled, split_unit
+from rotordrop.record.recording import Recording, damaged, spelled, split_unit
 
 _FORMATS = {"BINARY": ("<i2", -(2**15)), "BINARY32": ("<i4", -(2**31)), "FLOAT32": ("<f4", None)}
 """How an analogue sample is stored and what stands for a missing one (IEEE C37.111)."""
@@ -28,8 +28,7 @@ _SAME_DURATION = 0.01
 """Share by which the durations by rates and by time stamps may differ [1] (chosen): stamps are rounded."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Analogue:
+class _Analogue(NamedTuple):
     name: str
     unit: str
     factor: float
@@ -37,11 +36,10 @@ class _Analogue:
     skew: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Configuration:
-    analogue: tuple[_Analogue, ...]
+class _Configuration(NamedTuple):
+    analogue: list[_Analogue]
     digital: int
-    rates: tuple[tuple[float, int], ...]
+    rates: list[tuple[float, int]]
     start: float
     kind: str
     time_factor: float
@@ -65,10 +63,10 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
     numbers, stamps, table = (_ascii if rules.kind == "ASCII" else _binary)(content, rules, samples)
     declared = rules.rates[-1][1]
     if len(table) != declared:
-        raise RecordError(
-            f"{samples}: the configuration declares {declared} samples and {len(table)} are present; "
-            "the file is truncated or damaged, copy it again"
-        )
+        more = f", {len(table) - declared} more" if len(table) > declared else ""
+        what = "the two belong to other recordings" if more else "the file is truncated or damaged"
+        words = f": the configuration declares {declared} samples and {len(table)} are present{more}"
+        raise damaged(samples, f"{words}, {what}")
     time = rules.start + _seconds(numbers, stamps, rules, samples)
     channels = [
         profile.channel(
@@ -82,12 +80,10 @@ def read_comtrade(path: Path, profile: Profile) -> Recording:
     ]
     # rates and time stamps say the same twice; where they do not, one of them is damaged
     by_rates, by_stamps = float(time[-1] - time[0]), float(stamps[-1] - stamps[0]) * rules.time_factor
-    words = (
-        f"the samples last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time "
-        "stamps; the rates are used"
-    )
+    words = f"last {by_rates:.6g} s by the sampling rates and {by_stamps:.6g} s by their time stamps"
     agree = not by_stamps > 0.0 or by_rates <= 0.0 or abs(by_stamps / by_rates - 1.0) < _SAME_DURATION
-    return Recording(channels=tuple(channels), metadata=rules.entries, warnings=() if agree else (words,))
+    warnings = () if agree else (f"the samples {words}; the rates are used",)
+    return Recording(channels=tuple(channels), metadata=rules.entries, warnings=warnings)
 
 
 def _sections(path: Path) -> tuple[bytes, bytes]:
@@ -101,17 +97,13 @@ def _sections(path: Path) -> tuple[bytes, bytes]:
         if mark["bytes"]:  # binary samples may hold anything, line ends and such marks too
             body = content[mark.end() : mark.end() + int(mark["bytes"])]
             if len(body) < int(mark["bytes"]):
-                raise RecordError(
-                    f"{path} is truncated: its samples declare {int(mark['bytes'])} bytes and {len(body)} "
-                    "are present; copy the file again"
-                )
+                declared = f"its samples declare {int(mark['bytes'])} bytes and {len(body)} are present"
+                raise damaged(path, f" is truncated: {declared}")
         parts.setdefault(mark["kind"].decode().upper(), body)
     for kind in ("CFG", "DAT"):
         if kind not in parts:
             have = ", ".join(parts) or "none"
-            raise RecordError(
-                f"{path} has no section {kind} (it has {have}); it is cut off or no COMTRADE file"
-            )
+            raise damaged(path, f" has no section {kind} (it has {have}), it is cut off or no COMTRADE file")
     return parts["CFG"], parts["DAT"]
 
 
@@ -136,9 +128,7 @@ def _configuration(text: bytes, path: Path) -> _Configuration:
         number += 1
         if number > len(rows) or len(rows[number - 1]) < least:
             have = len(rows[number - 1]) if number <= len(rows) else 0
-            raise RecordError(
-                f"{path}, line {number}: {have} entries where {least} are expected; copy it again"
-            )
+            raise damaged(path, f", line {number}: {have} entries where {least} are expected")
         return [entry.strip() for entry in rows[number - 1]]
 
     try:
@@ -150,37 +140,24 @@ def _configuration(text: bytes, path: Path) -> _Configuration:
         analogue = []
         for _ in range(analogue_count):
             _, name, _, _, unit, factor, offset, skew, *_ = row(10)
-            analogue.append(
-                _Analogue(
-                    name=name,
-                    unit=spelled(unit),
-                    factor=float(factor),
-                    offset=float(offset),
-                    skew=1e-6 * float(skew or 0.0),
-                )
-            )
+            numbers = float(factor), float(offset), 1e-6 * float(skew or 0.0)
+            analogue.append(_Analogue(name, spelled(unit), *numbers))
         for _ in range(digital_count):
             row(2)
         row(1)
         declared = [row(2) for _ in range(max(int(row(1)[0]), 1))]
-        rates = tuple((float(rate), int(last)) for rate, last, *_ in declared)
+        rates = [(float(rate), int(last)) for rate, last, *_ in declared]
         start, when = _instant(row(2)), row(2)
         trigger = _instant(when)
         kind = row(1)[0].upper()
         time_factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
     except (ValueError, IndexError) as error:
-        raise RecordError(f"{path}, line {number}: {error}; the configuration is damaged") from error
+        raise damaged(path, f", line {number}: {error}, the configuration is damaged") from error
     if kind != "ASCII" and kind not in _FORMATS:
         raise RecordError(f"{path}, line {number}: the format {kind!r} is not ASCII, {', '.join(_FORMATS)}")
-    return _Configuration(
-        analogue=tuple(analogue),
-        digital=digital_count,
-        rates=rates,
-        start=(start[0] - trigger[0]) + (start[1] - trigger[1]),
-        kind=kind,
-        time_factor=time_factor * 1e-6,
-        entries={"station": station[0], "recorder": station[1], "trigger time": " ".join(when)},
-    )
+    entries = {"station": station[0], "recorder": station[1], "trigger time": " ".join(when)}
+    before = (start[0] - trigger[0]) + (start[1] - trigger[1])
+    return _Configuration(analogue, digital_count, rates, before, kind, 1e-6 * time_factor, entries)
 
 
 def _instant(entries: list[str]) -> tuple[int, float]:
@@ -204,27 +181,18 @@ def _ascii(content: bytes, rules: _Configuration, path: Path) -> tuple[Array, Ar
         try:
             table[index] = [float(field) if field else np.nan for field in fields[: table.shape[1]]]
         except ValueError as error:
-            raise RecordError(
-                f"{path}, line {index + 1}: {error}; repair the line or export again"
-            ) from error
+            raise damaged(path, f", line {index + 1}: {error}") from error
     return table[:, 0], table[:, 1], table[:, 2:]
 
 
 def _binary(content: bytes, rules: _Configuration, path: Path) -> tuple[Array, Array, Array]:
     stored, missing = _FORMATS[rules.kind]
     words = -(-rules.digital // 16)
-    row = np.dtype(
-        [
-            ("number", "<u4"),
-            ("stamp", "<u4"),
-            ("analogue", stored, (len(rules.analogue),)),
-            ("digital", "<u2", (words,)),
-        ]
-    )
+    parts = ("number", "<u4"), ("stamp", "<u4"), ("analogue", stored, (len(rules.analogue),))
+    row = np.dtype([*parts, ("digital", "<u2", (words,))])
     if len(content) % row.itemsize:
-        raise RecordError(
-            f"{path} is truncated: {len(content)} bytes are no whole number of samples of {row.itemsize}"
-        )
+        whole = f"{len(content)} bytes are no whole number of samples of {row.itemsize}"
+        raise damaged(path, f" is truncated: {whole}")
     table = np.frombuffer(content, row)
     values = table["analogue"].astype(np.float64)
     if missing is not None:
@@ -238,17 +206,18 @@ def _seconds(numbers: Array, stamps: Array, rules: _Configuration, path: Path) -
     """Time of every sample from the first [s]: by the rates where there are any, else by the time stamps."""
     if not np.all(np.diff(numbers) == 1.0):
         at = int(np.argmax(np.diff(numbers) != 1.0))
-        raise RecordError(
-            f"{path}: sample {numbers[at + 1]:.0f} follows sample {numbers[at]:.0f}; samples are missing or "
-            "in disorder, copy the file again"
-        )
+        words = f": sample {numbers[at + 1]:.0f} follows sample {numbers[at]:.0f}"
+        raise damaged(path, f"{words}, samples are missing or in disorder")
+    stamped = np.isfinite(stamps).all()
     if all(rate > 0 for rate, _ in rules.rates):
-        steps, last = np.empty(len(numbers)), 0
-        for rate, end in rules.rates:
-            steps[last:end], last = 1.0 / rate, end
         if len(rules.rates) == 1:
             return np.arange(len(numbers), dtype=np.float64) / rules.rates[0][0]
-        return np.concatenate([[0.0], np.cumsum(steps[1:])])
-    if not np.isfinite(stamps).all():
+        last = [0, *(end for _, end in rules.rates)]
+        steps = np.repeat([1.0 / rate for rate, _ in rules.rates], np.diff(last))
+        by_rates = np.concatenate([[0.0], np.cumsum(steps[1:])])
+        by_stamps = (stamps - stamps[0]) * rules.time_factor
+        # the interval from one rate to the next is that of the time stamps
+        return by_stamps if stamped and np.all(np.abs(by_stamps - by_rates) < sum(set(steps))) else by_rates
+    if not stamped:
         raise RecordError(f"{path} has neither a sampling rate nor a time stamp for every sample")
     return np.asarray((stamps - stamps[0]) * rules.time_factor)

@@ -3,32 +3,53 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
+from rotordrop.record.clock import TIME_UNITS, in_seconds
 from rotordrop.record.profile import Profile
-from rotordrop.record.readers.head import TIME_NAMES, Head, read_head
+from rotordrop.record.readers.head import Head, read_head
 from rotordrop.record.readers.text import (
     BLANKS,
     Layout,
     fields_of,
     find_layout,
     is_number,
+    is_row,
     plain_number,
     read_lines,
     stamp_parts,
 )
-from rotordrop.record.recording import Recording, listed, split_unit
+from rotordrop.record.recording import (
+    Recording,
+    damaged,
+    kind_of,
+    known_unit,
+    listed,
+    plain_name,
+    split_unit,
+    whose_time,
+)
+from rotordrop.record.sandbox import MOST_SERIES
 from rotordrop.units import parse_quantity
 
 _UNEVEN = 0.1
 """Share of a step by which the steps of a column without a name may differ for a time (chosen): rounding."""
 
+_SAME_SPAN, _ENDED = 0.2, 0.9
+"""Share of a record by which a second clock may begin or end elsewhere, and share of the rows before which a
+column that ends has a clock of its own [1] (chosen)."""
+
 _COUNTERS = re.compile(
-    r"(sample|index|idx|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
+    r"(sample|index|idx|number|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
 )
 _ONLY_NUMBERS = {".": re.compile(r"[0-9.eE+-]*"), ",": re.compile(r"[0-9,eE+-]*")}
 """By decimal sign. Python reads ``1_000`` and digits of any script as numbers; no recorder writes them."""
@@ -55,10 +76,8 @@ def _without_head_beside(lines: list[str], path: Path) -> list[str]:
         return lines
     rows = [fields_of(line, ",") for line in lines]
     if beside != list(range(0, 5 * (len(first) // 5), 5)):
-        raise RecordError(
-            f"{path}, line 1: {len(first)} fields with {len(beside)} times 'Record Length' are no heads of "
-            "five columns each; export it again"
-        )
+        words = f"{len(first)} fields with {len(beside)} times 'Record Length' are no heads of five columns"
+        raise damaged(path, f", line 1: {words}")
     labels = []
     for i in beside:
         head = {row[i]: row[i + 1] for row in rows if len(row) > i + 1 and row[i]}
@@ -72,50 +91,122 @@ def _without_head_beside(lines: list[str], path: Path) -> list[str]:
     ]
 
 
+def _grows_evenly(values: Array, step: float | None) -> bool:
+    """Whether values (N,) grow evenly, and are no counter of samples of a known step."""
+    steps = np.diff(values)
+    even = len(steps) > 1 and np.min(steps) > 0.0 and np.ptp(steps) <= _UNEVEN * np.median(steps)
+    return bool(even and not (step and np.all(steps == 1.0)))
+
+
 def recording_of_lines(
-    lines: list[str], complete: bool, origin: str, path: Path, profile: Profile
+    lines: list[str], complete: bool, origin: str, path: Path, profile: Profile, *, segments: bool = False
 ) -> Recording:
-    """Make a recording of lines of text, whose `origin` is a word for the report."""
-    layout = find_layout(lines, path, profile.text)
-    head = read_head(lines[: layout.first], layout, profile, path)
+    """Make a recording of lines of text, whose `origin` is a word for the report.
+
+    Tables below each other, with the head repeated, are joined where one goes on from the other or has other
+    channels. Of others the first is read with a warning where they are `segments`, which a recorder writes.
+    """
+    layout, parts, firsts = find_layout(lines, path, profile.text), list[Recording](), list[int]()
+
+    def head_of(first: int) -> int:
+        """Where the lines begin that stand between the rows above and the first row."""
+        while first > 0 and not is_row(fields_of(lines[first - 1], layout.separator), layout):
+            first -= 1
+        return first
+
+    key = next((line for line in lines[: layout.first][::-1] if re.search(r"[^\W\d_]", line)), None)
+    tops = [layout.first, *(i + 1 for i in range(layout.first, len(lines)) if lines[i] == key)]
+    for first, below in pairwise([*tops, len(lines) + 1]):
+        end = head_of(below - 1) if below <= len(lines) else len(lines)
+        if end > first:
+            begin = head_of(first) if segments or first != layout.first else 0
+            table, whole = lines[:end], complete or end < len(lines)
+            parts.append(_of_table(table, begin, whole, replace(layout, first=first), origin, path, profile))
+            firsts.append(first)
+    return _joined(parts, firsts, segments, path) if len(parts) > 1 else parts[0]
+
+
+def _joined(parts: list[Recording], firsts: Sequence[int], segments: bool, path: Path) -> Recording:
+    """One recording of tables that follow each other or have other channels."""
+    first, warnings = parts[0], tuple(word for part in parts for word in part.warnings)
+    pieces, labels = [first], [[channel.label for channel in part.channels] for part in parts]
+    if len({label for named in labels for label in named}) == sum(map(len, labels)):
+        beside = tuple(channel for part in parts for channel in part.channels)
+        return replace(first, channels=beside, warnings=warnings)
+    for part, named in zip(parts[1:], labels[1:], strict=True):
+        last, after = pieces[-1].channels[0].time, part.channels[0].time
+        step = (last[-1] - last[0]) / max(len(last) - 1, 1)
+        # the time of each segment may count from its own start
+        shift = _began(part) - _began(first) if after[0] <= last[-1] else 0.0
+        if named != labels[0] or abs(after[0] + shift - last[-1] - step) > 0.5 * step:
+            words = f"the file holds {len(parts)} segments that do not follow each other"
+            if not segments:
+                what = f"the head stands again in line {firsts[1]}: {words}"
+                raise RecordError(f"{path}: {what}; keep one of them, or export again as one table")
+            ask = f"(first_data_line = {firsts[1] + 1} under [text] of a profile reads the second)"
+            return replace(first, warnings=(*first.warnings, f"{words}; the first is read {ask}"))
+        pieces.append(replace(part, channels=tuple(replace(c, time=c.time + shift) for c in part.channels)))
+    channels = tuple(
+        replace(
+            channel,
+            time=np.concatenate([piece.channels[i].time for piece in pieces]),
+            values=np.concatenate([piece.channels[i].values for piece in pieces]),
+        )
+        for i, channel in enumerate(first.channels)
+    )
+    return replace(first, channels=channels, warnings=warnings)
+
+
+def _began(part: Recording) -> float:
+    """When a segment began by its date and time of day [s]; 0 where it says none."""
+    date = part.metadata.get("Date", "").split(" ")[0].replace("/", "-")
+    clock = re.sub(r"([.,]\d{1,9})\d*.*", r"\1", part.metadata.get("Time", "").split(" ")[0])
+    seconds, nanoseconds = stamp_parts(f"{date} {clock}") or (0, 0)
+    return seconds % 86_400_000 + 1e-9 * nanoseconds
+
+
+def _of_table(
+    lines: list[str], begin: int, complete: bool, layout: Layout, origin: str, path: Path, profile: Profile
+) -> Recording:
+    """The recording of one table, whose head begins at a line."""
     rows, notes, warnings = _intact_rows(lines, complete, layout, path)
-    columns = [split_unit(label) for label in head.labels]
-    table = {
-        i: _numbers([row[i] for row in rows], label, layout, path)
-        for i, (label, kind) in enumerate(zip(head.labels, layout.kinds, strict=True))
-        if kind == "number" or (kind == "blank" and any(row[i] for row in rows))
-    }
-    stamped = _stamped_seconds(rows, layout, path)
-    if stamped is not None:
-        first = (field for field, kind in zip(rows[0], layout.kinds, strict=True) if kind == "time")
-        head.entries.setdefault("start", " ".join(first))
-    times, used, words = _clock(table, columns, stamped, head, profile, path)
-    channels = []
-    for i in sorted(set(table) - set(used)):
-        name, label, unit = columns[i]
-        time = times[max(k for k in times if k <= i)]
+    head = read_head(lines[begin : layout.first], layout, profile, path)
+    table = _Table(rows=rows, layout=layout, head=head, profile=profile, path=path)
+    clock = table.clock()
+    channels, scaled = [], list[str]()
+    for i in sorted(set(table.numbers) - set(clock.used)):
+        (name, label, unit), time = table.columns[i], clock.of(i)
+        if _COUNTERS.match(name) and np.all(np.diff(table.numbers[i]) == 1.0):
+            continue
         # side by side, captures may differ in length: the shorter ends in blanks
-        there = slice(
-            int(np.max(np.flatnonzero(np.isfinite(time)), initial=-1)) + 1 if len(used) > 1 else None
-        )
-        unnamed = f"column {i + 1}"
-        channels.append(
-            profile.channel(name or unnamed, unit, table[i][there], time[there], label=label or unnamed)
-        )
-    texts = [label for label, kind in zip(head.labels, layout.kinds, strict=True) if kind == "text"]
+        several = len(clock.times) > 1
+        there = slice(int(np.max(np.flatnonzero(np.isfinite(time)), initial=-1)) + 1 if several else None)
+        name, label, values = name or f"column {i + 1}", label or f"column {i + 1}", table.numbers[i][there]
+        known = np.isfinite(values)
+        ends = int(np.sum(known))
+        if 0 < ends < _ENDED * len(values) and known[:ends].all():
+            words = f"left out, {label!r} ends in row {ends} of {len(values)}: it has a clock of its own"
+            warnings.append(f"{words}, which the file does not hold; export it with its times")
+            continue
+        if np.array_equal(values, np.round(values)) and label not in profile.units:
+            factor, offset = table.told(i, 1.0, "factor", "per count"), table.told(i, 0.0, "offset")
+            if factor != 1.0:  # counts
+                values, scaled = values * factor + offset, [*scaled, label]
+        channels.append(profile.channel(name, unit, values, time[there], label=label, clocked=True))
+    notes += [f"whole numbers, taken times the factors of the head: {listed(scaled)}"] if scaled else []
+    texts = [head.labels[i] for i in table.texts]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
     if head.count is not None and len(rows) < head.count:
-        warnings.append(
-            f"the header declares {head.count} samples and {len(rows)} are present: the file is truncated"
-        )
+        words = f"declares {head.count} samples and {len(rows)} are present"
+        warnings.append(f"the header {words}: the file is truncated")
     sign = _SIGNS.get(layout.separator, repr(layout.separator))
     decimal = "decimal comma" if layout.decimal == "," else "decimal point"
     return Recording(
         channels=tuple(channels),
-        metadata=head.entries,
-        notes=(f"{origin}, {sign} between {layout.columns} columns, {decimal}", *notes, *words),
+        metadata={k: v for k, v in head.entries.items() if not profile.time.step or kind_of(k) != "rate"},
+        notes=(f"{origin}, {sign} between {layout.columns} columns, {decimal}", *notes, *clock.notes),
         warnings=tuple(warnings),
-        sensitivity=head.sensitivity,
+        sensitivities=head.sensitivities,
         voltage_offset=head.voltage_offset,
     )
 
@@ -126,19 +217,23 @@ def _intact_rows(
     """Take the data rows, refuse a wrong column count, leave out a last row that was cut; notes, warnings."""
     body = [fields_of(line, layout.separator) for line in lines[layout.first :]]
     wrong = [i for i, row in enumerate(body) if len(row) != layout.columns]
+    rows = len(body) - next((k for k, row in enumerate(reversed(body)) if is_row(row, layout)), len(body))
+    below = next((row for row in body[rows:] if any(row)), [])
+    spoken = re.match(r"[*#%! ]*[^\W\d_]{2}", " ".join(below)) and layout.kinds[0] != "text"
+    spoken = spoken or not any(is_number(field, layout.decimal) for field in below)
+    apart = below and (any(body[rows]) or below[0].startswith("*") or len(body) > rows + 3)
+    if rows and apart and complete and spoken:
+        words = f"left out, from line {layout.first + rows + 1} on, below the rows: {' '.join(below)[:40]!r}"
+        return body[:rows], [words], []
     last = layout.first + len(body)
     if wrong and wrong != [len(body) - 1]:
-        line = layout.first + wrong[0] + 1
-        raise RecordError(
-            f"{path}, line {line}: {len(body[wrong[0]])} columns where {layout.columns} are expected "
-            f"({lines[line - 1][:60]!r}; {len(wrong)} such lines); repair the line or export again"
-        )
+        at = layout.first + wrong[0]
+        words = f"line {at + 1}: {len(body[wrong[0]])} columns where {layout.columns} are expected"
+        ask = f"({lines[at][:60]!r}; {len(wrong)} such lines); repair the line or export again as one table"
+        raise RecordError(f"{path}, {words} {ask}")
     if wrong:
-        words = (
-            f"the file ends within line {last}, after {len(body[-1])} of {layout.columns} columns: the file "
-            f"is truncated, {len(body) - 1} complete rows are used"
-        )
-        return body[:-1], [], [words]
+        words = f"the file ends within line {last}, after {len(body[-1])} of {layout.columns} columns"
+        return body[:-1], [], [f"{words}: the file is truncated, {len(body) - 1} complete rows are used"]
     if complete or len(body) < 3:
         return body, [], []
 
@@ -155,126 +250,209 @@ def _intact_rows(
     return (body[:-1], [], [words]) if len(same) == 1 else (body[:-1], [words], [])
 
 
-def _numbers(fields: list[str], label: str, layout: Layout, path: Path) -> Array:
-    """The fields of a column as numbers, missing samples as NaN."""
-    if _ONLY_NUMBERS[layout.decimal].fullmatch("".join(fields)):
-        try:
-            return np.array("\n".join(fields).replace(",", ".").split("\n"), dtype=np.float64)
-        except ValueError:
-            pass  # looked at one by one
-    values = np.full(len(fields), np.nan)
-    for i, field in enumerate(fields):
-        if is_number(field, layout.decimal):
-            values[i] = float(plain_number(field, layout.decimal))
-        elif field.lower() not in BLANKS:
-            raise RecordError(
-                f"{path}, line {layout.first + i + 1}, column {label!r}: {field[:40]!r} is not a number; "
-                "repair the line or export again"
-            )
-    return values
+@dataclass(frozen=True, kw_only=True)
+class _Clock:
+    """The times of the rows."""
+
+    times: Mapping[int, Array]
+    """Times [s] by the column from which on they hold, shape (N,)."""
+    own: Mapping[int, Array] = field(default_factory=dict)
+    """Those of single columns."""
+    used: Sequence[int] = ()
+    """Columns that are no channels."""
+    notes: tuple[str, ...] = ()
+
+    def of(self, column: int) -> Array:
+        """Times of a column [s], shape (N,)."""
+        return self.own.get(column, self.times[max((k for k in self.times if k <= column), default=0)])
 
 
-def _stamped_seconds(rows: list[list[str]], layout: Layout, path: Path) -> Array | None:
-    """Seconds from the first row by the columns of dates and times, None where there is none."""
-    stamped = [i for i, kind in enumerate(layout.kinds) if kind == "time"]
-    if not stamped:
-        return None
-    seconds, nanoseconds = np.zeros((2, len(rows)), dtype=np.int64)
-    dated = False
-    for k, row in enumerate(rows):
-        for i in stamped:
-            parts = stamp_parts(row[i])
-            if parts is None:
-                raise RecordError(
-                    f"{path}, line {layout.first + k + 1}: {row[i][:40]!r} is not a date or time; repair it"
-                )
-            dated = dated or parts[0] >= 10 * _DAY
-            seconds[k] += parts[0]
-            nanoseconds[k] += parts[1]
-    if not dated:  # the time of day begins again at midnight
-        seconds[1:] += _DAY * np.cumsum(np.diff(seconds) < -_DAY // 2)
-    return np.asarray((seconds - seconds[0]) + 1e-9 * (nanoseconds - nanoseconds[0]), dtype=np.float64)
+@dataclass(frozen=True, kw_only=True)
+class _Table:
+    """Rows of fields, and what is known of their columns."""
 
+    rows: list[list[str]]
+    layout: Layout
+    head: Head
+    profile: Profile
+    path: Path
 
-def _clock(
-    table: dict[int, Array],
-    columns: list[tuple[str, str, str]],
-    stamped: Array | None,
-    head: Head,
-    profile: Profile,
-    path: Path,
-) -> tuple[dict[int, Array], list[int], list[str]]:
-    """The time of every row [s] by the column from which on it holds, the columns it took, and notes.
+    def of_kind(self, kind: str) -> list[int]:
+        """Columns that hold such things."""
+        return [i for i, own in enumerate(self.layout.kinds) if own == kind]
 
-    Several columns of one name give the time of the columns behind each.
-    """
-    step = parse_quantity(profile.time.step, "time") if profile.time.step else head.step
-    if stamped is not None and not np.ptp(stamped) > 0.0:
-        stamped = None  # the date of a column of its own is no clock
-    at = _time_columns(columns, table, stamped is not None, step, profile, path)
-    if at:
-        units = [profile.time.unit or columns[i][2] or head.time_unit for i in at]
-        notes = [] if all(units) else ["time column taken in seconds"]
-        times = {
-            i: table[i] * parse_quantity(f"1 {unit or 's'}", "time")
-            for i, unit in zip(at, units, strict=True)
-        }
-        return {0: times[at[0]], **times}, at, notes
-    # stamps of whole seconds say less than a sampling interval
-    if stamped is not None and not (step and stamped[-1] - stamped[0] < 0.5 * step * len(stamped)):
-        return {0: stamped}, [], []
-    if step is None or step <= 0:
-        raise RecordError(
-            f"{path} has no time column among {listed(label for _, label, _ in columns)} and no sampling "
-            'interval; name it in the profile, time.channel = "..." or time.step = "50 us"'
+    def told(self, column: int, none: float, *kinds: str) -> float:
+        """A number that the head gives for a column."""
+        fields = [row[column] for kind in kinds if (row := self.head.by_column.get(kind))]
+        number = fields and is_number(fields[0], self.layout.decimal)
+        return float(plain_number(fields[0], self.layout.decimal)) if number else none
+
+    @cached_property
+    def columns(self) -> list[tuple[str, str, str]]:
+        """Name, label and unit of each."""
+        return [split_unit(label) for label in self.head.labels]
+
+    @cached_property
+    def numbers(self) -> dict[int, Array]:
+        """Columns of numbers, missing samples as NaN."""
+        rare = [i for i in self.of_kind("blank") if any(row[i] for row in self.rows) and i not in self.texts]
+        return {i: self._numbers(i) for i in sorted((*self.of_kind("number"), *rare))}
+
+    @cached_property
+    def texts(self) -> list[int]:
+        """Columns that hold words, be it in a few rows."""
+        decimal, rare = self.layout.decimal, self.of_kind("blank")
+        said = {i: (row[i] for row in self.rows if row[i].lower() not in BLANKS) for i in rare}
+        spoken = [i for i, fields in said.items() if not all(is_number(field, decimal) for field in fields)]
+        return sorted([*self.of_kind("text"), *spoken])
+
+    def _numbers(self, column: int) -> Array:
+        fields, decimal = [row[column] for row in self.rows], self.layout.decimal
+        if _ONLY_NUMBERS[decimal].fullmatch("".join(fields)):
+            try:
+                return np.array("\n".join(fields).replace(",", ".").split("\n"), dtype=np.float64)
+            except ValueError:
+                pass  # looked at one by one
+        values = np.full(len(fields), np.nan)
+        for i, text in enumerate(fields):
+            if is_number(text, decimal):
+                values[i] = float(plain_number(text, decimal))
+            elif text.lower() not in BLANKS:
+                at = f"line {self.layout.first + i + 1}, column {self.head.labels[column]!r}"
+                words = f"{text[:40]!r} is not a number; repair the line or export again"
+                raise RecordError(f"{self.path}, {at}: {words}")
+        return values
+
+    def _stamped(self) -> Array | None:
+        """Seconds from the first row by the columns of dates and times, None where there is none."""
+        stamped = self.of_kind("time")
+        if not stamped:
+            return None
+        self.head.entries.setdefault("start", " ".join(self.rows[0][i] for i in stamped))
+        seconds, nanoseconds = np.zeros((2, len(self.rows)), dtype=np.int64)
+        dated = False
+        for k, row in enumerate(self.rows):
+            for i in stamped:
+                parts = stamp_parts(row[i])
+                if parts is None:
+                    line = self.layout.first + k + 1
+                    raise damaged(self.path, f", line {line}: {row[i][:40]!r} is not a date or time")
+                dated = dated or parts[0] >= 10 * _DAY
+                seconds[k] += parts[0]
+                nanoseconds[k] += parts[1]
+        if not dated:  # the time of day begins again at midnight
+            seconds[1:] += _DAY * np.cumsum(np.diff(seconds) < -_DAY // 2)
+        return np.asarray((seconds - seconds[0]) + 1e-9 * (nanoseconds - nanoseconds[0]), dtype=np.float64)
+
+    def clock(self) -> _Clock:
+        """The clock of the rows: by hand, by columns of time or of dates, or even by what the head says."""
+        by_hand, stamped = self.profile.time.step, self._stamped()
+        step = parse_quantity(by_hand, "time") if by_hand else self.head.step
+        still = stamped is not None and not np.ptp(stamped) > 0.0
+        stamped = None if still else stamped  # the date of a column of its own is no clock
+        at = self._time_columns(stamped is not None, step)
+        found = self._by_columns(at) if at else None
+        if found is not None and not by_hand:
+            return self._of_wide_table(found)
+        # stamps of whole seconds say less than a sampling interval
+        coarse = stamped is not None and step and stamped[-1] - stamped[0] < 0.5 * step * len(stamped)
+        if stamped is not None and not coarse and not by_hand:
+            return self._of_wide_table(_Clock(times={0: stamped}))
+        if step is None or step <= 0:
+            why = " (its stamps stand still, they are coarser than the samples)" if still else ""
+            have = f"no time column among {listed(one[1] for one in self.columns)}{why}"
+            ask = 'name it in the profile, time.channel = "..." or time.step = "50 us"'
+            raise RecordError(f"{self.path} has {have} and no sampling interval; {ask}")
+        return self._counted(step, () if found is None else found.used, found)
+
+    def _counted(self, step: float, used: Sequence[int], found: _Clock | None) -> _Clock:
+        """An even clock of a step [s], or one by a counter where samples are missing."""
+        head, by_hand = self.head, self.profile.time.start
+        counter = next((i for i in self.numbers if i not in used), next(iter(self.numbers)))
+        values = self.numbers[counter]
+        index, counters, of_trigger = np.arange(len(values), dtype=np.float64), [], False
+        ones = float(np.mean(np.diff(values) == 1.0)) if np.all(values == np.round(values)) else 0.0
+        # where samples are missing a counter steps by more, and so tells it
+        if ones == 1.0 or ones > (0.5 if _COUNTERS.match(self.columns[counter][0]) else 0.9):
+            of_trigger = by_hand is None and bool(values[0] < 0.0 <= values[-1])
+            index = values - (0.0 if of_trigger or head.trigger_sample is not None else values[0])
+            # beside every channel may stand its counter, which has no name
+            alike = [i for i, own in self.numbers.items() if np.array_equal(own, values)]
+            counters = [counter, *(i for i in alike if not self.columns[i][0] and i != counter)]
+        offered = (
+            parse_quantity(by_hand, "time") if by_hand else None,
+            0.0 if of_trigger else None,
+            None if head.trigger_sample is None else -head.trigger_sample * step,
+            head.start,
+            None if found is None else float(found.times[0][0]),
         )
-    start, notes = 0.0, []
-    if profile.time.start is not None:
-        start = parse_quantity(profile.time.start, "time")
-    elif head.trigger_sample is not None:
-        start = -head.trigger_sample * step
-    elif head.start is not None:
-        start = head.start
-    else:
-        notes = ["no trigger in the file: record time counts from the first sample"]
-    counter = next(iter(table))
-    values = table[counter]
-    # where samples are missing a counter steps by more, and so tells it
-    if len(values) > 1 and np.all(values == np.round(values)):
-        ones = float(np.mean(np.diff(values) == 1.0))
-        counts = ones == 1.0 or ones > (0.5 if _COUNTERS.match(columns[counter][0]) else 0.9)
-    else:
-        counts = False
-    if counts:
-        return {0: start + step * table[counter]}, [counter], notes
-    return {0: start + step * np.arange(len(table[counter]), dtype=np.float64)}, [], notes
+        start = next((one for one in offered if one is not None), None)
+        notes = ("no trigger in the file: record time counts from the first sample",) if start is None else ()
+        return _Clock(times={0: (start or 0.0) + step * index}, used=(*used, *counters), notes=notes)
 
+    def _by_columns(self, at: Sequence[int]) -> _Clock:
+        """Times by columns: one for all, or one for each channel by its name or its place before it."""
+        step, first = self.head.step, self.numbers[at[0]]
+        usual = float(np.median(np.diff(first[np.isfinite(first)]))) if step else 0.0
+        told = [unit for unit, s in TIME_UNITS.items() if step and abs(usual * s / step - 1.0) < _UNEVEN]
+        units = [known_unit(self.columns[i][2] or self.head.time_unit) or "" for i in at]
+        units = [self.profile.time.unit or unit or units[0] or "".join(told) for unit in units]
+        # dates in numbers lose digits when they become floating-point numbers
+        decimal = self.layout.decimal
+        stamps = [
+            [plain_number(row[i], decimal) if is_number(row[i], decimal) else "" for row in self.rows]
+            if abs(self.numbers[i][0]) > 1e4
+            else self.numbers[i]
+            for i in at
+        ]
+        times = dict(zip(at, in_seconds(stamps, units), strict=True))
+        bare = not all(units) and isinstance(stamps[0], np.ndarray)
+        notes = ["time column taken in seconds"] if bare else []
+        names = {plain_name(self.columns[i][0]): i for i in self.numbers if i not in at}
+        whose = {i: plain_name(whose_time(self.columns[i][0]) or "") for i in at}
+        own = {names[plain]: times[i] for i, plain in whose.items() if plain in names}
+        rest = [i for i in at if whose[i] not in names] or list(at)
+        # each holds for the channels to its right; of clocks side by side the first does
+        last = max((i for i in self.numbers if i not in at and i not in own), default=0)
+        spare = [i for i in rest[1:] if i > last or i - 1 in rest]
+        notes += [f"left out, other times: {listed(self.columns[i][1] for i in spare)}"] if spare else []
+        return _Clock(
+            times={0: times[rest[0]], **{i: times[i] for i in rest if i not in spare}},
+            own=own,
+            used=at,
+            notes=tuple(notes),
+        )
 
-def _time_columns(
-    columns: list[tuple[str, str, str]],
-    table: dict[int, Array],
-    stamped: bool,
-    step: float | None,
-    profile: Profile,
-    path: Path,
-) -> list[int]:
-    """The columns of the time: the one that the profile names, else by name, unit or even steps."""
-    wanted = profile.time.channel
-    if wanted is not None:
-        for i, (name, label, _) in enumerate(columns):
-            if wanted in (name, label) and i in table:
-                return [i]
-        labels = listed(label for _, label, _ in columns)
-        raise RecordError(f"{path} has no time column {wanted!r}; its columns are {labels}")
-    if stamped:
-        return []
-    named = [
-        i for i in table if TIME_NAMES.match(columns[i][0]) and columns[i][2] in ("", "s", "ms", "us", "min")
-    ] or [i for i in table if columns[i][2] in ("s", "ms", "us")]
-    if named:
-        return [i for i in named if columns[i][0] == columns[named[0]][0]]
-    first = next(iter(table))
-    # a scope that names its channels only: the first column has no name and grows evenly
-    steps = np.diff(table[first])
-    even = len(steps) > 1 and np.min(steps) > 0.0 and np.ptp(steps) <= _UNEVEN * np.median(steps)
-    return [first] if not columns[first][0] and even and not (step and np.all(steps == 1.0)) else []
+    def _time_columns(self, stamped: bool, step: float | None) -> list[int]:
+        """The columns of times: the one that the profile names, else by name, unit or even steps."""
+        wanted, columns = self.profile.time.channel, self.columns
+        if wanted is not None:
+            at = [i for i in self.numbers if wanted in columns[i][:2]][:1]
+            if not at:
+                have = listed(label for _, label, _ in columns)
+                raise RecordError(f"{self.path} has no time column {wanted!r}; its columns are {have}")
+            return at
+        if stamped:
+            return []
+        timed = [i for i in self.numbers if columns[i][2] in ("", *TIME_UNITS)]
+        known = {i: own[np.isfinite(own)] for i in timed if np.isfinite(own := self.numbers[i]).any()}
+        in_s = [i for i in known if columns[i][2] in ("s", "ms", "us", "ns")]
+        grow = [i for i in in_s if np.all(np.diff(known[i]) > 0.0)]
+        found = [i for i in timed if whose_time(columns[i][0]) is not None or i in grow] or in_s[:1]
+        # a scope that names its channels only: the first column has no name and grows evenly
+        even = [i for i, own in known.items() if _grows_evenly(own, step)]
+        found = found or [i for i in even[:1] if i == next(iter(self.numbers)) and not columns[i][0]]
+        for i in even if found and found[0] in known else ():
+            # what grows evenly over the time of the first is a clock too, whatever its name
+            first, own = known[found[0]][[0, -1]], known[i][[0, -1]]
+            found += [i] if np.all(np.abs(own - first) < _SAME_SPAN * np.ptp(first)) else []
+        return sorted(set(found))
+
+    def _of_wide_table(self, clock: _Clock) -> _Clock:
+        """The clock, unless the rows of one instant name a channel each."""
+        for i in [] if np.all(np.diff(clock.of(0)) > 0.0) else self.of_kind("text"):
+            counts = {word: n for word, n in Counter(row[i] for row in self.rows).items() if n > 1}
+            if 1 < len(counts) <= MOST_SERIES and len(set(counts.values())) == 1:
+                words = f"its column {self.head.labels[i]!r} names {len(counts)} channels ({listed(counts)})"
+                raise RecordError(f"{self.path} has one value a row: {words}; export a column for each")
+        return clock

@@ -11,64 +11,43 @@ from rotordrop.errors import RecordError, UsageError
 from rotordrop.record.event_date import dated_line
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers.text import Layout, fields_of, is_number
-from rotordrop.record.recording import known_unit, split_unit
+from rotordrop.record.recording import TIME_NAMES, kind_of, known_unit, sensitivities_in, split_unit
 from rotordrop.units import parse_quantity
-
-TIME_NAMES = re.compile(
-    r"(time|zeit|t|temps|tempo|tiempo|timestamp|x_value|x[- _]?axis([- _]value)?)\b", re.IGNORECASE
-)
 
 _LONGEST_LINE = 500
 """Characters of a line that are looked at (chosen)."""
 
-_KEYS = {
-    "step": "dt step increment sampleinterval samplinginterval samplingperiod sampleperiod abtastintervall "
-    "schrittweite deltax xinc xincrement hresolution",
-    "rate": "fs samplerate samplingrate samplingfrequency samplefrequency abtastrate abtastfrequenz rate",
-    "trigger": "triggersample triggerindex triggerposition pretriggersamples",
-    "before": "pretrigger pretriggertime vorlauf",
-    "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
-    "blocksize anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
-    "start": "t0 start starttime firstsample startoffset x0 xorg xorigin hoffset",
-    "time unit": "xunit xunits xaxisunit hunit horizontalunit horizontalunits",
-    "names": "label name names tracename channelname signalname pointname kanalname messstelle tag tagname "
-    "bezeichnung",
-    "units": "unit units einheit einheiten yunit yunits yunitlabel yaxisunit vunit verticalunit "
-    "verticalunits",
-}
-"""Keys of lines in letters and digits only, as recorders write them in English and German."""
+_LONGEST_UNIT = 10
+"""Characters of a unit that is not known (chosen)."""
 
 _OF_CLOCK = 2
 """Fields of a clock that may stand beyond the columns: its start and its step."""
 
-_KIND = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
-
-_SENSITIVITY = re.compile(r"(\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
 _VOLTAGE_OFFSET = re.compile(r"offset\s*[:=]?\s*([+-]?\d+(?:[.,]\d+)?)\s*(m?V)\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Head:
-    """What the head says."""
+    """What the head says; None and empty where it does not."""
 
     labels: list[str]
-    """Name of every column with its unit in brackets, empty where none is said."""
+    """Name of every column with its unit in brackets."""
     entries: dict[str, str]
     """Keys and values as written."""
     step: float | None
-    """Time between samples [s]."""
     start: float | None
-    """Time of the first sample [s]."""
+    """Time between samples, and of the first one [s]."""
     time_unit: str
-    """Unit of the time axis, empty where none is said."""
+    """Unit of the time axis."""
     trigger_sample: int | None
     """Sample at which the record time is zero."""
     count: int | None
     """Number of samples."""
-    sensitivity: float | None
-    """Volts per metre [V/m]."""
+    by_column: dict[str, list[str]]
+    """Rows with a value for every column, by what they tell."""
+    sensitivities: tuple[float, ...]
     voltage_offset: float
-    """Voltage at zero displacement [V]."""
+    """Volts per metre [V/m], and at zero displacement [V]."""
 
 
 def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) -> Head:
@@ -76,46 +55,86 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) ->
     given = profile.text.names
     if given is not None and len(given) != layout.columns:
         raise RecordError(f"{path} has {layout.columns} columns and the profile names {len(given)}")
-    rows = [fields_of(line if given else line.lstrip("# "), layout.separator) or [""] for line in lines]
+    as_read = [fields_of(line if given else line.lstrip("#% "), layout.separator) or [""] for line in lines]
+    keyed = [_behind_one_key(row) for row in as_read]  # a single such row may name two clocks alike
+    rows = keyed if sum(row is not own for row, own in zip(keyed, as_read, strict=True)) > 1 else as_read
     names, units, used = ([], [], set()) if given else _names_and_units(rows, layout)
     # rows that stand where the samples begin and are none: left out, the record would start later
     last = max(used, default=-1)
     damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(lines[i], rows[i], layout, last >= 0)]
     if damaged:
-        raise RecordError(
-            f"{path}, line {damaged[0] + 1} is damaged ({lines[damaged[0]][:60]!r}; {len(damaged)} such "
-            "lines before the first intact row); repair the line or export again"
-        )
+        what = f"{lines[damaged[0]][:60]!r}; {len(damaged)} such lines before the first intact row"
+        words = f"line {damaged[0] + 1} is damaged ({what}); repair the line or export again"
+        raise RecordError(f"{path}, {words}")
     if not given and not any(names):
         line = f"the line above the numbers reads {lines[-1][:60]!r}" if lines else "there is no header"
-        raise RecordError(
-            f"{path}: no row names the {layout.columns} columns ({line}); name them in the profile, "
-            f'text.names = ["Time [s]", ...]'
-        )
+        ask = 'name them in the profile, text.names = ["Time [s]", ...], or export each channel as a column'
+        raise RecordError(f"{path}: no row names the {layout.columns} columns ({line}); {ask}")
     unused = [line[:_LONGEST_LINE] for i, line in enumerate(lines) if i not in used]
     entries = _entries(unused, rows, used, layout)
     labels = [
         f"{name} [{unit}]" if unit and not known_unit(split_unit(name)[2]) else name
         for name, unit in zip(names, units, strict=True)
     ]
-    return _head(list(given) if given else labels, entries, "\n".join(unused))
+    for row in rows:
+        begins = {field for field in row[1:] if is_number(field, layout.decimal)}
+        if kind_of(row[0]) == "start" and len(begins) > 1:
+            words = f"the channels begin at {', '.join(sorted(begins))} ({row[0]}) and stand in one row"
+            raise RecordError(f"{path}: {words}; export them with times of their own")
+    labels = _told_apart(list(given) if given else labels, rows, used)
+    by_column = {kind_of(row[0]): _by_column(row, layout.columns) or [] for row in rows}
+    return _head(labels, entries, "\n".join(unused), by_column)
 
 
-def _head(labels: list[str], entries: dict[str, str], text: str) -> Head:
+def _behind_one_key(row: list[str]) -> list[str]:
+    """Fields behind one key where it stands again before others, "Unit, um, Unit, um": it counts as blank."""
+    again = len(row) > 3 and len(row[0]) > 1 and row[0] in row[1:] and {*row} != {row[0]}
+    again = again and not TIME_NAMES.match(row[0]) and not known_unit(row[0])
+    return [row[0], *("" if field == row[0] else field for field in row)] if again else row
+
+
+def _told_apart(labels: list[str], rows: list[list[str]], used: set[int]) -> list[str]:
+    """Names that stand for one column each: with the group above them, else counted.
+
+    A group stands above its first column, as merged cells are exported. Tables of Python count columns of one
+    name themselves, "X [um].1".
+    """
+    named = [re.sub(r"([\])])\.\d{1,3}$", r"\1", label) for label in labels]
+
+    def several(label: str) -> bool:
+        return label != "" and named.count(label) > 1 and not TIME_NAMES.match(label)
+
+    for i in range(max(used, default=0)):
+        if i in used or kind_of(rows[i][0]) or not any(map(several, named)):
+            continue
+        groups = [""]
+        for group in [*rows[i], *[""] * len(named)][: len(named)]:
+            groups.append(group or groups[-1])
+        pairs = zip(groups[1:], named, strict=True)
+        grouped = [f"{group} {label}" if several(label) else label or group for group, label in pairs]
+        named = grouped if len(set(grouped)) > len(set(named)) else named
+    for i, label in [(i, label) for i, label in enumerate(named) if several(label)][::-1]:
+        named[i] = re.sub(r"( ?[\[(].*)?$", rf" {named[: i + 1].count(label)}\1", label, count=1)
+    return named
+
+
+def _head(labels: list[str], entries: dict[str, str], text: str, by_column: dict[str, list[str]]) -> Head:
     """What entries by their keys and the text as a whole say."""
 
     def found(kind: str) -> tuple[str, str]:
         """Text and unit of the first entry of a kind, empty where there is none."""
         for key, value in entries.items():
-            if _kind(key) == kind:
+            if kind_of(key) == kind:
                 return value, split_unit(key)[2]
         return "", ""
 
     time_unit = known_unit(found("time unit")[0].partition(" ")[0]) or ""
     step, rate = _number(*found("step"), "time", time_unit or "s"), _number(*found("rate"), "frequency", "Hz")
     start, before = (_number(*found(kind), "time", time_unit or "s") for kind in ("start", "before"))
-    trigger, count = re.match(r"\d{1,15}(?!\d)", found("trigger")[0]), found("count")[0].strip()
-    sensitivity, offset = _SENSITIVITY.search(text), _VOLTAGE_OFFSET.search(text)
+    bare = "" if time_unit or found("before")[1] else found("before")[0]  # then "5000" counts samples
+    trigger = re.match(r"\d{1,15}(?!\d)", found("trigger")[0]) or re.fullmatch(r"\d{3,15}", bare)
+    count = found("count")[0].strip()
+    offset = _VOLTAGE_OFFSET.search(text)
     return Head(
         labels=labels,
         entries=entries,
@@ -125,18 +144,12 @@ def _head(labels: list[str], entries: dict[str, str], text: str) -> Head:
         trigger_sample=int(trigger.group()) if trigger else None,
         # a whole number and nothing else: "Samples: 5 per channel" declares no length
         count=round(float(count)) if re.fullmatch(r"[1-9]\d{0,9}|\d\.\d*[eE]\+?\d{1,2}", count) else None,
-        sensitivity=parse_quantity(
-            f"{_point(sensitivity[1])} {sensitivity[2]}/{known_unit(sensitivity[3])}", "voltage_sensitivity"
-        )
-        if sensitivity
-        else None,
-        voltage_offset=parse_quantity(f"{_point(offset[1])} {offset[2]}", "voltage") if offset else 0.0,
+        by_column=by_column,
+        sensitivities=sensitivities_in(text),
+        voltage_offset=parse_quantity(f"{offset[1].replace(',', '.')} {offset[2]}", "voltage")
+        if offset
+        else 0.0,
     )
-
-
-def _kind(field: str) -> str:
-    """What a key tells, by its letters and digits; empty for one that is not known."""
-    return _KIND.get(re.sub(r"[^a-z0-9]", "", split_unit(field.rstrip(" :"))[0].lower()), "")
 
 
 def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], list[str], set[int]]:
@@ -149,25 +162,32 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
     names, units, used = [""] * columns, [""] * columns, set()
     for i, row in enumerate(rows):
         wide = _cut(row, columns)
-        kind = _kind(row[0]) if len(row) > 1 else ""
+        kind = kind_of(row[0]) if len(row) > 1 else ""
         if kind in ("names", "units"):
             if (values := _by_column(row, columns, alone=kind == "units")) is not None:
                 used.add(i)
                 units = values if kind == "units" else units
-        elif not kind and wide is not None and (said := _filled(wide[1:])) and all(map(known_unit, said)):
-            units = [field if known_unit(field) else "" for field in wide]
+        elif not kind and wide is not None and _are_units(wide):
+            units = ["" if field in ("-", "1") else field for field in wide]
             used.add(i)
     full = [
         i
         for i, row in enumerate(rows)
-        if i not in used and not _kind(row[0]) and (wide := _cut(row, columns)) and _may_name(wide, layout)
+        if i not in used and not kind_of(row[0]) and (wide := _cut(row, columns)) and _may_name(wide, layout)
     ]
-    if full:
-        names = _cut(rows[full[-1]], columns) or names
-        used.add(full[-1])
+    alike = [
+        i
+        for i, row in enumerate(rows)
+        if i not in used and len(set(filter(None, row[1:]))) == 1 and _may_name(row, layout, True)
+    ]
+    if full or alike:
+        last = (full or alike)[-1]
+        names = _cut(rows[last], columns) or names
+        used.add(last)
     for i in sorted(used):
-        if _kind(rows[i][0]) == "names" and len(rows[i]) > 1:
-            said = _by_column(rows[i], columns, alone=False) or []
+        if kind_of(rows[i][0]) == "names" and len(rows[i]) > 1:
+            said = _by_column(rows[i], columns) or []
+            units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
             names = [new or old for new, old in zip(said, names, strict=True)]
     names = [f"CH{name}" if name.isdigit() else name for name in names]
     return names, [unit.strip("[]()") for unit in units], used
@@ -184,25 +204,33 @@ def _filled(fields: list[str]) -> list[str]:
     return [field for field in fields if field not in ("", "-", "1") and not is_number(field, ".")]
 
 
+def _are_units(row: list[str]) -> bool:
+    """Whether a row below the names gives units: most are known, none is long; its first may be a word."""
+    said = _filled(row[1:])
+    known = sum(known_unit(field) is not None for field in said)
+    return known > 0.5 * len(said) and all(len(field) <= _LONGEST_UNIT for field in said)
+
+
 def _cut(row: list[str], columns: int) -> list[str] | None:
     """A row as wide as the table; what stands beyond may be blank, a comment, or of the clock."""
     if len(row) < columns:
         return None
     beyond = [field for field in row[columns:] if field and field.lower() != "comment"]
-    clock = all(_kind(field) in ("step", "start") or is_number(field, ".") for field in beyond)
+    clock = all(kind_of(field) in ("step", "start") or is_number(field, ".") for field in beyond)
     return row[:columns] if clock and len(beyond) <= _OF_CLOCK else None
 
 
-def _may_name(row: list[str], layout: Layout) -> bool:
-    """Whether a row can name columns: most fields filled, no numbers, not one word for all."""
-    if sum(map(bool, row)) <= len(row) // 2 or (len(row) > 2 and len(set(row[1:])) == 1):
+def _may_name(row: list[str], layout: Layout, alike: bool = False) -> bool:
+    """Whether a row can name columns: most fields filled, no numbers, one word for all only where it may."""
+    one = len(row) > 2 and len(set(filter(None, row[1:]))) == 1
+    if sum(map(bool, row)) <= len(row) // 2 or (one and not alike):
         return False
     if TIME_NAMES.match(row[0]) and all(field.isdigit() for field in row[1:]):
         return True  # channels that have numbers for names
     return not any(is_number(field, sign) for field in row for sign in {".", layout.decimal})
 
 
-def _by_column(row: list[str], columns: int, *, alone: bool) -> list[str] | None:
+def _by_column(row: list[str], columns: int, *, alone: bool = False) -> list[str] | None:
     """Values behind a key, one for every column or for all but the first; None where they are others."""
     values = row[1:] if len(row) <= columns + 1 else _trimmed(row[1:])
     if len(values) == columns:
@@ -214,7 +242,7 @@ def _by_column(row: list[str], columns: int, *, alone: bool) -> list[str] | None
 
 def _was_a_row(line: str, fields: list[str], layout: Layout, below_names: bool) -> bool:
     """Whether a line that is no row begins like one: no comment, no word in front, numbers among the rest."""
-    if not line.strip() or line.lstrip()[0] in "#%!*" or re.match(r'\s*"?[^\W\d_]{2}', line):
+    if not line.strip() or line.lstrip()[0] in "#%!*" or re.match(r'\s*"?[^\W\d_][_-]?[^\W\d_]', line):
         return False
     numbers = sum(is_number(field, layout.decimal) for field in fields)
     whole = 2 * abs(len(fields) - layout.columns) <= layout.columns
@@ -229,7 +257,7 @@ def _entries(lines: list[str], rows: list[list[str]], used: set[int], layout: La
     for above, below in pairwise([_trimmed(row) for row in rows]):
         same = len(above) == len(below)
         for key, value in zip(above[1:], below[1:], strict=True) if same else ():
-            if _kind(key) in ("step", "start") and is_number(value, layout.decimal):
+            if kind_of(key) in ("step", "start") and is_number(value, layout.decimal):
                 entries.setdefault(key, value)
     return entries
 
@@ -237,13 +265,16 @@ def _entries(lines: list[str], rows: list[list[str]], used: set[int], layout: La
 def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
     """Add the entries of a line: ``key: value;key: value`` or ``key;value;unit``."""
     plain = line.strip().lstrip("#%/!* ").strip()
-    fields = [field.strip().strip('"').strip() for field in plain.split(separator)]
+    if separator == ",":  # "Sample Rate: 20,000 Hz"
+        plain = re.sub(r"(?<=[:=] )([1-9]\d{0,2}),(\d{3})(?= *[^\W\d_]|$)", r"\1\2", plain)
+    parts = [plain] if separator == " " and line.lstrip()[:1] in "#%" else plain.split(separator)
+    fields = [field.strip().strip('"').strip() for field in parts]
     pairs = [
         re.split("[:=]", field, maxsplit=1) for field in fields if re.match(r"[^:=]{2,40}[:=]\s*\S", field)
     ]
     if plain and pairs and not re.fullmatch(r"[\d:.\-T ]+", fields[0]):
         entries.update((key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key))
-    if line.lstrip().startswith("#"):
+    if line.lstrip().startswith(("#", "%")):
         if plain and not pairs:
             entries.setdefault(f"comment {len(entries) + 1}", plain)
     elif len(fields) > 1 and (key := fields[0].rstrip(": ")) and ":" not in key:
@@ -261,10 +292,6 @@ def _number(value: str, unit: str, kind: str, default_unit: str) -> float | None
         return None
     unit = unit or known_unit(match[2]) or match[2] or default_unit
     try:
-        return parse_quantity(f"{_point(match[1])} {unit}", kind)
+        return parse_quantity(f"{match[1].replace(',', '.')} {unit}", kind)
     except UsageError:
         return None
-
-
-def _point(number: str) -> str:
-    return number.replace(",", ".")

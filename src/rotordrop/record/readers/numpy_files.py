@@ -10,9 +10,9 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.readers.matlab import recording_of_variables
-from rotordrop.record.recording import Recording
-from rotordrop.record.sandbox import plain, refuse_bomb
+from rotordrop.record.readers.variables import is_samples, recording_of
+from rotordrop.record.recording import Recording, damaged
+from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb
 
 if TYPE_CHECKING:
     from rotordrop.record.profile import Profile
@@ -25,21 +25,12 @@ def read_npy(path: Path, profile: Profile) -> Recording:
     """
     with path.open("rb") as stream:
         array = _array(stream, path.stat().st_size, path.name, path)
-    if array.dtype.names:
-        variables = {name: np.ascontiguousarray(array[name]) for name in array.dtype.names}
-    elif array.ndim == 2 and profile.text.names is not None:
-        array = array if array.shape[1] == len(profile.text.names) else array.T
-        if array.shape[1] != len(profile.text.names):
-            raise RecordError(
-                f"{path} holds {array.shape} and the profile names {len(profile.text.names)} columns"
-            )
-        variables = {name: array[:, i] for i, name in enumerate(profile.text.names)}
-    else:
-        raise RecordError(
-            f"{path} holds an array {array.shape} whose columns have no names; name them in the profile, "
-            'text.names = ["t", …], or save with numpy.savez(path, t=t, S_NDE_A=…)'
-        )
-    return recording_of_variables(variables, path, profile)
+    names = array.dtype.names or ()
+    if not names and (array.ndim != 2 or profile.text.names is None):
+        ways = 'in the profile, text.names = ["t", …], or save with numpy.savez(path, t=t, S_NDE_A=…)'
+        words = f"an array {array.shape} whose columns have no names"
+        raise RecordError(f"{path} holds {words}; name them {ways}")
+    return recording_of_arrays({name: array[name] for name in names} or {"array": array}, path, profile)
 
 
 def read_npz(path: Path, profile: Profile) -> Recording:
@@ -52,30 +43,37 @@ def read_npz(path: Path, profile: Profile) -> Recording:
             for entry in entries:
                 with archive.open(entry) as stream:
                     array = _array(stream, entry.file_size, entry.filename, path)
-                variables[entry.filename.removesuffix(".npy")] = array if array.size > 1 else plain(array)
+                variables[entry.filename.removesuffix(".npy")] = array
     except (zipfile.BadZipFile, EOFError, NotImplementedError, OSError, RuntimeError) as error:
-        raise RecordError(f"{path} is no intact NPZ file ({error}); copy or save it again") from error
-    return recording_of_variables(variables, path, profile)
+        raise damaged(path, f" is no intact NPZ file ({error})") from error
+    return recording_of_arrays(variables, path, profile)
+
+
+def recording_of_arrays(arrays: dict[str, Any], path: Path, profile: Profile) -> Recording:
+    """Make a recording of named arrays and numbers."""
+    series = {name: np.ascontiguousarray(one) for name, one in arrays.items() if is_samples(one)}
+    content = Content(
+        items=tuple(Item(name=name, values=one, attributes={}) for name, one in series.items()),
+        attributes={name: plain(one) for name, one in arrays.items() if name not in series},
+    )
+    return recording_of(content, path, profile, ".")
 
 
 def _array(stream: IO[bytes], size: int, name: str, path: Path) -> np.ndarray[Any, Any]:
     """Read an array after comparing the size its head declares with what is there."""
     try:
         version = np.lib.format.read_magic(stream)
-        read = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        )
+        form = np.lib.format
+        read = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
         shape, columns_first, kind = read(stream)
         count = int(np.prod(shape, dtype=object))
         declared, present = count * kind.itemsize, size - stream.tell()
         if kind.hasobject or kind.itemsize == 0:
             raise RecordError(f"{path}: {name} holds Python objects, which are not unpacked; save numbers")
         if declared != present:
-            raise RecordError(
-                f"{path}: {name} declares {declared} bytes and {present} are present; the file is truncated "
-                "or damaged, copy it again"
-            )
+            words = f"{name} declares {declared} bytes and {present} are present"
+            raise damaged(path, f": {words}, the file is truncated or damaged")
         values = np.frombuffer(stream.read(declared), dtype=kind)
         return values.reshape(shape, order="F" if columns_first else "C")
     except (ValueError, TypeError, SyntaxError, TokenError, OverflowError, EOFError) as error:
-        raise RecordError(f"{path}: {name} is no intact NPY array ({error}); save it again") from error
+        raise damaged(path, f": {name} is no intact NPY array ({error})") from error

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Recording, split_unit
+from rotordrop.record.recording import Recording, damaged
 from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
 
 if TYPE_CHECKING:
@@ -22,29 +23,14 @@ _UNFINISHED = 2**64 - 1
 
 
 def read_tdms(path: Path, profile: Profile) -> Recording:
-    """Read all numeric channels of a TDMS file; the clock is in the waveform properties."""
+    """Read all numeric channels of a TDMS file; the clock is in the waveform properties, or a channel."""
+    from rotordrop.record.readers.variables import recording_of
+
     content = unpack(path, "tdms")
     if not content.items:
         raise RecordError(f"{path} holds no numeric channel")
-    channels = []
-    for item in content.items:
-        own = item.name.removeprefix(f"{item.attributes['group']}/")
-        name, _, unit = split_unit(own)
-        unit = str(item.attributes.get("unit_string", item.attributes.get("NI_UnitDescription", unit)))
-        try:
-            step = float(item.attributes.get("wf_increment", 0.0))
-            start = float(item.attributes.get("wf_start_offset", 0.0))
-        except ValueError:
-            step, start = 0.0, 0.0
-        if not 0.0 < step < np.inf:
-            raise RecordError(
-                f"{path}: channel {item.name!r} has no waveform property 'wf_increment' and so no clock"
-            )
-        time = start + step * np.arange(len(item.values), dtype=np.float64)
-        unit = profile.units.get(item.name, unit)
-        channels.append(profile.channel(name, unit, item.values, time, label=own))
-    entries = {key: str(value) for key, value in content.attributes.items()}
-    return Recording(channels=tuple(channels), metadata=entries)
+    lacks = "channel {} has no waveform property 'wf_increment' and so no clock"
+    return recording_of(content, path, profile, "/", lacks=lacks)
 
 
 def unpacked(path: Path) -> Content:
@@ -60,16 +46,16 @@ def unpacked(path: Path) -> Content:
             numeric = [channel for channel in found if channel.dtype.kind in "iuf"]
             present = sum(channel.read_data(scaled=False).nbytes for channel in numeric)
             if len(found) == len(numeric) and present != declared:
-                raise RecordError(
-                    f"{path}: the segments declare {declared} bytes of samples and the channels hold "
-                    f"{present}; the file is damaged, copy it again"
-                )
+                words = f"the segments declare {declared} bytes of samples and the channels hold {present}"
+                raise damaged(path, f": {words}")
+            starts = [one.properties["wf_start_time"] for one in numeric if "wf_start_time" in one.properties]
+            first = min(starts, default=None)
             items = tuple(
                 Item(
                     name=f"{channel.group_name}/{channel.name}",
                     values=channel[:],
                     attributes={str(key): plain(value) for key, value in channel.properties.items()}
-                    | {"group": channel.group_name},
+                    | _began(channel.properties, first),
                 )
                 for channel in numeric
             )
@@ -77,8 +63,15 @@ def unpacked(path: Path) -> Content:
     except (RecordError, MemoryError):
         raise
     except Exception as error:
-        raise RecordError(f"{path} cannot be read as a TDMS file: {error}; copy the file again") from error
+        raise damaged(path, f" cannot be read as a TDMS file: {error}") from error
     return Content(items=items, attributes=attributes)
+
+
+def _began(properties: Mapping[str, Any], first: Any) -> dict[str, float]:
+    """When a channel began, after the first of all [s]; a step of nothing is none."""
+    began = properties.get("wf_start_time")
+    known = began is not None and first is not None
+    return {"began_s": float((began - first) / np.timedelta64(1, "s"))} if known else {}
 
 
 def _raw_bytes(path: Path) -> int:
@@ -89,17 +82,14 @@ def _raw_bytes(path: Path) -> int:
             stream.seek(at)
             lead = stream.read(_LEAD_IN)
             if len(lead) < _LEAD_IN or lead[:4] != b"TDSm":
-                raise RecordError(f"{path}: no TDMS segment at byte {at} of {size}; the file is damaged")
+                raise damaged(path, f": no TDMS segment at byte {at} of {size}")
             length, offset = struct.unpack_from("<QQ", lead, 12)
             if length == _UNFINISHED or at + _LEAD_IN + length > size:
                 declared = "no length" if length == _UNFINISHED else f"{length} bytes"
-                raise RecordError(
-                    f"{path} is truncated: the segment at byte {at} declares {declared} and "
-                    f"{size - at - _LEAD_IN} bytes are present; copy the file again, or let the recorder "
-                    "close it"
-                )
+                words = f"declares {declared} and {size - at - _LEAD_IN} bytes are present, or is still open"
+                raise damaged(path, f" is truncated: the segment at byte {at} {words}")
             if offset > length:
-                raise RecordError(f"{path}: the segment at byte {at} places its samples outside itself")
+                raise damaged(path, f": the segment at byte {at} places its samples outside itself")
             raw += length - offset
             at += _LEAD_IN + length
     return raw

@@ -7,33 +7,37 @@ import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import TextLayout
+from rotordrop.record.recording import damaged
 
 BLANKS = frozenset(
-    ("", "nan", "-", "--", "---", "n/a", "na", "null", "#n/a", "inf", "-inf", "+inf", "∞", "-∞", "infinity")
+    "|nan|-|--|---|*|**|***|****|*****|n/a|na|null|#n/a|invalid|#value!|#num!|#div/0!|over|overflow|overload|"
+    "overrange|ol|+++++++|-------|inf|-inf|+inf|∞|-∞|infinity|1.#inf|-1.#inf|1.#qnan|-1.#ind".split("|")
 )
-"""What recorders write where a sample is missing."""
+"""What recorders write where a sample is missing or beyond the range."""
 
-_EXPONENT = r"(?:[eE][+-]?[0-9]+)?"
+_EXPONENT = r"(?:[eEdD][+-]?[0-9]+)?"
 _PLAIN = {
-    ".": re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+){_EXPONENT}"),
-    ",": re.compile(rf"[+-]?(?:[0-9]+,?[0-9]*|,[0-9]+){_EXPONENT}"),
+    ".": re.compile(rf"(?:[+-] *)?(?:[0-9]+\.?[0-9]*|\.[0-9]+){_EXPONENT}"),
+    ",": re.compile(rf"(?:[+-] *)?(?:[0-9]+,?[0-9]*|,[0-9]+){_EXPONENT}"),
 }
 _THOUSANDS = {
-    ".": re.compile(r"[+-]?[0-9]{1,3}(?:[,'’\u2009\u202f\u00a0 ][0-9]{3})+\.[0-9]+"),
-    ",": re.compile(r"[+-]?[0-9]{1,3}(?:[.'’\u2009\u202f\u00a0 ][0-9]{3})+,[0-9]+"),
+    ".": re.compile(r"[+-]?[1-9][0-9]{0,2}(?:[,'’\u2009\u202f\u00a0 ][0-9]{3})+(?:\.[0-9]+)?"),
+    ",": re.compile(r"[+-]?[1-9][0-9]{0,2}(?:[.'’\u2009\u202f\u00a0 ][0-9]{3})+(?:,[0-9]+)?"),
 }
-"""Numbers by their decimal sign; with thousands set apart only where decimals tell which sign is which."""
+"""Numbers by their decimal sign, and those with thousands set apart."""
 
 _STAMP = re.compile(
-    r"(?:(?:(?P<year>[0-9]{4})-(?P<month>[0-9]{1,2})-(?P<day>[0-9]{1,2})"
+    r"(?:(?:(?P<year>[0-9]{4})(?P<dash>[-/.])(?P<month>[0-9]{1,2})(?P=dash)(?P<day>[0-9]{1,2})"
     r"|(?P<first>[0-9]{1,2})(?P<sign>[./])(?P<second>[0-9]{1,2})(?P=sign)(?P<last>[0-9]{4}))(?:[T ]+|$))?"
-    r"(?:(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(?::(?P<whole>[0-9]{2})(?:[.,](?P<part>[0-9]{1,12}))?)?"
-    r"(?:Z|[+-][0-9]{2}:?[0-9]{2})?)?(?<=[0-9Z])"
+    r"(?:(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2})(?::(?P<whole>[0-9]{2})"
+    r"(?:(?:[.,]|[:;](?=[0-9]{3}))(?P<part>[0-9]{1,12}))?)?"
+    r"(?: ?(?P<half>[AP])M|Z|[+-][0-9]{2}:?[0-9]{2})?)?(?<=[0-9ZM])"
 )
 _A_NUMBER = re.compile(r"(^|[\s;,\"])[-+]?[.,]?\d")
 """Where a number begins, at the start of a field."""
@@ -50,14 +54,9 @@ _SHORTEST_ROW, _MANY_LINES = 4, 100_000
 
 _SEPARATORS = (";", "\t", ",", "|", " ")
 
-_SAMPLED_LINES = 60
-"""Lines by which the layout is judged (chosen): enough to outvote damaged ones, few enough for ten tries."""
-
-_LEAST_FITTING = 0.5
-"""Share of these lines that must be rows of numbers for a pair of signs to be believed (chosen)."""
-
-_MOSTLY = 0.6
-"""Share of the fields of a column that make it one of numbers or of times (chosen)."""
+_SAMPLED_LINES, _LEAST_FITTING, _MOSTLY = 60, 0.5, 0.6
+"""Lines by which the layout is judged, share of them that must be rows for two signs to be believed, share of
+fields that make a column one of numbers or of times [1] (chosen)."""
 
 ColumnKind = Literal["number", "time", "text", "blank"]
 
@@ -107,13 +106,11 @@ def read_lines(path: Path, rules: TextLayout) -> tuple[list[str], bool, str]:
 
 
 def _lines_of(text: str, path: Path) -> list[str]:
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.replace("\r\r\n", "\n").replace("\r\n", "\n").replace("\r", "\n")
     ends = text.count("\n")
     if ends > _MANY_LINES and len(text) < _SHORTEST_ROW * ends:
-        raise RecordError(
-            f"{path} has {ends} lines of {len(text) / ends:.1f} characters in the mean; a row of two numbers "
-            f"has {_SHORTEST_ROW} at least: export the recording again, one row per sample"
-        )
+        words = f" has {ends} lines of {len(text) / ends:.1f} characters in the mean; a row of two numbers"
+        raise damaged(path, f"{words} has {_SHORTEST_ROW} at least")
     lines = text.split("\n")
     long = next((i for i, line in enumerate(lines) if len(line) > _LONGEST_LINE), None)
     if long is not None:
@@ -122,16 +119,12 @@ def _lines_of(text: str, path: Path) -> list[str]:
 
 
 def _no_text(path: Path, at: int) -> RecordError:
-    return RecordError(
-        f"{path} is not a text file: character {at + 1} is a zero byte; set 'format' in the profile"
-    )
+    words = f"{path} is not a text file: character {at + 1} is a zero byte"
+    return RecordError(f"{words}; set 'format' in the profile, or [text] encoding = \"utf-16-le\"")
 
 
 def _too_long(path: Path, line: int, characters: str) -> RecordError:
-    return RecordError(
-        f"{path}, line {line} has {characters} characters; no row of a recording is so long: export it "
-        "again, one row per sample"
-    )
+    return damaged(path, f", line {line} has {characters} characters; no row of a recording is so long")
 
 
 def _encoding(content: bytes) -> str:
@@ -142,7 +135,8 @@ def _encoding(content: bytes) -> str:
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:
-        return "latin-1"
+        # so many accented letters in a row stand in no text of western Europe; 0x98 is no letter of cp1251
+        return "cp1251" if re.search(rb"[\xc0-\xff]{5}", content) and b"\x98" not in content else "latin-1"
     return "utf-8"
 
 
@@ -161,7 +155,10 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
     """Separator, decimal sign, what each column holds and the first data line, from the lines themselves."""
     # spread over the file, without the header and a last line that may be cut
     begin = len(lines) // 4 if rules.first_data_line is None else rules.first_data_line - 1
-    body = [line for line in lines[begin:-1] if line.strip()] or lines
+    body = [line for line in lines[begin:-1] if line.strip()]
+    body = (body if rules.first_data_line is None else [*takewhile(str.strip, lines[begin:])]) or lines[
+        begin:
+    ]
     sample = body[:: max(1, len(body) // _SAMPLED_LINES)]
     fits = [
         fit
@@ -173,15 +170,11 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
     if best is None or best[0][2] < _LEAST_FITTING * len(sample):
         last = f"{lines[-1][:60]!r}"
         if re.search(r"[;,\t]", lines[-1]) and not any(_A_NUMBER.search(line) for line in lines):
-            raise RecordError(
-                f"{path}: no line holds a number, the last one (line {len(lines)}) reads {last}: a header "
-                "without readings? Export the readings too"
-            )
-        raise RecordError(
-            f"{path}: found no columns of numbers with semicolon, tab, comma or blank between them (line "
-            f"{len(lines)} reads {last}); export it as a table of numbers, or name 'separator' and 'decimal' "
-            "in the profile"
-        )
+            words = f"no line holds a number, the last one (line {len(lines)}) reads {last}"
+            raise RecordError(f"{path}: {words}: a header without readings? Export the readings too")
+        words = "found no columns of numbers with semicolon, tab, comma or blank between them"
+        ask = "export it as a table of numbers, or name 'separator' and 'decimal' in the profile"
+        raise RecordError(f"{path}: {words} (line {len(lines)} reads {last}); {ask}")
     layout = best[1]
     if rules.first_data_line is not None:
         return replace(layout, first=rules.first_data_line - 1)
@@ -202,7 +195,10 @@ def _fit(sample: list[str], separator: str, decimal: str) -> tuple[tuple[int, in
     fitting = [row for row in rows if len(row) == columns]
     kinds = tuple(_kind([row[i] for row in fitting], decimal) for i in range(columns))
     numbers = kinds.count("number")
-    if not numbers:
+    # what may set thousands apart does so where another number has the decimal sign
+    apart = [field for row in fitting for field in row if _THOUSANDS[decimal].fullmatch(field)]
+    plain = (decimal in field for row in fitting for field in row if is_number(field, decimal))
+    if not numbers or (apart and not any(plain)):
         return None
     layout = Layout(separator=separator, decimal=decimal, first=0, columns=columns, kinds=kinds)
     intact = sum(is_row(row, layout) for row in fitting)
@@ -240,11 +236,11 @@ def is_number(field: str, decimal: str) -> bool:
 
 
 def plain_number(field: str, decimal: str) -> str:
-    """A number as Python writes it."""
+    """A number as Python writes it; Fortran has a D before its exponent."""
     if _THOUSANDS[decimal].fullmatch(field):
-        whole, sign, part = field.rpartition(decimal)
+        whole, sign, part = field.partition(decimal)
         field = re.sub(r"[^0-9+-]", "", whole) + sign + part
-    return field.replace(decimal, ".")
+    return re.sub("[Dd]", "e", field.replace(decimal, ".").replace(" ", ""))
 
 
 def stamp_parts(field: str) -> tuple[int, int] | None:
@@ -262,6 +258,7 @@ def stamp_parts(field: str) -> tuple[int, int] | None:
     except ValueError:
         return None
     if match["hour"]:
-        seconds += 3600 * int(match["hour"]) + 60 * int(match["minute"]) + int(match["whole"] or 0)
+        hour = int(match["hour"]) % (12 if match["half"] else 24) + 12 * (match["half"] == "P")
+        seconds += 3600 * hour + 60 * int(match["minute"]) + int(match["whole"] or 0)
         nanoseconds = int((match["part"] or "").ljust(9, "0")[:9])
     return seconds, nanoseconds

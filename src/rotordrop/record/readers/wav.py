@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, Recording, channels_in_words
+from rotordrop.record.recording import FULL_SCALE, Recording, channels_in_words, damaged
 from rotordrop.units import split_quantity
 
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -25,16 +25,14 @@ def read_wav(path: Path, profile: Profile) -> Recording:
     content = path.read_bytes()
     blocks = _blocks(content, path)
     if b"fmt " not in blocks or b"data" not in blocks or len(blocks[b"fmt "]) < 16:
-        raise RecordError(f"{path} has no format or no samples; it is no WAV file or damaged")
+        raise damaged(path, " has no format or no samples")
     kind, count, rate, _, align, bits = struct.unpack_from("<HHIIHH", blocks[b"fmt "])
     if kind == _EXTENSIBLE and len(blocks[b"fmt "]) >= 26:
         kind = struct.unpack_from("<H", blocks[b"fmt "], 24)[0]
     data = blocks[b"data"]
     if not count or not rate or align * 8 != count * bits or len(data) % align:
-        raise RecordError(
-            f"{path}: {len(data)} bytes of samples do not divide into {channels_in_words(count)} of {bits} "
-            "bits; the file is damaged, copy it again"
-        )
+        words = f"{len(data)} bytes of samples do not divide into {channels_in_words(count)} of {bits} bits"
+        raise damaged(path, f": {words}")
     samples = _samples(data, kind, bits, path).reshape(-1, count)
     factor, unit = (1.0, FULL_SCALE) if profile.full_scale is None else split_quantity(profile.full_scale)
     names = profile.text.names or tuple(f"channel {number + 1}" for number in range(count))
@@ -46,8 +44,7 @@ def read_wav(path: Path, profile: Profile) -> Recording:
     channels = tuple(
         profile.channel(name, unit, samples[:, i] * factor, time) for i, name in enumerate(names)
     )
-    notes = ("no trigger in the file: record time counts from the start",)
-    return Recording(channels=channels, notes=notes)
+    return Recording(channels=channels, notes=("no trigger in the file: record time counts from the start",))
 
 
 def _blocks(content: bytes, path: Path) -> dict[bytes, bytes]:
@@ -59,17 +56,13 @@ def _blocks(content: bytes, path: Path) -> dict[bytes, bytes]:
     while at + 8 <= len(content):
         name, length = struct.unpack_from("<4sI", content, at)
         if at + 8 + length > len(content):
-            raise RecordError(
-                f"{path} is truncated: the block {name.decode('latin-1')!r} declares {length} bytes and "
-                f"{len(content) - at - 8} are present; copy the file again"
-            )
+            words = f"declares {length} bytes and {len(content) - at - 8} are present"
+            raise damaged(path, f" is truncated: the block {name.decode('latin-1')!r} {words}")
         found.setdefault(name, content[at + 8 : at + 8 + length])
         at += 8 + length + length % 2
     declared = struct.unpack_from("<I", content, 4)[0] + 8
     if declared > len(content) + 1:
-        raise RecordError(
-            f"{path} is truncated: it declares {declared} bytes and has {len(content)}; copy the file again"
-        )
+        raise damaged(path, f" is truncated: it declares {declared} bytes and has {len(content)}")
     return found
 
 
@@ -77,9 +70,8 @@ def _samples(data: bytes, kind: int, bits: int, path: Path) -> Array:
     if kind == _FLOAT and bits in (32, 64):
         return np.frombuffer(data, f"<f{bits // 8}").astype(np.float64)
     if kind != _PCM or bits not in (8, 16, 24, 32):
-        raise RecordError(
-            f"{path}: WAV format {kind} with {bits} bits is not known; export plain PCM or float"
-        )
+        words = f"WAV format {kind} with {bits} bits is not known"
+        raise RecordError(f"{path}: {words}; export plain PCM or float")
     if bits == 8:
         return (np.frombuffer(data, np.uint8).astype(np.float64) - 128.0) / 128.0
     if bits == 24:

@@ -57,7 +57,7 @@
     drawn.forEach(function (element) {
       var front = element.closest(".front"), beside = element.closest(".front > .beside");
       var width = onPaper ? (beside ? 535 : 985) : null;
-      var height = Math.round((onPaper ? (beside ? 0.56 : front ? 0.76 : 0.85) : 1.0) * Number(element.getAttribute("data-height")));
+      var height = Math.round((onPaper ? (beside ? 0.6 : front ? 0.76 : 0.62) : 1.0) * Number(element.getAttribute("data-height")));
       element.style.height = height + "px";
       element.style.width = onPaper ? width + "px" : "";
       element.style.zoom = onPaper ? "0.7" : "";
@@ -65,8 +65,8 @@
     });
   }
 
-  function unfold() {
-    var closed = list(hidden);
+  function unfold(selector) {
+    var closed = list(selector);
     closed.forEach(function (part) { part.open = true; });
     return closed;
   }
@@ -77,14 +77,14 @@
     if (part && part.matches(hidden)) { part.open = true; part.scrollIntoView(); }
   }
   var opener = document.getElementById("unfold"), closed = [];
-  if (opener) { opener.addEventListener("click", unfold); }
+  if (opener) { opener.addEventListener("click", function () { unfold(hidden); }); }
   list(".contents a").forEach(function (one) { one.addEventListener("click", function () { window.setTimeout(reveal, 0); }); });
   window.addEventListener("hashchange", reveal);
   document.addEventListener("toggle", drawNext, true);
 
   night.addEventListener("change", function () { redraw(night.matches); });
   window.addEventListener("beforeprint", function () {
-    closed = unfold();
+    closed = unfold(".printed:not([open])");
     waiting().forEach(draw);
     if (night.matches) { redraw(false); }
     resize(true);

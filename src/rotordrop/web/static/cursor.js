@@ -1,72 +1,42 @@
 // Window and cursor: where they are, what is read at the cursor, and the orbits that follow it.
-import { canvasPen, keepPng, keepSvg } from "./figures.js";
-import { dashOf } from "./compare.js";
-import { drawOrbit, nearest, orbitPicture } from "./orbit.js";
-import { csv, drawAll, drawStrip, lines, loadView } from "./panels.js";
+import { canvasPen } from "./figures.js";
+import { drawOrbit, nearest } from "./orbit.js";
+import { drawAll, drawStrip, loadView } from "./panels.js";
 import { follow } from "./plots.js";
-import * as server from "./server.js";
-import { by, fileName, files, impacts, shift, showLines, span, state, zero } from "./state.js";
+import { by, estimated, hits, span, state, zero } from "./state.js";
 import { make } from "./tables.js";
 import * as units from "./units.js";
 
-const motions = () => state.orbits;
-
-function orbitOf(index) {
-  const panel = state.orbits[index], place = state[panel.verb].places[index], forcePanel = state.loaded.find((one) => one.id === "force");
-  const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time: panel.time, x: panel.found[place[role][0]], y: panel.found[place[role][1]] }));
-  const turn = by("orbitof").value === "window" ? null : turnBefore();
-  if (turn) { return { name: place.name, gap: place.gap, gapIs: place.gap_is, paths: paths.map((one) => ofTurn(one, turn, by("orbitof").value === "1X")), others: [], cursor: state.cursor, force: null, impacts: [], angle: null, turn }; }
-  const others = panel.found.others.map(({ found, columns: [x, y], k }) => ({ x: found[x], y: found[y], k, dash: dashOf(k) }));
-  let force = null;
-  if (forcePanel && panel.verb === "estimate" && state.cursor !== null) {
-    force = { value: forcePanel.found[place.force[0]][nearest(forcePanel.time, state.cursor)], largest: place.peaks.force.value };
-  }
+function orbitOf(panel) {
+  const { place, found, time } = panel, known = estimated(place.name), { gap, gap_is: gapIs } = known || place;
+  const paths = ["estimated", "measured"].filter((role) => place[role]).map((role) => ({ role, time, x: found[place[role][0]], y: found[place[role][1]] }));
+  const force = known && state.cursor !== null ? { value: loadAt("force", known.force[0]), largest: known.peak_force.value } : null;
   const turning = state.estimate ? state.estimate.speed : null;
-  return { name: place.name, gap: place.gap, gapIs: place.gap_is, paths, others, cursor: state.cursor, force,
-    impacts: impacts().filter((one) => one.place === place.name && one.time >= state.view.from && one.time <= state.view.to).map((one) => one.azimuth),
+  return { name: place.name, gap, gapIs, paths, cursor: state.cursor, force,
+    impacts: hits().filter((one) => one.place === place.name && one.time >= state.view.from && one.time <= state.view.to).map((one) => one.azimuth),
     angle: turning && state.cursor !== null && state.view.to - state.view.from < 2 ? turning * state.cursor : null };
 }
-
-// The turn of the shaft that ends at the cursor: from the passage of the mark before it where there is one, else by the speed.
-function turnBefore() {
-  const at = state.cursor ?? state.view.from, speed = speedAt(at), marks = (state.look.marks || []).map((time) => time - zero());
-  const last = marks.findLastIndex((time) => time <= at);
-  if (last > 0 && marks[last] - marks[last - 1] < 3) { return { from: marks[last - 1], to: marks[last], seen: true }; }
-  return speed > 0 ? { from: at - (2 * Math.PI) / speed, to: at, seen: false } : null;
-}
-// Samples of one turn; for 1X what is left of them at once per turn about their mean, by least squares.
-function ofTurn(path, { from, to, seen }, filtered) {
-  const first = Math.max(nearest(path.time, from), 0), last = nearest(path.time, to), time = path.time.slice(first, last + 1), part = { ...path, time, x: path.x.slice(first, last + 1), y: path.y.slice(first, last + 1), seen };
-  return filtered ? { ...part, x: once(time, part.x, from, to), y: once(time, part.y, from, to) } : part;
-}
-export function once(time, values, from, to) {
-  const rows = Array.from(time, (t) => { const angle = (2 * Math.PI * (t - from)) / (to - from); return [1, Math.cos(angle), Math.sin(angle)]; }), m = [0, 1, 2].map((i) => [0, 1, 2, 3].map((j) => rows.reduce((sum, row, k) => sum + row[i] * (j < 3 ? row[j] : values[k]), 0)));
-  for (let i = 0; i < 3; i += 1) { for (let k = 0; k < 3; k += 1) { if (k !== i) { const share = m[k][i] / m[i][i]; for (let j = i; j < 4; j += 1) { m[k][j] -= share * m[i][j]; } } } }
-  const c = m.map((row, i) => row[3] / row[i]);
-  return rows.map(([, a, b]) => c[0] + c[1] * a + c[2] * b);
+// Force or stress at the cursor; NaN where none is drawn there.
+function loadAt(id, column) {
+  const panel = state.panels.find((one) => one.id === id), at = state.cursor;
+  return panel?.time.length && at !== null && at >= panel.time[0] && at <= panel.time.at(-1) ? panel.found[column][nearest(panel.time, at)] : NaN;
 }
 
 export function makeOrbits() {
-  const names = motions().map(({ verb }, i) => state[verb].places[i].name), box = by("orbits");
-  if (box.dataset.names !== names.join("\n")) {
-    box.dataset.names = names.join("\n");
-    box.replaceChildren(...names.map((name, i) => {
-      const title = `Orbit ${name}`;
-      return make("figure", { class: "orbit", of: [make("canvas", { role: "img" }), make("header", { of: [files(title, {
-        csv: () => csv({ ...state.orbits[i], title }), svg: () => keepSvg(orbitPicture(orbitOf(i)), fileName(title)),
-        png: () => keepPng(orbitPicture(orbitOf(i)), fileName(title)), python: () => showLines(lines(state.orbits[i].verb, `orbit ${i}`)), command: () => showLines(state[state.orbits[i].verb].command, "As command")
-      })] })] });
-    }));
+  const names = state.orbits.map(({ place }) => place.name).join("\n"), box = by("orbits");
+  if (box.dataset.names !== names) {
+    box.dataset.names = names;
+    box.replaceChildren(...state.orbits.map(() => make("figure", { class: "orbit", of: [make("canvas", { role: "img" })] })));
   }
   drawOrbits();
 }
 
 function drawOrbits() {
   [...by("orbits").querySelectorAll("canvas")].forEach((canvas, i) => {
-    if (!motions()[i]) { return; }
-    const told = orbitOf(i);
+    if (!state.orbits[i]) { return; }
+    const told = orbitOf(state.orbits[i]);
     drawOrbit(canvasPen(canvas), told);
-    canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle${told.turn ? `, one turn from ${units.eventText(told.turn.from)}` : ""}, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
+    canvas.setAttribute("aria-label", `Orbit at ${told.name} in its clearance circle, ${told.paths.map((one) => one.role).join(" and ")}, ${told.impacts.length} impacts in the window`);
   });
   readout();
 }
@@ -94,17 +64,16 @@ export function orderAt(time, x, y, t, speed) {
 // Radius over air gap: as sure as the gap is known.
 export const overGap = (radius, gap) => (gap && Number.isFinite(radius) ? [...new Set([gap[1], gap[0]].map((one) => units.written(radius / one, 3)))].join(" to ") : "–");
 
-function cellsOf({ verb, found }, place, at) {
-  const value = (from, name) => (from[name] ? from[name][nearest(from.time, at)] : NaN);
-  const role = place.estimated ? "estimated" : "measured", [x, y] = at === null ? [NaN, NaN] : place[role].map((name) => value(found, name));
+function cellsOf({ found, place }, at) {
+  const value = (name) => (found[name] && at !== null ? found[name][nearest(found.time, at)] : NaN);
+  const role = place.estimated ? "estimated" : "measured", [x, y] = place[role].map(value), known = estimated(place.name);
   const order = at === null ? NaN : orderAt(found.time, ...place[role].map((name) => found[name]), at, speedAt(at));
-  const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), overGap(Math.hypot(x, y), place.gap),
+  const cells = [units.written(x / units.factor("length"), 4), units.written(y / units.factor("length"), 4), overGap(Math.hypot(x, y), (known || place).gap),
     Number.isFinite(x) ? `${Math.round((Math.atan2(y, x) * 180) / Math.PI)}°`.replace("-", "−") : "–",
     Number.isFinite(order) ? `${units.fixed(order, 2)}X` : "–"];
-  for (const [id, name, kind] of state.estimate ? [["force", "force", "force"], ["stress", "stress", "pressure"]] : []) {
-    const panel = state.loaded.find((one) => one.id === id), names = verb === "estimate" ? place[name] : [];
-    const [now, low, high] = names.map((column) => (at !== null ? value(panel.found, column) / units.factor(kind) : NaN));
-    cells.push(Number.isFinite(now) ? [units.written(now, 4), names[1] ? `${units.written(low, 3)} to ${units.written(high, 3)}` : ""] : "–");
+  for (const [id, kind] of state.estimate ? [["force", "force"], ["stress", "pressure"]] : []) {
+    const [now, low, high] = (known?.[id] || []).map((column) => loadAt(id, column) / units.factor(kind));
+    cells.push(Number.isFinite(now) ? [units.written(now, 4), high === undefined ? "" : `${units.written(low, 3)} to ${units.written(high, 3)}`] : "–");
   }
   return cells;
 }
@@ -113,11 +82,8 @@ function readout() {
   const at = state.cursor, speed = at === null ? NaN : speedAt(at);
   by("clock").textContent = at === null ? "point at a trace"
     : `${units.timeText(at, state.view.to - state.view.from)} · record ${units.fixed(at + zero(), 5)} s${speed > 0 ? ` · ${units.shown(speed, "speed", 4)}` : ""}`;
-  const rows = motions().map((panel, i) => {
-    const place = state[panel.verb].places[i];
-    return make("tr", { of: [make("th", { scope: "row", text: place.name }), ...cellsOf(panel, place, at).map((cell) => (Array.isArray(cell)
-      ? make("td", { class: "number", of: [make("span", { text: cell[0] }), make("span", { class: "interval", text: cell[1] })] }) : make("td", { class: "number", text: cell })))] });
-  });
+  const rows = state.orbits.map((panel) => make("tr", { of: [make("th", { scope: "row", text: panel.place.name }), ...cellsOf(panel, at).map((cell) => (Array.isArray(cell)
+    ? make("td", { class: "number", of: [make("span", { text: cell[0] }), make("span", { class: "interval", text: cell[1] })] }) : make("td", { class: "number", text: cell })))] }));
   const of = (name, kind) => `${name} [${units.unit(kind)}]`;
   const columns = ["", of("x", "length"), of("y", "length"), "radius/gap", "angle", "order", ...(state.estimate ? [of("force", "force"), of("stress", "pressure")] : [])];
   const meant = { "radius/gap": "Distance from the centre over the air gap, at both ends of what is known of the gap", angle: "Angle on the ring, from +x", order: "Turns of the shaft centre per turn of the shaft, over half a turn of the shaft about the cursor; forward positive" };
@@ -126,45 +92,29 @@ function readout() {
   tellBetween();
 }
 
-// ---- two cursors: what lies between the mark and the cursor, of every sample
+// ---- two cursors: the mark, and what lies between it and the cursor
 
-let asking = 0;
 export function setMark(t) {
   state.mark = t;
-  state.between = null;
   drawAll();
   drawOrbits();
   document.dispatchEvent(new Event("seen"));
 }
 const both = () => (state.mark === null || state.cursor === null || state.mark === state.cursor ? null : [Math.min(state.mark, state.cursor), Math.max(state.mark, state.cursor)]);
 
-async function askBetween() {
-  const ends = both(), { id } = state.job;
-  if (!ends) { return; }
-  const found = await Promise.all(state.panels.map(({ verb, measured }) => {
-    const columns = measured.map((one) => one.column), own = verb === "look" ? zero() : shift("estimate");
-    return columns.every(Boolean) ? server.between(id, verb, columns, ends[0] + own, ends[1] + own).catch(() => null) : null;
-  }));
-  const now = both();
-  if (state.job?.id === id && now && now[0] === ends[0] && now[1] === ends[1]) { state.between = { ends, found }; tellBetween(); }
-}
-
 function tellBetween() {
   const ends = both(), box = by("between");
   by("unmark").hidden = state.mark === null;
   box.hidden = !ends;
   if (!ends) { return; }
-  const apart = ends[1] - ends[0], speed = speedAt(ends[0]), known = state.between && state.between.ends[0] === ends[0] && state.between.ends[1] === ends[1] ? state.between.found : null;
-  if (!known) { clearTimeout(asking); asking = setTimeout(() => askBetween().catch(() => {}), 200); }
+  const apart = ends[1] - ends[0], speed = speedAt(ends[0]);
   const order = speed > 0 ? ` = ${units.fixed((2 * Math.PI) / apart / speed, 2)}X` : "", turns = speed > 0 ? `, ${units.fixed((apart * speed) / (2 * Math.PI), 2)} turns` : "";
-  const rows = state.panels.flatMap((panel, i) => panel.measured.map(({ label, value }, k) => {
-    const drawn = value(panel.found), f = units.factor(panel.kind), at = (t) => drawn[nearest(panel.time, t)] / f, told = known?.[i]?.[k];
-    const cell = (v) => make("td", { class: "number", text: units.written(v, 4) });
-    return make("tr", { of: [make("th", { scope: "row", text: `${label} [${units.unit(panel.kind)}]` }), cell(at(state.mark)), cell(at(state.cursor)), cell(at(state.cursor) - at(state.mark)),
-      ...["mean", "least", "largest"].map((name) => (told && told[name] !== null ? cell(told[name] / f) : make("td", { class: "number", text: known ? "–" : "…" })))] });
+  const rows = state.panels.flatMap((panel) => panel.measured.map(({ label, value }) => {
+    const drawn = value(panel.found), [at, then] = [state.mark, state.cursor].map((t) => drawn[nearest(panel.time, t)] / units.factor(panel.kind));
+    return make("tr", { of: [make("th", { scope: "row", text: `${label} [${units.unit(panel.kind)}]` }), ...[at, then, then - at].map((v) => make("td", { class: "number", text: units.written(v, 4) }))] });
   }));
   box.replaceChildren(make("caption", { text: `Mark to cursor: Δt ${units.timeText(apart, apart)}${turns}; 1/Δt ${units.written(1 / apart, 4)} Hz${order}` }),
-    make("thead", { of: [make("tr", { of: ["", "mark", "cursor", "Δ", "mean", "least", "largest"].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) })] }), make("tbody", { of: rows }));
+    make("thead", { of: [make("tr", { of: ["", "mark", "cursor", "Δ"].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) })] }), make("tbody", { of: rows }));
 }
 
 // ---- where window and cursor are
@@ -184,15 +134,9 @@ export function zoom(share, about) {
 export const pan = (direction) => { const by4 = ((state.view.to - state.view.from) / 4) * direction; setView({ from: state.view.from + by4, to: state.view.to + by4 }); };
 export function setCursor(t) { state.cursor = t; drawOrbits(); follow(t); if (state.playing === null) { document.dispatchEvent(new Event("seen")); } }
 export function stepCursor(direction) {
-  const { time } = state.loaded[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
+  const { time } = state.panels[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
   setCursor(time[Math.min(Math.max(here + direction, 0), time.length - 1)]);
 }
-export const nextImpact = (direction) => {
-  if (state.impact >= 0) { return state.impact + direction; }
-  const list = impacts(), at = state.cursor ?? state.view.from;
-  return direction > 0 ? Math.max(0, list.findIndex((one) => one.time > at)) : list.findLastIndex((one) => one.time < at);
-};
-
 export function play(on) {
   by("play").setAttribute("aria-pressed", String(on));
   by("play").textContent = on ? "❚❚ pause" : "▶ play";

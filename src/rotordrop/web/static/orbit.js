@@ -1,5 +1,5 @@
 // The path of the shaft centre in its clearance circle, with the force, at the cursor.
-import { arrow, colours, faint, placeColour, svgPen } from "./figures.js";
+import { arrow, colours, faint } from "./figures.js";
 import { factor, shown, unit, written } from "./units.js";
 
 export const nearest = (time, t) => {
@@ -12,11 +12,11 @@ export const nearest = (time, t) => {
 };
 
 // paths: [{role, time, x, y}]; force: {value, largest} or null; impacts: azimuths; angle of the shaft or null
-export function drawOrbit(pen, { name, gap, gapIs, paths, others = [], cursor, force, impacts, angle, turn }) {
+export function drawOrbit(pen, { name, gap, gapIs, paths, cursor, force, impacts, angle }) {
   const tone = colours(), size = Math.min(pen.width, pen.height);
   const cx = pen.width / 2, cy = pen.height / 2 + 4, radius = 0.5 * size - 26;
   let reach = gap ? gap[1] : 0;
-  for (const { x, y } of [...paths, ...others]) {
+  for (const { x, y } of paths) {
     for (let i = 0; i < x.length; i += 1) { reach = Math.max(reach, Math.hypot(x[i], y[i]) || 0); }
   }
   const scale = radius / (1.04 * (reach || 1)), at = (x, y) => [cx + scale * x, cy - scale * y];
@@ -30,14 +30,11 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, others = [], cursor, f
       pen.line([tick(1.0), tick(1.07)], tone.muted, 1.5);
     }
   }
-  for (const { x, y, k, dash } of others) {
-    pen.line(Array.from(x, (v, i) => at(v, y[i])), placeColour(tone, k + 1), 1, dash);
-  }
   for (const { role, x, y } of paths) {
     pen.line(Array.from(x, (v, i) => at(v, y[i])), role === "estimated" ? faint(tone.estimated, 0.6) : tone[role], role === "measured" ? 0.9 : 2.4);
   }
   for (const { role, time, x, y } of paths) {
-    if (cursor === null || turn || !time.length) { continue; }
+    if (cursor === null || !time.length) { continue; }
     const here = nearest(time, cursor), [px, py] = at(x[here], y[here]);
     if (!Number.isFinite(px)) { continue; }
     if (role === "estimated" && force && force.value > 0) {
@@ -50,14 +47,6 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, others = [], cursor, f
       pen.circle(px + 9 * Math.cos(angle), py - 9 * Math.sin(angle), 2, null, 0, tone.ink);
     }
   }
-  for (const { role, x, y, time } of turn && turn.to > turn.from ? paths.filter((one) => one.time.length) : []) { // the mark: a dot behind a gap, as an oscilloscope blanks it
-    const colour = role === "measured" ? tone.measured : tone.estimated, [px, py] = at(x[0], y[0]);
-    pen.circle(px, py, 6, null, 0, tone.back);
-    pen.circle(px, py, 3.5, null, 0, colour);
-    const middle = Math.floor(time.length / 8), [ax, ay] = at(x[middle], y[middle]), [bx, by] = at(x[middle + 1] ?? x[middle], y[middle + 1] ?? y[middle]);
-    if (Math.hypot(bx - ax, by - ay) > 0) { arrow(pen, [ax, ay], [ax + (9 * (bx - ax)) / Math.hypot(bx - ax, by - ay), ay + (9 * (by - ay)) / Math.hypot(bx - ax, by - ay)], colour, 1.5); }
-  }
-  if (turn) { pen.text(turn.seen ? "● mark passes" : "● turn begins, no mark in the record", pen.width - 6, 28, tone.muted, { align: "right", size: 10 }); }
   pen.text(name, 6, 14, tone.ink, { size: 12.5, weight: "600" });
   if (gap) {
     const known = gap[1] - gap[0] <= 1e-6, words = known ? `gap ${shown(gap[1], "length")}` : `gap ${written(gap[0] / factor("length"))} to ${shown(gap[1], "length")} (${gapIs})`;
@@ -66,10 +55,4 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, others = [], cursor, f
   const step = 10 ** Math.floor(Math.log10(reach / factor("length") || 1)) * factor("length");
   pen.line([[8, pen.height - 8], [8 + scale * step, pen.height - 8]], tone.ink, 2);
   pen.text(`${written(step / factor("length"), 2)} ${unit("length")}`, 12 + scale * step, pen.height - 5, tone.muted, { size: 10 });
-}
-
-export function orbitPicture(told) {
-  const pen = svgPen(520, 540, colours().back, `Orbit at ${told.name}`);
-  drawOrbit(pen, told);
-  return pen;
 }

@@ -1,22 +1,14 @@
-// The page: one job, its tabs and its status, and what every button and key does.
-import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
+// The page: one job, its figures, its reports and its status, and what every button and key does.
 import * as address from "./address.js";
-import { centrelineTab } from "./centreline.js";
-import { chooseOthers, compareTab, learnDrops } from "./compare.js";
-import { makeOrbits, nextImpact, pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
+import { pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
-import { addToLog, askAbout, askRemoval, leaveHome, redrawHome, showHome } from "./home.js";
-import { leaveMachines, showMachines } from "./machines.js";
-import { redoLog, redrawLog, showLog } from "./log.js";
-import { drawAll, FIGURES, isShown, lines, loadView, traces } from "./panels.js";
-import { rotorTab } from "./rotor.js";
+import { askRemoval, leaveHome, redrawHome, running, showHome } from "./home.js";
+import { drawAll, loadView } from "./panels.js";
+import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
 import * as server from "./server.js";
-import { by, events, files, homeView, impacts, origin, samples, say, showLines, simulated, span, state, notes, zero } from "./state.js";
-import { cards, facts, findings, impactTable, levelOf, make, sentence, table, timeline } from "./tables.js";
-import { cutFiles, drawFall, fallFiles, fallSeen, fallWanted, openFall } from "./waterfall.js";
+import { by, events, homeView, impacts, origin, refused, samples, say, simulated, span, state, tried } from "./state.js";
+import { impactTable, make, timeline } from "./tables.js";
 import * as units from "./units.js";
-
-const timeOf = (verb) => (t) => units.eventText(verb === "look" ? t - zero() : t);
 
 function goImpact(index) {
   const list = impacts();
@@ -34,94 +26,57 @@ function goImpact(index) {
 const TABS = {
   Impacts: () => {
     const source = state.estimate && state.estimate.impacts.length ? state.estimate : state.look, list = impacts();
-    return [...(list.length ? [impactTable(list.slice(0, 400), source.impact_columns, state.impact, timeOf("estimate"), goImpact), ...levelOf(list.map((one) => one.numbers))] : [make("p", { text: "No impacts." })]),
-      ...(source === state.estimate ? [make("p", { class: "small", text: "By the estimated contacts, in place of the count of the first look, which has the displacement alone. The report lists every contact." })] : []),
-      make("span", { class: "files", of: [make("button", { text: "as Python", on: { click: () => showLines(lines(source === state.look ? "look" : "estimate", "impacts")) } })] })];
+    if (!list.length) { return [make("p", { text: "No impacts." })]; }
+    return [impactTable(list, source.impact_columns, state.impact, units.eventText, goImpact), make("p", { class: "small", text: "Small beside a value: its 90 % interval." }),
+      ...(source === state.estimate ? [make("p", { class: "small", text: "Every contact, the hardest first; the other contacts follow hops too short for an impact." })] : [])];
   },
-  Events: () => [...(notes().length ? [make("h3", { class: "part", text: "Notes" }), make("ol", { class: "timeline", of: notes().map((note) => make("li", { of: [
-      make("button", { class: "link", text: units.eventText(note.time), on: { click: () => { state.cursor = note.time; setView({ from: note.time - 0.05, to: note.time + 0.1 }); } } }), make("span", { text: note.text }),
-      make("button", { class: "link", text: "✕", "aria-label": `Remove the note ${note.text}`, on: { click: () => keepNotes(notes().filter((one) => one !== note)).catch(lost) } })] })) }), make("h3", { class: "part", text: "Events" })] : []),
-    make("p", { class: "small", text: `Times count from ${origin()}${state.estimate ? "" : "; an interval beside an event is its own, on the clock of the record"}.` }),
-    timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })],
-  Numbers: () => {
-    const page = state.estimate || state.look;
-    const folded = page.verdict.filter((one) => page.assumptions?.includes(one.text)), list = (some) => make("ul", { class: "statements", of: some.map(sentence) });
-    const [first, ...rest] = page.verdict, todo = page.to_do;
-    return [list([first]), ...(todo ? [make("h3", { class: "part", text: todo.heading }), list(todo.statements)] : []), cards(page.cards), list(rest.filter((one) => !folded.includes(one))),
-      ...(folded.length ? [make("details", { of: [make("summary", { text: `${folded.length} more notes and assumptions` }), list(folded)] })] : []), ...(state.estimate ? page.summary : []).map(table)];
-  },
-  Quality: () => [findings(state.estimate?.findings || state.look.findings), make("p", { class: "small", text: (state.estimate || state.look).not_seen || "" }), ...(!state.estimate && state.look.sections.at(-1)?.statements || []).map((one) => make("p", { class: "small", text: one.text }))],
-  Restart: () => {
-    const card = state.estimate?.restart;
-    if (!card) { return [make("p", { text: "An estimate of this drop is needed to weigh whether the machine may run again." })]; }
-    return [make("ul", { class: "statements", of: card.verdict.map(sentence) }), ...card.summary.map(table), ...card.sections.flatMap((part) => [
-      make("h3", { class: "part", text: part.heading }), ...part.text.map((text) => make("p", { text: units.inWords(text) })), ...part.tables.map(table)])];
-  },
-  All: () => (state.estimate || state.look).sections.filter((part) => part.text.length + part.statements.length + part.tables.length).flatMap((part) => [make("h3", { class: "part", text: part.heading }),
-    ...part.text.map((text) => make("p", { text: units.inWords(text) })), make("ul", { class: "statements", of: part.statements.map(sentence) }), ...part.tables.map(table)]),
-  Centre: centrelineTab,
-  Compare: compareTab,
-  Rotor: rotorTab,
-  Origin: () => [facts((state.estimate || state.look).facts), facts(Object.entries(state.job.files).map(([role, file]) => [role, `${file.name}, ${file.bytes} bytes, SHA-256 ${file.sha256}`])),
-    make("p", { of: Object.entries(state.job.files).filter(([role]) => ["machine", "profile"].includes(role)).map(([role, file]) => make("button", { text: `Save ${file.name}`, on: { click: async () => keep(await server.sentFile(state.job.id, role), file.name) } })) })]
+  Events: () => [make("p", { class: "small", text: `Times count from ${origin()}${state.estimate ? "" : "; an interval beside an event is its own, on the clock of the record"}.` }),
+    timeline(events(), units.eventText, (time) => { state.cursor = time; setView({ from: time - 0.05, to: time + 0.1 }); })]
 };
 
+const tabList = (box, names, chosen, choose, panel) => box.replaceChildren(...names.map(([name, text, more = {}]) => make("button", {
+  role: "tab", text, "aria-selected": String(name === chosen), tabindex: name === chosen ? "0" : "-1", "aria-controls": panel, "data-name": name, ...more, on: { click: () => choose(name) }
+})));
 function showTab(name, focus = false) {
   state.tab = name;
-  by("tabs").replaceChildren(...Object.keys(TABS).map((text) => make("button", {
-    role: "tab", text, "aria-selected": String(text === name), tabindex: text === name ? "0" : "-1", "aria-controls": "tabpanel", on: { click: () => showTab(text, true) }
-  })));
+  tabList(by("tabs"), Object.keys(TABS).map((text) => [text, text]), name, (text) => showTab(text, true), "tabpanel");
   if (focus) { by("tabs").querySelector('[aria-selected="true"]').focus(); }
   by("tabpanel").setAttribute("aria-label", name);
   by("tabpanel").replaceChildren(...TABS[name]());
   noted();
 }
 
+const STAGES = { look: "reading and checking the record", channels: "reading the record", check: "computing" };
+const SAID = { channels: "Channels", look: "Looking", estimate: "Estimating", waterfall: "Waterfall", check: "Machine" };
 function showStatus() {
-  const { states } = state.job, { look, estimate, waterfall, channels } = states;
-  for (const id of ["estimate", "report", "document", "waterfall", "channels", "tomachine", "tothelog", "aboutdrop"]) { by(id).disabled = Boolean(state.job.damaged); }
-  if (state.job.damaged) { say(state.job.damaged, "bad", make("button", { text: "Remove", on: { click: () => askRemoval(state.job) } })); return false; }
-  const running = [estimate, waterfall, look, channels].find((one) => one && ["waiting", "running"].includes(one.state));
-  by("estimate").disabled = Boolean(running) || !state.job.files.machine || !state.look;
-  by("report").disabled = by("document").disabled = by("tothelog").disabled = !(estimate && estimate.result);
-  by("waterfall").disabled = !(waterfall && waterfall.result) && by("estimate").disabled;
-  by("why").textContent = whyNot(running, estimate);
-  for (const id of ["document", "tothelog"]) { by(id).textContent = by(id).textContent.replace(UNESTIMATED, "") + (by(id).disabled ? UNESTIMATED : ""); }
-  by("tomachine").hidden = Boolean(state.job.files.machine);
+  const { states, files, damaged } = state.job, { look, estimate } = states, busy = running(state.job);
+  for (const id of ["estimate", "channels", "tomachine"]) { by(id).disabled = Boolean(damaged); }
+  for (const [id, role] of [["savemachine", "machine"], ["saveprofile", "profile"]]) { by(id).hidden = !files[role]; }
+  by("tomachine").hidden = Boolean(files.machine);
+  by("document").hidden = !estimate?.result;
+  showViews();
+  if (damaged) { say(damaged, "bad", make("button", { text: "Remove", on: { click: () => askRemoval(state.job) } })); return false; }
+  by("estimate").disabled = Boolean(busy) || !files.machine || !state.look;
+  by("why").textContent = busy || (state.look && files.machine) ? "" : `needs ${state.look ? "the machine file" : "a readable record"}`;
   by("simulated").hidden = !simulated();
   by("simulated").title = simulated();
-  by("waterfall").title = "Frequencies of the coast-down, found and named; needs a record to standstill, or nearly";
-  if (running) {
-    const verb = Object.keys(states).find((one) => states[one] === running), share = running.fraction || 0;
-    const stage = running.state === "waiting" ? "waiting for another computation" : running.stage || ({ look: "reading and checking the record", channels: "reading the record" }[verb] || "compiling and preparing");
-    const seconds = Math.round(running.left || 0), left = seconds ? `, about ${seconds} s left` : "";
-    const bar = make("progress", { max: 1, "aria-label": stage, ...(share > 0 ? { value: share } : {}) });
-    say(`${{ channels: "Channels", look: "Looking", estimate: "Estimating", waterfall: "Waterfall" }[verb]}: ${stage} (${Math.round(running.spent)} s${left})`, "notice", bar,
-      make("button", { text: "Cancel", id: "cancel", on: { click: async () => { state.job = await server.cancel(state.job.id, verb); await refresh(); } } }));
+  if (busy) {
+    const told = states[busy], share = told.fraction || 0, stage = told.state === "waiting" ? "waiting for another computation" : told.stage || STAGES[busy] || "compiling and preparing";
+    say(`${SAID[busy]}: ${stage} (${Math.round(told.spent)} s)`, "notice", make("progress", { max: 1, "aria-label": stage, ...(share > 0 ? { value: share } : {}) }),
+      make("button", { text: "Cancel", id: "cancel", on: { click: async () => { state.job = await server.cancel(state.job.id, busy); await refresh(); } } }));
     return true;
   }
-  const failed = [waterfall, estimate, look].find((one) => one && one.state === "failed");
-  if (failed) { say(failed.error, "bad", ...(failed === estimate || failed === waterfall ? [] : waysOut(failed.error))); }
+  const failed = [state.report, "estimate", "look"].find((verb) => states[verb]?.state === "failed");
+  if (failed) { say(states[failed].error, "bad", ...(failed === "look" ? waysOut(states[failed].error) : [])); }
   else if (state.estimate) {
-    say(state.estimate.verdict[0].text, state.estimate.verdict[0].level, ...state.estimate.cards.map(({ title, figures: [first] }) => {
-      const [text, interval] = first.value[units.chosen()];
-      return make("span", { class: "headline", of: [make("span", { text: `${title.split(" touchdown")[0]} ${first.label.toLowerCase()} ` }), make("strong", { text }), make("span", { class: "note", text: interval ? ` (90 %: ${interval})` : "" })] });
+    say(state.estimate.statement.text, state.estimate.statement.level, ...state.estimate.headline.map(({ name, label, number }) => {
+      const [text, interval] = number[units.chosen()];
+      return make("span", { class: "headline", of: [make("span", { text: `${name} ${label} ` }), make("strong", { text }), make("span", { class: "note", text: interval ? ` (90 %: ${interval})` : "" })] });
     }));
   }
-  else if (state.look) {
-    const told = state.look.verdict[0], stop = state.look.findings.find((one) => one.severity === "stop"), words = estimate && estimate.state === "cancelled" ? "The estimate was cancelled. " : "";
-    say(words + (stop ? `${stop.message}; ${stop.remedy}` : told.text), stop ? "bad" : told.level);
-  } else { say("Nothing was found yet.", "notice"); }
+  else if (state.look) { say((estimate?.state === "cancelled" ? "The estimate was cancelled. " : "") + state.look.statement.text, state.look.statement.level); }
+  else { say("Nothing was found yet.", "notice"); }
   return false;
-}
-
-// Why a button of the drop cannot be pressed.
-const UNESTIMATED = " (needs an estimate)";
-function whyNot(running, estimate) {
-  if (running) { return "one computation of a drop at a time"; }
-  if (!state.look) { return "Estimate and Waterfall need a readable record"; }
-  if (!state.job.files.machine) { return "Estimate and Waterfall need the machine file"; }
-  return estimate?.result ? "" : "Report needs an estimate";
 }
 
 // What helps after a record could not be looked at: the missing file, the channels, or to look once more.
@@ -144,9 +99,39 @@ async function showUnread() {
   by("unread").dataset.of = key;
   by("unread").replaceChildren(make("h3", { class: "part", text: `${file.name}, ${file.bytes} bytes` }));
   if (!TEXTS.test(file.name) || file.bytes > LARGEST_SHOWN) { return; }
-  const text = await (await server.sentFile(id, role)).slice(0, SHOWN_CHARACTERS).text();
+  const bytes = await (await server.sentFile(id, role)).slice(0, SHOWN_CHARACTERS).arrayBuffer(), read = (encoding) => new TextDecoder(encoding).decode(bytes);
+  const text = read("utf-8").slice(0, -1).includes("\ufffd") ? read("windows-1252") : read("utf-8"); // the cut may part a letter
   by("unread").append(make("p", { class: "small", text: "It begins with these lines:" }),
     make("ol", { class: "begins", of: text.split(/\r?\n/).slice(0, SHOWN_LINES).map((line) => make("li", { of: [make("code", { text: line })] })) }));
+}
+
+// ---- figures or a report: one is seen at a time
+
+const REPORTS = { look: ["Look", "Report of the look"], estimate: ["Report", "Report of the estimate"], waterfall: ["Waterfall", "Frequencies of a coast-down (w)"], check: ["Machine", "What the machine amounts to"] };
+const OF_MACHINE = ["waterfall", "check"]; // computed when they are asked for
+function showViews() {
+  const { states, files } = state.job;
+  const there = (verb) => states[verb]?.report || (OF_MACHINE.includes(verb) && files.machine && (verb === "check" || state.look));
+  const names = Object.entries(REPORTS).map(([verb, [text, title]]) => [verb, text, { title, disabled: there(verb) ? null : "" }]);
+  tabList(by("views"), [["", "Traces", { disabled: state.look ? null : "" }], ...names], state.report, (verb) => tried(showReport(verb)), "main");
+  const source = states[state.report]?.report || "", seen = Boolean(state.report);
+  by("main").hidden = seen || !state.look;
+  by("reports").hidden = !seen;
+  by("reporttab").hidden = !source;
+  by("noreport").hidden = !seen || Boolean(source);
+  by("noreport").textContent = states[state.report]?.state === "failed" ? "There is no report: see above." : running(state.job) === state.report ? "The report is being made." : "There is no report yet.";
+  by("reportframe").hidden = !source;
+  if (source && by("reportframe").getAttribute("src") !== source) { by("reportframe").src = source; by("reporttab").href = source; by("reportframe").title = REPORTS[state.report][1]; }
+}
+async function showReport(verb) {
+  const { id, states } = state.job;
+  play(false);
+  state.report = verb;
+  if (OF_MACHINE.includes(verb) && !states[verb]?.result && !running(state.job)) { state.job = await server.begin(id, verb, {}); }
+  if (state.job?.id !== id) { return; }
+  noted();
+  await refresh();
+  if (!verb && state.panels.length) { drawAll(); }
 }
 
 // ---- jobs
@@ -159,22 +144,19 @@ async function refresh() {
   state.job = job;
   const done = (verb) => (job.states[verb] && job.states[verb].result) || "";
   const now = `${id} ${done("look")} ${done("estimate")}`;
-  if (wantsFall === id && done("waterfall")) { wantsFall = ""; await showFall(); }
   if (now !== shown) {
     const [look, estimate] = await Promise.all(["look", "estimate"].map((verb) => (done(verb) ? server.page(id, verb) : null)));
     if (state.job?.id !== id) { return; }
     shown = now;
     Object.assign(state, { look, estimate, panels: [] });
-    if (state.othersOf !== id) { Object.assign(state, { othersOf: id, others: [] }); }
-    if (estimate) { await learnDrops(); }
-    by("main").hidden = !look || !by("fall").hidden;
+    by("main").hidden = !look || Boolean(state.report);
     if (look) {
       units.learn(look.units);
       const columns = look.places.map((place) => place.radius), [first, last] = span();
       Object.assign(state, { view: homeView(), cursor: null, impact: -1 });
       const found = await samples("look", columns, first, last, 2400);
       if (state.job?.id !== id || shown !== now) { return; }
-      state.overview = { time: found.time, data: { time: found.time, curves: columns.map((name) => ({ values: found[name] })) } };
+      state.overview = { time: found.time, curves: columns.map((name) => ({ values: found[name] })) };
       await asSeen();
     }
   }
@@ -186,131 +168,71 @@ async function refresh() {
 
 function lost(error) {
   if (error.status === 409) { say(error.message, "bad", ...waysOut(error.message)); return; } // damaged on the disk
-  say(error instanceof server.Refusal ? error.message : "The server does not answer; is 'rotordrop serve' running? The page tries again.", "bad");
-  if (!(error instanceof server.Refusal)) { setTimeout(() => state.job && refresh().catch(lost), 1500); }
-}
-
-// ---- notes at an instant, and which figures are drawn
-
-async function keepNotes(list) {
-  state.job = await server.label(state.job.id, { notes: list });
-  if (state.tab === "Events") { showTab("Events"); }
-  drawAll();
-}
-function askNote() {
-  if (!state.job || state.cursor === null) { say("Point at a trace first: a note stands at the cursor.", "notice"); return; }
-  const time = state.cursor;
-  by("instantwhen").textContent = `At ${units.eventText(time)} from ${origin()}`;
-  by("instanttext").value = "";
-  by("instant").showModal();
-  by("instanttext").focus();
-  by("instant").onclose = () => { if (by("instant").returnValue === "keep") { keepNotes([...notes(), { time, text: by("instanttext").value }]).catch(lost); } };
-}
-function chooseTraces() {
-  const box = (value, text, checked) => make("label", { class: "choice", of: [make("input", { type: "checkbox", value, ...(checked ? { checked: "" } : {}) }), make("span", { text })] });
-  const list = traces(), chosen = (id) => [...by(id).querySelectorAll("input")].filter((one) => one.checked).map((one) => one.value);
-  by("figurechoices").replaceChildren(...FIGURES().map(([id, text]) => box(id, text, isShown(id))));
-  by("tracechoices").replaceChildren(...list.map((one) => box(one.key, one.label, state.own.includes(one.key))));
-  const limit = () => {
-    const first = list.find((one) => one.key === chosen("tracechoices")[0]), many = chosen("tracechoices").length >= 8;
-    [...by("tracechoices").querySelectorAll("input")].forEach((input, i) => { input.disabled = Boolean(first) && (list[i].kind !== first.kind || list[i].verb !== first.verb || (many && !input.checked)); });
-  };
-  by("tracechoices").onchange = limit;
-  limit();
-  by("figuresdialog").showModal();
-  by("figuresdialog").onclose = () => {
-    const { returnValue } = by("figuresdialog");
-    if (returnValue === "usual") { Object.assign(state, { figures: null, own: [] }); }
-    if (returnValue === "choose") {
-      const shownNow = chosen("figurechoices"), own = chosen("tracechoices");
-      Object.assign(state, { figures: shownNow.length || own.length ? shownNow : null, own });
-    }
-    if (returnValue !== "cancel") { loadView(); }
-  };
+  if (refused(error)) { setTimeout(() => state.job && refresh().catch(lost), 1500); }
 }
 
 // ---- views: the address says which is seen
 
-const part = (name) => (name in TABS ? name : "Impacts");
 async function openDrop(told) {
   if (state.job?.id !== told.drop) {
-    leaveFall();
     Object.assign(state, { job: null, look: null, estimate: null, view: null, panels: [] });
     by("main").hidden = true;
     state.job = await server.job(told.drop);
     shown = "";
   }
-  by("actions").hidden = false;
+  by("actions").hidden = by("views").hidden = false;
   by("dropname").textContent = by("dropname").title = state.job.name;
+  state.report = told.report in REPORTS ? told.report : "";
   state.asked = told;
   if (shown && state.look) { await asSeen(); }
   await refresh();
 }
 
-// What the address asks for: window, cursor, motion, tab, others, waterfall.
+// What the address asks for: window, cursor, mark, motion, tab.
 async function asSeen() {
   const told = state.asked || {}, number = (name) => (told[name] === undefined ? NaN : Number(told[name]));
   state.asked = null;
   state.view = number("to") > number("from") ? { from: number("from"), to: number("to") } : state.view || homeView();
   state.cursor = Number.isFinite(number("at")) ? number("at") : state.cursor;
-  by("orbitof").value = ["turn", "1X"].includes(told.orbit) ? told.orbit : "window";
   state.mark = Number.isFinite(number("mark")) ? number("mark") : null;
-  state.figures = told.figures ? told.figures.split(",") : null;
-  state.own = told.traces ? told.traces.split(",") : [];
   if ([...by("signal").options].some((one) => one.value === told.show)) { by("signal").value = told.show; }
-  showTab(part(told.tab || state.tab));
+  showTab(told.tab in TABS ? told.tab : state.tab);
   await loadView();
-  if (told.with) { await learnDrops(told.with.split(",")); }
-  if (told.view === "waterfall") { fallWanted(told); }
-  if (told.view === "waterfall") { if (by("fall").hidden) { await waterfall(); } } else { leaveFall(); }
 }
 const seen = () => {
   const rounded = (value, size) => (value === null ? "" : String(Number(value.toPrecision(size))));
-  return { drop: state.job.id, ...(by("fall").hidden ? {} : { view: "waterfall", ...fallSeen() }), tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
-    at: rounded(state.cursor, 9), show: by("signal").value === "y" ? "" : by("signal").value, mark: rounded(state.mark, 9), orbit: by("orbitof").value === "window" ? "" : by("orbitof").value,
-    figures: (state.figures || []).join(","), traces: state.own.join(","), with: state.others.map((other) => other.job).filter(Boolean).join(",") };
+  return { drop: state.job.id, report: state.report, tab: state.tab, ...(state.view ? { from: rounded(state.view.from, 7), to: rounded(state.view.to, 7) } : {}),
+    at: rounded(state.cursor, 9), mark: rounded(state.mark, 9), show: by("signal").value === "y" ? "" : by("signal").value };
 };
 const noted = () => address.note(() => (state.job ? seen() : address.read()));
 document.addEventListener("seen", noted);
 
 async function route() {
   address.settle();
-  const told = address.read(), atDrop = Boolean(told.drop);
+  const told = address.read();
   if (told.token) { location.reload(); return; }
-  const place = atDrop ? "" : { log: "tolog", machines: "tomachines", machine: "tomachines" }[told.view] || "todrops";
-  for (const id of ["todrops", "tomachines", "tolog"]) { if (id === place) { by(id).setAttribute("aria-current", "page"); } else { by(id).removeAttribute("aria-current"); } }
   leaveHome();
-  leaveMachines();
   by("unread").hidden = true;
-  by("log").hidden = true;
-  if (atDrop) {
-    try { await openDrop(told); } catch (error) {
-      if (error.status !== 404) { throw error; }
-      await home({});
-      say("There is no such drop; it may have been removed.", "bad");
-    }
-    return;
+  if (!told.drop) { await home(told); return; }
+  try { await openDrop(told); } catch (error) {
+    if (error.status !== 404) { throw error; }
+    await home({});
+    say("There is no such drop; it may have been removed.", "bad");
   }
-  await home(told);
 }
 async function home(told) {
-  leaveFall();
   play(false);
   state.job = null;
-  shown = "";
-  by("main").hidden = by("actions").hidden = by("simulated").hidden = true;
-  if (told.view === "log") { await showLog(told); } else if (["machines", "machine"].includes(told.view)) { await showMachines(told); } else { await showHome(told); }
+  shown = state.report = "";
+  for (const id of ["main", "reports", "views", "actions", "simulated"]) { by(id).hidden = true; }
+  await showHome(told);
 }
 
-const sent = (id, kind = "drop") => {
-  if (kind === "machine") { address.go({ view: "machines" }); return; }
-  justSent = id;
-  if (id) { shown = ""; address.go({ drop: id }); }
-};
-const openChosen = (list) => (list.length ? chooseFiles(list, sent).catch((error) => say(error.message, "bad")) : null);
+const sent = (id) => { justSent = id; if (id) { shown = ""; address.go({ drop: id }); } };
+const openChosen = (list) => (list.length ? tried(chooseFiles(list, sent)) : null);
 
 // What the recording holds is read by a process of its own, then asked.
-let wantsChannels = "";
+let wantsChannels = "", channelWords = "", justSent = "";
 async function channels(words = "") {
   const { id } = state.job;
   wantsChannels = id;
@@ -320,7 +242,6 @@ async function channels(words = "") {
   state.job = job;
   await refresh();
 }
-let channelWords = "", justSent = "";
 async function askedChannels() {
   const { id, states: { channels: told, look } } = state.job;
   if (wantsChannels === id && told?.state === "done" && told.result) {
@@ -335,57 +256,31 @@ async function askedChannels() {
 
 // ---- wiring
 
-const click = (id, handler) => by(id).addEventListener("click", () => Promise.resolve(handler()).catch((error) => say(error.message, "bad")));
+const click = (id, handler) => by(id).addEventListener("click", () => tried(Promise.resolve().then(handler)));
 const openFiles = () => by("files").click();
 click("open", openFiles); click("open2", openFiles); click("tryit", async () => sent(await sendExample())); click("help", () => by("keys").showModal());
 by("files").addEventListener("change", () => { const list = [...by("files").files]; by("files").value = ""; openChosen(list); });
 click("channels", () => channels());
 click("tomachine", () => chooseFiles([], sent));
-click("aboutdrop", () => askAbout(state.job, (job) => { state.job = job; by("dropname").textContent = by("dropname").title = job.name; }));
-click("tothelog", () => addToLog(state.job));
 click("estimate", async () => { state.job = await server.begin(state.job.id, "estimate", { method: by("method").value }); await refresh(); });
-click("report", () => server.openReport(state.job.id, "estimate"));
-let wantsFall = "";
-async function showFall() {
-  const { id } = state.job, page = await server.page(id, "waterfall");
-  if (state.job.id !== id) { return; }
-  play(false);
-  by("main").hidden = true;
-  by("fall").hidden = false;
-  noted();
-  await openFall(id, page);
-  by("fallmap").focus();
-}
-function leaveFall() {
-  if (by("fall").hidden) { return; }
-  by("fall").hidden = true;
-  by("main").hidden = !state.look;
-  if (state.job) { noted(); }
-  if (state.panels.length) { drawAll(); }
-  by("waterfall").focus();
-}
-async function waterfall() {
-  const told = state.job.states.waterfall;
-  if (told && told.result) { await showFall(); return; }
-  wantsFall = state.job.id;
-  state.job = await server.begin(state.job.id, "waterfall", {});
-  await refresh();
-}
-click("waterfall", waterfall);
-click("fallback", leaveFall);
-click("fallreport", () => server.openReport(state.job.id, "waterfall"));
-by("fallfiles").replaceChildren(files("Waterfall", { csv: fallFiles.CSV, svg: fallFiles.SVG, png: fallFiles.PNG, python: () => showLines(fallFiles.Python()), command: () => showLines(fallFiles.Command(), "As command") }));
-by("cutfiles").replaceChildren(files("Cuts", { csv: cutFiles.CSV, svg: cutFiles.SVG, png: cutFiles.PNG, python: () => showLines(cutFiles.Python()) }));
 click("document", async () => keep(new Blob([await server.documentText(state.job.id, "estimate")], { type: "application/json" }), `${state.job.name}.json`));
+for (const [id, role] of [["savemachine", "machine"], ["saveprofile", "profile"]]) { click(id, async () => keep(await server.sentFile(state.job.id, role), state.job.files[role].name)); }
 click("remove", () => askRemoval(state.job));
 click("whole", () => setWindow(...span())); click("early", () => setView(homeView()));
-click("next", () => goImpact(nextImpact(1))); click("previous", () => goImpact(nextImpact(-1)));
+click("next", () => goImpact(state.impact + 1)); click("previous", () => goImpact(state.impact - 1));
 click("setmark", () => (state.cursor === null ? say("Point at a trace first: the mark is set at the cursor.", "notice") : setMark(state.cursor)));
-click("unmark", () => setMark(null)); click("noteat", askNote); click("choosetraces", chooseTraces);
+click("unmark", () => setMark(null));
 click("play", () => play(state.playing === null));
-by("orbitof").addEventListener("change", () => state.view && makeOrbits());
 by("signal").addEventListener("change", () => state.view && loadView());
-function chooseUnits(name) { units.choose(name); by("units").value = name; if (state.job && state.look && state.view) { showTab(state.tab); showStatus(); redraw(); } else if (!state.job) { redrawHome(); if (!by("log").hidden) { redoLog(); } } }
+document.addEventListener("click", (event) => { if (!event.target.closest("#more > summary")) { by("more").open = false; } });
+
+const redraw = () => { if (!state.job) { redrawHome(); } else if (!state.report && state.panels.length) { drawAll(); } };
+function chooseUnits(name) {
+  units.choose(name);
+  by("units").value = name;
+  if (state.job && state.look && state.view) { showTab(state.tab); showStatus(); }
+  redraw();
+}
 by("units").addEventListener("change", () => chooseUnits(by("units").value));
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function chooseTheme(name) {
@@ -398,37 +293,31 @@ by("theme").addEventListener("change", () => chooseTheme(by("theme").value));
 dark.addEventListener("change", () => chooseTheme(by("theme").value));
 
 const KEYS = {
-  n: () => goImpact(nextImpact(1)), p: () => goImpact(nextImpact(-1)), " ": () => play(state.playing === null),
-  "+": () => zoom(0.6), "=": () => zoom(0.6), "-": () => zoom(1.7), 0: () => setWindow(...span()), d: () => setView(homeView()),
-  b: () => by("setmark").click(), i: askNote, f: chooseTraces,
-  c: () => chooseOthers().catch((error) => say(error.message, "bad")), m: () => channels(),
-  u: () => chooseUnits(units.chosen() === "SI" ? "US" : "SI"), t: () => chooseTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"),
+  n: () => goImpact(state.impact + 1), p: () => goImpact(state.impact - 1), " ": () => play(state.playing === null),
+  "+": () => zoom(0.6), "=": () => zoom(0.6), "-": () => zoom(1.7), 0: () => setWindow(...span()), d: () => setView(homeView()), b: () => by("setmark").click(), m: () => channels(),
   ArrowLeft: (event) => (event.shiftKey ? pan(-1) : stepCursor(-1)), ArrowRight: (event) => (event.shiftKey ? pan(1) : stepCursor(1))
 };
 for (const signal of ["y", "x", "r"]) { KEYS[signal] = () => { by("signal").value = signal; loadView(); }; }
+const ALWAYS = {
+  "?": () => by("keys").showModal(), o: openFiles, l: () => address.go({ view: "drops" }), u: () => chooseUnits(units.chosen() === "SI" ? "US" : "SI"),
+  t: () => chooseTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"), w: () => by("views").querySelector("[data-name=waterfall]:not(:disabled)")?.click(),
+  Escape: () => { by("more").open = false; if (state.job && state.look && state.report) { tried(showReport("")); } }
+};
 document.addEventListener("keydown", (event) => {
-  const typing = event.target.closest("input, select, textarea, dialog, [role=menu]");
-  if (event.target.closest("[role=tablist]") && /^Arrow(Left|Right)$/.test(event.key)) {
-    const names = Object.keys(TABS), step = event.key === "ArrowRight" ? 1 : names.length - 1;
-    showTab(names[(names.indexOf(state.tab) + step) % names.length], true);
+  const list = event.target.closest("[role=tablist]");
+  if (list && /^Arrow(Left|Right)$/.test(event.key)) {
+    const names = [...list.querySelectorAll("[role=tab]:not(:disabled)")], step = event.key === "ArrowRight" ? 1 : names.length - 1;
+    const { name } = names[(names.indexOf(event.target) + step) % names.length].dataset;
+    if (list === by("tabs")) { showTab(name, true); } else { list.querySelector(`[data-name="${name}"]`).focus(); }
     return;
   }
-  if (typing || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest("button"))) { return; }
-  if (event.key === "?") { by("keys").showModal(); return; }
-  if (event.key === "o") { openFiles(); return; }
-  if (event.key === "l") { address.go({ view: "drops" }); return; }
-  if (event.key === "w" && !by("waterfall").disabled && !by("actions").hidden) { (by("fall").hidden ? waterfall : leaveFall)(); return; }
-  if (event.key === "Escape") { leaveFall(); return; }
-  if ("ut".includes(event.key)) { KEYS[event.key](); return; }
-  if (by("fall").hidden && state.job && state.look && state.view && KEYS[event.key]) { event.preventDefault(); KEYS[event.key](event); }
+  if (event.target.closest("input, select, textarea, dialog") || event.ctrlKey || event.metaKey || event.altKey || (event.key === " " && event.target.closest("button, summary"))) { return; }
+  if (ALWAYS[event.key]) { ALWAYS[event.key](); return; }
+  if (!state.report && state.job && state.look && state.view && KEYS[event.key]) { event.preventDefault(); KEYS[event.key](event); }
 });
-document.addEventListener("compared", () => showTab("Compare"));
 document.addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
 document.addEventListener("dragleave", (event) => { if (!event.relatedTarget) { document.body.classList.remove("over"); } });
 document.addEventListener("drop", (event) => { event.preventDefault(); document.body.classList.remove("over"); openChosen(event.dataTransfer.files); });
-const redraw = () => {
-  if (!state.job) { redrawLog(); } else if (!by("fall").hidden) { drawFall(); } else if (state.panels.length) { drawAll(); if (["Centre", "Compare", "Rotor"].includes(state.tab)) { showTab(state.tab); } }
-};
 let waiting = 0;
 const resized = () => { clearTimeout(waiting); waiting = setTimeout(redraw, 120); };
 window.addEventListener("resize", resized);

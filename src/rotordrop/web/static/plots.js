@@ -20,35 +20,24 @@ function levelsOn(u, levels) {
   c.restore();
 }
 
-// The mark of the second cursor and notes at an instant, over every trace.
-function uprightsOn(u, uprights, scale) {
-  const c = u.ctx, ratio = window.devicePixelRatio || 1, tone = colours();
+// The mark of the second cursor, over every trace.
+function markOn(u, mark, scale) {
+  if (mark === null) { return; }
+  const c = u.ctx, x = u.valToPos(mark / scale, "x", true);
   c.save();
   c.beginPath(); c.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height); c.clip();
-  c.font = `${10 * ratio}px system-ui, sans-serif`; c.textAlign = "left"; c.textBaseline = "alphabetic"; c.lineJoin = "round";
-  for (const { time, text, mark } of uprights) {
-    const x = u.valToPos(time / scale, "x", true);
-    c.strokeStyle = c.fillStyle = mark ? tone.accent : tone.residual; c.lineWidth = ratio * (mark ? 1.5 : 1); c.setLineDash(mark ? [] : [3 * ratio, 3 * ratio]);
-    c.beginPath(); c.moveTo(x, u.bbox.top); c.lineTo(x, u.bbox.top + u.bbox.height); c.stroke();
-    c.setLineDash([]); c.lineWidth = 4 * ratio; c.strokeStyle = tone.back;
-    c.strokeText(text.length > 28 ? `${text.slice(0, 27)}…` : text, x + 3 * ratio, u.bbox.top + 10 * ratio);
-    c.fillText(text.length > 28 ? `${text.slice(0, 27)}…` : text, x + 3 * ratio, u.bbox.top + 10 * ratio);
-  }
+  c.strokeStyle = colours().accent; c.setLineDash([6, 3]); c.lineWidth = 1.5 * (window.devicePixelRatio || 1);
+  c.beginPath(); c.moveTo(x, u.bbox.top); c.lineTo(x, u.bbox.top + u.bbox.height); c.stroke();
   c.restore();
 }
 
 // A panel: {element, kind, axis, curves: [{label, colour, values, lower, upper}], levels, time, fromZero}
 export function drawPanel(panel, view, on) {
   const tone = colours(), [scale, timeName] = timeScale(view.to - view.from), f = factor(panel.kind);
-  const own = [Float64Array.from(panel.time, (t) => t / scale)], others = [], series = [{}], bands = [];
+  const data = [Float64Array.from(panel.time, (t) => t / scale)], series = [{}], bands = [];
   const finite = (array) => Array.from(array, (v) => (Number.isFinite(v) ? v / f : null));
-  const add = (array, made) => { own.push(finite(array)); series.push(made); };
-  for (const { label, colour, values: drawn, lower, upper, width, dash, time } of panel.curves) {
-    if (time) { // of another drop, which has a clock of its own
-      others.push([Float64Array.from(time, (t) => t / scale), finite(drawn)]);
-      series.push({ label, stroke: colour, width, dash, points: { show: false } });
-      continue;
-    }
+  const add = (array, made) => { data.push(finite(array)); series.push(made); };
+  for (const { label, colour, values: drawn, lower, upper, width, dash } of panel.curves) {
     if (lower) {
       bands.push({ series: [series.length, series.length + 1], fill: faint(colour, 0.22) });
       const edge = { stroke: faint(colour, 0.35), width: 0.5, points: { show: false } };
@@ -56,7 +45,6 @@ export function drawPanel(panel, view, on) {
     }
     add(drawn, { label, stroke: colour, width: width || 1.3, dash, points: { show: false } });
   }
-  const data = others.length ? uPlot.join([own, ...others]) : own;
   const axis = { stroke: tone.ink, grid: { stroke: tone.line, width: 1 }, ticks: { stroke: tone.line, width: 1 }, font: "11px system-ui, sans-serif", labelFont: "11px system-ui, sans-serif" };
   const levels = panel.levels.map((level) => ({ ...level, value: level.value / f }));
   const range = (u, low, high) => {
@@ -73,7 +61,7 @@ export function drawPanel(panel, view, on) {
       { ...axis, size: 54, values: values(8), label: `${panel.axis} [${unit(panel.kind)}]`, labelSize: 16, labelGap: 0, gap: 3 }],
     series, bands,
     hooks: {
-      draw: [(u) => levelsOn(u, levels), (u) => uprightsOn(u, on.uprights, scale)],
+      draw: [(u) => levelsOn(u, levels), (u) => markOn(u, on.mark, scale)],
       setSelect: [(u) => {
         if (u.select.width > 3) {
           on.window(scale * u.posToVal(u.select.left, "x"), scale * u.posToVal(u.select.left + u.select.width, "x"));
@@ -86,7 +74,7 @@ export function drawPanel(panel, view, on) {
   panel.element.replaceChildren();
   const made = new uPlot(options, data, panel.element);
   made.over.addEventListener("dblclick", on.home);
-  made.over.addEventListener("click", (event) => { if (event.shiftKey) { on.mark(scale * made.posToVal(event.offsetX, "x")); } });
+  made.over.addEventListener("click", (event) => { if (event.shiftKey) { on.setMark(scale * made.posToVal(event.offsetX, "x")); } });
   made.over.addEventListener("wheel", (event) => {
     event.preventDefault();
     on.zoom(event.deltaY > 0 ? 1.25 : 0.8, scale * made.posToVal(event.offsetX, "x"));
@@ -112,9 +100,8 @@ export function follow(cursor) {
 }
 
 // data: {time, curves: [{values}]}; events: [{time, words}]
-export const drawOverview = (canvas, told) => stripOn(canvasPen(canvas), told);
-
-export function stripOn(pen, { data, events, impacts, view, span, uprights, origin }) {
+export function drawOverview(canvas, { data, events, impacts, view, span, mark, origin }) {
+  const pen = canvasPen(canvas);
   const tone = colours(), top = 4, bottom = pen.height - 16;
   const px = (t) => ((t - span[0]) / (span[1] - span[0])) * pen.width;
   let high = 0;
@@ -127,7 +114,7 @@ export function stripOn(pen, { data, events, impacts, view, span, uprights, orig
   });
   for (const t of impacts) { pen.line([[px(t), bottom], [px(t), bottom - 5]], tone.limit, 1); }
   for (const { time } of events) { pen.line([[px(time), top], [px(time), bottom]], tone.muted, 1, [2, 3]); }
-  for (const { time, mark } of uprights) { pen.line([[px(time), top], [px(time), bottom]], mark ? tone.accent : tone.residual, 1.5); }
+  if (mark !== null) { pen.line([[px(mark), top], [px(mark), bottom]], tone.accent, 1.5); }
   pen.line([[left, top], [left, bottom]], tone.accent, 1);
   pen.line([[right, top], [right, bottom]], tone.accent, 1);
   const [scale, name] = timeScale(span[1] - span[0]);

@@ -28,7 +28,7 @@ export async function chooseFiles(list, sent) {
   by("sending").onclose = () => {
     if (by("sending").returnValue !== "send") { return; }
     const chosen = [...by("roles").querySelectorAll("select")].map((one) => one.value);
-    sendFiles(found.map((file, i) => [chosen[i], file]).filter(([what]) => what)).then((done) => sent(...[done].flat())).catch((error) => say(error.message, "bad"));
+    sendFiles(found.map((file, i) => [chosen[i], file]).filter(([what]) => what)).then(sent).catch((error) => say(error.message, "bad"));
   };
 }
 
@@ -37,7 +37,7 @@ by("numbers").addEventListener("toggle", async () => {
   try {
     const { properties, required } = await server.numbers();
     by("numberfields").replaceChildren(...Object.entries(properties).map(([name, { description, examples }]) => make("label", {
-      of: [make("span", { text: required.includes(name) ? description : `${description} (optional)` }), make("input", { name, placeholder: examples[0], maxlength: 120, autocomplete: "off" })]
+      of: [make("span", { text: `${description.replace(/ \[\S+?( [^\]]*)?\]/, "$1")}${required.includes(name) ? "" : " (optional)"}` }), make("input", { name, placeholder: examples[0], maxlength: 120, autocomplete: "off" })]
     })));
     by("numberfields").querySelector("input").focus();
   } catch (error) { say(error.message, "bad"); }
@@ -45,14 +45,11 @@ by("numbers").addEventListener("toggle", async () => {
 const numbersGiven = () => Object.fromEntries([...by("numberfields").querySelectorAll("input")].map((one) => [one.name, one.value.trim()]).filter(([, value]) => value));
 const textFile = (name, text) => new File([text], name, { type: "text/plain" });
 
-async function sendOnly(id, pairs) {
+async function sendTo(id, pairs, numbers) {
   for (const [what, file] of pairs) {
     say(`Sending ${file.name} …`, "notice");
     await server.send(id, what, file);
   }
-}
-async function sendTo(id, pairs, numbers) {
-  await sendOnly(id, pairs);
   if (Object.keys(numbers).length && !pairs.some(([what]) => what === "machine")) { await server.sendNumbers(id, numbers); }
   await server.begin(id, "look");
 }
@@ -61,12 +58,6 @@ async function sendFiles(pairs) {
   const records = pairs.filter(([what]) => what === "record"), others = pairs.filter(([what]) => what !== "record"), numbers = numbersGiven();
   const options = Object.fromEntries(["gap", "speed", "operator"].map((name) => [name, by(name).value.trim()]).filter(([, value]) => value));
   if (!records.length) {
-    const machine = others.find(([what]) => what === "machine");
-    if (!state.job && machine) { // a machine alone: its own speeds, studies and designs
-      const job = await server.newJob(machine[1].name.replace(/\.[^.]+$/, ""), {});
-      try { await sendOnly(job.id, others); } catch (error) { await server.remove(job.id); throw error; }
-      return [job.id, "machine"];
-    }
     if (!state.job || !(others.length || Object.keys(numbers).length)) { say("None of these files is a record. Open a drop first to give it what belongs to it.", "bad"); return state.job?.id; }
     if (Object.keys(options).length) { await server.setOptions(state.job.id, options); }
     await sendTo(state.job.id, others, numbers);

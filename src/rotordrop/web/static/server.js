@@ -22,51 +22,23 @@ async function ask(method, address, body) {
 const order = (content) => JSON.stringify(content || {});
 const result = (job, verb, what) => `/api/jobs/${job}/${verb}/${what}`;
 
-export const jobs = async () => (await ask("GET", "/api/jobs")).json();
+export const jobs = async () => (await (await ask("GET", "/api/jobs")).json()).jobs;
 export const job = async (id) => (await ask("GET", `/api/jobs/${id}`)).json();
 export const newJob = async (name, options) => (await ask("POST", "/api/jobs", order({ name, options }))).json();
 export const remove = (id) => ask("DELETE", `/api/jobs/${id}`);
-let largest = {}; // bytes by role, as the server said
-export const send = (id, role, file) => {
-  if (file.size > largest[role]) { throw new Refusal(413, `${file.name} has ${(file.size / 1e6).toFixed(0)} MB, and at most ${(largest[role] / 1e6).toFixed(0)} MB are taken; cut the record to the drop`); }
-  return ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
-};
+export const send = (id, role, file) => ask("PUT", `/api/jobs/${id}/files/${role}?name=${encodeURIComponent(file.name)}`, file);
 export const setOptions = async (id, options) => (await ask("POST", `/api/jobs/${id}/options`, order(options))).json();
 export const sentFile = async (id, role) => (await ask("GET", `/api/jobs/${id}/files/${role}`)).blob();
-export async function formats() {
-  const told = await (await ask("GET", "/api/formats")).json();
-  ({ largest } = told);
-  return told.formats;
-}
+export const formats = async () => (await (await ask("GET", "/api/formats")).json()).formats;
 export const example = async (name) => new File([await (await ask("GET", `/api/example/${name}`)).blob()], name);
-export const label = async (id, said) => (await ask("POST", `/api/jobs/${id}/label`, order(said))).json();
-export const log = async () => (await ask("GET", "/api/log")).json();
-export const addToLog = async (id) => (await ask("POST", `/api/jobs/${id}/log`, order())).json();
-export const takeOutOfLog = (id) => ask("DELETE", `/api/jobs/${id}/log`);
 export const begin = async (id, verb, options) => (await ask("POST", `/api/jobs/${id}/${verb}`, order(options))).json();
 export const numbers = async () => (await ask("GET", "/api/numbers")).json();
 export const sendNumbers = (id, values) => ask("POST", `/api/jobs/${id}/numbers`, order(values));
 export const cancel = async (id, verb) => (await ask("POST", result(id, verb, "cancel"))).json();
 export const page = async (id, verb) => (await ask("GET", result(id, verb, "page"))).json();
-export const field = async (id, plane, part) =>
-  new Float32Array(await (await ask("GET", `${result(id, "waterfall", "field")}?plane=${plane}&part=${part}`)).arrayBuffer());
 export const documentText = async (id, verb) => (await ask("GET", result(id, verb, "document"))).text();
-export const reportAddress = async (id, verb) => (await (await ask("POST", result(id, verb, "report"))).json()).address;
-// the window is opened while the click still allows it; where it is not allowed the report takes the place of the page
-export async function openReport(id, verb) {
-  const opened = window.open("about:blank");
-  const address = await reportAddress(id, verb);
-  if (opened) { opened.opener = null; opened.location = address; } else { location.assign(address); }
-}
 
-function question(columns, start, end, points) {
-  const asked = new URLSearchParams();
-  columns.forEach((column) => asked.append("column", column));
-  asked.set("start", start);
-  asked.set("end", end);
-  if (points) { asked.set("points", points); }
-  return asked;
-}
+const question = (columns, start, end, points) => new URLSearchParams([...columns.map((column) => ["column", column]), ["start", start], ["end", end], ...(points ? [["points", points]] : [])]);
 
 // A window of histories: times [s] and one array per column, as single precision on the wire.
 export async function samples(id, verb, columns, start, end, points) {
@@ -79,10 +51,6 @@ export async function samples(id, verb, columns, start, end, points) {
   columns.forEach((column, i) => { found[column] = new Float32Array(bytes, 16 + 4 * count * (i + 1), count); });
   return found;
 }
-
-// Mean, smallest and largest of every sample between two instants; "x 0|y 0" is a radius.
-export const between = async (id, verb, columns, start, end) =>
-  (await ask("GET", `${result(id, verb, "between")}?${question(columns, start, end)}`)).json();
 
 export const table = async (id, verb, columns, start, end) =>
   (await ask("GET", `${result(id, verb, "csv")}?${question(columns, start, end)}`)).blob();

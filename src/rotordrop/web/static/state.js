@@ -1,11 +1,10 @@
 // What the parts of the page share: one job, one window, one cursor.
-import { menu } from "./menu.js";
 import * as server from "./server.js";
 import { make, sentence } from "./tables.js";
 
 export const by = (id) => document.getElementById(id);
-export const state = { job: null, look: null, estimate: null, view: null, cursor: null, impact: -1, tab: "Impacts", panels: [], loaded: [], orbits: [], overview: null, playing: null, serial: 0,
-  speed: null, others: [], drops: [], mark: null, between: null, figures: null, own: [] };
+export const state = { job: null, look: null, estimate: null, view: null, cursor: null, mark: null, impact: -1, tab: "Impacts", report: "",
+  panels: [], orbits: [], overview: null, playing: null, serial: 0, speed: null };
 export const zero = () => (state.estimate || state.look).zero;
 // What times count from: an estimate knows power-off, a look only the release.
 export const origin = () => (state.estimate ? "power-off" : state.look.counted_from || "the release (± 2 ms)");
@@ -17,6 +16,9 @@ export const homeView = () => (state.estimate ? { from: -0.005, to: state.estima
 export const usesEstimate = () => state.estimate && state.view.from >= -0.05 && state.view.to <= state.estimate.traces.end + 0.01;
 export const impacts = () => (state.estimate && state.estimate.impacts.length ? state.estimate.impacts
   : state.look.impacts.map((one) => ({ ...one, time: one.time - zero() })));
+export const hits = () => impacts().filter((one) => one.impact !== false);
+// What an estimate says of a place that is drawn; an estimate has one for every bearing, a look for every sensor plane.
+export const estimated = (name) => state.estimate?.places.find((place) => place.name === name);
 
 // What happened when, times from power-off. Of the first look only what an estimate does not know better.
 export const events = () => {
@@ -34,25 +36,15 @@ export async function samples(verb, columns, from, to, points) {
   return found;
 }
 
-// What is said of instants, times from power-off.
-export const notes = () => state.job?.label?.notes || [];
-// Vertical lines of every figure over time: the mark of the second cursor, and notes.
-export const uprights = () => [...(state.mark === null ? [] : [{ time: state.mark, text: "mark", mark: true }]), ...notes()];
-
 export function say(text, level, ...more) {
   by("status").replaceChildren(make("ul", { class: "words", of: [sentence({ text, level })] }), ...more);
 }
-
+// What the server says against something, or that it does not answer; whether it is worth to ask again.
+export function refused(error) {
+  const answered = error instanceof server.Refusal;
+  say(answered ? error.message : "The server does not answer; is 'rotordrop serve' running? The page tries again.", "bad");
+  return !answered;
+}
 // What goes wrong in an action is said on the page.
 export const tried = (promise) => Promise.resolve(promise).catch((error) => say(error.message, "bad"));
-
-export function showLines(text, title = "As Python") {
-  by("linestitle").textContent = title;
-  by("code").textContent = text;
-  by("lines").showModal();
-}
-
-const WAYS = { csv: "Save as CSV", svg: "Save as SVG", png: "Save as PNG", python: "As Python", command: "As command" };
-// The one menu of a figure: what can be saved of it, and how it is made again.
-export const files = (title, ways) => menu("⋯", `${title}: save, as Python`, Object.entries(WAYS).filter(([way]) => ways[way]).map(([way, text]) => [text, () => Promise.resolve(ways[way]()).catch((error) => say(error.message, "bad")), { "aria-label": `${title}: ${text[0].toLowerCase()}${text.slice(1)}` }]), { class: "menu files" });
 export const fileName = (title) => `${state.job.name} ${title}${simulated() ? " simulated" : ""}`.replace(/[^\w.-]+/g, "_");

@@ -9,15 +9,6 @@ export function learn(units) { known = { ...known, ...units }; }
 export const factor = (kind) => (known[kind] ? known[kind][system][0] : 1);
 export const unit = (kind) => (known[kind] ? known[kind][system][1] : "");
 
-// A sentence written with SI units, in the units that are shown: numbers, ranges and errors before a unit, with as many digits.
-export function inWords(text) {
-  const number = "[−-]?\\d[\\d\u202f]*(?:\\.\\d+)?", kinds = Object.values(known).filter(({ SI, US }) => system === "US" && US[1] !== SI[1] && SI[1] !== "Hz");
-  return kinds.reduce((told, { SI: [size, name], US: [other, unit] }) => told.replace(new RegExp(`(${number})(?:( to | ± )(${number}))?[ \u00a0]${name.replace("/", "\\/")}(?![\\w/]| s| mm)`, "g"), (all, first, between, last) => {
-    const turned = (one) => { const plain = one.replace(/[\u202f]/g, "").replace("−", "-"); return written((Number(plain) * size) / other, Math.max(2, plain.replace(/[-.]|^0\.0*/g, "").length)); };
-    return `${turned(first)}${between ? between + turned(last) : ""} ${unit}`;
-  }), text);
-}
-
 // A minus sign that reads as one, and none before a zero.
 export function fixed(value, places) {
   const text = value.toFixed(places);
@@ -34,10 +25,6 @@ export function written(value, digits = 4) {
   return rest ? `${grouped}.${rest}` : grouped;
 }
 export const shown = (value, kind, digits) => (Number.isFinite(value) ? `${written(value / factor(kind), digits)} ${unit(kind)}` : "–");
-
-// A number and its interval as they go into a table of their own, in the unit that is shown.
-export const COLUMNS = "unit,value,lower,upper";
-export const columnsOf = (one) => [unit(one.kind), ...[one.value, one.lower, one.upper].map((value) => (Number.isFinite(value) ? Number((value / factor(one.kind)).toPrecision(7)) : ""))];
 
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);

@@ -1,22 +1,16 @@
 """One simulated drop with a known truth, recorded by good sensors."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rotordrop.evidence.evidence import Evidence, known, read_evidence
-from rotordrop.evidence.initial_state import InitialState
-from rotordrop.evidence.rest import Rest
-from rotordrop.evidence.sensing import Sensing, build_sensing
-from rotordrop.known import Known
-from rotordrop.machine import Machine, example_machine
-from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop import Known, build_drop_model, example_machine
+from rotordrop.evidence.evidence import known, read_evidence
+from rotordrop.evidence.sensing import build_sensing
 from rotordrop.rotor.reduction import Reduction
-from rotordrop_bench import SyntheticDrop, hidden_machine, synthesize_drop
+from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.sensor_chain import PERFECT
 
 SPEED = 2.0 * math.pi * 100.0
@@ -24,7 +18,7 @@ BASIS = Reduction(modes=6, attachment=True)
 
 
 @pytest.fixture(scope="session")
-def truth() -> Machine:
+def truth():
     """The machine of the records with its sensors known to be exact."""
     machine = example_machine("lp400")
     values: dict[str, Known | float] = {}
@@ -35,7 +29,7 @@ def truth() -> Machine:
 
 
 @pytest.fixture(scope="session")
-def drop(truth: Machine) -> SyntheticDrop:
+def drop(truth):
     """A drop from 100 Hz of that machine, 60 ms long, with 0.45 µm of noise and nothing else wrong."""
     hidden = hidden_machine(truth, 5, drawn=False, reduction=BASIS)
     chain = replace(PERFECT, noise=0.45e-6, speed_noise=0.1)
@@ -43,33 +37,33 @@ def drop(truth: Machine) -> SyntheticDrop:
 
 
 @pytest.fixture(scope="session")
-def model(truth: Machine) -> DropModel:
+def model(truth):
     """The drop model of that machine, in the basis the record was made with."""
     return build_drop_model(truth, BASIS)
 
 
 @pytest.fixture(scope="session")
-def sensing(model: DropModel, drop: SyntheticDrop) -> Sensing:
+def sensing(model, drop):
     return build_sensing(model, drop.record.sensors)
 
 
 @pytest.fixture(scope="session")
-def evidence(drop: SyntheticDrop, model: DropModel) -> Evidence:
+def evidence(drop, model):
     return read_evidence(model, drop.record, drop.tail)
 
 
 @pytest.fixture(scope="session")
-def rest(evidence: Evidence) -> Rest:
+def rest(evidence):
     return known(evidence.rest)
 
 
 @pytest.fixture(scope="session")
-def initial(evidence: Evidence) -> InitialState:
+def initial(evidence):
     return known(evidence.fall)
 
 
 @pytest.fixture(scope="session")
-def contacts(drop: SyntheticDrop) -> np.ndarray:
+def contacts(drop):
     """True times of the first contact at every bearing [s from power-off]."""
     log = drop.result.contacts
     return np.array([log.of_bearing(b).start[0] for b in range(2)])

@@ -1,0 +1,48 @@
+"""Records of drops as public functions are given them: of this machine, as many as tails and names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.machine import Machine
+from rotordrop.record.record import Record
+from rotordrop.require import each, require
+
+
+def require_drop(record: Any, machine: Any, name: str = "record", *, none: bool = False) -> None:
+    """Refuse what is no record, and one whose sensors the machine does not have, or not there."""
+    require(machine, "machine", Machine)
+    sensors = () if require(record, name, Record, none=none) is None else record.sensors
+    nodes = {sensor.name: sensor.node for sensor in machine.sensors}
+    for sensor in sensors:
+        if nodes.get(sensor.name) != sensor.node:
+            there = f"has it at {nodes[sensor.name]}" if sensor.name in nodes else f"has {', '.join(nodes)}"
+            raise RecordError(
+                f"{name} has sensor {sensor.name} at node {sensor.node}; the machine {there}. It was read "
+                "for another machine: give that one, or read it again with this one"
+            )
+
+
+def given_drops(
+    machine: Machine, records: Any, tails: Any, names: Any
+) -> tuple[tuple[Record, ...], tuple[Record | None, ...], tuple[str, ...]]:
+    """Records of drops of a machine, their tails and names, by default the stems of their files.
+
+    Raises
+    ------
+    UsageError
+        When they are none, or not as many.
+    """
+    require(machine, "machine", Machine)
+    drops = each(records, "records", Record)
+    if not drops:
+        raise UsageError("records is empty; expected one Record at least.")
+    rests = each(
+        [None] * len(drops) if tails is None else tails, "tails", Record, none=True, records=len(drops)
+    )
+    for record, rest in zip(drops, rests, strict=True):
+        require_drop(record, machine)
+        require_drop(rest, machine, "tail", none=True)
+    stems = [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(drops)]
+    return drops, rests, each(stems if names is None else names, "names", str, records=len(drops))

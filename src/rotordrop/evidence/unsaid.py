@@ -1,0 +1,100 @@
+"""What a recording does not say by itself, and the options that say it: a profile as far as it is guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+from rotordrop.elements.sensor import Sensor
+from rotordrop.errors import RecordError, UsageError
+from rotordrop.record.arrangement import fitting, pairs_of, planes_as_listed, sensors_of_planes
+from rotordrop.record.columns import find_speed, likeliest, options_for, worth_of
+from rotordrop.record.profile import Profile
+from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, called, listed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guess:
+    """A profile and what it still lacks."""
+
+    profile: Profile
+    """What was given and what could be guessed."""
+    found: tuple[str, ...]
+    """What was found, in words."""
+    missing: tuple[str, ...]
+    """What has to be said, each with the way to say it; empty when the profile is complete."""
+    likely: Mapping[str, str]
+    """What is likeliest where it has to be said: sensor -> channel, or plane -> channels without sensors."""
+
+
+def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:
+    """Complete a profile from a recording that was read with it, for sensors that need a channel each."""
+    mapped = given.channels | sensors_of_planes(recording, sensors, given)
+    for sensor in sensors:
+        hits = fitting(recording.channels, sensor.name)
+        if sensor.name not in mapped and len(hits) == 1:
+            mapped[sensor.name] = hits[0].label
+    unmapped = [sensor.name for sensor in sensors if sensor.name not in mapped]
+    missing: list[str] = []
+    if unmapped:
+        free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
+        options = options_for(recording, sensors, unmapped)
+        missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
+    pairs = [] if sensors else pairs_of(recording.channels)[0]
+    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
+    paired = [channel.label for _, pair, _ in pairs for channel in pair]
+    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
+    looked_at = (likely | mapped).values() if sensors else paired or [c.label for c in recording.channels]
+    used = [c for c in recording.channels if c.label in looked_at and c.label != given.speed.pulses]
+    profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
+    profile, speed = _with_speed(recording, profile, used if sensors else [])
+    if speed is None and sensors:  # a look needs none
+        missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
+    sensitive = recording.sensitivities or (sensors and all(one.sensitivity is not None for one in sensors))
+    missing += _units_missing([c for c in used if c.label != speed], profile, sensitive=bool(sensitive))
+    found = []
+    for channel in recording.channels:
+        span = f"{channel.values.min():.4g} to {channel.values.max():.4g} {channel.unit or '(no unit)'}"
+        rate = (len(channel.time) - 1) / max(float(channel.time[-1] - channel.time[0]), 1e-12)
+        named = called("channel", channel.label)
+        found.append(f"{named}: {len(channel.values)} samples at {rate:.6g} Hz, {span}")
+    found += [f"sensor {name}: {called('channel', label)}" for name, label in mapped.items()]
+    found += [f"{called('plane', name)}: {text}" for name, text in planes.items() if not sensors]
+    unsaid = "not known; an estimate needs --speed-channel, --pulses or --speed"
+    found.append(f"shaft speed: {speed or unsaid}")
+    if not sensors and not planes:
+        likely = planes_as_listed(recording)
+    return Guess(profile=profile, found=tuple(found), missing=tuple(missing), likely=likely)
+
+
+def _units_missing(used: Sequence[Channel], profile: Profile, *, sensitive: bool) -> list[str]:
+    """What has to be said of the units of displacements."""
+    bare, volts = [], False
+    for channel in used:
+        unit = profile.units.get(channel.label) or profile.unit or channel.unit
+        if channel.unit not in (*SPEED_UNITS, FULL_SCALE):
+            try:
+                volts |= worth_of(unit)[1] == "voltage"
+            except UsageError:
+                bare.append(f"{channel.label} ({unit!r} is none)" if unit else channel.label)
+    missing = [f"the unit of {listed(bare)}: --unit um"] if bare else []
+    if any(channel.unit == FULL_SCALE for channel in used):
+        missing.append('what full scale is: --full-scale "500 um"')
+    if volts and not (profile.sensitivity or sensitive):
+        missing.append('the sensitivity of the channels in volts: --sensitivity "8 mV/um"')
+    return missing
+
+
+def _with_speed(
+    recording: Recording, profile: Profile, taken: Sequence[Channel]
+) -> tuple[Profile, str | None]:
+    """The profile with the channel of the speed, and where the speed comes from; None where nothing tells."""
+    rules = profile.speed
+    if rules.constant is not None or rules.pulses is not None:
+        return profile, rules.constant or f"pulses of {rules.pulses}"
+    with suppress(RecordError):
+        if (channel := find_speed(recording, taken, profile, "the recording")) is not None:
+            speed = rules.model_copy(update={"channel": channel.label})
+            return profile.model_copy(update={"speed": speed}), channel.label
+    return profile, None

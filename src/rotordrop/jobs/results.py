@@ -1,0 +1,358 @@
+"""What a computation leaves: its report, its document, histories to draw, and their page as JSON.
+
+Sentences and numbers are those of the report; the page derives none of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotordrop.arrays import Array
+from rotordrop.evidence.impacts import AFTER_LAST
+from rotordrop.files import write_json
+from rotordrop.jobs.traces import write_traces
+from rotordrop.jobs.written import columns_json, quantity_json, shown_units
+from rotordrop.known import NINETY
+from rotordrop.report.content import SIMULATED_RECORD, Statement
+from rotordrop.report.origin import Origin, UsedFile, command_line, now
+from rotordrop.report.page import write_page
+from rotordrop.report.quantity import Quantity
+
+if TYPE_CHECKING:
+    from rotordrop.estimate.estimate import Estimate
+    from rotordrop.estimate.published import Drop
+    from rotordrop.evidence.look import Look
+    from rotordrop.jobs.workspace import Job
+    from rotordrop.machine import Machine
+    from rotordrop.record.record import Record
+    from rotordrop.report.style import Panel
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis
+
+Met = tuple[str, float, float, Quantity, Quantity]
+"""An impact: place, time [s], azimuth [rad], and two numbers of it."""
+
+
+def write_look(seen: Look, made: Path, machine: str) -> None:
+    """Write what a look shows: motion of every plane with the speed, its report and its page as JSON."""
+    from rotordrop.report.look_page import look_page
+
+    columns: dict[str, Array] = {}
+    labels: dict[str, str] = {}
+    for number, path in enumerate(seen.motion.paths):
+        curves = {"x": path.position[:, 0], "y": path.position[:, 1], "radius": path.radius}
+        columns |= {f"{name[0]}{number}": values for name, values in curves.items()}
+        labels |= {f"{name[0]}{number}": f"{path.name} {name} [m]" for name in curves}
+    if seen.record.speed is not None:
+        columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
+    write_traces(made, "motion", seen.motion.time, columns)
+    content = look_page(seen)
+    write_page(content, made / "report.html")
+    write_json(made / "document.json", seen.as_json(), sealed=True)
+    stop = next((one for one in seen.findings if one.severity == "stop"), None)
+    said = content.verdict[0] if stop is None else Statement(f"{stop.message}; {stop.remedy}", "bad")
+    doubt = {path.name: path.wall.distance_error for path in seen.motion.paths}
+    impacts = [
+        _met(hit, hit.depth, (hit.depth - doubt[hit.plane], hit.depth + doubt[hit.plane]), None)
+        for hit in seen.impacts
+    ]
+    impacts += [_met(one, one.distance, None, one.approach_interval_90) for one in seen.contacts]
+    row = {
+        "machine": machine,
+        "recorded": seen.record.event_date,
+        "simulated": seen.record.is_simulated,
+        "speed": quantity_json(Quantity(value=math.nan if seen.speed is None else seen.speed, kind="speed")),
+    }
+    write_json(
+        made / "page.json",
+        {
+            **_common("motion", tuple(columns), seen.motion.time, said, row),
+            "simulated": content.simulated,
+            "labels": labels,
+            "counted_from": content.counted_from,
+            "zero": seen.drops[0].release if seen.drops else float(seen.motion.time[0]),
+            "places": [
+                {
+                    "name": path.name,
+                    "gap": list(path.wall.interval_90) if math.isfinite(path.gap) else None,
+                    "gap_is": "90 %",
+                    "measured": [f"x{b}", f"y{b}"],
+                    "radius": f"r{b}",
+                }
+                for b, path in enumerate(seen.motion.paths)
+            ],
+            "timeline": [{"time": time, "words": words} for time, words in seen.timeline()],
+            **_impacts(
+                sorted(impacts, key=lambda one: one[1]),
+                "beyond the air gap" if seen.drops else "from the usual place",
+                "radial velocity before",
+            ),
+        },
+    )
+
+
+def write_estimate(
+    estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any], since: Drop | None = None
+) -> None:
+    """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
+    from rotordrop.estimate.document import estimate_document
+    from rotordrop.report.drop_sections import force_panel, stress_panel
+    from rotordrop.report.estimate_page import estimate_page
+    from rotordrop.report.machine_content import weight_shares
+
+    content = estimate_page(estimate, _origin(job, options, "estimate"), since)
+    names, grid, columns = histories_of(estimate)
+    loads = weight_shares(estimate.machine)
+    places = []
+    for bearing, own in zip(estimate.bearings, names, strict=True):
+        gap, peak = bearing.air_gap, bearing.peak_force
+        ends = None if gap is None else [gap.lower, gap.upper]
+        known = bearing.values.get("air_gap_m")
+        level = "limits" if ends is None or known is None or list(known.interval_90 or ()) != ends else "90 %"
+        shown = {"time": peak.time, "value": peak.value}
+        places.append({"name": bearing.name, "gap": ends, "gap_is": level, **own, "peak_force": shown})
+    contacts = sorted(
+        ((b.name, *one) for b in estimate.bearings for one in zip(b.impacts, b.after_flight, strict=True)),
+        key=lambda row: -row[1].peak_force.value,
+    )
+    met = [
+        (
+            name,
+            one.peak_time,
+            one.azimuth,
+            Quantity.of(one.peak_force, "force"),
+            Quantity.of(one.impulse, "impulse", digits=3),
+        )
+        for name, one, _ in contacts
+    ]
+    listed = _impacts(met, "peak force", "impulse")
+    for row, (*_, after) in zip(listed["impacts"], contacts, strict=True):
+        row["impact"] = after
+    write_traces(made, "drop", grid, columns)
+    write_page(content, made / "report.html")
+    write_json(made / "document.json", estimate_document(estimate), sealed=True)
+    row = {
+        "machine": estimate.machine.name,
+        "recorded": estimate.record.event_date,
+        "simulated": estimate.simulated_record,
+        "speed": quantity_json(Quantity(value=estimate.speed, kind="speed")),
+        "force": _largest(estimate, "peak_force", "force"),
+        "stress": _largest(estimate, "peak_stress", "pressure"),
+    }
+    write_json(
+        made / "page.json",
+        {
+            **_common("drop", tuple(columns), grid, content.verdict[0], row),
+            "simulated": content.simulated,
+            "headline": [
+                {
+                    "name": bearing.name,
+                    "label": card.figures[0].label.lower(),
+                    "number": quantity_json(card.figures[0].value),
+                }
+                for bearing, card in zip(estimate.bearings, content.cards, strict=True)
+            ],
+            "labels": {column: _label(estimate, column) for column in columns},
+            "timeline": _events(estimate),
+            "zero": estimate.drop_instant.value,
+            "speed": estimate.speed,
+            "places": places,
+            "panels": {
+                "force": [_panel(force_panel(bearing, loads)) for bearing in estimate.bearings],
+                "stress": [_panel(stress_panel(bearing)) for bearing in estimate.bearings],
+            },
+            **listed,
+        },
+    )
+
+
+def write_waterfall(
+    found: CoastDownAnalysis,
+    machine: Machine,
+    record: Record,
+    job: Job,
+    made: Path,
+    options: Mapping[str, Any],
+) -> None:
+    """Write the frequencies of a coast-down: their report and their document."""
+    from rotordrop.report.waterfall_page import waterfall_page
+
+    content = waterfall_page(
+        found,
+        title=f"Frequencies of a coast-down of {machine.name}",
+        facts=(
+            ("machine", machine.name),
+            ("record", f"{record.path.name if record.path else record.name}"),
+            ("SHA-256", record.sha256),
+            ("centre of the bearings", found.signal.centre),
+            *_origin(job, options, "waterfall").facts(record.sha256),
+        ),
+        simulated=SIMULATED_RECORD if record.is_simulated else "",
+    )
+    write_page(content, made / "report.html")
+    write_json(made / "document.json", found.as_json(), sealed=True)
+
+
+def write_check(machine: Machine, made: Path) -> None:
+    """Write what a machine amounts to: its report and its document."""
+    from rotordrop.report.machine_content import machine_content, machine_json
+    from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+
+    summary = summarise_machine(machine)
+    warnings = machine_warnings(machine, summary)
+    write_page(machine_content(machine, summary, warnings, drawn=True), made / "report.html")
+    write_json(made / "document.json", machine_json(machine, summary, warnings), sealed=True)
+
+
+def _met(
+    one: Any, beyond: float, ends: tuple[float, float] | None, speeds: tuple[float, float] | None
+) -> Met:
+    depth = Quantity(value=beyond, kind="length", interval_90=ends, digits=3)
+    approach = Quantity(value=one.approach, kind="velocity", interval_90=speeds, digits=3)
+    return one.plane, one.time, one.azimuth, depth, approach
+
+
+def _common(
+    name: str, columns: tuple[str, ...], time: Array, said: Statement, row: Mapping[str, Any]
+) -> dict[str, Any]:
+    statement = {"text": said.sentence, "level": said.level}
+    return {
+        "traces": {"name": name, "columns": list(columns), "start": float(time[0]), "end": float(time[-1])},
+        "units": shown_units(),
+        "statement": statement,
+        "row": {**row, "statement": statement},
+    }
+
+
+def _largest(estimate: Estimate, peak: str, kind: str) -> dict[str, Any] | None:
+    """The largest peak over the bearings, by the upper end of its interval; without one it is no evidence."""
+    found = [(bearing.name, getattr(bearing, peak)) for bearing in estimate.bearings]
+    known = [(name, one) for name, one in found if one.interval_90 is not None]
+    if not known:
+        return None
+    name, one = max(known, key=lambda entry: entry[1].interval_90[1])
+    return {"bearing": name, **quantity_json(Quantity.of(one.known, kind))}
+
+
+def _label(estimate: Estimate, column: str) -> str:
+    """A column as people name it, ``"force lower 0"`` by the bearing it is of and with its unit."""
+    words, _, number = column.rpartition(" ")
+    unit = {"force": "N", "stress": "Pa"}.get(words.partition(" ")[0], "m")
+    return f"{estimate.bearings[int(number)].name} {words} [{unit}]"
+
+
+def _events(estimate: Estimate) -> list[dict[str, Any]]:
+    """What happened when, times [s] from power-off: the estimate knows better than the first look.
+
+    A first touch has the interval of power-off and its own, by its timing or by the steps of the force. What
+    has no interval is left out.
+    """
+    events = [(0.0, "power-off")]
+    timed = [contact.timing_error for contact in estimate.replay.contacts] if estimate.replay else []
+    for number, bearing in enumerate(estimate.bearings):
+        if bearing.impacts:
+            first = min(impact.start for impact in bearing.impacts)
+            step = float(np.median(np.diff(bearing.force.time)))
+            own = math.hypot(timed[number] if timed else 0.0, step / math.sqrt(12.0))
+            low, high = estimate.drop_instant.interval_90
+            half = math.hypot(0.5 * (high - low), NINETY * own)
+            events.append((first, f"first touch at {bearing.name} (± {1e3 * half:.2g} ms)"))
+        if bearing.contact_from is not None:
+            events.append((bearing.contact_from, f"last impact at {bearing.name}, {AFTER_LAST}"))
+        peak = bearing.peak_force
+        if peak.time_interval_90 is not None:
+            early, late = (_milliseconds(abs(end - peak.time)) for end in peak.time_interval_90)
+            events.append((peak.time, f"largest force at {bearing.name} (−{early}, +{late} ms)"))
+    return [{"time": time, "words": words} for time, words in sorted(events) if math.isfinite(time)]
+
+
+def _milliseconds(time: float) -> str:
+    return f"{1e3 * time:.2g}" if time < 0.0995 else f"{1e3 * time:.0f}"
+
+
+def command_of(job: Job, options: Mapping[str, Any], verb: str) -> str:
+    """The command that does the same with the files of a job."""
+    told = job.read()["files"]
+    words = [verb, *(told[role]["name"] for role in ("machine", "record") if role in told)]
+    words += ["--tail", told["tail"]["name"]] if "tail" in told and verb == "estimate" else []
+    words += ["--profile", told["profile"]["name"]] if "profile" in told else []
+    if verb == "estimate":
+        words += ["--method", "replay"] if options.get("method") == "replay" else []
+        words += ["--quick"] if options.get("quick") else []
+    return command_line(words)
+
+
+def _origin(job: Job, options: Mapping[str, Any], verb: str) -> Origin:
+    from rotordrop.simulate.fingerprint import fingerprint
+
+    named = {"machine": "machine file"}
+    return Origin(
+        command=command_of(job, options, verb),
+        operator=str(options.get("operator", "")),
+        files=tuple(
+            UsedFile(role=named.get(role, role.split(" ")[0]), name=file["name"], sha256=file["sha256"])
+            for role, file in job.read()["files"].items()
+        ),
+        made=now(),
+        fingerprint=fingerprint(),
+    )
+
+
+def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
+    """Every history of an estimate on the clock of its force, and which column of a bearing is what.
+
+    Where a history has a clock of its own it is read off between its samples by straight lines.
+    """
+    grid = np.asarray(estimate.bearings[0].force.time)
+    columns: dict[str, Array] = {}
+    names: list[dict[str, Any]] = []
+    for b, bearing in enumerate(estimate.bearings):
+        told: dict[str, Any] = {"labels": {}}
+        for motion in bearing.motions:
+            role = "measured" if motion.role == "measured" else "estimated"
+            if role in told:
+                continue
+            told[role] = [f"{axis} {role} {b}" for axis in "xy"]
+            told["labels"][role] = motion.label
+            for column, history in zip(told[role], (motion.horizontal, motion.vertical), strict=True):
+                columns[column] = _on(grid, history.time, history.values)
+        for kind, history, band in (
+            ("force", bearing.force, bearing.force_band),
+            ("stress", bearing.stress, bearing.stress_band),
+        ):
+            told[kind] = [f"{kind} {b}"]
+            columns[f"{kind} {b}"] = _on(grid, history.time, history.values)
+            if band is not None:
+                told[kind] += [f"{kind} lower {b}", f"{kind} upper {b}"]
+                columns[f"{kind} lower {b}"] = _on(grid, band.time, band.lower)
+                columns[f"{kind} upper {b}"] = _on(grid, band.time, band.upper)
+        names.append(told)
+    return names, grid, columns
+
+
+def _on(grid: Array, time: Array, values: Array) -> Array:
+    if len(time) == len(grid) and np.array_equal(time, grid):
+        return values
+    return np.asarray(np.interp(grid, time, values, left=math.nan, right=math.nan))
+
+
+def _panel(panel: Panel) -> dict[str, Any]:
+    return {
+        "origin": panel.histories[0].label,
+        "band": None if panel.band is None else panel.band.label,
+        "levels": [{"name": name, "value": value} for name, value in panel.levels],
+    }
+
+
+def _impacts(found: Sequence[Met], *columns: str) -> dict[str, Any]:
+    """Impacts with their numbers as a table has them."""
+    heads, rows = columns_json(columns, [one[3:] for one in found])
+    impacts = [
+        {"place": place, "time": time, "azimuth": azimuth, "numbers": numbers}
+        for (place, time, azimuth, *_), numbers in zip(found, rows, strict=True)
+    ]
+    return {"impacts": impacts, "impact_columns": heads}

@@ -1,0 +1,65 @@
+"""How far a long computation is: told to a function, or shown by a bar in a terminal or a notebook."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Literal
+
+Progress = Callable[[str, float], None]
+"""Called with the name of the present stage and the fraction done (0 to 1)."""
+
+Shown = Progress | Literal[False] | None
+"""What a caller may ask for: to be told; nothing; by default a bar where somebody sees it."""
+
+
+def is_shown() -> bool:
+    """Whether somebody sees a bar: standard error is a terminal, or a notebook has it."""
+    return (sys.stderr is not None and sys.stderr.isatty()) or _in_notebook()
+
+
+def _in_notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
+@contextmanager
+def shown(progress: Shown, title: str) -> Iterator[Progress]:
+    """Give the function that a long computation tells its progress."""
+    if callable(progress):
+        yield progress
+    elif progress is None and is_shown():
+        with _bar(title) as told:
+            yield told
+    else:
+        yield lambda stage, fraction: None
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[Progress]:
+    """Draw a bar with the time left on standard error while a long computation runs."""
+    from rich.console import Console
+    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeRemainingColumn(),
+    )
+    # a notebook draws what a terminal does; widgets, which rich would take there, need another package
+    console = Console(stderr=True, force_terminal=True, force_jupyter=False)
+    log, handler = logging.getLogger("rotordrop"), logging.Handler(logging.INFO)
+    with Bars(*columns, console=console, transient=sys.stderr.isatty()) as bars:
+        task = bars.add_task(title, total=1.0)
+        # such as that kernels are compiled, which from Python nobody else says
+        handler.emit = lambda record: bars.update(task, description=record.getMessage())  # type: ignore[method-assign]
+        log.addHandler(handler)
+        log.setLevel(logging.INFO)
+        try:
+            yield lambda stage, fraction: bars.update(task, completed=fraction, description=stage or title)
+        finally:
+            log.removeHandler(handler)

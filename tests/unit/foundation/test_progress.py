@@ -1,0 +1,57 @@
+"""Long computations called from Python show a bar in a terminal and in a notebook, and nothing elsewhere."""
+
+import io
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from rotordrop import CoastDownCase, example_machine, simulate_coast_down
+from rotordrop.progress import shown
+
+
+@pytest.fixture
+def error(monkeypatch):
+    """Standard error, a terminal or not."""
+
+    def made(*, terminal):
+        stream = io.StringIO()
+        stream.isatty = lambda: terminal
+        monkeypatch.setattr(sys, "stderr", stream)
+        monkeypatch.setenv("TERM", "xterm")
+        return stream
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("terminal", "progress", "drawn"), [(True, None, True), (True, False, False), (False, None, False)]
+)
+def test_a_terminal_gets_a_bar_unless_it_is_not_wanted(error, terminal, progress, drawn):
+    stream = error(terminal=terminal)
+    with shown(progress, "estimating") as tell:
+        tell("step 1", 0.25)
+    assert ("step 1" in stream.getvalue() and "25 %" in stream.getvalue()) == drawn
+    assert drawn or stream.getvalue() == ""
+
+
+def test_notebooks_get_a_bar_and_who_gives_a_function_is_told(error, monkeypatch):
+    shell = SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    stream = error(terminal=False)
+    with shown(None, "estimating") as tell:
+        tell("step 1", 0.25)
+    assert "step 1" in stream.getvalue()
+    stream, told = error(terminal=True), []
+    with shown(lambda *words: told.append(words), "estimating") as tell:
+        tell("step 1", 0.25)
+    assert told == [("step 1", 0.25)]
+    assert stream.getvalue() == ""
+
+
+@pytest.mark.parametrize(("progress", "drawn"), [(None, True), (False, False)])
+def test_a_coast_down_shows_how_far_it_is(error, progress, drawn):
+    stream = error(terminal=True)
+    case = CoastDownCase(speed=377.0, duration=0.01)
+    simulate_coast_down(example_machine("paper"), case, progress=progress)
+    assert ("0 s, 59.86 Hz" in stream.getvalue()) == drawn

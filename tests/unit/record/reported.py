@@ -1,0 +1,518 @@
+"""Forms of files and faults of recorders that users of other programs reported, made from one motion."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import h5py
+import numpy as np
+from scipy.io import savemat
+from tests.unit.record.every_format import universal
+from tests.unit.record.exports import Export
+
+COUNT, STEP, START = 1200, 1e-4, -0.05
+TIME = START + STEP * np.arange(COUNT)
+NAMES = ("NDE X", "NDE Y", "DE X", "DE Y")
+COUNTED = ("CH1", "CH2", "CH3", "CH4")
+FORMS = np.array([-0.7, 0.9, -0.8, 0.75])
+
+
+def motion(time: np.ndarray) -> np.ndarray:
+    """Displacements [µm]: an orbit of 8 µm, a fall of 0.2 mm, a rest."""
+    fell = np.clip(time, 0.0, 7e-3)[:, None] ** 2 * 4.9e6
+    return fell * FORMS + 8.0 * np.sin(377.0 * time[:, None] + np.arange(4))
+
+
+MICRONS = np.round(motion(TIME) + np.random.default_rng(7).normal(0.0, 0.3, (COUNT, 4)), 2)
+DATE = 1_773_480_413
+
+
+@dataclass(frozen=True)
+class Reported:
+    """One file and what is read of it, or asked."""
+
+    kind: str
+    file: str
+    content: bytes | Callable[[Path], object]
+    names: tuple[str, ...] = NAMES
+    values: np.ndarray | None = None
+    """Readings [µm], those of `MICRONS` at the times of the record where they are left out."""
+    kept: object = ()
+    """Samples of the motion that the record holds, all where it is left out."""
+    start: float | None = None
+    """Time of the first one [s]; that of the motion where it is left out."""
+    off: float = 0.011
+    """Most that a reading may be off [µm]."""
+    late: float = 2e-8
+    """Most that a time may be off [s]."""
+    missing: int = 0
+    """Readings that nobody made."""
+    said: str = ""
+    """What is noted or warned of, as a pattern."""
+    question: str = ""
+    """What is asked, as a pattern."""
+
+    written = Export.written
+
+
+def table(
+    names=NAMES,
+    unit="um",
+    values=MICRONS,
+    *,
+    times=tuple(f"{t:.4f}" for t in TIME),
+    time="Time [s]",
+    separator=",",
+    digits=2,
+    change=None,
+) -> bytes:
+    """A table with a row of names, whose fields `change` may change: row, column -> field."""
+    head = [time, *(f"{name} [{unit}]" if unit else name for name in names)]
+    rows = [[t, *(f"{v:.{digits}f}" for v in row)] for t, row in zip(times, values, strict=True)]
+    for (row, column), field in (change or {}).items():
+        rows[row][column] = field
+    return ("\n".join(separator.join(row) for row in [head, *rows]) + "\n").encode()
+
+
+def own_times(apart: float) -> bytes:
+    """A column of times before each channel, read `apart` [s] after the one before."""
+    clocks = [TIME + k * apart for k in range(4)]
+    values = np.column_stack([motion(clock)[:, k] for k, clock in enumerate(clocks)])
+    head = ",".join(f"{name}_time [s],{name} [um]" for name in NAMES)
+    rows = [",".join(f"{clocks[k][i]:.7f},{values[i, k]:.4f}" for k in range(4)) for i in range(COUNT)]
+    return "\n".join([head, *rows, ""]).encode()
+
+
+def beside(first: str, second: str) -> bytes:
+    """Two captures side by side, the second 5 ms later, each behind its own times."""
+    late = motion(TIME + 5e-3)[:, 2:]
+    head = f"{first},NDE X [um],NDE Y [um],{second},DE X [um],DE Y [um]"
+    rows = zip(TIME, motion(TIME)[:, :2], late, strict=True)
+    lines = [f"{t:.4f},{a:.4f},{b:.4f},{t + 5e-3:.4f},{c:.4f},{d:.4f}" for t, (a, b), (c, d) in rows]
+    return "\n".join([head, *lines, ""]).encode()
+
+
+def below() -> bytes:
+    """A table for each point, one below the other."""
+    heads = (f"Point Name,{n},\nX (ms),Y (um),\n" for n in NAMES)
+    rows = ("".join(f"{1e3 * t:.4f},{v},\n" for t, v in zip(TIME, w, strict=True)) for w in MICRONS.T)
+    return "\n".join(map("".join, zip(heads, rows, strict=True))).encode()
+
+
+def scope(path: Path) -> None:
+    """Muxed signals of Simulink: structure with time."""
+    signals = [{"values": MICRONS[:, k : k + 2], "label": f"{n} [um]"} for n, k in (("NDE", 0), ("DE", 2))]
+    savemat(path, {"S": {"time": TIME, "signals": np.array(signals, dtype=object)}})
+
+
+def dspace(path: Path) -> None:
+    """X and Y of ControlDesk, each with its name and samples."""
+    named = zip(NAMES, MICRONS.T, strict=True)
+    found = [{"Name": f"Model/Sensors/{n}", "Unit": "um", "Data": v} for n, v in named]
+    savemat(path, {"d": {"X": {"Name": "Time", "Data": TIME}, "Y": np.array(found, dtype=object)}})
+
+
+def hdf5(**attributes) -> Callable[[Path], None]:
+    """Whole numbers with attributes, and a clock beside them."""
+
+    def write(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file.create_dataset("time", data=TIME).attrs["units"] = "s"
+            factor = next((v for k, v in attributes.items() if k in ("scale_factor", "gain")), 1.0)
+            for name, values in zip(NAMES, MICRONS.T, strict=True):
+                item = file.create_dataset(name, data=np.rint(values / factor).astype(np.int16))
+                item.attrs.update({"units": "um", **attributes})
+
+    return write
+
+
+def grouped(path: Path, form: str) -> None:
+    """A group for each plane or channel, by the form of its names."""
+    with h5py.File(path, "w") as file:
+        for name, values in zip(NAMES, MICRONS.T, strict=True):
+            item = file.create_dataset(form.format(*name.split()), data=values)
+            item.attrs.update({"unit": "um", "dt": STEP, "t0": START})
+
+
+def matrix(path: Path, unit: object = "um") -> None:
+    with h5py.File(path, "w") as file:
+        item = file.create_dataset("data", data=MICRONS.T)
+        item.attrs.update({"channel_names": [n.encode() for n in NAMES], "fs": 1.0 / STEP, "unit": unit})
+
+
+def compound(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        rows = np.rec.fromarrays([TIME, *MICRONS.T], names=["Time", *NAMES])
+        file.create_dataset("table", data=np.asarray(rows)).attrs["unit"] = "um"
+
+
+def workbook(*rows: list[object]) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        import openpyxl
+
+        book = openpyxl.Workbook()
+        for row in rows:
+            book.active.append(row)
+        book.create_sheet("DE").append([1.0])
+        book.save(path)
+
+    return write
+
+
+def universal_in_mm(time: str = "s", per_second: float = 1.0) -> bytes:
+    """Lengths in mm by dataset 164, without a label."""
+    factors = "".join(f"{v:25.17E}" for v in (1e3, 1.0, 1.0))
+    units = f"{-1:6d}\n{164:6d}\n{5:10d}mm (milli-newton)   {2:10d}\n{factors}\n{273.15:25.17E}\n{-1:6d}\n"
+    channels, clock = dict(zip(NAMES, 1e-3 * MICRONS.T, strict=True)), (per_second * START, per_second * STEP)
+    return units.encode() + universal(channels, *clock, unit="NONE", time=time, padded=False)
+
+
+def twincat() -> bytes:
+    def line(key: str, *values: str) -> str:
+        return "\t".join(part for value in values for part in (key, value))
+
+    head = ["Name\tScope Project_AutoSave\t", "File\tdrop.csv\t", "", line("Name", *NAMES)]
+    head += [line("SymbolComment", *[""] * 4), line("Data-Type", *["REAL64"] * 4)]
+    head += [line("SampleTime[ms]", *["0.1"] * 4), line("SymbolName", *(f"GVL.{n}" for n in NAMES))]
+    head += [line("Unit", *["µm"] * 4), ""]
+    rows = ["\t".join(f"{i}\t{v:.2f}" for v in row) for i, row in enumerate(MICRONS)]
+    return ("\r\n".join([*head, *rows, "EOF"]) + "\r\n").encode()
+
+
+def hioki() -> bytes:
+    head = ['"File name","WAVE0001.CSV","V1.00"', '"Start trigger time","\'10-06-30 15:53:03"']
+    head += ['"CH","CH1","CH2","CH3","CH4","LA1","LA2",', '"Mode","DC","DC","DC","DC","LOGIC","LOGIC",']
+    head += ['"Scaling","On","On","On","On","-","-",']
+    head += ['"Time","CH1[um]","CH2[um]","CH3[um]","CH4[um]","LA1","LA2",']
+    rows = [
+        f"{t:.9E},{','.join(f'{v:.5E}' for v in row)},{int(t < 0)},1,"
+        for t, row in zip(TIME, MICRONS, strict=True)
+    ]
+    return "\n".join([*head, *rows, ""]).encode()
+
+
+def two_rates(path: Path) -> None:
+    """COMTRADE, 10 kHz, then 5 kHz from sample 801 on."""
+    lines = ["STATION,1,1999", "4,4A,0D"]
+    lines += [f"{k},{name},,,um,0.01,0,0,-32767,32767,1,1,P" for k, name in enumerate(NAMES, start=1)]
+    lines += ["50", "2", "10000,800", "5000,1000", "14/03/2026,09:26:53.000000", "14/03/2026,09:26:53.050000"]
+    path.write_text("\n".join([*lines, "ASCII", "1", ""]))
+    read = [*range(801), *range(802, COUNT, 2)]
+    rows = [
+        f"{k},{round(1e6 * (TIME[i] - START))},{','.join(f'{round(100 * v)}' for v in MICRONS[i])}"
+        for k, i in enumerate(read, start=1)
+    ]
+    path.with_suffix(".dat").write_text("\n".join(rows[:1000]) + "\n")
+
+
+def few_digits() -> bytes:
+    stamps = [f"{t:.1e}" for t in np.round(TIME, 9) + 0.0]
+    rows = [f"{t},{','.join(f'{v:.2f}' for v in row)}" for t, row in zip(stamps, MICRONS, strict=True)]
+    return "\n".join(["X,CH1,CH2,CH3,CH4", "Second,um,um,um,um", *rows, ""]).encode()
+
+
+def fortran() -> bytes:
+    rows = [
+        "  ".join(f"{v:.6E}".replace("E", "D") for v in (t, *(1e-6 * row)))
+        for t, row in zip(TIME, MICRONS, strict=True)
+    ]
+    return "\n".join(["# TIME NDE_X NDE_Y DE_X DE_Y", "# s m m m m", *rows, ""]).encode()
+
+
+def melted() -> bytes:
+    rows = [f"{TIME[i]:.4f},{n},{MICRONS[i, k]}" for i in range(COUNT) for k, n in enumerate(NAMES)]
+    return "\n".join(["time,variable,value", *rows, ""]).encode()
+
+
+def of_matlab(path: Path) -> None:
+    """A table, as scipy sees it: the parts of an object of MATLAB."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        item = file.create_dataset("drop", data=np.arange(6, dtype=np.uint32)[None])
+        item.attrs.update({"MATLAB_class": np.bytes_("table"), "MATLAB_object_decode": np.int32(3)})
+    content = bytearray(path.read_bytes())
+    content[:512] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508, b" ") + b"\x00\x02IM"
+    path.write_bytes(content)
+
+
+AFTER = slice(300, None)
+NUMBERS, COUNTS = [str(i) for i in range(COUNT)], {"values": 50 * MICRONS - 50, "digits": 0}
+ROWS = [[float(t), *map(float, row)] for t, row in zip(TIME, MICRONS, strict=True)]
+
+FROM_TRIGGER = [str(i - 500) for i in range(COUNT)]
+LINES = table().splitlines(keepends=True)
+SLOW = [row[:-1] + (b",60\n" if k < 12 else b",\n") for k, row in enumerate(LINES[1:])]
+REPORTED = [
+    *(
+        Reported(
+            f"{code} for no value",
+            "a.csv",
+            table(change={(100, 2): code}),
+            missing=1,
+            said=r"1 of 1200 samples of NDE Y are missing, the first at -0\.04 s",
+            off=1.0,
+        )
+        for code in ("", *"9.91E+37 9.9E34 1E+30 1E+12 -9999 32767 -- n/a INVALID ****".split())
+    ),
+    Reported(
+        "two missing readings",
+        file="a.csv",
+        missing=2,
+        off=1.5,
+        content=table(change={(100, 2): "", (101, 2): "NaN"}),
+        said="2 of 1200 samples of NDE Y are missing",
+    ),
+    Reported(
+        "a long gap while it levitates",
+        file="a.csv",
+        kept=AFTER,
+        content=table(change={(k, 1): "" for k in range(200, 300)}),
+        said=r"100 samples are missing from -0\.03 s on; read from -0\.02 s to 0\.0699 s",
+    ),
+    Reported(
+        "lost rows",
+        file="a.csv",
+        missing=12,
+        off=2.5,
+        content=b"\n".join([*table().split(b"\n")[:100], *table().split(b"\n")[103:]]),
+        said="3 of 1200 samples of NDE X, NDE Y, DE X, DE Y are missing",
+    ),
+    Reported(
+        "a clock set back",
+        file="a.csv",
+        said=r"the clock steps back by 1\.00 s after -0\.0401 s",
+        content=table(times=[f"{t - (i > 99):.4f}" for i, t in enumerate(TIME)]),
+    ),
+    Reported(
+        "one wrong stamp",
+        file="a.csv",
+        said=r"the clock steps back by 9\.90 ms after -0\.0401 s",
+        content=table(change={(100, 0): f"{TIME[100] - 0.01:.4f}"}),
+    ),
+    Reported(
+        "a clock set forward",
+        file="a.csv",
+        kept=AFTER,
+        start=TIME[300] + 1.0,
+        content=table(times=[f"{t + (i >= 300):.4f}" for i, t in enumerate(TIME)]),
+        said="10000 samples are missing .*; read from",
+    ),
+    *(
+        Reported(
+            f"a time for each channel, {1e6 * apart:g} µs apart",
+            "a.csv",
+            own_times(apart),
+            values=motion(TIME[int(np.ceil(3 * apart / STEP - 1e-6)) :]),
+            off=off,
+            start=START + STEP * np.ceil(3 * apart / STEP - 1e-6),
+            said="begin up to .* apart; each is read by",
+        )
+        for apart, off in ((5e-3, 1e-3), (3e-4, 1e-3), (12.5e-6, 1.0))
+    ),
+    *(
+        Reported(f"packed by {attributes}", "a.h5", hdf5(**attributes), off=off)
+        for attributes, off in (
+            ({"scale_factor": 0.5, "add_offset": 0.0}, 0.26),
+            ({"scale_factor": 2.0}, 1.01),
+            ({"gain": 0.02}, 0.011),
+        )
+    ),
+    Reported("whole numbers", "a.h5", hdf5(), off=0.51, said="NDE X holds whole numbers, taken as um"),
+    Reported(
+        "two factors",
+        "a.h5",
+        hdf5(scale_factor=0.5, gain=0.1),
+        question=r"has several factors, scale_factor = 0\.5, gain = 0\.1; keep the one",
+    ),
+    *(
+        Reported(f"names that count, {names[0]}", "a.csv", table(names), names=names)
+        for names in (
+            tuple(f"{word}{k}" for k in range(first, first + 4))
+            for word, first in (("Sensor", 1), ("Displacement ", 1), ("Ax", 1), ("Dev1/ai", 0), ("CH", 1))
+        )
+    ),
+    Reported(
+        "names that count, an axial one behind",
+        file="a.csv",
+        names=COUNTED,
+        said="not looked at: CH5",
+        content=table((*COUNTED, "CH5"), values=np.column_stack([MICRONS, MICRONS[:, 0]])),
+    ),
+    Reported(
+        "one name for all", "a.csv", table(("X",) * 4, ""), question=r"channel 'X 1' has no unit; name it"
+    ),
+    Reported(
+        "names counted by pandas",
+        file="a.csv",
+        names=("Weg 1", "Weg 2", "Weg 3", "Weg 4"),
+        content=table(("Weg [um]", "Weg [um].1", "Weg [um].2", "Weg [um].3"), ""),
+    ),
+    *(
+        Reported(f"in {unit}", "a.csv", table(unit=unit))
+        for unit in ("мкм", "Âµm", "?m", "\ufffdm", "µm", "micron")
+    ),
+    Reported("in thou", "a.csv", table(unit="thou", values=MICRONS / 25.4, digits=4), off=0.01),
+    *(
+        Reported(
+            f"in {unit}",
+            "a.csv",
+            table(unit=unit),
+            question=r"is in .*, which is neither a length nor a voltage; name its unit in .*: \[units\]",
+        )
+        for unit in ("um pk-pk", "%", "p.u.", "counts")
+    ),
+    Reported(
+        "a sensitivity as the unit",
+        "a.csv",
+        table(unit="V (200 mV/mil)", values=MICRONS * 0.2 / 25.4, digits=6),
+    ),
+    Reported("times of two digits", "a.csv", few_digits(), names=COUNTED, late=1e-5, said="rounded"),
+    Reported("exponents D", "a.txt", fortran(), names=("NDE_X", "NDE_Y", "DE_X", "DE_Y")),
+    Reported("logic channels", "a.csv", hioki(), names=COUNTED),
+    Reported("a table of HDF5", "a.h5", compound),
+    Reported("a matrix of HDF5", "a.h5", matrix, start=0.0),
+    Reported("a unit for each column", "a.h5", partial(matrix, unit=[b"um"] * 4), start=0.0),
+    Reported("muxed signals", "a.mat", scope, ("NDE 1", "NDE 2", "DE 1", "DE 2")),
+    Reported("X and Y of dSPACE", "a.mat", dspace, tuple(f"d.Y({k}).Data" for k in range(1, 5))),
+    *(
+        Reported(
+            f"clocks {first!r} and {second!r}",
+            "a.csv",
+            beside(first, second),
+            values=motion(TIME[50:]),
+            start=START + 5e-3,
+            said="begin up to 5.00 ms apart",
+        )
+        for first, second in (("A [s]", "B [s]"), ("Time 1", "Time 2"), ("Abszisse [s]",) * 2, ("",) * 2)
+    ),
+    Reported("signs apart", "a.csv", table().replace(b",-", b",-   ")),
+    Reported("a head of %", "a.txt", fortran().replace(b"#", b"%"), ("NDE_X", "NDE_Y", "DE_X", "DE_Y")),
+    Reported("pages", "a.csv", b"".join([*LINES[:601], b"\nPage 2\n", LINES[0], *LINES[601:]])),
+    Reported("points below each other", "a.csv", below()),
+    Reported(
+        "a slow column without its times",
+        "a.csv",
+        b"".join([LINES[0][:-1], b",Speed [Hz]\n", *SLOW]),
+        said="left out, 'Speed' ends in row 12 of 1200",
+    ),
+    Reported("units of dataset 164", "a.uff", universal_in_mm()),
+    Reported("abscissa in ms", "a.uff", universal_in_mm("ms", 1e3)),
+    *(
+        Reported(form, "a.h5", partial(grouped, form=form), names=[form.format(*n.split()) for n in NAMES])
+        for form in ("{}/{}", "{} {}/data")
+    ),
+    *(
+        Reported(form, "a.csv", table([form.format(n) for n in NAMES], "", time="in s"), names)
+        for form, names in (("{} in um", NAMES), ("{}.um", [f"{n}.um" for n in NAMES]))
+    ),
+    *(
+        Reported(
+            f"thousands without decimals, {decimal}",
+            file="a.csv",
+            content=table(
+                unit="nm",
+                separator=";",
+                times=[f"{t:.4f}".replace(".", decimal) for t in TIME],
+                change={
+                    (i, k + 1): f"{1e3 * v:,.0f}".replace(",", sign) for (i, k), v in np.ndenumerate(MICRONS)
+                },
+            ),
+        )
+        for decimal, sign in (".,", ",.")
+    ),
+    *(
+        Reported(f"{head!r} above, {below[:9]!r} below", "a.csv", head + table(**given) + below, **said)
+        for head, given, below, said in (
+            (b"# Sensitivity: -8 mV/um\n", {"unit": "V", "values": -8e-3 * MICRONS, "digits": 6}, b"", {}),
+            (b"# X: 8 mV/um\n# Y: 7 mV/um\n", {"unit": "V"}, b"", {"question": "several .*= .V .8.00 mV/µm"}),
+            (b"Sample Rate: 10,000 Hz\nPreTrigger,500\n", {"time": "No", "times": NUMBERS}, b"", {}),
+            (b"Fs: 10000 Hz\nPre-trigger samples,500\n", {"time": "No", "times": FROM_TRIGGER}, b"", {}),
+            (b"Factor,,.02,.02,.02,.02\nOffset,,1,1,1,1\n", COUNTS, b"", {"said": "times the factors"}),
+            (b"", {}, b"Max,1,2,3,4\nMin,0,0,0,0\n", {"said": "below the rows: 'Max 1 2 3 4'"}),
+            (b"", {}, b"\nGroup,2\nn,1\n1,2\n", {"said": "below the rows: 'Group 2'"}),
+            (b"", {}, b"\nGroup,2\n" + table(), {"question": "export again as one table"}),
+        )
+    ),
+    Reported(
+        "merged cells",
+        "a.xlsx",
+        workbook(
+            ["Drop test"],
+            ["Time", "NDE", None, "DE", None],
+            [None, "X", "Y", "X", "Y"],
+            ["s", "µm", "µm", "µm", "µm"],
+            *ROWS,
+        ),
+    ),
+    Reported(
+        "numbers as text, decimal comma",
+        "a.xlsx",
+        workbook(
+            ["Time [s]", *(f"{n} [um]" for n in NAMES)],
+            *([f"{v:.4f}".replace(".", ",") for v in row] for row in ROWS),
+        ),
+        said=r"\(left out: 'DE'\)",
+    ),
+    Reported(
+        "a remark in a sheet",
+        "a.xlsx",
+        workbook(["Time [s]", *(f"{n} [um]" for n in NAMES), "Remark"], *ROWS[:-1], [*ROWS[-1], "hit"]),
+        said="left out, no numbers: Remark",
+    ),
+    Reported("index and value pairs", "a.csv", twincat(), start=0.0, said="below the rows: 'EOF'"),
+    Reported(
+        "two rates",
+        "a.cfg",
+        two_rates,
+        kept=slice(0, COUNT, 2),
+        late=2e-7,
+        said="sampled at 10000 Hz and, from .* s on, at 5000 Hz",
+    ),
+    *(
+        Reported(
+            f"stamps in {name}",
+            file="a.csv",
+            start=0.0,
+            late=1e-9,
+            content=table(time=name, times=[form(i) for i in range(COUNT)]),
+        )
+        for name, form in (
+            ("time_ns", lambda i: f"{DATE * 10**9 + i * 10**5}"),
+            ("timestamps", lambda i: f"{DATE * 10**3 + i // 10}.{i % 10}"),
+            ("timestamp", lambda i: f"{DATE + i // 10000}.{i % 10000:04d}"),
+            ("Time", lambda i: f"2026/03/14 09:26:53.{i:04d}"),
+            ("Date Time", lambda i: f"3/14/2026 9:26:53.{i:04d} PM"),
+            ("Zeit", lambda i: f"14.03.2026 09:26:53:{i:04d}"),
+        )
+    ),
+    Reported(
+        "days since 1900",
+        file="a.csv",
+        start=0.0,
+        late=1e-7,
+        content=table(time="Time", times=[f"{45999.3930556 + STEP * i / 86400:.12f}" for i in range(COUNT)]),
+    ),
+    Reported(
+        "stamps of whole seconds",
+        "a.csv",
+        table(time="Time", times=["14.03.2026 09:26:53"] * COUNT),
+        question=r"\(its stamps stand still, they are coarser than the samples\) and no sampling interval",
+    ),
+    Reported("one value a row", "a.csv", melted(), question="one value a row: .* names 4 channels"),
+    Reported("a table of MATLAB", "a.mat", of_matlab, question="objects .MATLAB table. that only"),
+    *(
+        Reported(kind, "a.dat", begin + bytes(60), question=f"of the format {kind}")
+        for kind, begin in (("imc FAMOS", b"|CF,2,1,1;"), ("XML", b"<?xml "), ("DADiSP", b"DATASET X"))
+    ),
+    Reported("HDF5 by another name", "a.dat", hdf5(scale_factor=0.02)),
+    Reported(
+        "more rows than declared",
+        file="a.cfg",
+        question=r"declares 900 samples and 1000 are present, 100 more",
+        content=lambda path: (
+            two_rates(path),
+            path.write_text(path.read_text().replace("5000,1000", "5000,900")),
+        ),
+    ),
+]
+"""All of them; `studies` and tests take them from here."""
