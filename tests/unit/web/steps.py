@@ -12,7 +12,6 @@ from tests.unit.web.serving import Served
 from rotordrop.jobs.workspace import Workspace
 
 LOOKED = "document.querySelectorAll('.panel canvas').length >= 2"
-PRESS = "document.getElementById('{}').click()"
 
 
 @contextlib.contextmanager
@@ -46,7 +45,10 @@ def open_drop(browser: Browser, name: str) -> None:
 
 
 def press(browser: Browser, button: str) -> None:
-    browser.evaluate(PRESS.format(button))
+    """Press it as soon as it can be pressed: a click on a disabled button is lost without a word."""
+    here = f"document.getElementById({button!r})"
+    browser.until(f"{here} && !{here}.disabled")
+    browser.evaluate(f"{here}.click()")
 
 
 def quiet(browser: Browser) -> None:
