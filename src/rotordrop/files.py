@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 import shutil
@@ -245,6 +246,15 @@ def write_json(path: str | os.PathLike[str], content: Any, *, sealed: bool = Fal
     except (TypeError, ValueError) as error:
         raise OutputError(f"cannot write {path} as JSON: {error}") from error
     write_text(path, text)
+
+
+def finite(content: Any) -> Any:
+    """The same content with nothing in place of what is not finite, which JSON cannot hold."""
+    if isinstance(content, dict):
+        return {key: finite(value) for key, value in content.items()}
+    if isinstance(content, tuple | list):
+        return [finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 def with_digest(content: Mapping[str, Any]) -> dict[str, Any]:

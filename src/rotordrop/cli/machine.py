@@ -164,6 +164,7 @@ def check(
     Example: rotordrop check machine.toml --report machine.html
     """
     from rotordrop.machine import load_machine
+    from rotordrop.report.critical_speeds_page import machine_page
     from rotordrop.report.machine_content import machine_content, machine_json
     from rotordrop.report.page import write_page
     from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
@@ -173,7 +174,7 @@ def check(
     warnings = machine_warnings(described, summary, speed)
 
     if report is not None:
-        write_page(machine_content(described, summary, warnings, drawn=True), report)
+        write_page(machine_page(described, summary, warnings), report)
     page = machine_content(described, summary, warnings, brief=not everything)
     deliver(machine_json(described, summary, warnings), json, page)
 

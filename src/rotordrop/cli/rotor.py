@@ -11,10 +11,6 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured
 from rotordrop.cli._output import deliver, progress_bar
 
-BEYOND_NOMINAL = 1.1
-"""Highest speed of a Campbell diagram over the nominal one [1]; chosen, not measured."""
-SPEEDS = 61
-"""Speeds of a Campbell diagram; chosen, not measured."""
 Held = StrEnum("Held", {"free_free": "free-free", "ambs": "AMBs", "touchdown_bearings": "touchdown bearings"})
 """What holds the rotor."""
 
@@ -35,15 +31,13 @@ def critical_speeds(
 
     Example: rotordrop critical-speeds machine.toml --report speeds.html
     """
-    import numpy as np
-
     from rotordrop.machine import load_machine
     from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
-    from rotordrop.rotor.campbell import campbell_diagram
+    from rotordrop.rotor.campbell import campbell_diagram, speed_grid
     from rotordrop.rotor.critical_speeds import WHIRLS, critical_speed_map
 
     described = load_machine(machine)
-    grid = np.linspace(0.0, top_speed or BEYOND_NOMINAL * float(described.speed.nominal), SPEEDS)
+    grid = speed_grid(described, top_speed)
     chosen = list(held or (item for item in Held if item is not Held.ambs or described.ambs))
     maps, diagrams = {}, {}
     with progress_bar("critical speeds") as progress:

@@ -65,6 +65,7 @@ def write_look(seen: Look, made: Path, machine: str) -> None:
         "machine": machine,
         "recorded": seen.record.event_date,
         "simulated": seen.record.is_simulated,
+        "falls": bool(seen.drops),
         "speed": quantity_json(Quantity(value=math.nan if seen.speed is None else seen.speed, kind="speed")),
     }
     write_json(
@@ -199,12 +200,13 @@ def write_waterfall(
 
 def write_check(machine: Machine, made: Path) -> None:
     """Write what a machine amounts to: its report and its document."""
-    from rotordrop.report.machine_content import machine_content, machine_json
+    from rotordrop.report.critical_speeds_page import machine_page
+    from rotordrop.report.machine_content import machine_json
     from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 
     summary = summarise_machine(machine)
     warnings = machine_warnings(machine, summary)
-    write_page(machine_content(machine, summary, warnings, drawn=True), made / "report.html")
+    write_page(machine_page(machine, summary, warnings), made / "report.html")
     write_json(made / "document.json", machine_json(machine, summary, warnings), sealed=True)
 
 
@@ -235,7 +237,8 @@ def _largest(estimate: Estimate, peak: str, kind: str) -> dict[str, Any] | None:
     if not known:
         return None
     name, one = max(known, key=lambda entry: entry[1].interval_90[1])
-    return {"bearing": name, **quantity_json(Quantity.of(one.known, kind))}
+    written = quantity_json(Quantity.of(one.known, kind))
+    return {"bearing": name, **written, "interval_90": list(one.interval_90)}
 
 
 def _label(estimate: Estimate, column: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -23,15 +22,6 @@ SIMULATED_RECORD = "Simulated record."
 
 SIMULATED_MACHINE = "Simulated: computed from the machine description; nothing was measured."
 """What every report on a simulation says."""
-
-
-def finite(tree: Any) -> Any:
-    """The same content with nothing in place of what is not finite, which JSON cannot hold."""
-    if isinstance(tree, dict):
-        return {key: finite(value) for key, value in tree.items()}
-    if isinstance(tree, tuple | list):
-        return [finite(value) for value in tree]
-    return None if isinstance(tree, float) and not math.isfinite(tree) else tree
 
 
 @dataclass(frozen=True)
@@ -160,6 +150,17 @@ def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", not
     shown = [k for k, column in enumerate(columns) if not column.optional or any(row[k] for row in cells)]
     by_row = tuple(tuple(row[k] for k in shown) for row in cells)
     return Table(tuple(columns[k].label for k in shown), by_row, caption, note)
+
+
+def card_table(cards: Iterable[Card], told: Callable[[KeyFigure], object]) -> Table:
+    """Headline numbers, one column per bearing."""
+
+    def of(card: Card) -> Column:
+        values = {figure.label: told(figure) for figure in card.figures}
+        return Column(card.title, lambda label: values.get(label, ""))
+
+    labels = dict.fromkeys(figure.label for card in cards for figure in card.figures)
+    return table(labels, (Column("", str), *map(of, cards)))
 
 
 @dataclass(frozen=True)

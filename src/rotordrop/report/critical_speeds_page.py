@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,17 +13,22 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
+from rotordrop.files import finite
 from rotordrop.report.content import (
+    Card,
     Column,
     Figure,
+    KeyFigure,
     ReportContent,
     Section,
     Statement,
     Table,
     appendix,
+    card_table,
+    fact,
     table,
 )
-from rotordrop.report.machine_content import defaults_section
+from rotordrop.report.machine_content import defaults_section, drawing_section, machine_content
 from rotordrop.report.quantity import NO_BREAK
 from rotordrop.report.style import (
     INK,
@@ -44,13 +50,16 @@ from rotordrop.rotor.campbell import (
     Crossing,
     Separation,
     amplification_factor,
+    campbell_diagram,
     separations,
+    speed_grid,
 )
-from rotordrop.rotor.critical_speeds import CriticalSpeedMap
+from rotordrop.rotor.critical_speeds import CriticalSpeedMap, critical_speed_map
 from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.rotor.machine_summary import MachineSummary, MachineWarning
     from rotordrop.rotor.suspension import EquivalentStiffness
 
 HIGHEST = 1000.0
@@ -120,6 +129,46 @@ def critical_speeds_page(
         ),
         lead=2,
     )
+
+
+def machine_page(
+    machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
+) -> ReportContent:
+    """Build the page of a machine: mass, critical speeds, drawing, and what is known of its bearings."""
+    grid = speed_grid(machine)
+    held = ["touchdown bearings", *(["AMBs"] if machine.ambs else [])]
+    diagrams = {name: campbell_diagram(machine, grid, name) for name in held}
+    speeds = critical_speeds_page(machine, {"standstill": critical_speed_map(machine)}, diagrams)
+    told = machine_content(machine, summary, warnings)
+    rotor = (
+        fact("mass", summary.fe.total_mass, "mass"),
+        fact("centre of gravity from node 1", summary.fe.centre_of_gravity, "dimension"),
+    )
+    return replace(
+        told,
+        verdict=(told.verdict[0], *speeds.verdict),
+        cards=(
+            Card("Rotor", rotor),
+            *(Card(_held(machine, name), tuple(_lowest(one))) for name, one in diagrams.items()),
+        ),
+        summary=(),
+        sections=(
+            replace(drawing_section(machine), tables=told.summary[:2]),
+            *speeds.sections[:-1],
+            Section(
+                "Bearings and AMBs at rest",
+                statements=told.verdict[1:],
+                tables=(card_table(told.cards, lambda figure: figure.value),),
+            ),
+            *speeds.sections[-1:],
+        ),
+        lead=2,
+    )
+
+
+def _lowest(diagram: CampbellDiagram) -> Iterator[KeyFigure]:
+    for one in sorted(diagram.crossings, key=lambda one: one.speed)[:4]:
+        yield fact(f"critical speed, {one.direction}", one.speed / TURN, "frequency")
 
 
 def _margins(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Margins:
@@ -433,32 +482,33 @@ def critical_speeds_json(
     maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
 ) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units; null where there is no line."""
-    return {
+    found: dict[str, Any] = {
         "maps": {name: _map_json(found) for name, found in maps.items()},
         "campbell": {name: _campbell_json(diagram) for name, diagram in diagrams.items()},
     }
+    return dict(finite(found))
 
 
 def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
     return {
         "whirl": found.whirl,
         "stiffness_N_m": found.stiffness.tolist(),
-        "massless_Hz": _lists(found.massless),
-        "with_support_mass_Hz": _lists(found.with_support_mass),
+        "massless_Hz": found.massless.tolist(),
+        "with_support_mass_Hz": found.with_support_mass.tolist(),
         "bearings": {
             part.bearing: {
                 "load_N": part.load,
                 "tangent_N_m": part.tangent,
                 "simple_N_m": part.simple,
                 "support_N_m": part.support,
-                "contact_N_m": _finite(part.contact),
+                "contact_N_m": part.contact,
                 "equivalent_tangent_N_m": part.equivalent("tangent"),
                 "equivalent_simple_N_m": part.equivalent("simple"),
             }
             | (_relaxing_json(found, part) if part.branches else {})
             for part in found.lines
         },
-        "at_the_machine_Hz": {name: _lists(values) for name, values in found.at_lines.items()},
+        "at_the_machine_Hz": {name: values.tolist() for name, values in found.at_lines.items()},
     }
 
 
@@ -476,30 +526,19 @@ def _campbell_json(diagram: CampbellDiagram) -> dict[str, Any]:
     shapes = diagram.shapes[0]
     return {
         "speed_Hz": (diagram.speed / TURN).tolist(),
-        "frequency_Hz": _lists(diagram.frequency),
-        "damping_ratio": _lists(diagram.damping_ratio),
-        "whirl": _lists(diagram.whirl),
+        "frequency_Hz": diagram.frequency.tolist(),
+        "damping_ratio": diagram.damping_ratio.tolist(),
+        "whirl": diagram.whirl.tolist(),
         "node_positions_m": [float(z) for z in diagram.node_positions],
-        "shapes_at_lowest_speed": {"real": _lists(shapes.real), "imaginary": _lists(shapes.imag)},
+        "shapes_at_lowest_speed": {"real": shapes.real.tolist(), "imaginary": shapes.imag.tolist()},
         "critical_speeds": [
             {
                 "speed_Hz": crossing.speed / TURN,
                 "line": crossing.line,
                 "direction": crossing.direction,
                 "damping_ratio": crossing.damping_ratio,
-                "amplification_factor": _finite(amplification_factor(crossing.damping_ratio)),
+                "amplification_factor": amplification_factor(crossing.damping_ratio),
             }
             for crossing in diagram.crossings
         ],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
-def _lists(values: Any) -> Any:
-    """Nested lists with None for NaN."""
-    found = np.asarray(values).astype(object)
-    found[~np.isfinite(values)] = None
-    return found.tolist()

@@ -56,16 +56,13 @@ def machine_content(
     summary: MachineSummary,
     warnings: tuple[MachineWarning, ...],
     *,
-    drawn: bool = False,
     brief: bool = False,
 ) -> ReportContent:
     """Put what is known about a machine into a report: what it amounts to, what to know before trusting it.
 
-    For a page it is ``drawn``; for one screen it is ``brief``: where the drop model ends is named only, and
-    defaults are counted only.
+    For one screen it is ``brief``: where the drop model ends is named only, and defaults are counted only.
     """
-    open_values = defaults_section(machine)
-    tables = () if brief or drawn else tuple(found for section in open_values for found in section.tables)
+    open_values = () if brief else defaults_section(machine)
     rotor, sag = rotor_values(summary.fe, 4), summary.levitated_sag
     if sag is not None:
         span = float(max(sag) - min(sag))
@@ -90,8 +87,11 @@ def machine_content(
         ),
         summary=()
         if brief
-        else (named_values("rotor", rotor), mode_table(modes, "bending or support"), *tables),
-        sections=(drawing_section(machine), *open_values) if drawn else (),
+        else (
+            named_values("rotor", rotor),
+            mode_table(modes, "bending or support"),
+            *(one for section in open_values for one in section.tables),
+        ),
     )
 
 

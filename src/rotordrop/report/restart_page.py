@@ -10,6 +10,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from rotordrop.estimate.published import Drop
+from rotordrop.files import finite
 from rotordrop.known import Known
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -19,7 +20,6 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
-    finite,
     table,
 )
 from rotordrop.report.style import SERIES, axis_title, fit_legend, panels

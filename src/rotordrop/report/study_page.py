@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError, unknown_key
+from rotordrop.files import finite
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.machine import kind_of_path
@@ -23,7 +24,6 @@ from rotordrop.report.content import (
     Statement,
     Table,
     appendix,
-    finite,
     table,
 )
 from rotordrop.report.quantity import Quantity as Shown

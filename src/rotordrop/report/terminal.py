@@ -8,15 +8,13 @@ from typing import IO, TYPE_CHECKING
 from unicodedata import category
 
 from rotordrop.report.content import (
-    Card,
     Cell,
-    Column,
     KeyFigure,
     Level,
     ReportContent,
     Statement,
     Table,
-    table,
+    card_table,
 )
 from rotordrop.report.quantity import THIN_SPACE, Quantity, one_line
 
@@ -70,21 +68,10 @@ def _parts(content: ReportContent) -> list[RenderableType]:
     if content.screen is not None:
         parts.append(_table(content.screen))
     elif content.cards:
-        parts.append(_cards(content))
+        parts.append(_table(card_table(content.cards, _told)))
     parts.extend(_statement(statement) for statement in content.verdict if statement not in first)
     parts.extend(_table(table) for table in content.summary)
     return parts
-
-
-def _cards(content: ReportContent) -> RenderableType:
-    """Headline numbers, one column per bearing."""
-
-    def of(card: Card) -> Column:
-        values = {figure.label: _told(figure) for figure in card.figures}
-        return Column(card.title, lambda label: values.get(label, ""))
-
-    labels = dict.fromkeys(figure.label for card in content.cards for figure in card.figures)
-    return _table(table(labels, (Column("", str), *map(of, content.cards))))
 
 
 def _told(figure: KeyFigure) -> str:

@@ -19,6 +19,10 @@ from rotordrop.rotor.suspension import Support, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
 
 REDUCTION = Reduction(modes=16, attachment=True)
+BEYOND_NOMINAL = 1.1
+"""Highest speed of a diagram over the nominal one [1]; chosen, not measured."""
+SPEEDS = 61
+"""Speeds of a diagram; chosen, not measured."""
 _SPARE_MODES = 4
 """Modes computed beyond those asked for (chosen): a line that sinks with the speed comes from above."""
 _STANDSTILL = 1e-3
@@ -66,6 +70,11 @@ class CampbellDiagram:
 
 
 @one_thread()
+def speed_grid(machine: Machine, highest: float | None = None) -> Array:
+    """Speeds of a Campbell diagram from standstill to the highest [rad/s], shape (S,)."""
+    return np.linspace(0.0, highest or BEYOND_NOMINAL * float(machine.speed.nominal), SPEEDS)
+
+
 def campbell_diagram(
     machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
 ) -> CampbellDiagram:

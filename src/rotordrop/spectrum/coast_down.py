@@ -13,7 +13,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
 from rotordrop.evidence.impacts import Settling
-from rotordrop.files import new_hdf5
+from rotordrop.files import finite, new_hdf5
 from rotordrop.known import Known
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress
@@ -160,7 +160,7 @@ class CoastDownAnalysis:
             "force_and_stress": [dict(found) for found in self.signal.force_and_stress],
             "force_and_stress_statements": [str(one["statement"]) for one in self.signal.force_and_stress],
         }
-        return {key: _finite(value) for key, value in content.items()}
+        return {key: finite(value) for key, value in content.items()}
 
 
 @one_thread()
@@ -302,15 +302,6 @@ def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
         if stopped is None
         else Known(value=stopped, status="determined", lower=stopped, upper=stopped, unit="s"),
     )
-
-
-def _finite(content: Any) -> Any:
-    """The same content with null for every number that JSON cannot hold."""
-    if isinstance(content, dict):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
 def _law_json(law: SpeedLaw) -> dict[str, Any]:

@@ -23,7 +23,7 @@ QUIET = (
 class Browser:
     """One browser with one page; everything it said or asked for is kept."""
 
-    def __init__(self, profile: Path, *, width: int = 1280, height: int = 800) -> None:
+    def __init__(self, profile: Path) -> None:
         here_in, there_out = os.pipe()
         there_in, here_out = os.pipe()
         options = f"{' '.join(QUIET)} --user-data-dir={profile}"
@@ -45,16 +45,11 @@ class Browser:
         self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
-        self.size(width, height)
+        self.size(1280, 800)
 
     def size(self, width: int, height: int) -> None:
-        self.call(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=False,
-        )
+        told: dict[str, Any] = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **told)
 
     def call(self, method: str, timeout: float = 60.0, **parameters: Any) -> dict[str, Any]:
         self._number += 1
@@ -96,14 +91,13 @@ class Browser:
         self.call("Page.navigate", url=address)
         self.until("document.readyState === 'complete'")
 
-    def key(self, key: str, code: str = "", text: str | None = None, modifiers: int = 0) -> None:
-        told = {"key": key, "code": code or key, "modifiers": modifiers}
+    def key(self, key: str) -> None:
         numbers = {"Tab": 9, "Enter": 13, "Escape": 27, "ArrowLeft": 37, "ArrowRight": 39, " ": 32}
         number = numbers.get(key, ord(key.upper()[0]) if len(key) == 1 else 0)
-        typed = text if text is not None else ("\r" if key == "Enter" else key if len(key) == 1 else "")
-        for kind in ("keyDown", "keyUp"):
-            more = {"text": typed} if kind == "keyDown" and typed else {}
-            self.call("Input.dispatchKeyEvent", type=kind, windowsVirtualKeyCode=number, **told, **more)
+        typed = "\r" if key == "Enter" else key if len(key) == 1 else ""
+        told: dict[str, Any] = {"key": key, "code": key, "windowsVirtualKeyCode": number}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **told, **({"text": typed} if typed else {}))
+        self.call("Input.dispatchKeyEvent", type="keyUp", **told)
 
     def choose_files(self, selector: str, files: list[Path]) -> None:
         node = self.call("Runtime.evaluate", expression=f"document.querySelector({selector!r})")["result"][

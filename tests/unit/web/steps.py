@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from tests.unit.web.browser import Browser
 from tests.unit.web.serving import Served
 
-from rotordrop.jobs.workspace import Workspace
-
 LOOKED = "document.querySelectorAll('.panel canvas').length >= 2"
-
-
-@contextlib.contextmanager
-def serving(folder: Path) -> Iterator[Served]:
-    server = Served(Workspace(folder))
-    try:
-        yield server
-    finally:
-        server.stop()
 
 
 def send(browser: Browser, files: Sequence[Path]) -> None:

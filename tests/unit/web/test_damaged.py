@@ -11,11 +11,9 @@ from pathlib import Path
 
 import pytest
 from tests.no_file import NO_FILE, on_posix
-from tests.unit.web.made_drops import SPEED, estimated
+from tests.unit.web.made_drops import estimated
 from tests.unit.web.serving import Served
 
-from rotordrop.errors import RotordropError
-from rotordrop.jobs import runner
 from rotordrop.jobs.runner import Runner, result_folder
 from rotordrop.jobs.workspace import Job, Workspace
 from rotordrop.web.app import make_app
@@ -122,25 +120,6 @@ def test_what_is_no_file_is_named_where_one_should_be_and_the_rest_works(served,
         assert not job.path.exists()
 
 
-@on_posix
-@pytest.mark.parametrize("kind", NO_FILE)
-@pytest.mark.parametrize("name", ["token", "jobs/0123456789abcdef"])
-def test_what_is_no_file_beside_the_jobs_keeps_no_page_from_being_served(tmp_path, kind, name):
-    space = Workspace(tmp_path / "served")
-    space.prepare()
-    space.token()
-    (space.path / name).unlink(missing_ok=True)
-    NO_FILE[kind](space.path / name)
-    try:
-        server = Served(Workspace(space.path))
-    except RotordropError as refusal:
-        assert name == "token" and "token is no file" in str(refusal)
-        return
-    asked = [server.ask("GET", "/api/jobs"), server.order("/api/jobs", {"name": "drop"})]
-    server.stop()
-    assert [answer.status for answer in asked] == [200, 201]
-
-
 def test_a_record_that_was_changed_or_leads_out_of_its_folder_is_not_served(served, files, tmp_path):
     (tmp_path / "secret.csv").write_text("secret")
     job = Job(served.space.jobs_folder / served.new_job({"record": files["record"]}))
@@ -211,12 +190,6 @@ def test_a_folder_that_may_only_be_read_is_shown_and_refuses_in_words():
     shutil.rmtree(folder)
 
 
-def test_a_computation_that_goes_on_is_said(served, files, monkeypatch):
-    monkeypatch.setattr(runner, "_locked", lambda job, verb: verb == "estimate")
-    served.new_job({})
-    assert set(runner.running(served.space)) == {"estimate"}
-
-
 def test_a_file_that_is_removed_while_it_is_asked_for_is_no_error_of_the_server(served, monkeypatch):
     """Six clients that read and removed at once met a traceback."""
     job = served.new_job({"record": ("a.csv", b"x" * 3_000_000)})
@@ -231,17 +204,6 @@ def test_a_file_that_is_removed_while_it_is_asked_for_is_no_error_of_the_server(
     monkeypatch.setattr(Job, "file", removed_meanwhile)
     answer = served.ask("GET", f"/api/jobs/{job}/files/record")
     assert (answer.status, "it has been removed" in answer.text) == (404, True)
-
-
-def test_the_row_of_a_drop_says_what_its_estimate_says(server):
-    number = estimated(server, "mine", "a" * 64, 3100.0, recorded="2019-10-16T13:42:07")
-    row = listed(server)[number]["row"]
-    assert (row["machine"], row["recorded"], row["simulated"]) == ("LP-400", "2019-10-16T13:42:07", True)
-    assert row["speed"]["value"] == pytest.approx(SPEED)
-    assert (row["force"]["bearing"], row["force"]["value"], row["stress"]) == ("DE", 3100.0, None)
-    assert row["force"]["SI"] == ["3\u202f100 N", "2\u202f790 to 3\u202f410 N"]
-    assert row["statement"] == {"text": "The model is consistent.", "level": "good"}
-    assert row["verb"] == "estimate"
 
 
 @pytest.mark.parametrize("harm", ["changed", "cut", "gone"])

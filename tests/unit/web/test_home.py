@@ -1,36 +1,41 @@
 """The list of drops in a headless Chromium: found, sorted, removed, addressed."""
 
+import numpy as np
 import pytest
 from tests.unit.web.browser import CHROMIUM
 from tests.unit.web.made_drops import estimated
-from tests.unit.web.steps import open_drop, press, quiet, serving
+from tests.unit.web.steps import open_drop, press, quiet
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here")]
 NAMES = "[...document.querySelectorAll('.dropname')].map(one => one.innerText).join()"
 
 
 @pytest.fixture
-def three(tmp_path):
-    with serving(tmp_path / "served") as server:
-        estimated(server, "middle", "a" * 64, 3000.0, recorded="2022-01-01T00:00:00")
-        estimated(server, "small", "b" * 64, 1000.0, recorded="2023-01-01T00:00:00")
-        estimated(server, "large", "c" * 64, 9000.0, recorded="2021-01-01T00:00:00")
-        yield server
+def three(server):
+    for name, peak, year in (("middle", 3000.0, 2022), ("small", 1000.0, 2023), ("large", 9000.0, 2021)):
+        estimated(server, name, name[0] * 64, peak, recorded=f"{year}-01-01T00:00:00")
+    return server
 
 
 def test_drops_are_sorted_and_filtered_and_the_address_keeps_it(browser, three):
     browser.open(three.address)
-    browser.until(f"{NAMES} === 'large,small,middle'")  # the newest on the page first
+    browser.until(f"{NAMES} === 'small,middle,large'")  # the latest event first
+    drawn = (
+        "[...document.querySelectorAll('.drawn i')].map(i => [i.style.left, i.style.width].map(parseFloat))"
+    )
+    ends = [(low, low + wide) for low, wide in browser.evaluate(drawn)]
+    expected = [(100 * 0.9 * peak / 9900, 100 * 1.1 * peak / 9900) for peak in (1000, 3000, 9000)]
+    np.testing.assert_allclose(ends, expected, rtol=1e-4)
     press(browser, "sort-force")
     assert browser.evaluate(NAMES) == "large,middle,small"
     press(browser, "sort-force")
     assert browser.evaluate(NAMES) == "small,middle,large"
     assert browser.evaluate("document.querySelector('[aria-sort]').ariaSort") == "ascending"
-    press(browser, "sort-date")
-    assert browser.evaluate(NAMES) == "small,middle,large"
+    browser.evaluate("query.value = 'none'; query.dispatchEvent(new Event('input'))")
+    assert "No drop has none in its name" in browser.evaluate("droprows.innerText")
     browser.evaluate("query.value = 'll'; query.dispatchEvent(new Event('input'))")
     assert browser.evaluate(NAMES) == "small"
-    browser.until("location.hash.includes('q=ll') && location.hash.includes('sort=-date')")
+    browser.until("location.hash.includes('q=ll') && location.hash.includes('sort=force')")
     browser.call("Page.reload")
     browser.until(f"{NAMES} === 'small'")
     quiet(browser)
@@ -41,15 +46,15 @@ def test_a_drop_is_removed_after_a_question(browser, three):
     browser.until(NAMES)
     browser.evaluate("document.querySelector('[aria-label=\"Remove middle\"]').click()")
     browser.evaluate("document.querySelector('#sure [value=cancel]').click()")
-    assert browser.evaluate(NAMES) == "large,small,middle"
+    assert browser.evaluate(NAMES) == "small,middle,large"
     browser.evaluate("document.querySelector('[aria-label=\"Remove middle\"]').click()")
     browser.evaluate("document.querySelector('#sure [value=remove]').click()")
-    browser.until(f"{NAMES} === 'large,small'")
+    browser.until(f"{NAMES} === 'small,large'")
     browser.evaluate("document.querySelector('[aria-label=\"Remove small\"]').click()")
     browser.key("Escape")
     browser.until("!document.getElementById('sure').open")
     browser.call("Page.reload")
-    browser.until(f"{NAMES} === 'large,small'")
+    browser.until(f"{NAMES} === 'small,large'")
     quiet(browser)
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.web.serving import Served
 
 from rotordrop import load_machine, look
 from rotordrop.cli.app import run
@@ -45,23 +44,14 @@ def test_a_look_on_the_page_says_what_a_look_in_python_says(served, looked, seen
     assert document == json.loads(json.dumps(said))
     page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
     assert [impact["time"] for impact in page["impacts"]] == [impact.time for impact in seen.impacts]
+    assert [(one["time"], one["words"]) for one in page["timeline"]] == list(seen.timeline())
+    assert page["row"]["falls"]
     body = served.ask("GET", f"/api/jobs/{looked}/look/window?column=y0&start=0&end=0.01").body
     count = int(np.frombuffer(body, "<u4", 1, 8)[0])
     values = np.frombuffer(body, "<f4", count, 16 + 4 * count)
     first = int(np.searchsorted(seen.motion.time, np.frombuffer(body, "<f8", 1)[0]))
     vertical = seen.motion.paths[0].position[first : first + count, 1]
     np.testing.assert_array_equal(values, vertical.astype("f4"))
-
-
-def test_a_first_touch_has_one_interval_on_the_page_and_in_the_document(served, looked, seen):
-    page = served.ask("GET", f"/api/jobs/{looked}/look/page").told
-    assert page["counted_from"] == "the release (± 2 ms)"
-    words = [one["words"] for one in page["timeline"] if one["words"].startswith("first touch at ")]
-    assert len(words) == len(seen.planes)
-    assert words == [words for _, words in seen.timeline() if words.startswith("first touch at ")]
-    for plane in seen.planes:
-        low, high = plane.touch_interval_90
-        assert f"first touch at {plane.plane} (± {500.0 * (high - low):.2g} ms)" in words
 
 
 def test_a_table_holds_every_sample_of_a_window(served, looked, seen):
@@ -81,6 +71,8 @@ def test_a_record_alone_is_looked_at_with_the_gap_given_until_another_comes(serv
     document = served.document(job, "look")
     assert {plane["air_gap_m"] for plane in document["planes"]} == {300e-6}
     assert document["speed_rad_per_s"] == pytest.approx(2 * np.pi * 60)
+    page = served.ask("GET", f"/api/jobs/{job}/look/page").told
+    assert [place["gap"] for place in page["places"]] == [[300e-6, 300e-6]] * 2
     made, before = served.space.job(job).path / "look.made", served.space.job(job).digests()
     assert served.put(job, "record", "other.csv", b"time [s]\n").status == 201
     assert served.ask("GET", f"/api/jobs/{job}").told["states"] == {}
@@ -117,7 +109,9 @@ def report_of(served, job, verb):
 def test_look_and_machine_have_their_reports(served, looked):
     assert "A look at drop_060" in report_of(served, looked, "look")
     served.done(looked, "check")
-    assert "share of the weight" in report_of(served, looked, "check")
+    said = report_of(served, looked, "check")
+    places = [said.index(part) for part in ("mass</dt>", "<h2>Rotor", "<h2>Damped critical", "share of the")]
+    assert places == sorted(places)
     assert served.document(looked, "check")["machine"].startswith("LP-400")
 
 
@@ -131,9 +125,8 @@ def test_what_needs_a_machine_says_so(served, files, verb):
     ("options", "words"),
     [
         ({"method": "guess"}, "the method is 'guess'; there are tracked, replay"),
-        ({"quick": "yes"}, "the option quick is 'yes'; expected bool"),
         ({"path": "/etc"}, "there is no option 'path'"),
-        ({"gap": 3}, "the option gap is '3'; expected str"),
+        ({"gap": 3}, "the option gap is '3'; expected a text"),
     ],
 )
 def test_an_option_that_is_none_is_refused(served, looked, options, words):
@@ -170,31 +163,6 @@ def test_what_waits_is_cancelled_too(tmp_path, monkeypatch):
     assert queue.ask(job, "look", {})["state"] == "waiting"
     queue.cancel(job, "look")
     assert state_of(job, "look")["state"] == "cancelled"
-
-
-def test_three_people_at_once_get_what_is_theirs(served, files):
-    jobs = [served.new_job({"record": files["record"]}, gap=f"{gap} um") for gap in (250, 260, 270)]
-    for job in jobs:
-        served.order(f"/api/jobs/{job}/look")
-    for job, gap in zip(jobs, (250e-6, 260e-6, 270e-6), strict=True):
-        assert served.settled(job, "look")["state"] == "done"
-        assert served.document(job, "look")["planes"][0]["air_gap_m"] == pytest.approx(gap)
-
-
-@pytest.mark.slow
-@posix
-def test_a_child_outlives_its_server_and_the_next_one_finds_its_result(tmp_path, files):
-    first = Served(Workspace(tmp_path))
-    job, token = first.new_job({"record": files["record"]}), first.token
-    first.order(f"/api/jobs/{job}/look")
-    first.stop()
-    second = Served(Workspace(tmp_path))
-    try:
-        assert second.token == token
-        assert second.settled(job, "look")["state"] == "done"
-        assert second.ask("GET", f"/api/jobs/{job}/look/page").status == 200
-    finally:
-        second.stop()
 
 
 @pytest.mark.slow
@@ -318,14 +286,6 @@ def test_a_damaged_token_is_replaced(tmp_path):
     made = space.token()
     assert len(made) == 43
     assert space.token() == made
-
-
-def test_a_new_record_during_a_look_ends_the_look(served, files):
-    job = served.new_job({"record": files["record"]}, gap="300 um", speed="60 Hz")
-    served.order(f"/api/jobs/{job}/look")
-    assert served.put(job, "record", "other.csv", b"time [s]\n").status == 201
-    served.failed(job, "look")
-    assert served.ask("GET", f"/api/jobs/{job}/look/page").status == 404
 
 
 def test_a_job_removed_meanwhile_hides_no_other(served, monkeypatch):

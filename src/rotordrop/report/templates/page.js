@@ -31,8 +31,17 @@
     return JSON.parse(onDark ? text.replace(colours, function (one) { return dark[one]; }) : text);
   }
 
+  // figures keep the width that their words need; where there is less room they are made smaller as a whole
+  function fit(element) {
+    var share = Math.min(1, element.parentNode.clientWidth / 560);
+    element.style.width = share < 1 ? "560px" : "";
+    element.style.transform = share < 1 ? "scale(" + share + ")" : "";
+    element.style.marginBottom = (share - 1) * Number(element.getAttribute("data-height")) + "px";
+  }
+
   function draw(element) {
     var description = described(element, night.matches);
+    fit(element);
     drawn.push(element);
     return Plotly.newPlot(element, description.data, description.layout, settings);
   }
@@ -59,9 +68,11 @@
       var width = onPaper ? (beside ? 535 : 985) : null;
       var height = Math.round((onPaper ? (beside ? 0.6 : front ? 0.76 : 0.62) : 1.0) * Number(element.getAttribute("data-height")));
       element.style.height = height + "px";
+      element.style.transform = element.style.marginBottom = "";
       element.style.width = onPaper ? width + "px" : "";
       element.style.zoom = onPaper ? "0.7" : "";
       Plotly.relayout(element, { width: width, height: height, autosize: !onPaper });
+      if (!onPaper) { fit(element); }
     });
   }
 
@@ -82,6 +93,8 @@
   window.addEventListener("hashchange", reveal);
   document.addEventListener("toggle", drawNext, true);
 
+  window.addEventListener("resize", function () { drawn.forEach(fit); });
+  if (window.self !== window.top) { document.documentElement.classList.add("framed"); }
   night.addEventListener("change", function () { redraw(night.matches); });
   window.addEventListener("beforeprint", function () {
     closed = unfold(".printed:not([open])");

@@ -134,7 +134,7 @@ export function zoom(share, about) {
 export const pan = (direction) => { const by4 = ((state.view.to - state.view.from) / 4) * direction; setView({ from: state.view.from + by4, to: state.view.to + by4 }); };
 export function setCursor(t) { state.cursor = t; drawOrbits(); follow(t); if (state.playing === null) { document.dispatchEvent(new Event("seen")); } }
 export function stepCursor(direction) {
-  const { time } = state.panels[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
+  const { time } = state.orbits[0], here = state.cursor === null ? 0 : nearest(time, state.cursor);
   setCursor(time[Math.min(Math.max(here + direction, 0), time.length - 1)]);
 }
 export function play(on) {

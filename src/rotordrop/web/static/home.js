@@ -5,7 +5,7 @@ import { by, refused, say, tried } from "./state.js";
 import { BADGES, make, quantity } from "./tables.js";
 import * as units from "./units.js";
 
-const home = { jobs: [], told: "", waiting: 0, open: false, sort: "added", down: true };
+const home = { jobs: [], told: "", waiting: 0, open: false, sort: "date", down: true };
 const VERBS = { estimate: "estimating", waterfall: "waterfall", check: "machine", look: "looking", channels: "reading" };
 
 export const running = (job) => Object.keys(VERBS).find((verb) => ["waiting", "running"].includes(job.states[verb]?.state));
@@ -16,7 +16,7 @@ function stateOf(job) {
   if (estimate?.result) { return ["estimated", ""]; }
   if (look?.state === "failed") { return ["not readable", "bad"]; }
   if (estimate?.state === "failed") { return ["estimate failed", "bad"]; }
-  return [estimate?.state === "cancelled" ? "cancelled" : look?.result ? "looked at" : "files only", ""];
+  return [estimate?.state === "cancelled" ? "cancelled" : look?.result ? (job.row?.falls === false ? "no drop" : "looked at") : "files only", ""];
 }
 // What is said of a drop in the list: that it is damaged or cannot be read, or the verdict of its estimate.
 function statementOf(job) {
@@ -24,11 +24,11 @@ function statementOf(job) {
   return error ? { text: error, level: "bad" } : job.row?.verb === "estimate" || job.row?.statement?.level === "bad" ? job.row.statement : null;
 }
 
-const dated = (job) => job.row?.recorded || "";
+const dated = (job) => job.row?.recorded || new Date(1e3 * job.created).toISOString(); // of the event, else when it was added
 const COLUMNS = [["name", "drop", (job) => job.name.toLowerCase()], ["machine", "machine", (job) => (job.row?.machine || "").toLowerCase()],
-  ["date", "date of event", dated], ["added", "added", (job) => job.created], ["speed", "speed", (job) => job.row?.speed?.value ?? -1], ["state", "state", (job) => stateOf(job)[0]],
-  ["force", "peak force, 90 %", (job) => job.row?.force?.value ?? -1], ["stress", "peak stress, 90 %", (job) => job.row?.stress?.value ?? -1], ["verdict", "verdict", (job) => statementOf(job)?.level || ""]];
-const NUMBERS = ["speed", "force", "stress"], WIDE = ["machine", "added", "state"];
+  ["date", "date", dated], ["speed", "speed", (job) => job.row?.speed?.value ?? -1], ["state", "state", (job) => stateOf(job)[0]],
+  ["force", "peak force, 90\u00a0%", (job) => job.row?.force?.value ?? -1], ["stress", "peak stress, 90\u00a0%", (job) => job.row?.stress?.value ?? -1], ["verdict", "verdict", (job) => statementOf(job)?.level || ""]];
+const NUMBERS = ["speed", "force", "stress"], WIDE = ["machine", "state"];
 
 function shownJobs() {
   const words = by("query").value.toLowerCase().split(/\s+/).filter(Boolean), [, , key] = COLUMNS.find(([name]) => name === home.sort);
@@ -44,14 +44,22 @@ export function askRemoval(job) {
   sure.onclose = () => { if (sure.returnValue === "remove") { sure.returnValue = ""; tried(server.remove(job.id).then(() => address.go({ view: "drops" }))); } };
 }
 
+// An interval on the scale of all drops, so that the list by date is their log.
+function drawnInterval({ interval_90: ends }, name) {
+  const [low, high] = ends || [], most = Math.max(...home.jobs.map((job) => job.row?.[name]?.interval_90?.[1] || 0)), bar = make("span", { class: "drawn", of: [make("i")] });
+  if (!ends) { return []; }
+  Object.assign(bar.firstChild.style, { left: `${(100 * low) / most}%`, width: `${(100 * (high - low)) / most}%` });
+  return [bar];
+}
+
 function row(job) {
   const [words, level] = stateOf(job), found = job.row, told = statementOf(job), open = () => address.go({ drop: job.id });
-  const number = (one) => make("td", { class: "number", of: one ? [...quantity(one), make("span", { class: "interval", text: one.bearing })] : [make("span", { text: "–" })] });
+  const number = (one, name) => make("td", { class: "number", of: one ? [...quantity(one), make("span", { class: "interval", text: one.bearing }), ...drawnInterval(one, name)] : [make("span", { text: "–" })] });
   return make("tr", { on: { click: (event) => { if (!event.target.closest("a, button")) { open(); } } }, of: [
     make("th", { scope: "row", of: [make("a", { class: "dropname", href: address.of({ drop: job.id }), text: job.name }), ...(found?.simulated ? [make("span", { class: "tag", text: "simulated" })] : []),
       make("span", { class: "small narrow", text: [found?.machine, words].filter(Boolean).join(", ") })] }),
-    make("td", { class: "wide", text: found?.machine || "–" }), make("td", { text: dated(job) ? units.minuteText(dated(job)) : "–" }), make("td", { class: "wide small", text: units.dateText(job.created) }),
-    make("td", { class: "number", text: found?.speed ? found.speed[units.chosen()][0] : "–" }), make("td", { class: `wide state ${level}`, text: words }), number(found?.force), number(found?.stress),
+    make("td", { class: "wide", text: found?.machine || "–" }), make("td", { class: found?.recorded ? null : "small", text: `${found?.recorded ? "" : "added "}${units.minuteText(dated(job))}` }),
+    make("td", { class: "number", text: found?.speed ? found.speed[units.chosen()][0] : "–" }), make("td", { class: `wide state ${level}`, text: words }), number(found?.force, "force"), number(found?.stress, "stress"),
     make("td", { class: "verdictcell", of: told ? [make("span", { class: `badge ${told.level}`, title: told.text, text: BADGES[told.level] }), ...(told.level === "good" ? [] : [make("span", { class: "small clamp", text: told.text })])] : [] }),
     make("td", { of: [make("button", { class: "link", text: "✕", title: "Remove …", "aria-label": `Remove ${job.name}`, on: { click: () => askRemoval(job) } })] })
   ] });
@@ -64,17 +72,17 @@ function draw() {
   by("list").hidden = !home.jobs.length;
   by("drophead").replaceChildren(make("tr", { of: [...COLUMNS.map(([key, text]) => make("th", { scope: "col", class: NUMBERS.includes(key) ? "number" : WIDE.includes(key) ? "wide" : null, "aria-sort": key === home.sort ? (home.down ? "descending" : "ascending") : null,
     of: [make("button", { class: "link", id: `sort-${key}`, text: `${text}${key === home.sort ? (home.down ? " ▾" : " ▴") : ""}`, on: { click: () => sortBy(key) } })] })), make("th", { scope: "col", of: [make("span", { class: "hidden", text: "remove" })] })] }));
-  by("droprows").replaceChildren(...rows.map(row));
+  by("droprows").replaceChildren(...(rows.length ? rows.map(row) : [make("tr", { of: [make("td", { colspan: COLUMNS.length + 1, text: `No drop has ${by("query").value.trim()} in its name, machine, date, state or verdict.` })] })]));
   by("count").textContent = rows.length === home.jobs.length ? `${rows.length} ${rows.length === 1 ? "drop" : "drops"}` : `${rows.length} of ${home.jobs.length} drops`;
   if (focused && document.activeElement === document.body) { by(focused)?.focus(); }
 }
 
 function sortBy(key) {
-  Object.assign(home, { down: home.sort === key ? !home.down : ["date", "added", ...NUMBERS].includes(key), sort: key });
+  Object.assign(home, { down: home.sort === key ? !home.down : ["date", ...NUMBERS].includes(key), sort: key });
   noted();
   draw();
 }
-const noted = () => address.note(() => ({ view: "drops", q: by("query").value.trim(), sort: home.sort === "added" ? "" : `${home.down ? "-" : ""}${home.sort}` }));
+const noted = () => address.note(() => ({ view: "drops", q: by("query").value.trim(), sort: home.sort === "date" && home.down ? "" : `${home.down ? "-" : ""}${home.sort}` }));
 
 // What is in the folder; asked again as long as the list is seen, for others put drops there too.
 async function load() {
@@ -92,8 +100,8 @@ async function load() {
 const lost = (error) => { if (refused(error)) { home.waiting = setTimeout(() => home.open && load().catch(lost), 1500); } };
 
 export async function showHome(told) {
-  const sort = (told.sort || "-added").replace(/^-/, "");
-  Object.assign(home, { open: true, told: "", sort: COLUMNS.some(([key]) => key === sort) ? sort : "added", down: (told.sort || "-").startsWith("-") });
+  const sort = (told.sort || "-date").replace(/^-/, "");
+  Object.assign(home, { open: true, told: "", sort: COLUMNS.some(([key]) => key === sort) ? sort : "date", down: (told.sort || "-").startsWith("-") });
   by("query").value = told.q || "";
   by("home").hidden = false;
   by("status").replaceChildren();

@@ -52,7 +52,13 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, cursor, force, impacts
     const known = gap[1] - gap[0] <= 1e-6, words = known ? `gap ${shown(gap[1], "length")}` : `gap ${written(gap[0] / factor("length"))} to ${shown(gap[1], "length")} (${gapIs})`;
     pen.text(words, pen.width - 6, 14, tone.limit, { align: "right" });
   }
-  const step = 10 ** Math.floor(Math.log10(reach / factor("length") || 1)) * factor("length");
-  pen.line([[8, pen.height - 8], [8 + scale * step, pen.height - 8]], tone.ink, 2);
-  pen.text(`${written(step / factor("length"), 2)} ${unit("length")}`, 12 + scale * step, pen.height - 5, tone.muted, { size: 10 });
+  const f = factor("length"), ten = f * 10 ** Math.floor(Math.log10(reach / f || 1)), step = ten * [5, 2, 1].find((one) => one * ten <= reach || one === 1);
+  for (const value of [-step, step]) {
+    const [x] = at(value, 0), [, y] = at(0, value), words = written(value / f, 2);
+    pen.line([[x, cy - 3], [x, cy + 3]], tone.muted);
+    pen.line([[cx - 3, y], [cx + 3, y]], tone.muted);
+    pen.text(words, x, cy + 14, tone.muted, { size: 10, align: "center" });
+    pen.text(words, cx + 6, y + 3, tone.muted, { size: 10 });
+  }
+  pen.text(unit("length"), 6, pen.height - 5, tone.muted, { size: 10 });
 }

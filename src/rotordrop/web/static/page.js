@@ -4,7 +4,7 @@ import { pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./curs
 import { keep } from "./figures.js";
 import { askRemoval, leaveHome, redrawHome, running, showHome } from "./home.js";
 import { drawAll, loadView } from "./panels.js";
-import { askChannels, chooseFiles, sendExample, tellFormats } from "./sending.js";
+import { askChannels, chooseFiles, sendExample, tailPair, tellFormats, useTail } from "./sending.js";
 import * as server from "./server.js";
 import { by, events, homeView, impacts, origin, refused, samples, say, simulated, span, state, tried } from "./state.js";
 import { impactTable, make, timeline } from "./tables.js";
@@ -26,7 +26,7 @@ function goImpact(index) {
 const TABS = {
   Impacts: () => {
     const source = state.estimate && state.estimate.impacts.length ? state.estimate : state.look, list = impacts();
-    if (!list.length) { return [make("p", { text: "No impacts." })]; }
+    if (!list.length) { return [make("p", { text: `No impacts: ${state.look.row.falls ? "no contact is seen after the release" : "nothing falls in this record"}.` })]; }
     return [impactTable(list, source.impact_columns, state.impact, units.eventText, goImpact), make("p", { class: "small", text: "Small beside a value: its 90 % interval." }),
       ...(source === state.estimate ? [make("p", { class: "small", text: "Every contact, the hardest first; the other contacts follow hops too short for an impact." })] : [])];
   },
@@ -57,7 +57,9 @@ function showStatus() {
   showViews();
   if (damaged) { say(damaged, "bad", make("button", { text: "Remove", on: { click: () => askRemoval(state.job) } })); return false; }
   by("estimate").disabled = Boolean(busy) || !files.machine || !state.look;
-  by("why").textContent = busy || (state.look && files.machine) ? "" : `needs ${state.look ? "the machine file" : "a readable record"}`;
+  by("estimate").textContent = estimate?.result ? "Estimate again" : "Estimate";
+  by("estimate").classList.toggle("main", !estimate?.result);
+  by("why").textContent = busy ? "" : needed();
   by("simulated").hidden = !simulated();
   by("simulated").title = simulated();
   if (busy) {
@@ -74,9 +76,16 @@ function showStatus() {
       return make("span", { class: "headline", of: [make("span", { text: `${name} ${label} ` }), make("strong", { text }), make("span", { class: "note", text: interval ? ` (90 %: ${interval})` : "" })] });
     }));
   }
-  else if (state.look) { say((estimate?.state === "cancelled" ? "The estimate was cancelled. " : "") + state.look.statement.text, state.look.statement.level); }
+  else if (state.look) { say((estimate?.state === "cancelled" ? "The estimate was cancelled. " : "") + state.look.statement.text, state.look.statement.level, ...tailOffer()); }
   else { say("Nothing was found yet.", "notice"); }
   return false;
+}
+
+// A record of rest and a drop without a tail: what was sent apart belongs together.
+function tailOffer() {
+  if (!state.pair) { return []; }
+  const [rest, drop] = state.pair, text = rest.id === state.job.id ? `Use as the settled tail of ${drop.name}` : `Use ${rest.name} as its settled tail`;
+  return [make("button", { id: "usetail", text, on: { click: () => tried(useTail(rest, drop).then(sent)) } })];
 }
 
 // What helps after a record could not be looked at: the missing file, the channels, or to look once more.
@@ -108,18 +117,27 @@ async function showUnread() {
 // ---- figures or a report: one is seen at a time
 
 const REPORTS = { look: ["Look", "Report of the look"], estimate: ["Report", "Report of the estimate"], waterfall: ["Waterfall", "Frequencies of a coast-down (w)"], check: ["Machine", "What the machine amounts to"] };
-const OF_MACHINE = ["waterfall", "check"]; // computed when they are asked for
+const needed = (verb) => (verb !== "check" && !state.look ? "needs a readable record" : state.job.files.machine ? "" : "needs the machine file");
+const OPENED = ["waterfall", "check"]; // computed when they are opened
+const opens = (verb) => OPENED.includes(verb) && !needed(verb);
+// Why there is no report.
+function unmade(verb) {
+  const { states, files } = state.job, told = states[verb]?.state, needs = needed(verb);
+  if (["waiting", "running"].includes(told)) { return "The report is being made."; }
+  if (told === "failed") { return "There is no report: see above."; }
+  if (verb !== "look" && needs) { return `${REPORTS[verb][1]}: ${needs}.${files.machine ? "" : " Drop it here, or make one of twelve numbers: ⋯, Machine …"}`; }
+  return verb === "estimate" ? "Force and stress are not estimated yet: press Estimate." : "There is no report yet.";
+}
 function showViews() {
-  const { states, files } = state.job;
-  const there = (verb) => states[verb]?.report || (OF_MACHINE.includes(verb) && files.machine && (verb === "check" || state.look));
-  const names = Object.entries(REPORTS).map(([verb, [text, title]]) => [verb, text, { title, disabled: there(verb) ? null : "" }]);
+  const { states } = state.job;
+  const names = Object.entries(REPORTS).map(([verb, [text, title]]) => [verb, text, { title }]);
   tabList(by("views"), [["", "Traces", { disabled: state.look ? null : "" }], ...names], state.report, (verb) => tried(showReport(verb)), "main");
   const source = states[state.report]?.report || "", seen = Boolean(state.report);
   by("main").hidden = seen || !state.look;
   by("reports").hidden = !seen;
   by("reporttab").hidden = !source;
   by("noreport").hidden = !seen || Boolean(source);
-  by("noreport").textContent = states[state.report]?.state === "failed" ? "There is no report: see above." : running(state.job) === state.report ? "The report is being made." : "There is no report yet.";
+  by("noreport").textContent = seen ? unmade(state.report) : "";
   by("reportframe").hidden = !source;
   if (source && by("reportframe").getAttribute("src") !== source) { by("reportframe").src = source; by("reporttab").href = source; by("reportframe").title = REPORTS[state.report][1]; }
 }
@@ -127,7 +145,7 @@ async function showReport(verb) {
   const { id, states } = state.job;
   play(false);
   state.report = verb;
-  if (OF_MACHINE.includes(verb) && !states[verb]?.result && !running(state.job)) { state.job = await server.begin(id, verb, {}); }
+  if (opens(verb) && ["failed", "cancelled"].includes(states[verb]?.state)) { state.job = await server.begin(id, verb, {}); }
   if (state.job?.id !== id) { return; }
   noted();
   await refresh();
@@ -157,9 +175,12 @@ async function refresh() {
       const found = await samples("look", columns, first, last, 2400);
       if (state.job?.id !== id || shown !== now) { return; }
       state.overview = { time: found.time, curves: columns.map((name) => ({ values: found[name] })) };
+      state.pair = await tailPair(job);
+      if (state.job?.id !== id) { return; }
       await asSeen();
     }
   }
+  if (opens(state.report) && !job.states[state.report]) { state.job = await server.begin(id, state.report, {}); }
   await showUnread();
   if (state.job?.id !== id) { return; }
   if (!showStatus()) { await askedChannels(); return; }
@@ -272,7 +293,7 @@ click("setmark", () => (state.cursor === null ? say("Point at a trace first: the
 click("unmark", () => setMark(null));
 click("play", () => play(state.playing === null));
 by("signal").addEventListener("change", () => state.view && loadView());
-document.addEventListener("click", (event) => { if (!event.target.closest("#more > summary")) { by("more").open = false; } });
+document.addEventListener("click", (event) => { if (!event.target.closest("#more > summary, #more label")) { by("more").open = false; } });
 
 const redraw = () => { if (!state.job) { redrawHome(); } else if (!state.report && state.panels.length) { drawAll(); } };
 function chooseUnits(name) {
@@ -300,7 +321,7 @@ const KEYS = {
 for (const signal of ["y", "x", "r"]) { KEYS[signal] = () => { by("signal").value = signal; loadView(); }; }
 const ALWAYS = {
   "?": () => by("keys").showModal(), o: openFiles, l: () => address.go({ view: "drops" }), u: () => chooseUnits(units.chosen() === "SI" ? "US" : "SI"),
-  t: () => chooseTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"), w: () => by("views").querySelector("[data-name=waterfall]:not(:disabled)")?.click(),
+  t: () => chooseTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"), w: () => by("views").querySelector("[data-name=waterfall]")?.click(),
   Escape: () => { by("more").open = false; if (state.job && state.look && state.report) { tried(showReport("")); } }
 };
 document.addEventListener("keydown", (event) => {

@@ -29,7 +29,7 @@ function motionPanel(verb, place, index) {
 function loadPanel(kind) {
   const { places, panels } = state.estimate;
   return {
-    id: kind, verb: "estimate", columns: places.flatMap((place) => place[kind]), kind: kind === "force" ? "force" : "pressure",
+    id: kind, verb: "estimate", load: true, columns: places.flatMap((place) => place[kind]), kind: kind === "force" ? "force" : "pressure",
     title: kind === "force" ? "Bearing force" : "Maximum Hertz stress", axis: kind, fromZero: kind === "force",
     levels: panels[kind].flatMap((panel, i) => panel.levels.map(({ name, value }) => ({ name, value, place: i }))),
     measured: places.map((place) => ({ label: `${place.name} ${kind}`, value: (found) => found[place[kind][0]] })),
@@ -46,7 +46,7 @@ const speedPanel = { id: "speed", verb: "look", kind: "speed", title: "Shaft spe
 
 function wanted() {
   const verb = usesEstimate() ? "estimate" : "look", turning = state.look.traces.columns.includes("speed");
-  return [...state[verb].places.map((place, i) => motionPanel(verb, place, i)), ...(state.estimate ? [loadPanel("force"), loadPanel("stress")] : turning ? [speedPanel] : [])];
+  return [...(state.estimate ? [loadPanel("force"), loadPanel("stress")] : []), ...state[verb].places.map((place, i) => motionPanel(verb, place, i)), ...(turning && !state.estimate ? [speedPanel] : [])];
 }
 
 export async function loadView() {
@@ -79,7 +79,7 @@ function key({ label, colour, lower, bandLabel, dash = [] }) {
 function panelFrame(panel, tone) {
   panel.element = make("div", { class: "plot" });
   panel.drawn = panel.curves(panel.found, tone);
-  return make("section", { class: "panel", "aria-label": panel.title, of: [
+  return make("section", { class: panel.load ? "panel load" : "panel", "aria-label": panel.title, of: [
     make("header", { of: [make("h2", { text: panel.title }), make("span", { class: "keys-of", of: [...panel.drawn, ...levelKeys(panel.levels, tone)].map(key) }),
       make("button", { class: "link csv", text: "CSV", title: "Save every sample of the window as CSV", "aria-label": `Save ${panel.title} as CSV`, on: { click: () => tried(csv(panel)) } })] }), panel.element] });
 }

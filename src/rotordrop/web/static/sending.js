@@ -12,7 +12,7 @@ async function rolesOf(found) {
   const shaft = machine ? texts[found.indexOf(machine)].match(/shaft_table\s*=\s*["']([^"']+)["']/)?.[1] : null;
   const config = found.some((file) => /\.cfg$/i.test(file.name)), asked = state.job?.states?.look?.error || ""; // a shaft table that was forgotten
   return found.map((file, i) => (file === machine ? "machine" : texts[i] ? "profile" : file.name === shaft || asked.includes(`'${file.name}'`) || (config && /\.dat$/i.test(file.name)) ? "beside"
-    : /tail|settled|standstill|stillstand/i.test(file.name) ? "tail" : "record"));
+    : /tail|settled|standstill|stillstand|ruhe|(^|[^a-z])rest(?![a-z])/i.test(file.name) ? "tail" : "record"));
 }
 
 // Ask what the files are; without files, for a machine of twelve numbers for the drop that is open.
@@ -70,6 +70,22 @@ async function sendFiles(pairs) {
     last = job.id;
   }
   return last;
+}
+
+// A record in which nothing falls, and a drop of the same machine without a settled tail; null where there are no two.
+export async function tailPair({ id, files }) {
+  if (files.tail) { return null; }
+  const all = await server.jobs(), here = all.find((one) => one.id === id), rests = ({ row }) => row?.falls === false;
+  const other = all.find((one) => one.id !== id && one.files.machine?.sha256 === files.machine?.sha256 && one.files.record && (rests(here) ? !rests(one) && !one.files.tail : rests(one)));
+  return other ? (rests(here) ? [here, other] : [other, here]) : null;
+}
+export async function useTail(rest, drop) {
+  const give = async (what) => server.send(drop.id, what === "record" ? "tail" : what, new File([await server.sentFile(rest.id, what)], rest.files[what].name));
+  await give("record");
+  if (rest.files.profile && !drop.files.profile) { await give("profile"); }
+  await server.remove(rest.id);
+  await server.begin(drop.id, "look");
+  return drop.id;
 }
 
 // The bundled machine with its simulated drop, as if its files had been dropped here.

@@ -24,7 +24,7 @@ export const quantity = (cell) => {
 
 export function impactTable(impacts, columns, here, timeOf, go) {
   const marked = impacts.some((one) => "impact" in one);
-  const head = make("tr", { of: ["place", "time", ...columns.map((column) => column[chosen()]), ...(marked ? ["impact"] : [])].map((text, i) => make("th", { scope: "col", text, class: i ? "number" : null })) });
+  const head = make("tr", { of: ["place", "time", ...columns.map((column) => column[chosen()]), ...(marked ? ["impact"] : [])].map((text, i) => make("th", { scope: "col", text, class: i && i < columns.length + 2 ? "number" : null })) });
   const rows = impacts.map((impact, i) => make("tr", {
     class: i === here ? "here" : null, "aria-current": i === here ? "true" : null, on: { click: () => go(i) },
     of: [make("th", { scope: "row", of: [make("button", { class: "link", text: impact.place, "aria-label": `Go to impact ${i + 1} at ${impact.place}`, on: { click: (event) => { event.stopPropagation(); go(i); } } })] }),

@@ -29,8 +29,7 @@ export const shown = (value, kind, digits) => (Number.isFinite(value) ? `${writt
 // Time from power-off: milliseconds in short windows, seconds in long ones.
 export const timeScale = (span) => (span > 3 ? [1, "s"] : [1e-3, "ms"]);
 export const eventText = (t) => (Math.abs(t) < 1 ? `${fixed(1e3 * t, 2)} ms` : `${fixed(t, 4)} s`);
-export const minuteText = (date) => (/^\d{4}-\d\d-\d\dT\d\d:\d\d/.test(date) ? date.slice(0, 16).replace("T", " ") : date);
-export const dateText = (seconds) => new Date(1e3 * seconds).toISOString().slice(0, 16).replace("T", " ");
+export const minuteText = (date) => (/^\d{4}-\d\d-\d\dT\d\d:\d\d/.test(date) ? date.slice(0, 16).replace("T", " ").replaceAll("-", "\u2011") : date);
 export function timeText(t, span) {
   const [scale, name] = timeScale(span);
   const places = Math.max(0, 3 - Math.floor(Math.log10(span / scale)));
