@@ -350,9 +350,8 @@ def mean_values(force: History, stress: History) -> dict[str, Known]:
 
 
 def mean_late(force: History) -> float | None:
-    """Mean of a history over the late stretch; None where it ends before."""
-    step = float(force.time[1] - force.time[0])
-    if force.time[-1] < LATE[1] - 1.5 * step:
+    """Mean of a history over the late stretch; None where it ends more than 1 ms before."""
+    if force.time[-1] < LATE[1] - 1e-3:
         return None
     late = force.between(*LATE).values
     return float(np.mean(late)) if len(late) else None

@@ -178,7 +178,7 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
         # errors of a mean are those of independent samples at most.
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
         independent, length = forces.magnitude_sigma[late, b], forces.magnitude[late, b]
-        spread = float(np.linalg.norm(independent)) / len(independent)
+        spread = float(np.linalg.norm(independent)) * math.sqrt(forces.substeps) / len(independent)
         # An error across a force lengthens it, whatever its sign: no number of samples averages that out.
         lengthened = float(np.mean(np.hypot(length, independent) - length))
         left_out = MODEL_MEAN_FORCE_SIGMA * late_mean
@@ -271,7 +271,8 @@ def check_with_noise(
     Comes with what it would show of the peaks of the twin there, NaN elsewhere, shape (B,) [N].
     """
     shown, peaks = np.full(len(check.peak), np.nan), forces.magnitude.max(axis=0)
-    shown[list(apart)] = peaks_shown(problem, corrections_by_record(problem), forces.force)[list(apart)]
+    samples = forces.force[:: forces.substeps]
+    shown[list(apart)] = peaks_shown(problem, corrections_by_record(problem), samples)[list(apart)]
     hidden = np.nan_to_num(np.abs(peaks / shown - 1.0))
     wider = replace(
         check,
@@ -424,9 +425,8 @@ def bearing_drop(
     estimated = Motion(
         label="estimated", time=forces.time, displacement=forces.displacement[:, b], role="estimated"
     )
-    shown = Motion(
-        label="measured", time=forces.time, displacement=measured[: len(forces.time)], role="measured"
-    )
+    samples = forces.time[:: forces.substeps]
+    shown = Motion(label="measured", time=samples, displacement=measured[: len(samples)], role="measured")
     peak_force, peak_stress = (
         replace(peak, time_interval_90=when_largest(history, band, doubt))
         for peak, history, band in (

@@ -31,7 +31,7 @@ def value_of_information(
     [1].
     """
     names = problem.model.bearing_names
-    peaks = [int(np.argmax(forces.magnitude[:, b])) for b in range(len(names))]
+    peaks = np.argmax(forces.magnitude[:: forces.substeps], axis=0).tolist()
     at_peaks = smooth(smoothed.filtered, kept=peaks)
     form = problem.model.machine.rotor.force_sigma
     before: dict[str, float] = {}
@@ -41,7 +41,8 @@ def value_of_information(
         covariance = at_peaks.covariance(at)
         gradient = force_gradient(problem, smoothed.means[at], b)
         shared = covariance @ gradient
-        variance, force = max(float(gradient @ shared), 0.0), float(forces.magnitude[at, b])
+        variance = max(float(gradient @ shared), 0.0)
+        force = float(forces.magnitude[at * forces.substeps, b])
         rest = (MODEL_FORCE_SIGMA**2 + form**2) * force**2
         before[name] = NINETY * widening * math.sqrt(variance + rest)
         drawing[name] = NINETY * widening * math.hypot(math.sqrt(variance), MODEL_FORCE_SIGMA * force)

@@ -374,3 +374,18 @@ def test_a_pass_over_a_contact_is_the_same_interpreted(impacts, impacts_filtered
     for name, values in compiled.items():
         size = np.max(np.abs(values))
         assert interpreted[name] == pytest.approx(values, rel=1e-5, abs=1e-6 * size), name
+
+
+def test_between_samples_a_force_is_that_of_the_model(impacts, impacts_smoothed):
+    """With every fourth sample impacts have nearly the force they have with all: straight lines do not."""
+    every, shape = 4, (len(impacts_smoothed.means), len(impacts.watched), len(impacts.watched))
+    dense = replace(impacts_smoothed, watched=np.zeros(shape))
+    settings = dense.filtered.settings._replace(substeps=every * dense.filtered.settings.substeps)
+    filtered, means = replace(dense.filtered, settings=settings), dense.means[::every].copy()
+    thinned = replace(dense, filtered=filtered, means=means, watched=dense.watched[::every])
+    sparse = force_history(replace(impacts, time=impacts.time[::every].copy()), thinned)
+    whole = force_history(impacts, dense).magnitude[: len(sparse.time)]
+    at = slice(None, None, sparse.substeps)
+    straight = np.stack([np.interp(sparse.time, sparse.time[at], one[at]) for one in whole.T], axis=1)
+    errors = [np.max(np.abs(one - whole)) / np.max(whole) for one in (sparse.magnitude, straight)]
+    assert errors[0] < min(0.1, 0.6 * errors[1])
