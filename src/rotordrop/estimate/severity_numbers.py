@@ -73,12 +73,12 @@ def _falling(known: Known, factor: Factor) -> Known:
 
 
 def _sum(parts: list[Known], unit: str) -> Known:
-    if any(one.interval_90 is None for one in parts):
-        return Known(value=sum(one.value for one in parts), status="determined", unit=unit)
-    low, high = (sum(one.interval_90[k] for one in parts if one.interval_90) for k in (0, 1))
-    return Known(
-        value=sum(one.value for one in parts), status="determined", interval_90=(low, high), unit=unit
+    ends = [one.interval_90 for one in parts if one.interval_90 is not None]
+    interval = (
+        (sum(low for low, _ in ends), sum(high for _, high in ends)) if len(ends) == len(parts) else None
     )
+    value = sum(one.value for one in parts)
+    return Known(value=value, status=parts[0].status, interval_90=interval, unit=unit)
 
 
 def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
@@ -114,5 +114,5 @@ def _fatigue(
     _, high = bearing.peak_force.interval_90 or (0.0, bearing.peak_force.value)
     share = fatigue_share(ratings, time, loads, spin)
     most = (high / bearing.peak_force.value) ** 3 * share  # as the life goes with the load
-    known = Known(value=share, status="determined", interval_90=(0.0, most), unit="1")
+    known = Known(value=share, status=bearing.peak_force.known.status, interval_90=(0.0, most), unit="1")
     yield "severity.fatigue_by_16281", known

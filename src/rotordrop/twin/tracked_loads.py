@@ -439,6 +439,8 @@ def bearing_drop(
     if loads.peak_force.origin is Origin.TWIN:
         impacts = twin_impacts(forces, b, widening, cross_check)
         seen = race_moved(forces, b, gap, widening, doubt)
+        if cross_check is not None:  # as is handed over of a model that is not believed
+            seen["largest"] = replace(seen["largest"], status=INCONSISTENT)
     first = impacts[0] if impacts else None
     ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))
     return BearingDrop(
