@@ -152,7 +152,6 @@ def _extension(name: str, title: str, frame: str, sign: str = "") -> Extension:
         owner="bearing",
         names=(path,),
         neutral=neutral,
-        nothing={row.path: 0.0 for row in rows},
         sentence=sentence,
         joined=", ",
         frame=frame,

@@ -412,7 +412,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="drop",
         names=("remanence_time_constant",),
         neutral=_long,
-        nothing={"remanence.time_constant": REMANENCE_TIME},
         sentence=_decay,
         base=lambda machine: {"remanence_time_constant": guess(REMANENCE_TIME)} if machine.ambs else {},
     ),

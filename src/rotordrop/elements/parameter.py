@@ -324,8 +324,6 @@ class Extension:
     """What stands between the words on two parts."""
     frame: str = "{}"
     """What stands around the words on all parts."""
-    nothing: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Values found, by field below the part, with which the extension says what the base model says."""
     begins_as_base_model: bool = False
     """Whether a machine with the values to begin with computes what it does without, and knows of everything
     else what it does without."""
@@ -335,6 +333,8 @@ class Extension:
 
     def values(self, machine: Any) -> dict[str, Known]:
         """Values that a description with this extension names; none where it names some already."""
+        if self.owner == "unbalance" and any(one.stays_on for one in machine.ambs):
+            return {}  # such a magnet answers to the turning rotor like an unbalance
         parts = [part for _, part in parts_of(machine, self.owner)]
         if any(_at(part, name) is not None for part in parts for name in self.names):
             return {}
@@ -359,16 +359,6 @@ class Extension:
         """The machine followed as with this extension, which says nothing."""
         changed: M = cast(Any, machine).with_values(self.base_values(machine))
         return changed
-
-    def says_nothing(self, machine: Any, values: Values) -> bool:
-        """Whether all values found, by path in the machine, hold the ones that say nothing."""
-        held = [
-            (values[path], nothing)
-            for name, _ in parts_of(machine, self.owner)
-            for field, nothing in self.nothing.items()
-            if (path := path_of(self.owner, name, field)) in values
-        ]
-        return bool(held) and all(known.low <= nothing <= known.high for known, nothing in held)
 
     def found(self, machine: Any, values: Values, mean_load: float) -> str:
         """What the values found say, by path in the machine; in brackets 90 % intervals."""
@@ -405,7 +395,6 @@ def of_one_unknown(
         owner=row.owner,
         names=(row.path,),
         neutral=lambda _: {row.path: guess(neutral)},
-        nothing={row.path: neutral},
         sentence=said,
         joined=", " if frame else "; ",
         frame=frame or "{}",

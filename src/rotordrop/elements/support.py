@@ -407,7 +407,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         owner="bearing",
         names=("support.foundation_share", "support.foundation_damping_ratio"),
         neutral=_neutral,
-        nothing={"support.foundation_share": 0.0},
         sentence=_mode,
         rows=(
             Parameter(

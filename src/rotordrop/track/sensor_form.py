@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.support import support_sag
@@ -180,19 +181,22 @@ def _term_row(model: DropModel, unknown: Unknown, c: int) -> Array:
         row[support : support + 2] = seen.of_housing
     for along, shape in (
         (seen.of_rotor, model.basis.node_row(sensor.node)),
-        (seen.of_slope, _slope(model, sensor.node)),
+        (seen.of_slope, _slope(model, sensor.node, unknown.begin)),
     ):
         if along is not None:
             row[layout.modal_x], row[layout.modal_y] = along[0] * shape, along[1] * shape
     return row
 
 
-def _slope(model: DropModel, node: int) -> Array:
-    """Change of the mode shapes along the rotor at a node, shape (m,) [1/m per amplitude]."""
+def _slope(model: DropModel, node: int, offset: float) -> Array:
+    """Rise of the mode shapes from a node to a place beside it over their distance [m], shape (m,) [1/m].
+
+    Over some centimetres a shaft is not its tangent, which is taken where the distance is zero.
+    """
     z = model.fe.node_positions
-    left, right = max(node - 1, 1), min(node + 1, len(z))
-    rise = model.basis.node_row(right) - model.basis.node_row(left)
-    return np.asarray(rise / (z[right - 1] - z[left - 1]))
+    shapes = CubicSpline(z, [model.basis.node_row(k) for k in range(1, len(z) + 1)])
+    at = z[node - 1]
+    return np.asarray(shapes(at, 1) if offset == 0.0 else (shapes(at + offset) - shapes(at)) / offset)
 
 
 def share_in_groups(model: DropModel, unknowns: tuple[Unknown, ...], block: Array) -> None:

@@ -53,11 +53,6 @@ def drop_problem(
     return replace(problem, impulse_in_fall=FALL_SHARE * weight)
 
 
-def twin_problem(machine: Machine, evidence: Evidence, until: float = WINDOW) -> DropProblem:
-    """Estimation problem of a recorded drop in the basis that force and stress are taken from."""
-    return drop_problem(build_drop_model(machine, _basis(machine, FINE_REACH)), evidence, until)
-
-
 def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
     """What the record says, as the filter takes it."""
     readings, level = evidence.readings(until), evidence.settled_level

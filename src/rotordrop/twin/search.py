@@ -50,7 +50,6 @@ from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rises import LogLikelihoodGains, initial_guess_from
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.steps import GUESSES, WEIGHED, WHOLE, Steps
-from rotordrop.twin.tracked_parameters import parameters
 
 CALIBRATION_STAGE = Stage(until=0.06, force=0.07, share=0.01, passes=1)
 WHOLE_STAGE = replace(CALIBRATION_STAGE, until=0.2)
@@ -95,6 +94,10 @@ In the fine basis, where a fit has come to rest, all ten fell on drops of the be
 two drops of a foreign code cross-axis sensitivity rose by 12, with friction 11 % off. The right ones
 rose by 16 to 570 on one drop (study `structure`).
 """
+
+NAMED_RISE = 20.0
+"""Rise of the log likelihood from which an extension is named [1]: of 40 right ones the least rose by 23, two
+wrong ones by 12 and 19 (study `structure`)."""
 
 MOST_LOG_ODDS = 100.0
 """Logarithm of the odds from which a model is as good as certain [1]: larger ones overflow."""
@@ -256,8 +259,6 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
         other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
-        if again is not None:
-            again = search.without_uninformative(again, machine)
         followed = [one for one in (found, again) if one is not None]
         if not followed:
             return search.followed(search.refine(other))  # says where it was lost
@@ -276,12 +277,6 @@ def bayes_factor(one: Candidate, other: Candidate) -> float:
     if diverged or other_diverged:
         return 0.0 if diverged else math.exp(MOST_LOG_ODDS)
     return math.exp(min(of_other - of_one, MOST_LOG_ODDS))
-
-
-def _is_uninformative(found: Candidate, extension: Extension) -> bool:
-    """Whether all values of an extension that a candidate has hold the one that says nothing."""
-    stated = parameters(found.fit.problems[-1], found.fit.smoothed[-1], fits=True, widening=1.0)
-    return extension.says_nothing(found.machine, {one.path: one.estimate for one in stated})
 
 
 def score_of(fit: TrackedDrops) -> Score:
@@ -542,7 +537,7 @@ class Search:
             with suppress(IdentificationError):
                 back = self._again(other, plain)
                 without = min(without, back, key=lambda one: one.sized_score)
-        odds = 0.0 if _is_uninformative(other, extension) else against * bayes_factor(other, without)
+        odds = against * bayes_factor(other, without)
         stated = without if plain is described else found
         if odds < 1.0:
             scale, alternative = bayes_factor(found, stated), Alternative((*had, extension), odds, other.fit)
@@ -558,28 +553,6 @@ class Search:
         references = initial_guess_from(found.fit, self.drops.fine(machine))
         return self.at_rest(replace(found, machine=machine), references, found.noise_factor)
 
-    def without_uninformative(self, found: Candidate, described: Machine) -> Candidate:
-        """The candidate without the extensions whose values all hold the one that says nothing.
-
-        Such an extension has led to a better start. The model without it is refined from there; should that
-        one not follow the record as well, the unknowns stay for the width they give, and nothing is said.
-        """
-        if not found.accepted:
-            return found
-        telling = [one for one in found.accepted if not _is_uninformative(found, one.extension)]
-        if len(telling) == len(found.accepted):
-            return found
-        machine = described
-        for one in telling:
-            machine = one.extension.added_to(machine)
-        silent = replace(found, accepted=tuple(telling))
-        with suppress(IdentificationError):
-            without = self.refine(replace(silent, machine=machine))
-            (diverged, of_it), threshold = without.sized_score, evidence_threshold(len(found.fit.problems))
-            if not diverged and of_it - found.sized_score[1] < threshold:
-                return without
-        return silent
-
     def refine_if_followed(self, first: Candidate) -> Candidate | None:
         """The same; None where the finer basis loses a record with which the coarse one was inconsistent."""
         try:
@@ -590,8 +563,9 @@ class Search:
             return None
 
     def followed(self, found: Candidate) -> Candidate:
-        """What was found, if the filter followed all drops to the end."""
-        return replace(found, fit=_refuse_diverged(found.fit, self.drops.evidence))
+        """What was found, if the filter followed all drops to the end; what explains little has no name."""
+        named = tuple(one for one in found.accepted if one.gain >= NAMED_RISE)
+        return replace(found, fit=_refuse_diverged(found.fit, self.drops.evidence), accepted=named)
 
 
 def _checkpoint_of(fit: TrackedDrops) -> Checkpoint:

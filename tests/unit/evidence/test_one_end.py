@@ -18,7 +18,7 @@ from rotordrop.evidence.quality.flight import Weighed, check_flights, weighed
 from rotordrop.physics import columns as L
 from rotordrop.record.axes import sensor_planes
 from rotordrop.track.input_state import corrections_by_record, rotor_of
-from rotordrop.twin.problems import twin_problem
+from rotordrop.twin.problems import Drops
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.violations import Violations
 
@@ -83,7 +83,7 @@ def test_the_fall_knows_that_one_magnet_holds_on(evidence, drop):
 
 
 def test_the_twin_seeks_the_loop_of_that_magnet_and_not_its_lift(evidence):
-    problem = twin_problem(evidence.machine, evidence)
+    (problem,) = Drops(evidence=(evidence,), calibrate_only=False).fine(evidence.machine)
     paths = [unknown.path for unknown in problem.unknowns]
     for path in ("stiffness", "damping", "reference.x", "reference.y"):
         assert f"{HELD}.{path}" in paths
@@ -102,7 +102,7 @@ def test_the_twin_seeks_the_loop_of_that_magnet_and_not_its_lift(evidence):
 
 
 def test_the_cross_check_has_the_magnet_as_described_and_no_gate_there(evidence):
-    problem = twin_problem(evidence.machine, evidence)
+    (problem,) = Drops(evidence=(evidence,), calibrate_only=False).fine(evidence.machine)
     assert corrections_by_record(problem).reach[0] == 0.0
     assert corrections_by_record(problem).reach[1] > 0.0
     rotor = rotor_of(problem)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from tests.unit.track.conftest import flight_of
 from tests.unit.track.test_propagation import (
     advanced,
@@ -273,9 +274,8 @@ def test_sensors_read_as_their_form_says(lp400, prepared):
     state = np.random.default_rng(2).standard_normal(problem.n_dynamic) * 1e-5
     sensor = machine.sensors[0]
     z = np.asarray(problem.model.fe.node_positions)
-    slope = basis.node_row(sensor.node + 1) - basis.node_row(sensor.node - 1)
-    slope = slope / (z[sensor.node] - z[sensor.node - 2])
-    rows = basis.node_row(sensor.node) + 4e-3 * slope, basis.node_row(sensor.node)
+    shaft = CubicSpline(z, basis.shapes[0::2])
+    rows = shaft(z[sensor.node - 1] + 4e-3), basis.node_row(sensor.node)
     (x, y), (plain_x, plain_y) = ((row @ state[layout.modal_x], row @ state[layout.modal_y]) for row in rows)
     b = problem.model.bearing_names.index(sensor.bearing)
     hx, hy = state[layout.support][2 * b : 2 * b + 2]

@@ -14,16 +14,13 @@ from rotordrop.elements.support import soft_axis, soft_over_stiff
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.estimate import Verdict
-from rotordrop.evidence.evidence import read_evidence
 from rotordrop.rotor.unknowns import all_unknowns
-from rotordrop.track.calibration import TrackedDrops, track
+from rotordrop.track.calibration import TrackedDrops
 from rotordrop.twin import rises as rises_module
 from rotordrop.twin import search as search_module
 from rotordrop.twin.calibrated import with_found
-from rotordrop.twin.problems import Drops
 from rotordrop.twin.rises import LogLikelihoodGains
 from rotordrop.twin.search import (
-    CALIBRATION_STAGE,
     FIRST_OTHER_START,
     LEAST_RISE,
     Accepted,
@@ -179,7 +176,6 @@ class Weighed:
         monkeypatch.setattr(search_module, "converged", lambda problems, *_, **__: self.fit(problems))
         monkeypatch.setattr(search_module, "likeliest_noise", lambda *_: 0.125)
         monkeypatch.setattr(rises_module, "transferred", lambda _one, _two, means: means)
-        monkeypatch.setattr(search_module, "parameters", lambda *_, **__: ())
 
     def problems(self, machine):
         return (SimpleNamespace(machine=machine, first_contact=0.007, fall_time=0.007, time=np.zeros(3)),)
@@ -395,21 +391,21 @@ def test_a_found_number_has_an_interval_that_makes_sense(lp400):
     assert words == "Tried beyond the base model, and not enough: foundation mode."
 
 
-@pytest.mark.parametrize("name", [one.name for one in EXTENSIONS if one.nothing])
-def test_values_that_hold_the_neutral_one_say_nothing(lp400, name):
-    extension = next(one for one in EXTENSIONS if one.name == name)
-    machine = extension.added_to(lp400)
-    unknowns = {u.path: u for u in all_unknowns(build_drop_model(machine, "quick"))}
-    (nothing,) = set(extension.nothing.values())
-    values = {
-        path: Known(value=nothing, interval_90=(nothing - 1e-3, nothing + 1e-3))
-        for path in unknowns
-        if path.endswith(tuple(extension.nothing))
-    }
-    assert values and extension.says_nothing(machine, values)
-    one = next(iter(values))
-    telling = values | {one: Known(value=nothing + 3e-3, interval_90=(nothing + 1e-3, nothing + 5e-3))}
-    assert not extension.says_nothing(machine, telling)
+def test_no_unbalance_is_sought_beside_a_magnet_that_stays_on(lp400):
+    unbalance = next(one for one in EXTENSIONS if one.name == "unbalance beyond its grade")
+    assert unbalance.values(lp400) and not unbalance.values(lp400.with_magnets_on([lp400.ambs[0].name]))
+
+
+@pytest.mark.parametrize(("gain", "named"), [(19.0, False), (23.0, True), (math.inf, True)])
+def test_an_extension_that_explains_little_keeps_its_unknowns_and_is_not_named(lp400, gain, named):
+    lag = next(one for one in EXTENSIONS if one.name == "sensor lag")
+    fit = SimpleNamespace(problems=(None,), filtered=(SimpleNamespace(done=1, means=np.zeros((1, 1))),))
+    search = Search(drops=SimpleNamespace(evidence=(None,)), progress=None)
+    machine = lag.added_to(lp400)
+    found = Candidate(machine=machine, fit=fit, accepted=(Accepted(extension=lag, gain=gain),))
+    told = search.followed(found)
+    assert bool(told.accepted) == named
+    assert told.machine is machine
 
 
 def moved_fit(score, way, *, further=0, sigma=1.0, limit=9.0):
@@ -475,21 +471,3 @@ def test_a_fit_that_its_prior_or_the_first_impacts_hardly_allow_is_begun_again_f
     assert search.refine(first).sized_score == (False, best)
     assert len(begun) == windows
     assert windows == 2 or begun[2] == 2.0
-
-
-@pytest.mark.slow
-def test_an_extension_that_says_nothing_is_taken_off_and_the_rest_refined(calibrated, synthetic):
-    extension = next(one for one in EXTENSIONS if one.name == "brackets that follow the housing")
-    machine = extension.added_to(calibrated)
-    item = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail, name="hidden_060")
-    drops = Drops(evidence=(item,), calibrate_only=True)
-    search = Search(drops=drops, progress=None)
-    fit = track(drops.fine(machine), (CALIBRATION_STAGE,))
-    found = Candidate(machine=machine, fit=fit, accepted=(Accepted(extension=extension, gain=60.0),))
-    without = search.without_uninformative(found, calibrated)
-    assert without.accepted == () and without.machine == calibrated
-    assert (
-        without.fit.problems[0].n_dynamic + len(without.fit.problems[0].unknowns)
-        < len(fit.problems[0].unknowns) + fit.problems[0].n_dynamic
-    )
-    assert not without.inconsistent
