@@ -5,6 +5,7 @@ The public names below are loaded when first used, so that ``import rotordrop`` 
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +98,8 @@ __all__ = ["__version__", *_PUBLIC]
 
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
-        raise AttributeError(f"module 'rotordrop' has no attribute {name!r}")
+        words = f"module 'rotordrop' has no attribute {name!r}"
+        raise AttributeError(words, name=name, obj=sys.modules[__name__])  # Python names the nearest one
     value = getattr(import_module(_PUBLIC[name]), name)
     globals()[name] = value
     return value

@@ -5,9 +5,31 @@ A message names the thing, the value found, what was expected and the way out.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import ClassVar
+
+_speaks = {"of options": False}
+
+
+@contextmanager
+def speaking_of_options() -> Iterator[None]:
+    """While a command runs, a way out is an option of it, else an argument of a function."""
+    before = _speaks["of options"]
+    _speaks["of options"] = True
+    try:
+        yield
+    finally:
+        _speaks["of options"] = before
+
+
+def mapped(*planes: str) -> str:
+    """How one says which channels are which: ``--map "NDE: X1, Y1"``, or ``mapping=['NDE: X1, Y1']``."""
+    if _speaks["of options"]:
+        return " ".join(f"--map {plane}" if plane.isalpha() else f'--map "{plane}"' for plane in planes)
+    return f"mapping={list(planes)}"
 
 
 class RotordropError(Exception):

@@ -124,7 +124,7 @@ def estimate_drops(
     if isinstance(method, Replay) and any(held):
         raise RecordError(
             f"{held[0][0]} stayed held by its magnets in {stems[0]}, and the replay knows no drop of one "
-            "end; estimate it with the tracked twin (--method tracked)"
+            "end; estimate it with the tracked twin"
         )
     evidence = [
         Evidence(record=record, machine=machine, tail=tail, name=stem)

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 SIGMA_OF_MEDIAN = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution [1]."""
+DRAWN_BLOCKS = 900
+"""Blocks a history is cut into; each keeps its extremes, so a figure 900 pixels wide loses nothing."""
 
 
 def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -72,3 +74,28 @@ def noise_by_differences(values: NDArray[np.float64], order: int) -> float:
         * float(np.nanmedian(size, overwrite_input=True))
         / math.sqrt(math.comb(2 * order, order))
     )
+
+
+def peak_indices(*signals: NDArray[np.float64], blocks: int = DRAWN_BLOCKS) -> NDArray[np.int64]:
+    """Choose samples to draw: the first, the last, and in every block the extremes of every signal.
+
+    All of them where that would not save anything; the peaks of all signals stay.
+    """
+    count = len(signals[0])
+    if count <= 2 * blocks * len(signals):
+        return np.arange(count, dtype=np.int64)
+    edges = np.linspace(0, count, blocks + 1).astype(np.int64)
+    chosen: list[NDArray[np.int64]] = [np.array([0, count - 1], dtype=np.int64)]
+    for signal in signals:
+        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, signal), edges))
+        chosen.append(block_extremes(np.where(np.isnan(signal), np.inf, -signal), edges))
+    return np.unique(np.concatenate(chosen))
+
+
+def block_extremes(values: NDArray[np.float64], edges: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Index of the first smallest value of every block between two edges; no block is empty."""
+    width = int(np.max(np.diff(edges)))
+    index = edges[:-1, None] + np.arange(width)
+    inside = index < edges[1:, None]
+    block = np.where(inside, values[np.minimum(index, len(values) - 1)], np.inf)
+    return np.asarray(edges[:-1] + np.argmin(block, axis=1), dtype=np.int64)

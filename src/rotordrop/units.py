@@ -335,9 +335,10 @@ def format_amount(number: float) -> str:
 
 
 def format_moment(time: float) -> str:
-    """Write a time of a record [s] to 0.1 ms, as ``"0.2140 s"``; never as "-0.0000 s"."""
-    text = f"{time:.4f}"
-    return f"{text.removeprefix('-') if float(text) == 0.0 else text} s"
+    """Write a time of a record to 0.1 ms, as ``"214 ms"`` or, from one second on, ``"2.5 s"``."""
+    number, unit = (time, "s") if abs(time) >= 1.0 else (1e3 * time, "ms")
+    text = f"{round(number, 4 if unit == 's' else 1) + 0.0:.10g}"
+    return f"{text.replace('-', '−')} {unit}"
 
 
 def format_minute(moment: str) -> str:

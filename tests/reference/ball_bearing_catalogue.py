@@ -4,9 +4,9 @@ All functions take arrays, one entry per bearing, so that a whole catalogue is o
 """
 
 import numpy as np
+from tests.plain_bearing import BallBearingGeometry
 
 from rotordrop.physics.ball_bearing import row_approach, row_axial_force, row_axial_stiffness
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.hertz import contacts_in_series, race_contact
 
 _LOWEST_CONFORMITY, _HIGHEST_CONFORMITY = 0.5 + 1e-6, 1.0

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import checks_of, load_case
+from tests.plain_bearing import BallBearingGeometry
 from tests.reference import closed_forms
 from tests.reference.ball_bearing_catalogue import (
     conformity_of_rigidity,
@@ -19,7 +20,6 @@ from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 from rotordrop.elements.catalog.lookup import designations, find_bearing
 from rotordrop.physics import hertz
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.severity.fatigue import ball_row, share_by_16281
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -37,9 +37,10 @@ def quantity(kind: str) -> Callable[[str | float], float]:
     return parse
 
 
-def measured(kind: str, text: str, default: str | bool = True) -> Any:
+def measured(kind: str, text: str, default: str = "") -> Any:
     """An option with a unit; ``default`` says it as people write it."""
-    return Option(parser=quantity(kind), metavar=kind.upper(), help=text, show_default=default)
+    text += f"  [default: {default}]" if default else ""
+    return Option(parser=quantity(kind), metavar=kind.upper(), help=text, show_default=False)
 
 
 def text_option(metavar: str, text: str) -> Any:
@@ -50,6 +51,16 @@ def text_option(metavar: str, text: str) -> Any:
 def file_option(name: str, text: str, short: str | None = None) -> Any:
     """An option that names a file."""
     return Option(name, *([short] if short else []), metavar="FILE", help=text, show_default=False)
+
+
+def pairs(texts: Sequence[str] | None, expected: str) -> dict[str, str]:
+    """What texts such as ``"mass=60 kg"`` say, by name."""
+    found: dict[str, str] = {}
+    for text in texts or ():
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or found.setdefault(name, value) != value:
+            raise UsageError(f"{text!r}; expected {expected}, each once")
+    return found
 
 
 def refuse_beside(option: str, others: Mapping[str, object]) -> None:
@@ -86,7 +97,7 @@ Levitated = Annotated[
     bool, Option("--levitated", help="Start floating in the AMBs: synchronous orbit and sag.")
 ]
 ReductionChoice = Annotated[Reduction, Option(help="Modes of the rotor.")]
-Tolerance = Annotated[float, Option(min=1e-12, max=1e-3, help="Accuracy of a step.")]
+Tolerance = Annotated[float, Option(min=1e-12, max=1e-3, metavar="NUMBER", help="Accuracy of a step.")]
 IntegratorChoice = Annotated[Integrator, Option(help="Runge–Kutta pair.")]
 Json = Annotated[
     Path | None,

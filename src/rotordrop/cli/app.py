@@ -28,13 +28,29 @@ from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._output import with_files_apart
 from rotordrop.cli._terminal import interruptions_kept, open_streams, printable
-from rotordrop.errors import OutputError, RotordropError, UnmatchedError, UsageError
+from rotordrop.errors import OutputError, RotordropError, UnmatchedError, UsageError, speaking_of_options
 from rotordrop.one_thread import ENVIRONMENT
 
 BROKEN_PIPE = 141
 """Exit code when the reader has gone: 128 plus the number of the signal, the standard of shells."""
 
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
+
+
+class _Command(TyperCommand):
+    """A command whose help names its arguments as they are declared, without types and braces of typer's."""
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """What the usage line says."""
+        return ["[OPTIONS]", *(str(one.metavar) for one in self.params if one.param_type_name == "argument")]
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Arguments and options; an argument needs no type beside its name."""
+        found: list[Any] = super().get_params(ctx)
+        for one in found:
+            if one.param_type_name == "argument":
+                one.display_type_rich = lambda ctx: ""
+        return found
 
 
 @dataclass(frozen=True)
@@ -56,7 +72,7 @@ class Verb:
         text, _, example = (getdoc(function) or "").partition("\n\nExample: ")
         single = typer.Typer(add_completion=False, rich_markup_mode=None)
         epilog = f"Example: {example}" if example else None
-        single.command(self.name, help=text, epilog=epilog)(with_files_apart(function))
+        single.command(self.name, cls=_Command, help=text, epilog=epilog)(with_files_apart(function))
         command = typer.main.get_command(single)
         assert isinstance(command, TyperCommand)
         return command
@@ -148,7 +164,7 @@ class VerbTable(TyperGroup):
                 formatter.write_dl([(verb.name, verb.line) for verb in verbs], col_max=20)
 
 
-CONTEXT = {"help_option_names": ["-h", "--help"]}
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 app = typer.Typer(cls=VerbTable, add_completion=False, rich_markup_mode=None, context_settings=CONTEXT)
 
 
@@ -177,7 +193,8 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
 
     try:
         command = typer.main.get_command(program)
-        with command.make_context(name, list(arguments) or ["--help"]) as context:
+        opened = command.make_context(name, list(arguments) or ["--help"])
+        with speaking_of_options(), opened as context:
             command.invoke(context)
         sys.stdout.flush()
         return 0

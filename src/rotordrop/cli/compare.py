@@ -29,7 +29,6 @@ def compare(
         list[str] | None,
         Option(metavar="LIMIT", help='Limit to judge by, "peak_stress=2.5 GPa"; repeat it.'),
     ] = None,
-    allowed: Annotated[int | None, Option(metavar="N", help="Drops that somebody allows.")] = None,
     changed: Annotated[
         bool,
         Option(
@@ -46,7 +45,7 @@ def compare(
     Example: rotordrop compare drop1.json drop2.json
     """
     if changed:
-        others = {"--scatter": scatter, "--limit": limit, "--allowed": allowed, "--report": report}
+        others = {"--scatter": scatter, "--limit": limit, "--report": report}
         refuse_beside("--changes", others | {"--data": data})
         _deliver_changes(estimates, json)
         return
@@ -80,7 +79,6 @@ def compare(
         machine_name=", ".join(sorted({one.drop.machine for one in drops})),
         drop_scatter=drop_scatter,
         limits=limits,
-        allowed=allowed,
     )
     ranked: dict[str, Any] = {}
     for (bearing, key), ranking in rankings(drops, list(drops[0].drop.bearings), drop_scatter or {}).items():
@@ -93,7 +91,7 @@ def compare(
             "probability_worst_condition": None if condition is None else list(condition),
             "statement": ranking.statement,
         }
-    verdict = limit_statement(drops, limits, allowed).text
+    verdict = limit_statement(drops, limits).text
     numbers = {"left_out": left_out(drops), "bearings": ranked, "verdict": verdict}
     deliver(numbers, json, page, report=report, data=data)
 

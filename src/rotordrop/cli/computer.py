@@ -6,7 +6,6 @@ import os
 import platform
 import re
 import sys
-from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,14 +24,15 @@ if TYPE_CHECKING:
 USUAL_PORT = 8737
 """Where the page is served; chosen, not measured."""
 
+FIRST_RUN = "the first run takes half a minute more for a simulation, a minute for an estimate"
 EXTRAS = {
-    "io": ("recordings of TDMS and Excel, shaft tables of Excel", ("npTDMS", "openpyxl")),
-    "tables": ("to_xarray(), to_dataframe(), Parquet", ("xarray", "h5netcdf", "pyarrow")),
-    "postgres": ("a log of drops in PostgreSQL", ("psycopg",)),
-    "cluster": ("studies on a Dask cluster", ("distributed",)),
-    "serve": ("the page of 'rotordrop serve'", ("starlette", "uvicorn")),
+    "io": "recordings of TDMS and Excel, shaft tables of Excel",
+    "tables": "to_xarray(), to_dataframe(), Parquet",
+    "postgres": "a log of drops in PostgreSQL",
+    "cluster": "studies on a Dask cluster",
+    "serve": "the page of 'rotordrop serve'",
 }
-"""What an extra is for, and its packages."""
+"""What an extra is for."""
 
 
 def serve(
@@ -40,7 +40,8 @@ def serve(
         Path | None, text_option("FOLDER", "Where jobs are kept; your data folder by default.")
     ] = None,
     port: Annotated[
-        int, Option("--port", min=0, max=65535, help="Where to listen; 0 takes a free port.")
+        int,
+        Option("--port", min=0, max=65535, metavar="N", help="Where to listen; 0 takes a free port."),
     ] = USUAL_PORT,
     open_page: Annotated[bool, Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
@@ -112,19 +113,17 @@ def doctor(
 
 def examined() -> dict[str, Any]:
     """Everything the command says, ready for JSON."""
-    needed = ["numpy", "scipy", "numba", "pydantic", "pint", "h5py", "plotly", "jinja2", "typer", "rich"]
-    with suppress(PackageNotFoundError):  # run from a folder that was never installed
-        needed = [bare(text) for text in requires("rotordrop") or [] if "extra ==" not in text]
+    needs: dict[str, dict[str, str | None]] = {extra: {} for extra in ("", *EXTRAS)}
+    for text in requires("rotordrop") or []:
+        extra = re.search(r"extra == ['\"](\w+)", text)
+        needs.setdefault(extra[1] if extra else "", {})[bare(text)] = _version(bare(text))
     return {
         "rotordrop": __version__,
         "python": platform.python_version(),
         "executable": sys.executable,
         "system": platform.platform(),
-        "packages": {name: _version(name) for name in needed},
-        "extras": {
-            extra: {"for": text, "packages": {name: _version(name) for name in names}}
-            for extra, (text, names) in EXTRAS.items()
-        },
+        "packages": needs[""],
+        "extras": {extra: {"for": text, "packages": needs[extra]} for extra, text in EXTRAS.items()},
         "cache": _cache(),
         "cores": os.cpu_count() or 1,
         "threads": os.environ.get("OPENBLAS_NUM_THREADS"),
@@ -163,20 +162,17 @@ def _cache() -> dict[str, Any]:
 
 def cache_lines(cache: dict[str, Any]) -> list[str]:
     """What to say of compiled code."""
-    place = cache["folder"]
+    place, said = cache["folder"], []
     if cache["shipped"]:
-        came = f"compiled code came with the package: {cache['shipped']} kernels"
-        return [came, *cache_lines(cache | {"shipped": 0})] if cache["kernels"] else [came]
-    if not cache["kernels"]:
-        takes = "half a minute more for a simulation, a minute for an estimate"
-        if cache["writable"]:
-            return [f"compiled code is not cached yet in {place}; the first run takes {takes}"]
-        return [
-            f"problem: {place} cannot be written; every run compiles again: {takes}. "
-            "Name another folder in NUMBA_CACHE_DIR"
-        ]
-    size = cache["bytes"] / 1e6
-    cached = f"compiled code is cached: {cache['kernels']} kernels, {size:.1f} MB, in {place}"
-    if cache["writable"]:
-        return [cached]
-    return [f"{cached}, which cannot be written: every run copies it, and compiles again what is not there"]
+        said.append(f"compiled code came with the package: {cache['shipped']} kernels")
+    if cache["kernels"]:
+        said.append(
+            f"compiled code is cached: {cache['kernels']} kernels, {cache['bytes'] / 1e6:.1f} MB, in {place}"
+        )
+    if not said:
+        said.append(f"compiled code is not cached yet in {place}; {FIRST_RUN}")
+    if not (cache["writable"] or cache["shipped"]):
+        said.append(
+            f"problem: {place} cannot be written, every run compiles again; name another in NUMBA_CACHE_DIR"
+        )
+    return said

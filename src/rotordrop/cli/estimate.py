@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -82,7 +80,6 @@ def estimate(
         )
     machine, *records = options.machine_first(machine, *records)
     description, earlier = load_machine(machine), None if since is None else read_drop(since)
-    require_own_drops(records)
     if quick and method is Method.tracked and not is_calibrated(description):
         raise UsageError(
             f"--quick needs a calibrated machine; supports and contacts of {machine.name} are guesses. "
@@ -131,32 +128,6 @@ def _summarise(pages: Sequence[ReportContent], written: Sequence[str], out: Cons
         print_summary(page, out)
     for line in written:
         out.print(line)
-
-
-def require_own_drops(records: Sequence[Path]) -> None:
-    """Refuse two records of one file stem, by which results are listed, and the same recording given twice.
-
-    One drop would count as two then, and its errors would look smaller.
-    """
-    name, count = Counter(path.stem for path in records).most_common(1)[0]
-    if count > 1:
-        raise UsageError(
-            f"{count} records are named {name!r}; expected a name of its own for each, because results are "
-            "listed by it. Rename the files, or give each record once."
-        )
-    seen: dict[str, Path] = {}
-    for path in records:
-        try:
-            with path.open("rb") as stream:
-                digest = hashlib.file_digest(stream, "sha256").hexdigest()
-        except OSError:
-            continue  # the reader says what is wrong with it
-        if digest in seen:
-            raise UsageError(
-                f"{seen[digest]} and {path} are the same recording (equal content); expected another drop in "
-                "each. Leave one of them out."
-            )
-        seen[digest] = path
 
 
 def _read(
@@ -214,7 +185,6 @@ def calibrate(
     from rotordrop.twin.calibrated import calibrate_machine, calibration_json
 
     machine, *records = options.machine_first(machine, *records)
-    require_own_drops(records)
     description = load_machine(machine)
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     for record, rest in zip(read, tails, strict=True):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -19,6 +18,7 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
 from rotordrop.cli._output import console, deliver, require_places
 from rotordrop.errors import UsageError
+from rotordrop.units import format_minute, format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.ledger.book import LoggedDrop
@@ -72,7 +72,7 @@ def log(
     if action is Action.add:
         drop = _drop(what, bearings, recorded, duration, cause)
         number = book.add_drop(where, drop)
-        console().print(f"drop {number}: {drop.record} at {drop.speed / (2 * math.pi):.4g} Hz was logged")
+        console().print(f"drop {number}: {drop.record} at {format_quantity(drop.speed, 'speed')} was logged")
     elif action is Action.remove:
         if what is None or not what.isascii() or not what.isdigit():
             raise UsageError(f"{what!r} is not the number of a drop; 'rotordrop log show' lists them")
@@ -153,7 +153,6 @@ def _export(found: Mapping[int, LoggedDrop], file: str | None) -> None:
 def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, whole: bool) -> ReportContent:
     """What is used, and the drops: the latest ones, or all of them."""
     from rotordrop.report.content import ReportContent, Statement, Table
-    from rotordrop.units import format_minute
 
     shown, rows = [*found.items()][0 if whole else -LATEST :], []
     several = len({(drop.machine, drop.bearing_set) for drop in found.values()}) > 1
@@ -167,7 +166,7 @@ def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, w
             **({"machine, bearings": f"{drop.machine}, {drop.bearing_set}"} if several else {}),
             "date": day if drop.recorded else f"logged {day}",
             "record": f"{drop.record} (simulated)" if drop.simulated else drop.record,
-            "speed": f"{drop.speed / (2.0 * math.pi):.4g} Hz{lasted}",
+            "speed": f"{format_quantity(drop.speed, 'speed')}{lasted}",
             "largest force (90 %)": ""
             if worst is None
             else f"{worst.bearing} {worst.lower:.0f} to {worst.upper:.0f} N",

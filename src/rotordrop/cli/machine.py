@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as json_module
 import math
 import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,7 +14,7 @@ import typer
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
+from rotordrop.cli._options import file_option, measured, pairs, refuse_beside, text_option
 from rotordrop.cli._output import STANDARD_OUTPUT, console, deliver, deliver_text, require_places
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.units import percent, si_unit
@@ -45,10 +46,6 @@ Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
 """Documents with a published schema."""
 
 
-def _number(name: str) -> Any:
-    return text_option("TEXT", f"For --simple: {_QUESTIONS[name]}.")
-
-
 def init(
     target: Annotated[
         Path | None,
@@ -66,18 +63,12 @@ def init(
     simple: Annotated[
         bool, Option("--simple", help="Make it of twelve numbers; those not given are asked for.")
     ] = False,
-    mass: Annotated[str | None, _number("mass")] = None,
-    length: Annotated[str | None, _number("length")] = None,
-    centre: Annotated[str | None, _number("centre")] = None,
-    bearings: Annotated[str | None, _number("bearings")] = None,
-    sensors: Annotated[str | None, _number("sensors")] = None,
-    sensor_angle: Annotated[str | None, _number("sensor_angle")] = None,
-    designation: Annotated[str | None, _number("designation")] = None,
-    gap: Annotated[str | None, _number("gap")] = None,
-    speed: Annotated[str | None, _number("speed")] = None,
-    grade: Annotated[str | None, _number("grade")] = None,
-    support: Annotated[str | None, _number("support")] = None,
-    preload: Annotated[str | None, text_option("TEXT", "For --simple: preload of a row.")] = None,
+    numbers: Annotated[
+        list[str] | None,
+        Option(
+            "--set", metavar="NAME=VALUE", help=f"A number for --simple; of {', '.join(_QUESTIONS)}, preload."
+        ),
+    ] = None,
     schema: Annotated[
         Document | None,
         Option(
@@ -91,18 +82,20 @@ def init(
 
     Example: rotordrop init machine.toml
     """
-    numbers = locals()
-    given: dict[str, str | None] = {name: numbers[name] for name in _QUESTIONS}
     if schema is not None:
         deliver_text(_schema_text(schema), target, overwrite=force)
         return
     if simple:
         made = target or TEMPLATE_FILE
-        deliver_text(_simple_text(given, preload), made, overwrite=force)
+        deliver_text(_simple_text(numbers or ()), made, overwrite=force)
         if made != STANDARD_OUTPUT:
-            console(sys.stderr).print(f"next: rotordrop look RECORD {made}", soft_wrap=True)
+            console(sys.stderr).print(
+                f"next: rotordrop look RECORD {made}. An estimate with it takes minutes: it seeks the "
+                "form of the rotor too.",
+                soft_wrap=True,
+            )
         return
-    if any(value is not None for value in (*given.values(), preload)):
+    if numbers:
         raise UsageError("numbers of a machine belong to --simple; add it")
     if example is not None:
         _copy_example(example, target or Path(example), overwrite=force)
@@ -112,18 +105,18 @@ def init(
     deliver_text(template_text(), target or TEMPLATE_FILE, overwrite=force)
 
 
-def _simple_text(given: dict[str, str | None], preload: str | None) -> str:
+def _simple_text(numbers: Sequence[str]) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
     from rotordrop.machine.simple import simple_text
 
-    missing = [f"--{name.replace('_', '-')}" for name, value in given.items() if not value]
+    given = pairs(numbers, 'a number, "mass=60 kg"')
+    missing = [name for name in _QUESTIONS if not given.get(name)]
     if missing and not (sys.stdin and sys.stdin.isatty()):
         raise UsageError(
             f"--simple needs {', '.join(missing)}; nobody can be asked, because the input is no terminal: "
-            "give them as options"
+            f'give them, as in --set "{missing[0]}=..."'
         )
-    said = {name: value or typer.prompt(_QUESTIONS[name], err=True).strip() for name, value in given.items()}
-    return simple_text({**said, "preload": preload or ""})
+    return simple_text(given | {name: typer.prompt(_QUESTIONS[name], err=True).strip() for name in missing})
 
 
 def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:

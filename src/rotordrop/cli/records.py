@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option, measured, refuse_beside
+from rotordrop.cli._options import file_option, measured, refuse_beside, text_option
 from rotordrop.cli._output import console, deliver, progress_bar, require_places
 from rotordrop.errors import RecordError, UsageError
 
@@ -110,19 +110,21 @@ def profile(
     output: Annotated[Path, file_option("--output", "Profile to write, a .toml file.", "-o")],
     machine: Annotated[Path | None, file_option("--machine", "Machine whose sensors need a channel.")] = None,
     mapping: options.Planes = None,
-    unit: Annotated[str | None, Option(help="Unit of displacements that name none, um.")] = None,
-    sensitivity: Annotated[str | None, Option(help='Volts per length, "8 mV/um".')] = None,
-    full_scale: Annotated[str | None, Option(help='Full scale of a WAV file, "500 um".')] = None,
-    speed: Annotated[str | None, Option(help='Speed by hand, "60 Hz".')] = None,
-    speed_channel: Annotated[str | None, Option(help="Channel of the shaft speed.")] = None,
-    speed_unit: Annotated[str | None, Option(help="Its unit, rpm.")] = None,
-    pulses: Annotated[str | None, Option(help="Channel of tacho or keyphasor pulses.")] = None,
-    pulses_per_turn: Annotated[int | None, Option(min=1, help="Pulses per turn, 1.")] = None,
-    edge: Annotated[str | None, Option(help="Edge that counts, rising or falling.")] = None,
-    time_step: Annotated[str | None, Option(help='Sampling interval, "50 us".')] = None,
-    time_start: Annotated[str | None, Option(help='Time of the first sample, "-0.25 s".')] = None,
-    names: Annotated[str | None, Option(help="Names of the columns, commas between them.")] = None,
-    file_format: Annotated[str | None, Option("--format", help="Reader, where the suffix lies.")] = None,
+    unit: Annotated[str | None, text_option("TEXT", "Unit of displacements that name none, um.")] = None,
+    sensitivity: Annotated[str | None, text_option("TEXT", 'Volts per length, "8 mV/um".')] = None,
+    full_scale: Annotated[str | None, text_option("TEXT", 'Full scale of a WAV file, "500 um".')] = None,
+    speed: Annotated[str | None, text_option("TEXT", 'Speed by hand, "60 Hz".')] = None,
+    speed_channel: Annotated[str | None, text_option("TEXT", "Channel of the shaft speed.")] = None,
+    speed_unit: Annotated[str | None, text_option("TEXT", "Its unit, rpm.")] = None,
+    pulses: Annotated[str | None, text_option("TEXT", "Channel of tacho or keyphasor pulses.")] = None,
+    pulses_per_turn: Annotated[int | None, Option(min=1, metavar="N", help="Pulses per turn, 1.")] = None,
+    edge: Annotated[str | None, text_option("TEXT", "Edge that counts, rising or falling.")] = None,
+    time_step: Annotated[str | None, text_option("TEXT", 'Sampling interval, "50 us".')] = None,
+    time_start: Annotated[str | None, text_option("TEXT", 'Time of the first sample, "-0.25 s".')] = None,
+    names: Annotated[str | None, text_option("TEXT", "Names of the columns, commas between them.")] = None,
+    file_format: Annotated[
+        str | None, Option("--format", metavar="SUFFIX", help="Reader, where the suffix lies.")
+    ] = None,
 ) -> None:
     """Make a profile of a recorder: what its files do not say themselves, said once.
 
@@ -268,9 +270,10 @@ def waterfall(
     amplitude: Annotated[Amplitude, Option(help="Amplitudes of the waterfalls.")] = Amplitude.zero_to_peak,
     against: Annotated[Against, Option(help="What goes upwards.")] = Against.time,
     points: Annotated[
-        int | None, Option(min=16, help="Samples per frame; the paper's 32768, less in a short record.")
+        int | None,
+        Option(min=16, metavar="N", help="Samples per frame; the paper's 32768, less in a short record."),
     ] = None,
-    overlap: Annotated[float, Option(min=0.0, max=0.95, help="Share used again.")] = 0.5,
+    overlap: Annotated[float, Option(min=0.0, max=0.95, metavar="SHARE", help="Share used again.")] = 0.5,
     highest: Annotated[
         float | None,
         measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),

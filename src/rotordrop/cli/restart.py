@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option
+from rotordrop.cli._options import file_option, pairs
 from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
@@ -64,7 +63,7 @@ def restart(
     for field in limits:
         if field not in COMPARED:
             raise UsageError(f"--limit: no simulated drop has {field}; there are {', '.join(COMPARED)}")
-    made = _checks(check or ())
+    made = pairs(check, f'one of {", ".join(CHECKS)} and its outcome, "turning=bad"')
     earlier = [read_drop(one) for one in since or ()]
     restart_card(drop, earlier=earlier, checks=made)  # refuses before anything is simulated
     found = Foreseen()
@@ -76,17 +75,3 @@ def restart(
         found = replace(found, lift=lift_now(described, drop=drop))
     card = restart_card(drop, earlier=earlier, checks=made, foreseen=found)
     deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
-
-
-def _checks(written: Sequence[str]) -> dict[str, str]:
-    """Checks as they are written on the command line, with their outcome."""
-    found: dict[str, str] = {}
-    for text in written:
-        name, equals, outcome = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise UsageError(
-                f'--check {text!r}; expected one of {", ".join(CHECKS)} and its outcome, "turning=bad"'
-            )
-        if found.setdefault(name, outcome) != outcome:
-            raise UsageError(f"--check {name} is given twice; give the outcome that counts")
-    return found

@@ -63,9 +63,6 @@ def simulate(
         text_option("FORCE", 'Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
     ] = None,
     remanence_time: Annotated[float, measured("time", "Levitated: its decay.", "2 ms")] = 2e-3,
-    relevitate: Annotated[
-        float | None, measured("time", "Magnets with their controllers go on again at this time.")
-    ] = None,
     magnets: Annotated[
         list[str] | None,
         text_option(
@@ -101,21 +98,21 @@ def simulate(
     from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
-    if stays_on and (magnets or relevitate is not None):
+    if stays_on and magnets:
         raise UsageError(
-            "--stays-on has the spring and damper of a magnet and cannot go with --magnets or --relevitate, "
-            "which follow its control loop; choose one"
+            "--stays-on has the spring and damper of a magnet and cannot go with --magnets, which follow "
+            "its control loop; choose one"
         )
     described = load_machine(machine).with_magnets_on(stays_on or ())
     bearings = [bearing.name for bearing in described.touchdown_bearings]
-    events = magnet_events(magnets or (), relevitate, delay if levitated and not magnets else None)
+    events = tuple(map(magnet_event, magnets)) if magnets else None
     if levitated:
         if displacement or velocity:
             raise UsageError("--levitated cannot go with --displacement or --velocity; choose one start")
         left = named_pairs(remanent_force or (), "force", [amb.name for amb in described.ambs])
         start: Start = LevitatedStart(
             rotor_angle=rotor_angle,
-            delay=0.0 if events is not None and not magnets else delay,
+            delay=delay,
             remanent_force=left if remanent_force else None,
             remanence_time_constant=remanence_time,
         )
@@ -180,31 +177,15 @@ def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArra
     return values
 
 
-def magnet_events(
-    texts: Sequence[str], relevitate: float | None, released: float | None
-) -> tuple[MagnetEvent, ...] | None:
-    """Read events such as ``"20 ms: off"``; None where nothing is said of magnets in the loop.
-
-    With a time to ``relevitate`` [s], and one at which the magnets are ``released`` [s] before it.
+def magnet_event(text: str) -> MagnetEvent:
+    """Read an event such as ``"20 ms: off"``.
 
     Examples
     --------
-    >>> from rotordrop.cli.simulate import magnet_events
-    >>> [str(event) for event in magnet_events(["10 ms: lost NDE x"], 0.2, None)]
-    ['lost NDE x', 'levitate']
+    >>> from rotordrop.cli.simulate import magnet_event
+    >>> str(magnet_event("10 ms: lost NDE x"))
+    'lost NDE x'
     """
-    from rotordrop.simulate.case import MagnetEvent
-
-    if not texts and relevitate is None:
-        return None
-    events = [] if released is None else [MagnetEvent(action="off", time=released)]
-    events += [_magnet_event(text) for text in texts]
-    if relevitate is not None:
-        events.append(MagnetEvent(action="levitate", time=relevitate))
-    return tuple(events)
-
-
-def _magnet_event(text: str) -> MagnetEvent:
     from rotordrop.simulate.case import MagnetAction, MagnetEvent
 
     when, _, what = (part.strip() for part in text.partition(":"))

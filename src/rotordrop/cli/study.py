@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option, measured
+from rotordrop.cli._options import file_option, measured, pairs
 from rotordrop.cli._output import console, deliver, progress_bar
 from rotordrop.errors import UsageError, unknown_key
 
@@ -116,10 +116,7 @@ def _deliver_results(
         return
     kinds = {q.name: q.kind for q in BEARING_QUANTITIES}
     limits = {}
-    for text in above:
-        name, equals, limit = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise UsageError(f'--above {text!r}; expected a quantity and its limit, "peak_stress=1.8 GPa"')
+    for name, limit in pairs(above, 'a quantity and its limit, "peak_stress=1.8 GPa"').items():
         if name not in kinds:
             raise UsageError(f"--above: {unknown_key(name, tuple(kinds))}")
         limits[name] = parse_quantity(limit, kinds[name])

@@ -422,7 +422,7 @@ class BallBearing(RaceBearing):
             for name, value, bounds, why, unit in rows
             if value is not None
         }
-        if balls.count_range is not None:
+        if balls.count_range is not None and "ball_count" not in self.model_fields_set:
             values["ball_count_range"] = balls.count_range
         values |= {"ball_count": balls.ball_count, "ball_material": entry.ball_material}
         if read is not None and read.arrangement is not None:

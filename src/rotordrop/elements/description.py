@@ -143,6 +143,10 @@ class Description(BaseModel):
         """Values for fields that were left out and follow from others."""
         return {}
 
+    def __dir__(self) -> list[str]:
+        own = (name for name in vars(type(self)) if not name.startswith("_"))
+        return sorted({"changed", *type(self).model_fields, *own} - set(dir(Description)))
+
     @property
     def further_states(self) -> tuple[int, ...]:
         """Kinds of the states that it adds to the model of a drop."""

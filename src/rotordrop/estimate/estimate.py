@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +31,7 @@ from rotordrop.files import write_json
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
+from rotordrop.sketch import sketch
 from rotordrop.track.consistency import Check
 from rotordrop.units import format_quantity
 
@@ -375,7 +375,8 @@ class Estimate:
         return str(_above("rotordrop.report.terminal", "summary_text")(screen))
 
     def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
+        forces = {b.name: (b.force.time, b.force.values) for b in self.bearings}
+        return sketch(self.summary(), "time from power-off [s]", "force [kN]", forces, 1e-3)
 
 
 class Estimates(tuple[Estimate, ...]):

@@ -32,7 +32,7 @@ def given_drops(
     Raises
     ------
     UsageError
-        When they are none, or not as many.
+        When they are none, not as many, or one is there twice: its errors would look smaller.
     """
     require(machine, "machine", Machine)
     drops = each(records, "records", Record)
@@ -45,4 +45,16 @@ def given_drops(
         require_drop(record, machine)
         require_drop(rest, machine, "tail", none=True)
     stems = [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(drops)]
-    return drops, rests, each(stems if names is None else names, "names", str, records=len(drops))
+    names = each(stems if names is None else names, "names", str, records=len(drops))
+    seen: dict[str, str] = {}
+    for name, record in zip(names, drops, strict=True):
+        if names.count(name) > 1:
+            raise UsageError(
+                f"{names.count(name)} records are named {name!r}; expected a name of its own for each, as "
+                "they name the results. Rename the files, or give each once."
+            )
+        if record.sha256 and (other := seen.setdefault(record.sha256, name)) != name:
+            raise UsageError(
+                f"{other} and {name} are the same recording (equal content); leave one of them out."
+            )
+    return drops, rests, names

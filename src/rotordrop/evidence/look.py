@@ -65,6 +65,7 @@ from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record
 from rotordrop.require import require
+from rotordrop.sketch import sketch
 from rotordrop.units import format_quantity, in_si
 
 RELEASE_ERROR = 2e-3
@@ -159,6 +160,15 @@ class Look:
     notes: tuple[str, ...]
     """What was guessed."""
 
+    def __repr__(self) -> str:
+        """Record, drops and impacts of the first one."""
+        speed = "" if self.speed is None else f" at {format_quantity(self.speed, 'speed')}"
+        return f"<Look {self.record.name}: drops {len(self.drops)}{speed}, impacts {len(self.impacts)}>"
+
+    def _repr_html_(self) -> str:
+        heights = {path.name: (self.motion.time, path.position[:, 1]) for path in self.motion.paths}
+        return sketch(repr(self), "time [s]", "vertical displacement [µm]", heights, 1e6)
+
     @property
     def unit_doubted(self) -> bool:
         """Whether gravity or the air gap contradict the unit of the readings, so that no length holds."""
@@ -190,14 +200,15 @@ class Look:
         if not self.drops:
             events.append((float(self.record.time[-1]), "record ends"))
         events += [
-            (one.time, f"contact at {one.plane}, {math.degrees(one.azimuth):.0f}°") for one in self.contacts
+            (one.time, f"contact at {one.plane}, {math.degrees(one.azimuth):.0f}°".replace("-", "−"))
+            for one in self.contacts
         ]
         for number, drop in enumerate(self.drops, start=1):
             events.append((drop.release, "released" if number == 1 else f"released again, drop {number}"))
             last, between = drop.permanent_contact, drop.permanent_contact_interval_90
             if last is not None and between is not None:
                 early, late = (1e3 * abs(end - last) for end in between)
-                events.append((last, f"last impact, {AFTER_LAST} (−{early:.2g}, +{late:.2g} ms)"))
+                events.append((last, f"last impact, {AFTER_LAST} (−{early:.0f}, +{late:.0f} ms)"))
             events.append((drop.end, "lifted again" if drop.lifted else "record ends"))
         for plane in self.planes:
             if plane.touch is not None and plane.touch_interval_90 is not None:

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError
 
 from rotordrop.elements.air import SpeedDescription
@@ -26,6 +27,7 @@ from rotordrop.elements.values import Acceleration, Number, PositiveTime, defaul
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
+from rotordrop.sketch import sketch
 from rotordrop.units import GRAVITY, format_quantity, in_si
 
 RESERVED_NAMES = ("speed", "unbalance", "rotor", "gravity", "sensors", "ambs", "machine", "calibration")
@@ -294,6 +296,15 @@ class Machine(Description):
         )
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        ends = np.repeat(self.rotor.node_positions, 2)[1:-1]
+        radii = np.repeat([0.5 * element.outer_diameter for element in self.rotor.elements], 2)
+        z, r = np.concatenate([ends, ends[::-1]]), np.concatenate([radii, -radii[::-1]])
+        places = [self.rotor.node_positions[bearing.node - 1] for bearing in self.touchdown_bearings]
+        top = 1.2 * float(np.max(radii))
+        marks = {b.name: ([x, x], [-top, top]) for b, x in zip(self.touchdown_bearings, places, strict=True)}
+        return sketch(repr(self), "position [m]", "radius [mm]", {"shaft": (z, r), **marks}, 1e3)
 
     @property
     def source_path(self) -> Path | None:

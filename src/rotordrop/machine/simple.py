@@ -151,7 +151,7 @@ def simple_text(given: Mapping[str, str]) -> str:
     known = [name for name in EXAMPLES if name != "preload"]
     if strange := [name for name in given if name not in EXAMPLES]:
         raise UsageError(f"there is no number {strange[0]!r}; there are {', '.join(EXAMPLES)}")
-    said: dict[str, Any] = {name: value.strip() for name, value in given.items() if value.strip()}
+    said: dict[str, Any] = {name: " ".join(value.split()) for name, value in given.items() if value.strip()}
     if missing := [name for name in known if name not in said]:
         raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
     for name in ("bearings", "sensors"):
@@ -159,10 +159,24 @@ def simple_text(given: Mapping[str, str]) -> str:
         if len(planes) != 2:
             raise UsageError(f'{name} needs two planes, such as "110 mm, 980 mm"')
     try:
-        return machine_text(simple_machine(SimpleMachine(**said)))
+        made = simple_machine(SimpleMachine(**said))
     except ValidationError as error:
         reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
         raise UsageError(f"these numbers make no machine: {reasons}") from None
+    weight = f"both halves together: {said['mass']}, centre at {said['centre']}"
+    remarks = {
+        "speed.nominal": said["speed"],
+        "balance_grade.at_speed": said["speed"],
+        "rotor.sections.outer_diameter": f"a steel cylinder of {said['mass']} and {said['length']}",
+        "rotor.materials.NDE_half.density": weight,
+        "rotor.materials.DE_half.density": weight,
+        "touchdown_bearings.node": f"the planes at {', '.join(said['bearings'])}",
+        "sensors.node": f"the planes at {', '.join(said['sensors'])}",
+        "ambs.node": "taken to be the planes of the sensors",
+        "touchdown_bearings.support.stiffness": said["support"],
+        "touchdown_bearings.support.mass": "not given: a share of the rotor's mass",
+    }
+    return machine_text(made, remarks)
 
 
 def drafted_machine(
@@ -216,7 +230,7 @@ def drafted_machine(
 def beam_nodes(length: float, planes: Sequence[float]) -> list[float]:
     """Nodes of a beam [m]: ends, middle, every plane, and even ones that are not too close to these."""
     fixed = sorted({0.0, 0.5 * length, length, *planes})
-    even = [length * k / _ELEMENTS for k in range(1, _ELEMENTS)]
+    even = [round(length * k / _ELEMENTS, 6) for k in range(1, _ELEMENTS)]
     free = [place for place in even if min(abs(place - one) for one in fixed) > _CLOSEST * length]
     return sorted({*fixed, *free})
 
@@ -241,7 +255,7 @@ def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
             f"{_mm(0.74 * known.length)}: describe the rotor by sections"
         )
     area = known.mass / (STEEL_DENSITY * known.length)
-    diameter = f"{math.sqrt(4.0 * area / math.pi)!r} m"
+    diameter = f"{1e3 * math.sqrt(4.0 * area / math.pi):.6g} mm"
     middle = positions.index(0.5 * known.length) + 1
     halves = (("NDE_half", 1.0 - share, 1, middle), ("DE_half", share, middle, len(positions)))
     return {
@@ -250,7 +264,7 @@ def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
             name: {
                 "youngs_modulus": f"{STEEL_MODULUS!r} Pa",
                 "poisson_ratio": 0.3,
-                "density": f"{part * known.mass / (0.5 * known.length * area)!r} kg/m^3",
+                "density": f"{part * known.mass / (0.5 * known.length * area):.6g} kg/m^3",
             }
             for name, part, _, _ in halves
         },

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.ends import far_end_first
-from rotordrop.errors import UnpairedError, UsageError
+from rotordrop.errors import UnpairedError, UsageError, mapped
 from rotordrop.known import Known
 from rotordrop.record.clock import TIME_UNITS
 from rotordrop.record.profile import Profile
@@ -97,7 +97,7 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
         left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
         if pairs and left:
-            ask = 'say which look at one, as --map "PLANE: CHANNEL 0 deg, CHANNEL 90 deg"'
+            ask = f"say which look at one, as {mapped('PLANE: CHANNEL 0 deg, CHANNEL 90 deg')}"
             notes += (f"in no plane, and not looked at: {listed(left)}; {ask}",)
     if not planes:
         labels = [channel.label for channel in recording.channels if _may_read(channel)]
@@ -109,7 +109,7 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
                 "export the displacements of a plane together, or say their unit where the file has another "
                 "('rotordrop profile --unit um')",
             )
-        as_listed = " ".join(f'--map "{end}: {two}"' for end, two in planes_as_listed(recording).items())
+        as_listed = mapped(*(f"{end}: {two}" for end, two in planes_as_listed(recording).items()))
         raise UnpairedError(
             f"no two channels of {listed(channel.label for channel in recording.channels)} are a pair by "
             "their names (X and Y, A and B, H and V, left and right)",

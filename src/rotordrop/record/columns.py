@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError, UnmatchedError, UsageError
+from rotordrop.errors import RecordError, UnmatchedError, UsageError, mapped
 from rotordrop.record.arrangement import fitting, pairs_of, seats, sensors_of_planes
 from rotordrop.record.profile import LIKELY, Profile
 from rotordrop.record.recording import (
@@ -105,15 +105,15 @@ def options_for(recording: Recording, sensors: Sequence[Sensor], missing: Sequen
     """Options that would map the sensors without a channel: the likeliest planes, with their angles."""
     likely = likeliest(recording, sensors)
     if not likely:
-        return " ".join(f'--map "{name}=..."' for name in missing[:8])
+        return mapped(*(f"{name}=..." for name in missing[:8]))
     planes: dict[str, list[str]] = {}
     at = {sensor.name: sensor for sensor in sensors}
     for name, channel in likely.items():
         told = f"{channel.label} {math.degrees(float(at[name].angle)):.4g} deg"
         planes.setdefault(at[name].bearing or "", []).append(told)
     lacking = {at[name].bearing or "" for name in missing}
-    maps = " ".join(f'--map "{plane}: {", ".join(two)}"' for plane, two in planes.items() if plane in lacking)
-    return f"likeliest {maps} ({RULE}), or --map {LIKELY}"
+    maps = mapped(*(f"{plane}: {', '.join(two)}" for plane, two in planes.items() if plane in lacking))
+    return f"likeliest {maps} ({RULE}), or {mapped(LIKELY)}"
 
 
 def find_speed(

@@ -37,6 +37,7 @@ from rotordrop.record.readers.numpy_files import recording_of_arrays
 from rotordrop.record.recording import MARKS, SPEED_UNITS, Channel, Recording, spelled, split_unit, whose_time
 from rotordrop.record.tacho import passages, readings_of_held_signal
 from rotordrop.require import numbers, require
+from rotordrop.sketch import sketch
 from rotordrop.units import parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
@@ -202,6 +203,10 @@ class Record:
         """Name, length, rate and channels."""
         has = f"{', '.join(self.channel_names)}, {'with' if self.speed is not None else 'no'} speed"
         return f"<Record {self.name}: {self.duration:.4g} s at {self.sampling_rate:g} Hz, {has}>"
+
+    def _repr_html_(self) -> str:
+        read = zip(self.channel_names, self.signals.T, strict=True)
+        return sketch(repr(self), "time [s]", "reading [µm]", {n: (self.time, v) for n, v in read}, 1e6)
 
     @property
     def channel_names(self) -> tuple[str, ...]:

@@ -39,22 +39,23 @@ def compare_page(
     machine_name: str = "",
     drop_scatter: Mapping[str, float] | None = None,
     limits: Mapping[str, float] | None = None,
-    allowed: int | None = None,
 ) -> ReportContent:
     """Build the report that compares at least two drops with the same bearings.
 
     The scatter between equal drops (1 s.d.) and the limits are known by the field of a number, such as
-    ``"peak_force_N"`` [SI]; so many drops are allowed.
+    ``"peak_force_N"`` [SI].
     """
     bearings = _bearings(drops)
     ranked = rankings(drops, bearings, drop_scatter or {})
     simulated = [one.name for one in drops if one.drop.simulated_record]
-    text = f"The records of these drops are simulated, not measured: {', '.join(simulated)}."
+    which = "" if len(simulated) == len(drops) else f": {', '.join(simulated)}"
+    judged = limit_statement(drops, limits or {})
+    said = _verdict(drops, bearings, ranked)
     return ReportContent(
         title=f"Comparison of {len(drops)} drops" + (f" of {machine_name}" if machine_name else ""),
         subtitle=", ".join(one.name for one in drops),
-        simulated=text if simulated else "",
-        verdict=(*_verdict(drops, bearings, ranked), limit_statement(drops, limits or {}, allowed)),
+        simulated=f"Simulated records{which}." if simulated else "",
+        verdict=(judged, *said) if limits else (*said, judged),
         screen=_screen(drops, bearings),
         facts=(("rotordrop", __version__),),
         sections=(_severity_section(drops, bearings, ranked),),
@@ -131,19 +132,21 @@ def _verdict(
         )
         said.append(Statement(f"These are drops of {len(machines)} machines, {whose}.", "warning"))
     texts: dict[str, list[str]] = {}
-    for number in FIRST:
-        for bearing in bearings:
-            if (bearing, number.field) in ranked:
-                text = f"{ranked[bearing, number.field].statement}."
-            elif len(drops) - len(excluded) < 2:
-                text = "fewer than two drops are left to rank."
-            else:
-                text = (
-                    "not every drop states an interval, so the order of the numbers says nothing about which "
-                    "drop was the worst."
-                )
-            texts.setdefault(text, []).append(f"{bearing} {number.label}")
-    said += [Statement(f"{', '.join(places)}: {text}") for text, places in texts.items()]
+    # the surest first
+    places = [(number, bearing) for number in FIRST for bearing in bearings]
+    chance = {key: max(one.worst_drop) for key, one in ranked.items()}
+    for number, bearing in sorted(places, key=lambda place: -chance.get((place[1], place[0].field), 1.0)):
+        if (bearing, number.field) in ranked:
+            text = f"{ranked[bearing, number.field].statement}."
+        elif len(drops) - len(excluded) < 2:
+            text = "fewer than two drops are left to rank."
+        else:
+            text = (
+                "not every drop states an interval, so the order of the numbers says nothing about which "
+                "drop was the worst."
+            )
+        texts.setdefault(text, []).append(f"{bearing} {number.label}")
+    said += [Statement(f"{', '.join(of)}: {text}") for text, of in texts.items()]
     if any(one.drop_scatter is None for one in ranked.values()):
         said.append(Statement(UNKNOWN_SCATTER))
     said += [Statement(f"{one.name}: {text}", "warning") for one in drops for text in one.drop.warnings]
@@ -384,17 +387,12 @@ def read_limits(written: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def limit_statement(
-    drops: Sequence[ComparedDrop], limits: Mapping[str, float], allowed: int | None = None
-) -> Statement:
+def limit_statement(drops: Sequence[ComparedDrop], limits: Mapping[str, float]) -> Statement:
     """The verdict: which limits are kept, passed or open, by the intervals of the drops."""
-    if not limits and allowed is None:
+    if not limits:
         return Statement("No limit given: the numbers are compared with each other alone.")
     parts: list[str] = []
     found: list[bool | None] = []
-    if allowed is not None:
-        parts.append(f"{len(drops)} of {allowed} drops allowed")
-        found.append(len(drops) <= allowed)
     known = {number.field: number for number in NUMBERS}
     for field, limit in limits.items():
         text, kept = _against(drops, known[field], limit)

@@ -24,7 +24,7 @@ def write_data(content: ReportContent, folder: str | Path) -> list[Path]:
     written: list[Path] = []
     for name, table in _tables(content):
         rows = _table(table)
-        stem = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()[:60]
+        stem = re.sub(r"[^A-Za-z0-9]+", "_", name.partition(" (")[0]).strip("_").lower()[:60]
         path, k = folder / f"table_{stem}.csv", 2
         while path in written:
             path, k = folder / f"table_{stem}_{k}.csv", k + 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -57,17 +58,19 @@ from rotordrop.report.style import (
     curve,
     fit_legend,
     panels,
-    peak_indices,
     single,
     square,
     time_panels,
     upright,
 )
+from rotordrop.series import peak_indices
 from rotordrop.severity.numbers import LOADS
 from rotordrop.units import percent
 
 AROUND_PEAK = (2e-3, 4e-3)
 """Stretch before and after a peak [s] that gets a figure of its own; chosen, not measured."""
+ANOTHER_PEAK = 5e-3
+"""Uncertainty of the time of a peak [s] from which another peak may be the largest; chosen, not measured."""
 MEGA = 1e-6
 CARRIED = (
     "What was measured is carried from the planes of the sensors to the bearings along the straight line "
@@ -76,6 +79,7 @@ CARRIED = (
 NO_DISTRIBUTION = (
     "No distribution of the stress is stated: its numbers have no ranges, and single numbers do not hold."
 )
+NO_INTERVALS = "Of the estimated history, without intervals of their own; mean and peak have theirs above."
 NO_IMPACT = "The rotor did not touch a bearing in this window."
 LEVELS: dict[str, Level] = {"stop": "bad", "warning": "warning", "note": "notice"}
 """Levels by severity of a finding, the gravest first."""
@@ -100,7 +104,8 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
         if field not in known and not reason:
             continue
         value = Quantity.of(known.get(field), load.kind, range_only=not certain)
-        at = moment_of(peaks[field]) if field in peaks and certain else ""
+        when = moment_of(peaks[field]) if field in peaks and certain else ""
+        at = f"at {when}" if when else ""
         note = "; ".join(filter(None, (at, reason)))
         figures.append(KeyFigure(label if certain else f"{label}, range", value, note))
     origin = bearing.peak_force.origin
@@ -111,24 +116,30 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
 def moment_of(peak: Peak) -> str:
     """When a peak was, in words; nothing where it was estimated and its error is not known."""
     if peak.origin is Origin.SIMULATION:
-        return f"at {shown(peak.time, 'time', 3)}"
+        return shown(peak.time, "time", 3)
     if peak.time_interval_90 is None:
         return ""
-    return f"at {with_interval(peak.time, 'time', peak.time_interval_90)}"
+    low, high = peak.time_interval_90
+    if high - low < ANOTHER_PEAK:
+        return with_interval(peak.time, "time", peak.time_interval_90)
+    early = "" if peak.time - low < ANOTHER_PEAK else f", at the earliest {shown(low, 'time', 4)}"
+    late = "" if high - peak.time < ANOTHER_PEAK else f", at the latest {shown(high, 'time', 4)}"
+    return f"{shown(peak.time, 'time', 4)}{early}{late}"
 
 
 def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = True) -> Statement:
     """Set the peak stresses beside the stress of the static load rating, as information."""
     level: Level = "notice"
-    shares = []
+    shares: dict[str, list[str]] = {}
     for bearing in bearings:
         peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
         ends = " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in peak.ends))
-        shares.append(f"{ends} % ({bearing.name})")
+        shares.setdefault(ends, []).append(bearing.name)
         if (peak.value if certain else peak.ends[1]) >= STATIC_STRESS:
             level = "warning"
-    rated = f"{shown(STATIC_STRESS, 'pressure')} of C0 by ISO 76"
-    return Statement(f"Peak stress is {' and '.join(shares)} of the {rated}.", level)
+    limit = f"static limit, {shown(STATIC_STRESS, 'pressure')} (ISO 76)"
+    told = " and ".join(f"{share} % ({', '.join(names)})" for share, names in shares.items())
+    return Statement(f"Peak stress is {told} of the {limit}.", level)
 
 
 def drop_sections(
@@ -218,9 +229,10 @@ def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> 
         stress_box_figure(boxes),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
     )
-    # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
-    tables = () if any(one.stress_band for one in bearings) else (stress_table(boxes),)
-    return Section("Hertz stress", figures=(history, box), tables=tables)
+    told = stress_table(boxes)
+    if any(one.stress_band for one in bearings):
+        told = replace(told, note=f"{told.note} {NO_INTERVALS}")
+    return Section("Hertz stress", figures=(history, box), tables=(told,))
 
 
 def _impacts(bearings: Sequence[BearingDrop]) -> Section:
@@ -366,16 +378,23 @@ def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:
 
 
 def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:
-    """The findings as sentences, the serious ones first; what would stop an estimate with its way out."""
-    order = list(LEVELS)
-    return tuple(
-        Statement(
-            (f"Channel {found.channel}: " if found.channel else "")
-            + (f"{found.message}; {found.remedy}" if found.severity == "stop" else found.message),
-            LEVELS[found.severity],
-        )
-        for found in sorted(findings, key=lambda found: order.index(found.severity))
-    )
+    """The findings as sentences, the serious ones first; what would stop an estimate with its way out.
+
+    A kind that several channels have is told of the first.
+    """
+    order, count = list(LEVELS), Counter[tuple[str, str | None]]()
+    alike: dict[tuple[str, bool, int], list[Finding]] = {}
+    for found in sorted(findings, key=lambda found: order.index(found.severity)):
+        count[found.kind, found.channel] += 1
+        which = (found.kind, bool(found.channel), count[found.kind, found.channel])
+        alike.setdefault(which, []).append(found)
+    said = []
+    for first, *others in alike.values():
+        where = f"Channel {first.channel}: " if first.channel else ""
+        also = f" (likewise {', '.join(str(one.channel) for one in others)})" if others else ""
+        way_out = f"; {first.remedy}" if first.severity == "stop" else ""
+        said.append(Statement(f"{where}{first.message}{also}{way_out}", LEVELS[first.severity]))
+    return tuple(said)
 
 
 LISTED = 12

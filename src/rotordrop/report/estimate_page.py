@@ -18,7 +18,7 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.parameter import Role
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import published, row_of
-from rotordrop.estimate.advice import is_wide
+from rotordrop.estimate.advice import WORTH_SAYING, is_wide
 from rotordrop.estimate.bearing_drop import BearingDrop, History
 from rotordrop.estimate.estimate import (
     CrossCheck,
@@ -50,6 +50,7 @@ from rotordrop.report.content import (
 from rotordrop.report.drop_sections import (
     drop_sections,
     headline_card,
+    moment_of,
     quality_statements,
     record_quality_section,
     sensor_figure,
@@ -59,7 +60,7 @@ from rotordrop.report.drop_sections import (
 )
 from rotordrop.report.machine_content import drawing_section, not_given, weight_shares
 from rotordrop.report.origin import Origin
-from rotordrop.report.quantity import NO_INTERVAL, Quantity, shown, with_interval, written
+from rotordrop.report.quantity import NO_INTERVAL, THIN_SPACE, Quantity, shown, with_interval, written
 from rotordrop.report.style import (
     BAND_FILL,
     COLOURS,
@@ -87,7 +88,12 @@ FRONT = 2
 MAIN = 2
 """Headline numbers of the page to send: peak force and stress."""
 WORTH = 0.7
-"""Share of an interval that is left from which it is not said what would narrow it [1] (chosen)."""
+"""Share of an interval of stress that is left from which it is not said what would narrow it [1] (chosen)."""
+BALLS = (
+    "balls inferred from the designation",
+    "their number, diameter and conformity, from the maker",
+)
+"""Why the stress of a bearing is known no better than its force, and what would narrow it."""
 ROW_HEIGHT = 24
 TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1, 1.2, 1.5, 2, 3, 5, 10, 20, 50, 100)
 EXPECTED = "90 % expected by the filter"
@@ -192,16 +198,16 @@ def names_in(estimate: Estimate) -> Callable[[str], str]:
 
 def estimate_verdict(estimate: Estimate) -> tuple[Statement, ...]:
     """What model and record say of each other first, then warnings, notes and limits."""
-    found = [f for f in estimate.findings if f.message not in estimate.warnings]
-    serious = [s for s in quality_statements(found) if s.level in ("bad", "warning")]
+    serious = [s for s in quality_statements(estimate.findings) if s.level in ("bad", "warning")]
+    told = {found.message for found in estimate.findings}
     name_of = names_in(estimate)
     worth_knowing = {check.noted(): check.noted(name_of) for check in estimate.checks if check.note}
     return (
         _judgement(estimate),
         _part(estimate),
-        *(Statement(text, "warning") for text in estimate.warnings),
-        *cross_check_statements(estimate.cross_check),
         *serious,
+        *(Statement(text, "warning") for text in estimate.warnings if text not in told),
+        *cross_check_statements(estimate.cross_check),
         *(Statement(worth_knowing.get(note, note)) for note in estimate.notes),
         static_limit_statement(estimate.bearings, certain=estimate.consistent),
         *map(Statement, width_advice(estimate)),
@@ -229,40 +235,42 @@ def _part(estimate: Estimate) -> Statement:
 
 def width_advice(estimate: Estimate) -> Iterator[str]:
     """Why peak force and stress of a bearing are known no better, and what would narrow them most."""
-    found: dict[str, list[str]] = {}
+    found: dict[tuple[str, str, str], list[tuple[str, float, float]]] = {}
     for bearing in estimate.bearings:
         force, stress = bearing.peak_force.known, bearing.peak_stress.known
-        if estimate.advice and estimate.consistent and is_wide(force):
+        if estimate.consistent and is_wide(force):
             half = 0.5 * (force.high - force.low) / force.value
-            left, best = min(
-                (one.narrowed[bearing.name] / one.half_widths[bearing.name], k)
-                for k, one in enumerate(estimate.advice)
-            )
-            causes = ", ".join(dict.fromkeys(map(_cause, estimate.advice[best].paths)))
-            told = _narrowed("Force", half, half * left, causes, estimate.advice[best].measurement)
-            found.setdefault(told, []).append(bearing.name)
+            lefts = [one.narrowed[bearing.name] / one.half_widths[bearing.name] for one in estimate.advice]
+            left = min(lefts, default=1.0)
+            cause = remedy = ""
+            if left < WORTH_SAYING:
+                best = estimate.advice[lefts.index(left)]
+                cause, remedy = ", ".join(dict.fromkeys(map(_cause, best.paths))), best.measurement
+            found.setdefault(("Force", cause, remedy), []).append((bearing.name, half, half * left))
         if stress.allowance_90 and numbers_of(estimate.machine.bearing(bearing.name)).stress_sigma:
             half, rest = 0.5 * (stress.high - stress.low) / stress.value, stress.allowance_90 / stress.value
             left = math.hypot(math.sqrt(max(half**2 - rest**2, 0.0)), NINETY * MODEL_STRESS_SIGMA)
-            told = _narrowed(
-                "Stress", half, left, "balls inferred from the designation", "their number and diameter"
-            )
-            found.setdefault(told, []).append(bearing.name)
-    for told, names in found.items():
-        if told:
-            yield told.format(", ".join(names))
+            found.setdefault(("Stress", *BALLS), []).append((bearing.name, half, left))
+    for (load, cause, remedy), every in found.items():
+        if narrowed := [one for one in every if load == "Force" or one[2] < WORTH * one[1]]:
+            names, now, then = zip(*narrowed, strict=True)
+            known = f"{load} ({', '.join(names)}) ± {_per_cent(now)} % because of "
+            if not remedy:
+                yield f"{known}the readings themselves; no measurement of the machine would narrow it."
+            else:
+                yield f"{known}{cause}; would become ± {_per_cent(then)} % with {remedy}."
 
 
 def _cause(path: str) -> str:
     return "the beam in place of the rotor" if path == "rotor" else row_of(path).label
 
 
-def _narrowed(load: str, half: float, left: float, cause: str, remedy: str) -> str:
-    """The sentence on one load, with a place for names; nothing where little would be gained."""
-    if left > WORTH * half:
-        return ""
-    now, then = (f"{100.0 * one:.0f}" if one > 0.01 else f"{100.0 * one:.1f}" for one in (half, left))
-    return f"{load} ({{}}) ± {now} % because of {cause}; would become ± {then} % with {remedy}."
+def _per_cent(shares: Sequence[float]) -> str:
+    """Shares of several ends in per cent, the least and the largest where they differ."""
+    ends = (min(shares), max(shares))
+    return " to ".join(
+        dict.fromkeys(f"{100.0 * one:.0f}" if one > 0.01 else f"{100.0 * one:.1f}" for one in ends)
+    )
 
 
 def inspection_section(estimate: Estimate) -> Section:
@@ -689,7 +697,10 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     said: list[Statement] = []
     left = LINES - 4 - len(loads.rows) - _lines(verdict)
     # of a model that failed the way out comes first
-    ranked = [*grave, *calm] if estimate.consistent else [*calm[:1], *grave, *calm[1:]]
+    ranked = [*calm[:1], *grave, *calm[1:]]
+    if estimate.consistent:  # what limits a number comes first
+        widths = [Statement(text) for text in advice]
+        ranked = [*widths, *grave, *(one for one in calm if one not in widths)]
     for one in (_short(one, LONGEST) for one in ranked):
         if _lines(one) + (len(said) + 1 < len(ranked)) <= left:
             said.append(one)
@@ -712,13 +723,15 @@ def _lines(one: Statement) -> int:
 def _remedies(estimate: Estimate) -> Iterator[str]:
     """What to do next, first what may well let the model fit."""
     if estimate.machine.rotor.is_beam and not estimate.consistent:
-        yield DRAWING
+        yield DRAWING  # nothing else that is measured makes a beam the rotor
+        return
     name_of = names_in(estimate)
     yield from (check.advised(name_of) for check in estimate.checks if check.failed and check.remedy)
 
 
 def _short(one: Statement, longest: int) -> Statement:
-    return Statement(shorten(one.text, longest, placeholder=MORE), one.level)
+    plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
+    return Statement(shorten(plainly, longest, placeholder=MORE), one.level)
 
 
 def _loads(estimate: Estimate) -> Table:
@@ -736,9 +749,7 @@ def _loads(estimate: Estimate) -> Table:
 
     lines: dict[str, Callable[[BearingDrop], str]] = {
         "peak bearing force": lambda b: load(b, "peak_force_N", b.peak_force.known),
-        "at (from power-off)": lambda b: with_interval(
-            b.peak_force.time, "time", b.peak_force.time_interval_90
-        ),
+        "at (from power-off)": lambda b: moment_of(b.peak_force) or NO_INTERVAL,
         "peak Hertz stress": lambda b: load(b, "peak_stress_Pa", b.peak_stress.known, "pressure"),
         "impacts": lambda b: (
             b.missing.get("impacts") or with_interval(len(b.touched), "count", b.count_interval_90)

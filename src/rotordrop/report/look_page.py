@@ -32,7 +32,7 @@ from rotordrop.report.drop_sections import (
     quality_statements,
     record_quality_section,
 )
-from rotordrop.report.quantity import Quantity, shown
+from rotordrop.report.quantity import Quantity, shown, written
 from rotordrop.report.style import TURN, axis_title, curve, panels
 from rotordrop.units import format_moment
 
@@ -195,7 +195,7 @@ def _contact_table(seen: Look) -> Table:
     columns = (
         Column("plane", "plane"),
         Column("record time", lambda row: format_moment(row.time)),
-        Column("direction", lambda row: f"{degrees(row.azimuth):.0f}°"),
+        Column("direction", lambda row: f"{written(degrees(row.azimuth), 0)}°"),
         Column("from the usual place", "distance", "length"),
         Column("approaches with [m/s] (90 %)", lambda row: speed(row.approach, row.approach_interval_90)),
         Column("departs with [m/s] (90 %)", lambda row: speed(row.departure, row.departure_interval_90)),
@@ -255,13 +255,13 @@ def _verdict(seen: Look) -> list[Statement]:
     low, high = drop.count_interval_90
     release = f"{format_moment(drop.release)} (± {1e3 * RELEASE_ERROR:g} ms)"
     count = len(seen.impacts)
-    hits = f"{count} impact{'' if count == 1 else 's'} (90 %: {low} to {high})"
+    hits = f"{count} impact{'' if count == 1 else 's'} ({low} to {high})"
     touched = " First end: not determined." if len(seen.planes) > 1 else ""
     if seen.first_end is not None:
         at = next(plane.touch for plane in seen.planes if plane.plane == seen.first_end)
         touched = f" {seen.first_end} touched first, at {format_moment(at or 0.0)}."
     whirl = "" if seen.whirls else " No whirl."
-    said = [f"The rotor was released at {release}; {hits} followed{ends}{touched}{whirl}"]
+    said = [f"Released at {release}; {hits}{ends}{touched}{whirl}"]
     said += [
         f"{plane.plane}: {shown(plane.excess, 'length', 3)} (90 %: "
         f"{' to '.join(shown(end, 'length', 3) for end in plane.excess_interval_90)}) beyond the air gap of "
@@ -369,7 +369,7 @@ def _touch_of(impact: Impact) -> str:
 
 def _azimuth_of(impact: Impact) -> str:
     half = impact.azimuth_interval_90[1] - impact.azimuth
-    return f"{degrees(impact.azimuth):.0f}° ± {degrees(half):.0f}°"
+    return f"{written(degrees(impact.azimuth), 0)}° ± {degrees(half):.0f}°"
 
 
 def _impacts(seen: Look) -> Table:

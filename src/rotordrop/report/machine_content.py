@@ -105,11 +105,14 @@ def _verdict(warnings: tuple[MachineWarning, ...]) -> Statement:
 
 
 def _named(warnings: Iterable[MachineWarning]) -> list[str]:
-    """Kinds of warning, each with the places it was found at."""
-    places: dict[str, list[str]] = {}
+    """Kinds of warning with the places they were found at, those of the same places together."""
+    places: dict[str, dict[str, None]] = {}
     for warning in warnings:
-        places.setdefault(warning.kind, []).append(warning.bearing)
-    return [f"{kind} ({', '.join(dict.fromkeys(found))})" for kind, found in places.items()]
+        places.setdefault(warning.kind, {})[warning.bearing] = None
+    kinds: dict[str, list[str]] = {}
+    for kind, found in places.items():
+        kinds.setdefault(", ".join(found), []).append(kind)
+    return [f"{', '.join(of)} ({found})" for found, of in kinds.items()]
 
 
 def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]:
@@ -123,7 +126,11 @@ def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]
 
 
 def _remarks(machine: Machine, warnings: tuple[MachineWarning, ...], brief: bool) -> list[Statement]:
-    said = [Statement(one.message, "warning") for one in warnings if one.doubtful or not brief]
+    ends: dict[str, list[str]] = {}
+    for one in warnings:
+        if one.doubtful or not brief:
+            ends.setdefault(one.message.removeprefix(f"{one.bearing}: "), []).append(one.bearing)
+    said = [Statement(f"{', '.join(of)}: {text}", "warning") for text, of in ends.items()]
     if not brief:
         return said
     limits = _named(warning for warning in warnings if not warning.doubtful)

@@ -28,7 +28,7 @@ from rotordrop.report.content import (
 )
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit
-from rotordrop.report.simulate_page import SYMMETRIC
+from rotordrop.report.simulate_page import EQUAL, SYMMETRIC
 from rotordrop.report.style import (
     MUTED,
     OVER,
@@ -165,9 +165,9 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
 
 
 def _is_symmetric(results: StudyResults, names: Sequence[str]) -> bool:
-    """Whether every drop did the same to all bearings, to the last bit."""
+    """Whether every drop did the same to all bearings."""
     peaks = [results.numbers[f"{name}.peak_force"] for name in names]
-    return len(peaks) > 1 and all(np.array_equal(one, peaks[0], equal_nan=True) for one in peaks)
+    return len(peaks) > 1 and all(np.allclose(one, peaks[0], EQUAL, equal_nan=True) for one in peaks)
 
 
 def _loads(results: StudyResults, name: str) -> str:
@@ -266,7 +266,7 @@ def _in_words(name: str) -> str:
 
 
 def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
-    wanted = f"{bearing}.{quantity}"
+    wanted = LIFT if quantity == LIFT else f"{bearing}.{quantity}"
     names = {q.name: q for q in results.columns}
     if wanted not in names:
         raise UsageError(unknown_key(quantity, tuple(name.partition(".")[2] for name in names)))
@@ -342,35 +342,15 @@ def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) 
         figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
     if results.study.looped:
         caption = "Probability that the magnets lift the rotor again; bars: 90 % intervals."
-        figures.append(Figure(_lift_figure(results, name, kind), caption))
+        figures.append(Figure(_map_figure(results, name, kind, LIFT, 0.5), caption))
     return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
-
-
-def _lift_figure(results: StudyResults, name: str, kind: str) -> go.Figure:
-    figure = panels(["lift"])
-    factor, unit = display_unit(kind)
-    cells = results.map(LIFT, name, above=0.5)
-    known: list[Known] = [cell["known"] for cell in cells]
-    curve(
-        figure,
-        [0.5 * (cell["from"] + cell["to"]) / factor for cell in cells],
-        [one.value for one in known],
-        "probability",
-        mode="lines+markers",
-        colour=SERIES[0],
-        width=1.6,
-        legend=False,
-        error_y=bars([(one.value, one.low, one.high) for one in known], 1.0),
-    )
-    figure.update_xaxes(title_text=axis_title(plain(spoken_value(results.study.machine, name)), unit))
-    figure.update_yaxes(title_text="P(lift)")
-    return fit_legend(figure)
 
 
 def _map_figure(
     results: StudyResults, name: str, kind: str, quantity: str, limit: float | None = None
 ) -> go.Figure:
-    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    machine = results.study.machine
+    bearings = [LIFT] if quantity == LIFT else [bearing.name for bearing in machine.touchdown_bearings]
     figure = panels(bearings)
     factor, unit = display_unit(kind)
     for column, bearing in enumerate(bearings, start=1):
@@ -381,7 +361,7 @@ def _map_figure(
             curve(
                 figure,
                 results.column(name)[some] / factor,
-                results.column(f"{bearing}.{quantity}")[some] / size,
+                results.column(shown.name)[some] / size,
                 "a drop",
                 column=column,
                 mode="markers",
@@ -389,7 +369,7 @@ def _map_figure(
                 legend=column == 1,
             )
         for k, share in enumerate(SHARES if limit is None else SHARES[:1]):
-            cells = results.map(f"{bearing}.{quantity}", name, share=share, above=limit)
+            cells = results.map(shown.name, name, share=share, above=limit)
             known: list[Known] = [cell["known"] for cell in cells]
             curve(
                 figure,
@@ -403,10 +383,12 @@ def _map_figure(
                 legend=column == 1,
                 error_y=bars([(one.value, one.low, one.high) for one in known], size),
             )
-        title = plain(spoken_value(results.study.machine, name))
+        title = plain(spoken_value(machine, name))
         figure.update_xaxes(title_text=axis_title(title, unit), col=column)
     words = quantity.replace("_", " ")
-    if limit is not None:
+    if quantity == LIFT:
+        words, size_unit = "P(lift)", "1"
+    elif limit is not None:
         words = f"P({words} > {format_quantity(limit, shown.kind)})" if limit else f"P({words})"
     figure.update_yaxes(title_text=axis_title(words, size_unit), col=1)
     return fit_legend(figure)
@@ -457,19 +439,18 @@ def study_numbers(
     }
 
 
-def _influences(results: StudyResults) -> dict[str, Any]:
-    def number(known: Known | None) -> dict[str, float] | None:
-        if known is None:
-            return None
-        return {"value": known.value, "lower": known.low, "upper": known.high}
+def _bounded(known: Known | None) -> dict[str, float] | None:
+    return None if known is None else {"value": known.value, "lower": known.low, "upper": known.high}
 
+
+def _influences(results: StudyResults) -> dict[str, Any]:
     columns = [
         f"{b.name}.{quantity}" for b in results.study.machine.touchdown_bearings for quantity in MATTERS
     ]
     try:
         return {
             column: [
-                {"name": one.name, "alone": number(one.alone), "total": number(one.total)}
+                {"name": one.name, "alone": _bounded(one.alone), "total": _bounded(one.total)}
                 for one in influences(results, column)
             ]
             for column in columns
@@ -575,9 +556,8 @@ def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, 
     """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
 
     def counted(known: Known | None) -> dict[str, Any] | None:
-        if known is None:
-            return None
-        return {"value": known.value, "lower": known.low, "upper": known.high, "drops": known.drops}
+        found: dict[str, Any] | None = _bounded(known)
+        return found and found | {"drops": known and known.drops}
 
     def quantity(one: Repeat) -> dict[str, Any]:
         made: dict[str, Any] = finite(

@@ -84,6 +84,7 @@ POLAR = (
     "is taken off for slow roll."
 )
 LINES = "Lines"
+NO_LINE = "No line stands out: a short record is too short for one."
 SAID = 5
 """Lines that are named in the verdict (chosen)."""
 BY_DISPLACEMENT, AFTER_POWER_OFF = "by the displacement alone", "from power-off"
@@ -172,7 +173,7 @@ def frequency_sections(
     return (
         Section("Displacement over the coast-down", figures=(displacement,)),
         _waterfall_section(analysis, against, highest),
-        Section(LINES, reasons, tables=(line_table(analysis),)),
+        Section(LINES, reasons or (NO_LINE,), tables=(line_table(analysis),) if reasons else ()),
         *((_order_section(analysis),) if tracked else ()),
         *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law, role),)),
     )
@@ -215,7 +216,8 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
         f"{line.label} {where_of(line)} ({shown(line.amplitude, 'length', 3)})" for line in named[:SAID]
     )
     count = f"{len(analysis.lines)} lines, {len(named)} named"
-    said.append(Statement(f"{count}; the strongest: {largest}." if named else f"{count}."))
+    more = f"{count}; the strongest: {largest}." if named else f"{count}."
+    said.append(Statement(more if analysis.lines else NO_LINE))
     if found := analysis.signal.force_and_stress:
         said.append(Statement(first_window_sentence(found)))
     if analysis.signal.profile is None:

@@ -140,8 +140,8 @@ class MachineWarning(Doubt):
     """One thing to know before trusting a result of this machine.
 
     Its kind is "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load
-    direction", "shoulder of the race", "thermal runaway", "face", "control loop", "lift", "guess", or one of
-    the doubts.
+    direction", "shoulder of the race", "thermal runaway", "face", "control loop", "lift", "guess off the
+    middle of its range", or one of the doubts.
     """
 
     doubtful: bool = False
@@ -176,7 +176,7 @@ def _loop(summary: MachineSummary) -> Iterator[MachineWarning]:
             short = format_quantity(-one.spare_at_rest, "force")
             text = (
                 f"at full current it lacks {short} to lift its share of the rotor at rest in the touchdown "
-                "bearings; whether all magnets together lift it, 'simulate --relevitate' shows"
+                "bearings; whether all magnets together lift it, 'simulate --magnets' shows"
             )
             yield _warning("lift", one.name, one.spare_at_rest, 0.0, text)
 
@@ -260,7 +260,7 @@ def _guesses_aside(bearing: TouchdownBearing) -> Iterator[MachineWarning]:
             f"{row.label}: the guess {guess} is not the middle of its range, {low} to {high}; an estimate "
             f"takes the range for the 90 % interval about {centre}, and the guess for where to begin"
         )
-        yield _warning("guess", bearing.name, float(quantity), middle, text)
+        yield _warning("guess off the middle of its range", bearing.name, float(quantity), middle, text)
 
 
 def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:

@@ -27,9 +27,6 @@ class Certificate:
     """
     peak_change_truncation: Array | None = None
     """Relative change of the peak in the first 20 ms with eight more modes per plane [1], shape (B,)."""
-    peak_change_tolerance_whole: Array | None = None
-    peak_change_truncation_whole: Array | None = None
-    """The same over the whole drop [1]; chaos makes it grow with time, shape (B,)."""
 
     def sentence(self) -> str:
         """The certificate in words."""

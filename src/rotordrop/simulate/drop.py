@@ -200,8 +200,7 @@ def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certific
     tighter = _simulate(model, replace(case, tolerance=0.1 * case.tolerance))
     certificate = replace(
         result.certificate,
-        peak_change_tolerance=_peak_change(result, tighter, COMPARABLE_WINDOW),
-        peak_change_tolerance_whole=_peak_change(result, tighter, np.inf),
+        peak_change_tolerance=_peak_change(result, tighter),
     )
     basis = model.basis.reduction
     # a start given as a state belongs to the modes of its own model
@@ -211,12 +210,11 @@ def _certified(model: DropModel, case: DropCase, result: DropResult) -> Certific
     finer = _simulate(model_for(model.machine, replace(case, reduction=richer)), case)
     return replace(
         certificate,
-        peak_change_truncation=_peak_change(result, finer, COMPARABLE_WINDOW),
-        peak_change_truncation_whole=_peak_change(result, finer, np.inf),
+        peak_change_truncation=_peak_change(result, finer),
     )
 
 
-def _peak_change(one: DropResult, other: DropResult, until: float) -> Array:
-    first = peaks_of(one.time, one.bearing_force_magnitude, until)
-    second = peaks_of(other.time, other.bearing_force_magnitude, until)
+def _peak_change(one: DropResult, other: DropResult) -> Array:
+    first = peaks_of(one.time, one.bearing_force_magnitude, COMPARABLE_WINDOW)
+    second = peaks_of(other.time, other.bearing_force_magnitude, COMPARABLE_WINDOW)
     return np.abs(first - second) / np.maximum(second, 1e-9)

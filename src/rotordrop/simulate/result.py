@@ -24,6 +24,7 @@ from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
 from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
+from rotordrop.sketch import sketch
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
@@ -221,6 +222,10 @@ class DropResult(SimulationResult):
         return (
             f"<DropResult {self.machine_name} from {speed}, {self.time[-1]:.4g} s: {peaks}. {self.outcome}>"
         )
+
+    def _repr_html_(self) -> str:
+        forces = zip(self.bearing_names, self.bearing_force_magnitude.T, strict=True)
+        return sketch(repr(self), "time [s]", "force [kN]", {n: (self.time, v) for n, v in forces}, 1e-3)
 
     def peak_contact_pressure(self, bearing: int | str) -> tuple[float, float, float]:
         """Largest Hertz pressure of rotor on race [Pa], half width of the contact then [m], time [s]."""

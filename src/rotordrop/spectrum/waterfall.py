@@ -25,7 +25,6 @@ class PlanarSignal(Protocol):
     @property
     def shape(self) -> tuple[int, ...]:
         """Samples and directions, (N, 2)."""
-        ...
 
     def __getitem__(self, key: slice, /) -> ArrayLike: ...
 

@@ -17,6 +17,7 @@ from scipy.stats import beta, binom
 from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, OutputError, UsageError, unknown_key
 from rotordrop.known import Known
+from rotordrop.sketch import sketch
 from rotordrop.study.folder import StudyFolder, read_plan, read_shards, study_of
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import Quantity, columns_of
@@ -50,6 +51,16 @@ class StudyResults:
     def __len__(self) -> int:
         return len(self.drop)
 
+    def __repr__(self) -> str:
+        """Name of the study, drops, what was varied."""
+        lost = sum(self.failed.values())
+        return f"<StudyResults {self.study.name}: {len(self)} drops, {lost} failed; {', '.join(self.varied)}>"
+
+    def _repr_html_(self) -> str:
+        share = np.arange(1, len(self) + 1) / max(len(self), 1)
+        forces = {n: (np.sort(v), share) for n, v in self.numbers.items() if n.endswith(".peak_force")}
+        return sketch(repr(self), "peak force [N]", "share below [1]", forces)
+
     @property
     def columns(self) -> tuple[Quantity, ...]:
         """Quantities with unit and meaning."""
@@ -61,10 +72,12 @@ class StudyResults:
         return Counter(reason for reason in self.reasons if reason)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """One row per drop: number, varied values, quantities [SI], reason of a failure."""
+        """One row per drop: number, what was varied [SI], quantities (units in ``attrs``), why it failed."""
         import pandas
 
-        return pandas.DataFrame({"drop": self.drop, **self.varied, **self.numbers, "reason": self.reasons})
+        table = pandas.DataFrame({"drop": self.drop, **self.varied, **self.numbers, "reason": self.reasons})
+        table.attrs["units"] = {quantity.name: quantity.unit for quantity in self.columns}
+        return table
 
     def column(self, name: str) -> Array:
         """A quantity or a varied value of every drop, shape (N,) [SI]."""

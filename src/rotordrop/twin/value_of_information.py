@@ -17,7 +17,7 @@ from rotordrop.twin.allowances import MODEL_FORCE_SIGMA
 
 DRAWING = "the rotor by its sections, from a drawing"
 MOST_NAMED = 3
-"""Measurements that are named (chosen)."""
+"""Measurements that are named beside the best of every bearing (chosen)."""
 
 
 def value_of_information(
@@ -65,7 +65,9 @@ def value_of_information(
     if form:
         listed.append(Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=drawing))
     listed.sort(key=lambda one: one.left)
-    return tuple(one for one in listed[:MOST_NAMED] if one.left < WORTH_SAYING)
+    best = [min(listed, key=lambda one: one.narrowed[name]) for name in names]
+    named = (one for k, one in enumerate(listed) if k < MOST_NAMED or one in best)
+    return tuple(one for one in named if one.left < WORTH_SAYING)
 
 
 def explained(covariance: Array, shared: Array) -> float:

@@ -287,14 +287,17 @@ def test_a_stopped_estimate_leaves_an_earlier_one_alone(interrupted, tmp_path):
             "{tail} --profile {profile}",
             "drop_060_tail cannot be used: missing pre-trigger: no drop in the record",
         ),
-        ("{record} {copy}", "copy.h5 are the same recording (equal content)"),
-        ("a/drop_060.csv b/drop_060.csv", "2 records are named 'drop_060'; expected a name of its own"),
+        ("{record} {copy}", "copy are the same recording (equal content)"),
+        ("{record} {again}", "2 records are named 'drop_060'; expected a name of its own"),
     ],
 )
 def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_path, capsys):
     (tmp_path / "profile.toml").write_text('[speed]\nconstant = "60 Hz"\n')
-    shutil.copy(RECORD, tmp_path / "copy.h5")
-    made = {name: tmp_path / file for name, file in (("profile", "profile.toml"), ("copy", "copy.h5"))}
+    (tmp_path / "again").mkdir()
+    names = {"profile": "profile.toml", "copy": "copy.h5", "again": "again/drop_060.h5"}
+    made = {name: tmp_path / file for name, file in names.items()}
+    shutil.copy(RECORD, made["copy"])
+    shutil.copy(RECORD, made["again"])
     call = arguments.format(record=RECORD, tail=TAIL, other=another_drop(tmp_path), **made).split()
     output = tmp_path / "out.toml"
     place = ["--output" if verb == "calibrate" else "--json", str(output)]

@@ -5,7 +5,6 @@ import math
 import re
 from dataclasses import replace
 from importlib.resources import files
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -18,13 +17,11 @@ from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_rec
 from rotordrop.estimate.simulated_coast_down import simulated_coast_down
 from rotordrop.files import new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine
-from rotordrop.report.waterfall_page import waterfall_page
 from rotordrop.simulate import coast_down
 from rotordrop.simulate.case import CentredStart, CoastDownCase
 from rotordrop.simulate.checkpoint import work_folder
 from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
 from rotordrop.spectrum.coast_down import analyse_coast_down
-from rotordrop.spectrum.speed import FrequencyPath
 
 PAPER = str(example_path("paper"))
 
@@ -139,17 +136,6 @@ def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
     assert "for ever" in capsys.readouterr().err
 
 
-def test_a_machine_without_drag_is_told_the_way_out(capsys):
-    lp400 = str(example_path("lp400"))
-    assert run(["coast-down", lp400, "--speed", "60 Hz", "--until", "0.1 s"]) == 5
-    told = capsys.readouterr().err
-    assert "no aerodynamic drag" in told
-    assert "aero_time_constant" in told and "--drag-from RECORD" in told
-    assert run(["coast-down", "--help"]) == 0
-    helped = " ".join(capsys.readouterr().out.split())
-    assert "speed.aero_linear" in helped and "--drag-from" in helped and "--resume" in helped
-
-
 def test_drag_from_a_recorded_coast_down_stops_the_rotor_as_recorded(tmp_path, capsys):
     """Dry and linear drag known: the fitted drag, handed over, gives the recorded fall of speed again."""
     record = recorded(tmp_path / "record.csv", seconds=12.0)
@@ -204,39 +190,11 @@ def test_a_simulated_coast_down_knows_when_it_stopped(coast, tmp_path):
     assert simulated_coast_down(path).standstill == 2.34
 
 
-@pytest.mark.parametrize(
-    ("standstill", "sentence"),
-    [
-        (12.34, "The rotor stopped 12.34 s after power-off."),
-        (None, r"When the rotor stopped is open: the record does not determine it. It turned until 5.0 s at"),
-    ],
-)
-def test_the_page_says_when_the_rotor_stopped(standstill, sentence, signal):
-    page = waterfall_page(analyse_coast_down(replace(signal, standstill=standstill), ()), title="stop")
-    assert sentence in " ".join(statement.text for statement in page.verdict)
-    law = next(section for section in page.sections if section.heading == "Speed law").tables[0]
-    cells = [str(cell) for row in law.rows for cell in row]
-    assert sum("Hz/s" in cell for cell in cells) == 6
-    assert not any(re.search(r"\de[-+]|rad", cell) for cell in cells)
-    assert len(next(section for section in page.sections if section.heading == "Lines").tables) == 1
-
-
 def test_orders_of_a_simulation_are_those_a_sensor_would_show(signal):
     still = {name: np.zeros(np.shape(plane)) for name, plane in signal.planes.items()}
     found = analyse_coast_down(replace(signal, planes=still, recorded=False), ())
     typical = np.median(found.planes["DE"].track.major_axis)
     assert 1e-9 < typical < 4e-7, "the noise of the sensor, spread over all orders"
-
-
-def test_an_order_is_kept_apart_from_sums_and_differences_too(signal, monkeypatch):
-    time = np.linspace(0.0, 5.0, 101)
-    crossing = FrequencyPath(time=time, frequency=np.interp(time, signal.speed_time, signal.speed) / math.tau)
-    line = SimpleNamespace(kind="combination", forward={"DE": 1e-6}, path=crossing)
-    monkeypatch.setattr("rotordrop.spectrum.coast_down.find_lines", lambda *planes, **how: (line,))
-    orders = analyse_coast_down(signal, ()).planes
-    first = list(orders["DE"].track.orders).index(1.0)
-    assert not orders["DE"].track.separable[:, first].any()
-    assert orders["NDE"].track.separable[:, first].any()
 
 
 def test_critical_speeds_of_the_paper(tmp_path, capsys):
@@ -371,31 +329,6 @@ def test_a_run_is_resumed_with_its_own_machine_only(machine, tmp_path, capsys):
     assert run(ending) == 0
     assert (told.read_text(), output.read_bytes()) == whole
     assert not work_folder(output).exists()
-
-
-@pytest.fixture
-def stopped(monkeypatch):
-    """A coast-down during which somebody presses Ctrl-C."""
-
-    def pressed(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("rotordrop.simulate.coast_down.simulate_coast_down", pressed)
-
-
-def test_a_coast_down_of_millions_of_steps_says_so_first(machine, tmp_path, stopped, capsys):
-    slow = tmp_path / "slow.toml"
-    save_machine(load_machine(machine).with_values({"NDE.support.mass": 1e-9}), slow)
-    assert run(["coast-down", str(slow), "--speed", "60 Hz"]) == 130
-    said = " ".join(capsys.readouterr().err.split())
-    assert "each second: this will take long: at least" in said
-    assert "it will end unfinished after 5 million; Ctrl-C stops it" in said
-
-
-def test_ctrl_c_says_how_to_go_on(machine, tmp_path, stopped, capsys):
-    output = tmp_path / "c.h5"
-    assert run(["coast-down", machine, "--speed", "60 Hz", "--output", str(output)]) == 130
-    assert "go on with --resume" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_coast_down_runs_on_the_machine_that_init_writes(tmp_path):

@@ -93,8 +93,8 @@ def test_the_schema_of_an_estimate_knows_its_fields(capsys):
 def test_numbers_that_nobody_can_be_asked_for_are_named(capsys, monkeypatch):
     """Without a terminal the first question ended the command with the exit code of Ctrl-C."""
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
-    assert run(["init", "--simple", "--mass", "60 kg", "--length", "1.1 m"]) == UsageError.exit_code
+    assert run(["init", "--simple", "--set", "mass=60 kg", "--set", "length=1.1 m"]) == UsageError.exit_code
     said = capsys.readouterr().err
-    assert "--simple needs --centre, --bearings, --sensors, --sensor-angle, --designation" in said
+    assert "--simple needs centre, bearings, sensors, sensor_angle, designation" in said
     assert "the input is no terminal" in said
     assert not Path("machine.toml").exists()

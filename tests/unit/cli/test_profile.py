@@ -113,12 +113,10 @@ def test_every_command_that_reads_a_record_takes_a_map(command, tmp_path, monkey
 def test_twelve_numbers_fit_the_recorder_and_the_next_command_is_printed(tmp_path, monkeypatch, capsys):
     """The sensors of twelve numbers are called NDE_A, those of the recorder S_NDE_A."""
     monkeypatch.chdir(tmp_path)
-    numbers = {name.replace("_", "-"): value for name, value in EXAMPLES.items() if name != "preload"}
-    joined = {name: told if isinstance(told, str) else ", ".join(told) for name, told in numbers.items()}
-    given = [f"--{name}={told}" for name, told in joined.items()]
+    given = [f"--set={name}={value}" for name, value in EXAMPLES.items() if name != "preload"]
     assert run(["init", "--simple", *given, "twelve.toml"]) == 0
     said = capsys.readouterr().err
-    (following,) = re.findall(r"next: rotordrop (.*)", said)
+    (following,) = re.findall(r"next: rotordrop (.*?)\. ", said)
     assert following == "look RECORD twelve.toml"
     assert run(following.replace("RECORD", RECORD).split()) == 0
     assert run(["profile", RECORD, "--machine", "twelve.toml", "-o", "recorder.toml"]) == 0

@@ -13,7 +13,7 @@ from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import load_result, save_machine
 from rotordrop.cli.app import run
-from rotordrop.cli.simulate import magnet_events
+from rotordrop.cli.simulate import magnet_event
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
 
@@ -108,7 +108,8 @@ def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path)
 def test_a_lift_stands_on_the_terminal_the_page_and_in_json(tmp_path, capsys):
     save_machine(looped_machine(), tmp_path / "machine.toml")
     arguments = ["simulate", str(tmp_path / "machine.toml"), "--speed", "60 Hz", "--duration", "0.11 s"]
-    arguments += ["--levitated", "--delay", "5 ms", "--relevitate", "60 ms", "--output-step", "0.1 ms"]
+    arguments += ["--levitated", "--magnets", "5 ms: off", "--magnets", "60 ms: levitate"]
+    arguments += ["--output-step", "0.1 ms"]
     out = ["--report", str(tmp_path / "drop.html"), "--json", str(tmp_path / "drop.json")]
     assert run([*arguments, *out]) == 0
     assert "The magnets, switched on again at 60.0 ms, lift the rotor within" in capsys.readouterr().out
@@ -121,12 +122,12 @@ def test_a_lift_stands_on_the_terminal_the_page_and_in_json(tmp_path, capsys):
 
 
 def test_events_of_magnets_are_read_and_bad_ones_refused():
-    events = magnet_events(["speed 50 Hz: levitate", "rest: bias decays", "0 s: lost NDE x"], None, None)
+    events = [*map(magnet_event, ("speed 50 Hz: levitate", "rest: bias decays", "0 s: lost NDE x"))]
     assert [str(event) for event in events] == ["levitate", "bias decays", "lost NDE x"]
     assert events[0].below_speed == pytest.approx(314.159265)
     for text in ("20 ms: lift", "20 ms", "20 ms: lost NDE DE x"):
         with pytest.raises(UsageError, match="is not 'WHEN: ACTION"):
-            magnet_events([text], None, None)
+            magnet_event(text)
 
 
 def test_a_magnet_that_stays_on_is_named_and_is_no_loop(capsys):
@@ -134,7 +135,7 @@ def test_a_magnet_that_stays_on_is_named_and_is_no_loop(capsys):
     arguments = [*SHORT, "--levitated", "--stays-on"]
     assert run([*arguments, "A"]) != 0
     assert "no AMB 'A' that could stay on" in " ".join(capsys.readouterr().err.split())
-    assert run([*arguments, "NDE", "--relevitate", "60 ms"]) != 0
+    assert run([*arguments, "NDE", "--magnets", "60 ms: levitate"]) != 0
     assert "--stays-on" in capsys.readouterr().err
     assert run([*arguments, "NDE", "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)["bearings"]

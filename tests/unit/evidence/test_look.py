@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from ast import literal_eval
 from dataclasses import replace
 from pathlib import Path
 
@@ -262,7 +263,7 @@ def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
     file.write_text(text)
     alone = look(file, gap=GAP)
     assert re.search(r"no two channels of alpha, bravo, c, d, Speed are a pair by", alone.no_fall)
-    assert alone.notes[0].startswith('say which look at one plane: if they are listed in pairs, --map "')
+    assert alone.notes[0].startswith("say which look at one plane: if they are listed in pairs, mapping=[")
     assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
     file.write_text(text.replace("alpha", "a1").replace("bravo", "a2"))
     assert any("in no plane, and not looked at: c, d; say" in note for note in look(file).notes)
@@ -462,7 +463,7 @@ def test_the_map_that_odd_names_are_asked_with_can_be_given_as_it_stands(tmp_pat
     for name, odd in (("NDE_X", "front"), ("NDE_Y", "probe alpha"), ("DE_X", "K17"), ("DE_Y", "hinten")):
         head = head.replace(name, odd, 1)
     file.write_text(f"{head}\n{rest}")
-    given = re.findall(r'--map "([^"]+)"', look(file).notes[0])
+    given = literal_eval(look(file).notes[0].split("mapping=")[1].split(";")[0])
     assert given == ["NDE: front, probe alpha", "DE: K17, hinten"]
     seen = look(file, mapping=given)
     assert [plane.plane for plane in seen.planes] == ["NDE", "DE"]

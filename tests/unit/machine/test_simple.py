@@ -120,7 +120,7 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
 
 
 def test_numbers_without_simple_are_refused(capsys, tmp_path):
-    assert run(["init", str(tmp_path / "m.toml"), "--mass", "60 kg"]) == 64
+    assert run(["init", str(tmp_path / "m.toml"), "--set", "mass=60 kg"]) == 64
     assert "numbers of a machine belong to --simple" in capsys.readouterr().err
 
 

@@ -3,8 +3,7 @@
 import math
 
 import pytest
-
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
+from tests.plain_bearing import BallBearingGeometry
 
 
 @pytest.fixture(scope="session")

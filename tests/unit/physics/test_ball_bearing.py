@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.plain_bearing import BallBearingGeometry
 from tests.reference.closed_forms import bearing_equilibrium, lift_off_force
 
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
 from rotordrop.physics import ball_bearing as bb
 from rotordrop.physics.ball_bearing import bearing_constants, free_contact_angle
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.physics.ball_set import loose_race_seat, static_deflection
 

@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
+from tests.plain_bearing import BallBearingGeometry
 from tests.reference.differences import slopes
 
 from rotordrop.errors import SimulationError
 from rotordrop.machine import example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_bearing_geometry import BallBearingGeometry
 from rotordrop.physics.ball_loads import ball_loads, displacement_under
 from rotordrop.physics.ball_set import (
     ball_set_energy,

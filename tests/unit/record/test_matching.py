@@ -1,6 +1,7 @@
 """Channels find their sensors, by name or map, and their units."""
 
 import re
+from ast import literal_eval
 from dataclasses import replace
 
 import numpy as np
@@ -205,7 +206,7 @@ def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answ
     """Y stands a quarter turn behind X: the sensors at 135 and 45° were to be X and Y, in this order."""
     with pytest.raises(RecordError, match="likeliest") as asked:
         record_of(recording(*API), machine.sensors)
-    given = re.findall(r'--map "([^"]+)"', str(asked.value))
+    given = literal_eval(str(asked.value).split("mapping=")[1].split(" (planes")[0])
     assert given == [
         "NDE: Ch1 VE-101X 45 deg, Ch2 VE-101Y 135 deg",
         "DE: Ch3 VE-102X 45 deg, Ch4 VE-102Y 135 deg",
@@ -220,7 +221,7 @@ def test_a_map_without_angles_seats_the_channels_as_the_suggestion_does(machine,
     """The suggestion had X a quarter turn before Y; without its angles the same map exchanged the two."""
     with pytest.raises(RecordError, match="likeliest") as asked:
         record_of(recording(*API), machine.sensors)
-    angled = re.findall(r'--map "([^"]+)"', str(asked.value))
+    angled = literal_eval(str(asked.value).split("mapping=")[1].split(" (planes")[0])
     bare = [re.sub(r" \d+ deg", "", text) for text in angled]
     if swapped:
         bare = [re.sub(r": (.+), (.+)", r": \2, \1", text) for text in bare]

@@ -6,7 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotordrop.report.style import block_envelope, peak_indices
+from rotordrop.report.style import block_envelope
+from rotordrop.series import peak_indices
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 5000), blocks=st.integers(1, 60))

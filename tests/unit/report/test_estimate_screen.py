@@ -9,12 +9,13 @@ import pytest
 from rich.console import Console
 from tests.unit.report.conftest import section
 
+from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import LaterMotion
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.evidence.quality import NO_CHECK_SEES
 from rotordrop.known import Known
-from rotordrop.report.estimate_page import estimate_page, estimate_screen
+from rotordrop.report.estimate_page import estimate_page, estimate_screen, width_advice
 from rotordrop.report.terminal import print_summary
 from rotordrop.track.consistency import THIS, Check
 
@@ -69,7 +70,7 @@ def test_what_every_record_leaves_to_assumption_stands_in_one_statement(estimate
     (unseen,) = (note for note in estimate.notes if note.startswith(NO_CHECK_SEES))
     assert NO_CHECK_SEES not in text
     assert unseen in [one.text for one in section(estimate_page(estimate), "Record").statements]
-    assert "no unbalance phase" in text and "of C0 by ISO 76" in text
+    assert "no unbalance phase" in text and "static limit, 4200 MPa (ISO 76)" in text
     assert "has it estimated" not in text  # the note that says more
     assert any("has it estimated" in note for note in estimate.notes)
 
@@ -124,3 +125,20 @@ def test_an_estimate_that_lost_its_record_says_that_first_and_blames_no_sensor(e
     assert [row[1] for row in section(page, "Checks").tables[0].rows] == ["no", "not judged", "no"]
     sensors = next(one for one in section(page, "Parameters").tables if one.caption == "Sensors")
     assert "verdict" not in sensors.columns, "every gain is determined"
+
+
+def test_a_wide_force_says_why_and_what_would_narrow_it_once_for_both_ends(estimate):
+    def as_wide(bearing):
+        value = bearing.peak_force.known.value
+        known = replace(bearing.peak_force.known, interval_90=(0.84 * value, 1.16 * value))
+        return replace(bearing, peak_force=replace(bearing.peak_force, known=known))
+
+    halves = {one.name: 0.16 * one.peak_force.known.value for one in estimate.bearings}
+    narrowed = {name: half / 8.0 for name, half in halves.items()}
+    found = Advice(measurement="a tap test", paths=("support.mass",), half_widths=halves, narrowed=narrowed)
+    wide = replace(estimate, bearings=tuple(map(as_wide, estimate.bearings)), advice=(found,))
+    (said,) = width_advice(wide)
+    assert "Force (NDE, DE) ± 16 %" in said and "± 2 % with a tap test" in said
+    assert said in text_of(wide)
+    (said,) = width_advice(replace(wide, advice=(replace(found, narrowed=halves),)))
+    assert "Force (NDE, DE) ± 16 % because of the readings themselves" in said

@@ -33,12 +33,6 @@ def test_limits_are_kept_passed_open_or_not_given(limits, level, text):
     assert said.level == level and text in said.text and "passed by a" not in said.text
 
 
-def test_the_number_of_drops_is_counted():
-    assert limit_statement(DROPS, {}, 5).level == "good"
-    said = limit_statement(DROPS, {}, 1)
-    assert said.level == "bad" and "2 of 1 drops allowed" in said.text
-
-
 @pytest.mark.parametrize(
     ("limit", "message"),
     [

@@ -2,7 +2,6 @@
 
 import csv
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,7 +29,6 @@ from rotordrop.report.estimate_page import (
 )
 from rotordrop.report.quantity import Quantity, round_steps
 from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
-from rotordrop.report.waterfall_page import law_table, seen_of
 from rotordrop.severity.statistics import stress_statistics
 
 
@@ -113,21 +111,6 @@ def test_round_steps_reach_beyond_the_highest_force(highest, rings):
         found = round_steps(force)
         assert 2 <= len(found) <= 5
         assert found[-1] >= force > found[-1] - (found[1] - found[0])
-
-
-def test_a_drag_is_shown_as_the_slowing_it_causes_in_hertz_per_second():
-    """At 60 Hz: dry 2π rad/s² is 1 Hz/s, linear 0.1 /s is 6 Hz/s, quadratic 1e-3 /rad is 2π·3.6 Hz/s."""
-    turn = 2.0 * np.pi
-    known = {"constant": turn, "linear": 0.1, "quadratic": 1e-3}
-    parts = {name: Known(value=at, interval_90=(0.9 * at, 1.1 * at)) for name, at in known.items()}
-    drag = SimpleNamespace(initial_speed=Known(value=60.0 * turn), **parts)
-    exponential = SimpleNamespace(time_constant=Known(value=9.0))
-    law = SimpleNamespace(exponential=exponential, drag=drag, standstill=Known(value=50.0))
-    assert [row[1:3] for row in law_table(law).rows[1:4]] == [
-        ("1.00 Hz/s", "0.90 to 1.10 Hz/s"),
-        ("6.00 Hz/s", "5.40 to 6.60 Hz/s"),
-        ("22.6 Hz/s", "20.4 to 24.9 Hz/s"),
-    ]
 
 
 def row(name, prior, estimate, interval):
@@ -235,13 +218,6 @@ def test_thinned_outliers_keep_both_ends_and_leave_no_gap():
     assert (kept[0], kept[-1]) == (values.min(), values.max())
     distance = np.min(np.abs(values[:2000, None] - kept[None, :]), axis=1)
     assert distance.max() <= (values.max() - values.min()) / 300
-
-
-def test_a_short_line_is_seen_in_hundredths_of_a_second_and_a_long_one_in_whole_ones():
-    """The page said "0 to 2 s" where the report said 0.20 to 2.00 s."""
-    short, long = (SimpleNamespace(first_seen=0.2, last_seen=end) for end in (2.0, 40.0))
-    assert seen_of(short, [short]) == "0.20 to 2.00 s"
-    assert seen_of(short, [short, long]) == "0 to 2 s"
 
 
 def rows_of(path):

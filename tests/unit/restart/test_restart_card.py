@@ -14,10 +14,11 @@ from tests.published import bearing, published, value
 from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import build_drop_model, example_machine, read_document, save_machine
+from rotordrop.cli._options import pairs
 from rotordrop.cli._output import console
 from rotordrop.cli.app import run
 from rotordrop.cli.compare import _deliver_changes
-from rotordrop.cli.restart import CHECKS, _checks
+from rotordrop.cli.restart import CHECKS
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Joint, Parameter, Unbalance, Value
 from rotordrop.files import write_json
@@ -206,17 +207,21 @@ def test_a_check_that_was_made_is_not_open_and_a_bad_one_says_what_it_shows():
 
 
 @pytest.mark.parametrize(
-    ("read", "checks", "message"),
+    ("checks", "message"),
     [
-        (restart_card, {"x-ray": "bad"}, "there is no check 'x-ray'; there are lift"),
-        (restart_card, {"lift": "fine"}, "check lift = 'fine'; expected good or bad"),
-        (_checks, ["turning"], "expected one of lift, tail, turning"),
-        (_checks, ["lift=good", "lift=bad"], "--check lift is given twice"),
+        ({"x-ray": "bad"}, "there is no check 'x-ray'; there are lift"),
+        ({"lift": "fine"}, "check lift = 'fine'; expected good or bad"),
     ],
 )
-def test_unknown_checks_and_outcomes_are_named(read, checks, message):
+def test_unknown_checks_and_outcomes_are_named(checks, message):
     with pytest.raises(UsageError, match=message):
-        read(drop(), checks=checks) if read is restart_card else read(checks)
+        restart_card(drop(), checks=checks)
+
+
+@pytest.mark.parametrize("texts", [["turning"], ["lift=good", "lift=bad"]])
+def test_a_check_has_one_outcome(texts):
+    with pytest.raises(UsageError, match="expected its outcome, each once"):
+        pairs(texts, "its outcome")
 
 
 def test_the_checks_of_the_package_are_named_where_they_are_asked_for(capsys):

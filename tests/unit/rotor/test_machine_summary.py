@@ -88,7 +88,7 @@ def test_a_summary_names_what_is_out_of_the_usual(machine):
     assert warning.value < 0.0
     assert "would lift out of this bearing (-" in warning.message
     # The estimators take the range as it stands, not one about the guess.
-    found = warnings_of(example_machine("lp400"), "guess", 60.0)
+    found = warnings_of(example_machine("lp400"), "guess off the middle of its range", 60.0)
     assert [warning.bearing for warning in found] == ["NDE", "DE"]
     assert found[0].message == (
         "NDE: air gap: the guess 250 µm is not the middle of its range, 200 µm to 350 µm; an estimate takes "

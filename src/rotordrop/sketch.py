@@ -1,0 +1,53 @@
+"""What a notebook shows of a result: its words above a small figure, which needs no library."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from itertools import count, cycle
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotordrop.series import peak_indices
+
+COLOURS = ("#1c7ed6", "#e8590c", "#2b8a3e", "#9c36b5")
+WIDTH, HEIGHT = 460, 150
+"""Of the axes [px]."""
+
+
+def sketch(
+    words: str, across: str, up: str, curves: Mapping[str, tuple[ArrayLike, ArrayLike]], scale: float = 1.0
+) -> str:
+    """HTML of words and of curves (x, y) by name over shared axes, each with its smallest and largest value.
+
+    y is multiplied by `scale`; what is not finite is left out. More curves than `COLOURS` begin again.
+    """
+    drawn = {}
+    for name, (x, y) in curves.items():
+        points = np.column_stack([x, scale * np.asarray(y, dtype=np.float64)])
+        points = points[np.isfinite(points).all(axis=1)]
+        drawn[name] = points[peak_indices(points[:, 1])] if len(points) else points
+    every = np.concatenate([*drawn.values(), np.empty((0, 2))])
+    text = f"<pre>{escape(words)}</pre>"
+    if not len(every):
+        return text
+    low, high = every.min(axis=0), every.max(axis=0)
+    span = np.where(high > low, high - low, 1.0)
+    left, bottom = 60, HEIGHT + 24
+    (first, last), (least, most) = np.round(np.array([low, high]) / span, 4).T * span[:, None]
+    marks = [(left - 6, 32, f"{most:.4g}"), (left - 6, bottom, f"{least:.4g}"), (left + WIDTH // 2, 14, up)]
+    marks += [(left + 30, bottom + 18, f"{first:.4g}"), (left + WIDTH, bottom + 18, f"{last:.4g}")]
+    marks += [(left + WIDTH // 2, bottom + 18, across)]
+    parts = [f'<rect x="{left}" y="24" width="{WIDTH}" height="{HEIGHT}" fill="none" stroke="#8884"/>']
+    for (name, points), colour, row in zip(drawn.items(), cycle(COLOURS), count(), strict=False):
+        places = (points - low) / span * (WIDTH, -HEIGHT) + (left, bottom)
+        line = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
+        parts.append(f'<polyline points="{line}" fill="none" stroke="{colour}"/>')
+        parts.append(
+            f'<text x="{left + WIDTH + 8}" y="{36 + 16 * row}" fill="{colour}">{escape(name)}</text>'
+        )
+    parts += [f'<text x="{x}" y="{y}" text-anchor="end">{escape(mark)}</text>' for x, y, mark in marks]
+    style = "font:12px sans-serif;fill:currentColor;max-width:100%"
+    size = f'width="{WIDTH + 200}" height="{bottom + 24}"'
+    return f'{text}<svg {size} style="{style}">{"".join(parts)}</svg>'

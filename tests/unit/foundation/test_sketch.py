@@ -1,0 +1,54 @@
+"""What a notebook shows: words, and curves that stand where their numbers say."""
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+import rotordrop as rd
+from rotordrop.sketch import HEIGHT, WIDTH, sketch
+
+LP400, RECORD = rd.example_machine("lp400"), rd.example_record_path("lp400_drop_060")
+SHOWN = {
+    "machine": (lambda: LP400, 3),
+    "record": (lambda: rd.read_record(RECORD, LP400), 4),
+    "look": (lambda: rd.look(RECORD), 2),
+    "drop": (lambda: rd.simulate_drop(LP400, rd.DropCase(speed="60 Hz", duration="2 ms")), 2),
+    "study": (lambda: rd.sweep(LP400, {"speed": ["60 Hz", "90 Hz"]}, duration="2 ms"), 2),
+}
+
+
+def lines(html):
+    figure = ElementTree.fromstring(html[html.index("<svg") :])
+    return [
+        np.array([[float(x) for x in point.split(",")] for point in one.get("points").split()])
+        for one in figure.iter("polyline")
+    ]
+
+
+@pytest.mark.parametrize("kind", SHOWN)
+def test_every_result_has_a_figure_beside_its_words(kind):
+    make, count = SHOWN[kind]
+    made = make()
+    drawn = lines(made._repr_html_())
+    assert len(drawn) == count
+    assert np.ptp(np.concatenate(drawn), axis=0) == pytest.approx((WIDTH, HEIGHT), abs=0.2)
+    assert len(repr(made)) < 250 and "array(" not in repr(made)
+
+
+def test_a_curve_ends_where_its_largest_number_is():
+    html = sketch("<b>", "t [s]", "y [mm]", {"<i>": ([0.0, 1.0, 2.0], [0.0, np.nan, 2e-3])}, 1e3)
+    (drawn,) = lines(html)
+    assert drawn[-1] - drawn[0] == pytest.approx((WIDTH, -HEIGHT))
+    texts = re.findall(r">([^<>]+)</text>", html)
+    assert {"0", "2", "t [s]", "y [mm]", "&lt;i&gt;"} == set(texts) and "<pre>&lt;b&gt;</pre>" in html
+    assert sketch("nothing", "", "", {"y": ([0.0], [np.nan])}) == "<pre>nothing</pre>"
+
+
+def test_what_one_uses_is_listed():
+    assert {"touchdown_bearings", "with_values", "rotor"} < set(dir(LP400))
+    assert not {"parse_obj", "model_dump", "fill"} & set(dir(LP400))
+    with pytest.raises(AttributeError) as lost:
+        rd.critical_speeds  # noqa: B018
+    assert lost.value.name == "critical_speeds" and lost.value.obj is rd
