@@ -289,14 +289,14 @@ def test_a_fault_is_named_with_channel_and_time(fault, request, machine):
 
 
 def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):
-    found = only(whole_drop, machine, severity="warning")
+    found = only(whole_drop, machine, severity="note")
     assert (found.kind, found.time) == ("record ends before standstill", pytest.approx(2.0))
 
 
 def test_sound_records_pass_without_a_word(whole_drop, tail, machine, fast_drop):
     assert check_record(whole_drop, machine, tail) == ()
     kinds = {(found.kind, found.severity) for found in check_record(fast_drop, machine)}
-    assert kinds == {("short record", "warning"), ("record ends before standstill", "warning")}
+    assert kinds == {("short record", "warning"), ("record ends before standstill", "note")}
 
 
 def test_what_a_stopped_gate_did_not_ask_is_said_to_pass(whole_drop, machine, edited):
