@@ -48,6 +48,6 @@ def sketch(
             f'<text x="{left + WIDTH + 8}" y="{36 + 16 * row}" fill="{colour}">{escape(name)}</text>'
         )
     parts += [f'<text x="{x}" y="{y}" text-anchor="end">{escape(mark)}</text>' for x, y, mark in marks]
-    style = "font:12px sans-serif;fill:currentColor;max-width:100%"
+    style = "font:12px sans-serif;fill:currentColor"
     size = f'width="{WIDTH + 200}" height="{bottom + 24}"'
     return f'{text}<svg {size} style="{style}">{"".join(parts)}</svg>'

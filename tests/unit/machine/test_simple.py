@@ -109,7 +109,7 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
     said = {
         key: ", ".join(value) if isinstance(value, tuple) else value for key, value in TWELVE_NUMBERS.items()
     }
-    options = [f"--{key.replace('_', '-')}={value}" for key, value in said.items() if key != "support"]
+    options = [f"--set={key}={value}" for key, value in said.items() if key != "support"]
     target = tmp_path / "machine.toml"
     assert run(["init", "--simple", str(target), *options]) == 0
     assert len(asked) == 1

@@ -33,7 +33,7 @@ def test_loads_of_every_bearing(estimate, page, document):
     for k, (card, bearing) in enumerate(zip(page.cards, estimate.bearings, strict=True)):
         peaks = {"peak_force_N": bearing.peak_force, "peak_stress_Pa": bearing.peak_stress}
         in_python = {**bearing.values, **{field: peak.known for field, peak in peaks.items()}}
-        means = {row[0]: row[1 + k] for row in section(page, "Severity").tables[0].rows}
+        means = {row[0]: row[1 + k] for row in section(page, "Severity").tables[-1].rows}
         for load in (one for one in LOADS if one.field in in_python):
             shown = next((f for f in card.figures if f.label.lower() == load.label.lower()), None)
             value = means[load.label] if shown is None else shown.value
