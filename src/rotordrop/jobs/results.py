@@ -237,8 +237,8 @@ def _largest(estimate: Estimate, peak: str, kind: str) -> dict[str, Any] | None:
     if not known:
         return None
     name, one = max(known, key=lambda entry: entry[1].interval_90[1])
-    written = quantity_json(Quantity.of(one.known, kind))
-    return {"bearing": name, **written, "interval_90": list(one.interval_90)}
+    ends = list(one.interval_90)
+    return {"bearing": name, "interval_90": ends, **quantity_json(Quantity.of(one.known, kind))}
 
 
 def _label(estimate: Estimate, column: str) -> str:

@@ -113,19 +113,18 @@ def test_twelve_numbers_and_a_record_with_names_of_its_own_get_to_an_estimate(
     filled = f"for (const one of {fields}) {{one.value = one.placeholder}}"
     browser.evaluate(filled)
     press(browser, "send")
-    browser.until("document.getElementById('mapping').open", 120)
+    browser.until("document.getElementById('mapping').open")
     assert "NDE_A" in words(browser, "#channelrows")
     said = words(browser, "#channelrows option:checked")
     assert re.fullmatch(r"\S*Y1, −?\d+ to \d+ µm", said), said  # short enough for a list of 320 px
     chosen = "[...document.querySelectorAll('#channelrows select')].map(one => one.value).join()"
     assert browser.evaluate(chosen).replace("displacement/", "") == "Y1,X1,Y2,X2"
     browser.evaluate("document.querySelector('#mapping .main').click()")
-    browser.until(LOOKED, 120)
-    browser.until("!document.getElementById('estimate').disabled")
+    browser.until(LOOKED)
     press(browser, "estimate")
-    browser.until("/Estimating: (?!waiting|compiling|reading)/.test(document.body.innerText)", 240)
+    browser.until("/Estimating: (?!waiting|compiling|reading)/.test(document.body.innerText)")
     press(browser, "cancel")
-    browser.until("document.body.innerText.includes('The estimate was cancelled')", 60)
+    browser.until("document.body.innerText.includes('The estimate was cancelled')")
     quiet(browser)
 
 
@@ -133,7 +132,7 @@ def test_the_empty_page_offers_a_simulated_drop_to_try(browser, server):
     browser.open(server.address)
     browser.until("!document.getElementById('empty').hidden")
     press(browser, "tryit")
-    browser.until(LOOKED, 120)
+    browser.until(LOOKED)
     (job,) = server.ask("GET", "/api/jobs").told["jobs"]
     assert {"machine", "record", "tail"} < set(job["files"])
     assert browser.evaluate("!document.getElementById('simulated').hidden")
@@ -186,7 +185,7 @@ def test_a_file_that_cannot_be_read_is_shown_as_it_begins(browser, server, tmp_p
     browser.open(server.address)
     browser.until("!document.getElementById('empty').hidden")
     send(browser, [bad])
-    browser.until("!document.getElementById('unread').hidden", 60)
+    browser.until("!document.getElementById('unread').hidden")
     browser.until("document.querySelectorAll('#unread li').length >= 3")
     assert words(browser, "#unread li:nth-child(3)") == "0;<b>x</b>;3"
     buttons = browser.evaluate("[...document.querySelectorAll('#status button')].map(one => one.innerText)")
@@ -235,7 +234,7 @@ def test_reports_are_shown_in_a_frame_without_rights(browser, server, files):
     address = browser.evaluate("document.getElementById('reporttab').href")
     browser.until("location.hash.includes('report=look')")
     browser.evaluate("location.hash = location.hash.replace('report=look', 'report=check')")
-    browser.until("document.getElementById('reportframe').src.includes('/check/')", 60)
+    browser.until("document.getElementById('reportframe').src.includes('/check/')")
     browser.call("Page.reload")
     browser.until("document.getElementById('reportframe')?.src.includes('/check/')")
     browser.key("Escape")
@@ -266,7 +265,7 @@ def test_an_estimate_and_its_report_say_the_same(browser, server, files):
     press(browser, "estimate")
     browser.until("document.getElementById('cancel')")
     consistent = "The model follows the record."
-    browser.until(f"document.getElementById('status').innerText.includes({consistent!r})", 900)
+    browser.until(f"document.getElementById('status').innerText.includes({consistent!r})")
     assert browser.evaluate("document.querySelectorAll('.panel canvas').length") == 4
     chosen = browser.evaluate("new URLSearchParams(location.hash.slice(1)).get('drop')")
     document = server.ask("GET", f"/api/jobs/{chosen}/estimate/document").told
@@ -312,7 +311,7 @@ def _fits_a_telephone(browser):
     """Four figures of force, stress and motion on 400 px: high enough to read, and none leaves the screen."""
     browser.size(400, 800)
     plots = "[...document.querySelectorAll('.panel .u-over')]"
-    browser.until(f"{plots}.every(one => one.clientHeight >= 80)", 20.0)
+    browser.until(f"{plots}.every(one => one.clientHeight >= 80)")
     browser.until("document.documentElement.scrollWidth <= innerWidth")
     heads = "[...document.querySelectorAll('.panel header, .panel header *')]"
     assert browser.evaluate(f"{heads}.every(one => one.getBoundingClientRect().right <= innerWidth - 8)")

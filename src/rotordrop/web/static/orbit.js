@@ -56,7 +56,7 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, cursor, force, impacts
   for (const value of [-step, step]) {
     const [x] = at(value, 0), [, y] = at(0, value), words = written(value / f, 2);
     pen.line([[x, cy - 3], [x, cy + 3]], tone.muted);
-    pen.line([[cx - 3, y], [cx + 3, y]], tone.muted);
+    pen.line([[cx - 4, y], [cx, y]], tone.muted);
     pen.text(words, x, cy + 14, tone.muted, { size: 10, align: "center" });
     pen.text(words, cx + 6, y + 3, tone.muted, { size: 10 });
   }

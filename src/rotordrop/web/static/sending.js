@@ -72,12 +72,12 @@ async function sendFiles(pairs) {
   return last;
 }
 
-// A record in which nothing falls, and a drop of the same machine without a settled tail; null where there are no two.
-export async function tailPair({ id, files }) {
-  if (files.tail) { return null; }
-  const all = await server.jobs(), here = all.find((one) => one.id === id), rests = ({ row }) => row?.falls === false;
-  const other = all.find((one) => one.id !== id && one.files.machine?.sha256 === files.machine?.sha256 && one.files.record && (rests(here) ? !rests(one) && !one.files.tail : rests(one)));
-  return other ? (rests(here) ? [here, other] : [other, here]) : null;
+// A record in which nothing falls, and a drop of the same machine with neither tail nor estimate; null where there are no two.
+export async function tailPair(job) {
+  const rests = ({ row }) => row?.falls === false, open = ({ files, states }) => files.record && !files.tail && !states.estimate?.result;
+  const fits = (one) => one.id !== job.id && one.files.machine?.sha256 === job.files.machine?.sha256 && open(one) && rests(one) !== rests(job);
+  const other = open(job) ? (await server.jobs()).find(fits) : null;
+  return other ? (rests(job) ? [job, other] : [other, job]) : null;
 }
 export async function useTail(rest, drop) {
   const give = async (what) => server.send(drop.id, what === "record" ? "tail" : what, new File([await server.sentFile(rest.id, what)], rest.files[what].name));
