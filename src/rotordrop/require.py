@@ -84,7 +84,7 @@ def numbers(
             given = np.asanyarray(values)
             if given.dtype.kind not in "fiuO":
                 raise TypeError(f"they are of the kind {given.dtype}")
-            array = np.array(np.ma.filled(given.astype(np.float64), np.nan), subok=False)
+            array = np.array(np.ma.filled(given.astype(np.float64, copy=False), np.nan), subok=False)
         except (TypeError, ValueError) as error:
             raise UsageError(
                 f"{name} is {_shown(values)} that is no array of real numbers ({error}). "

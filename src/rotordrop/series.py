@@ -12,6 +12,14 @@ SIGMA_OF_MEDIAN = 1.4826
 DRAWN_BLOCKS = 900
 """Blocks a history is cut into; each keeps its extremes, so a figure 900 pixels wide loses nothing."""
 
+MANY = 1 << 18
+"""Samples that show what many more show no better: noise, steps, how far a rotor strays (chosen)."""
+
+
+def stride_of(count: int) -> int:
+    """Every how many-th of so many samples makes at most `MANY`."""
+    return max(-(-count // MANY), 1)
+
 
 def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Starts and lengths of the runs of true values, shape (R,) each, for a mask of shape (N,)."""

@@ -73,6 +73,7 @@ def one_end(record: Record, gaps: Array | None = None) -> OneEnd | None:
     gaps : array, shape (P,), optional
         Air gap of every plane [m]; by default how far the plane that strays most is away in the median.
     """
+    record = record.thinned()
     path, rate = record.motion, record.sampling_rate
     if path.shape[1] < 2:
         return None

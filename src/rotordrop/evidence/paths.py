@@ -18,7 +18,7 @@ from rotordrop.known import NINETY
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import FOLLOWED_TURNS, WhirlSpell, whirl_spells
 from rotordrop.record.record import Record
-from rotordrop.series import noise_by_differences, runs_of
+from rotordrop.series import MANY, noise_by_differences, runs_of, stride_of
 from rotordrop.units import GRAVITY, fall_time
 
 SLOWEST_FALL = 0.2
@@ -107,34 +107,46 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     NothingFallsError
         When nothing falls.
     """
-    raw, rate = record.resolved(), record.sampling_rate
-    begin, sunk, falls = _first_fall(raw, rate)
+    raw, rate, stride = record.resolved(), record.sampling_rate, stride_of(len(record.time))
+    begin, sunk, falls = _first_fall(raw[::stride], rate / stride)
+    begin, sunk = stride * begin, stride * sunk
     # where the rotor lies: the last quarter after the fall
     rest_from = sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
-    rest = np.median(raw[rest_from:], axis=0)
-    paths = []
+    rest = np.median(raw[rest_from::stride], axis=0)
+    paths: list[Path] = []
+    turns = []
     for number, plane in enumerate(record.planes):
         position, floated = raw[:, number], np.mean(raw[:begin, number], axis=0)
         # the plane at the other end is the one that moves most unlike this
-        unlike = [float(np.hypot(*np.std(place - position, axis=0))) for place in raw.swapaxes(0, 1)]
+        thin = raw[::stride].swapaxes(0, 1)
+        unlike = [float(np.hypot(*np.std(place - thin[number], axis=0))) for place in thin]
         other = raw[:, int(np.argmax(unlike))]
         wall = find_wall(position, other, rate, (begin, sunk), gaps[number])
         apart = position - floated - other + np.mean(other[:begin], axis=0)
-        turn = np.eye(2) if angles_known else _upright(position[:begin], rest[number] - floated)
-        centred = (position - wall.centre) @ turn.T
-        path = Path(
-            name=plane.bearing,
-            position=centred,
-            bearing_position=centred + wall.lever * apart @ turn.T,
-            levitated=turn @ (floated - wall.centre),
-            wall=wall,
-            noise=_noise(position),
+        apart *= wall.lever
+        turn = np.eye(2) if angles_known else _upright(position[:begin][-MANY:], rest[number] - floated)
+        turns.append(turn)
+        _turn(apart, turn)
+        paths.append(
+            Path(
+                name=plane.bearing,
+                position=position,
+                bearing_position=apart,
+                levitated=turn @ (floated - wall.centre),
+                wall=wall,
+                noise=_noise(position),
+            )
         )
+    for number, (path, turn) in enumerate(zip(paths, turns, strict=True)):
+        # in place: copies of a minute would fill a gigabyte
+        position, wall = path.position, path.wall
+        position -= wall.centre
+        _turn(position, turn)
+        np.add(path.bearing_position, position, out=path.bearing_position)
         radius = np.hypot(*path.bearing_position.T)
         if wall.touch is None or wall.touch.at(radius[:, None])[0] > (1.0 + BEYOND) * wall.gap:
-            touch = crossing(radius, begin, rate, wall.gap, wall.gap_error)
-            path = replace(path, wall=replace(wall, touch=touch))
-        paths.append(path)
+            wall = replace(wall, touch=crossing(radius, begin, rate, wall.gap, wall.gap_error))
+        paths[number] = replace(path, wall=wall)
     sought = [path for path, given in zip(paths, gaps, strict=True) if given is None]
     notes = [_gap_note(path) for path in sought if not path.wall.determined]
     if len(notes) < len(sought):
@@ -241,6 +253,12 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     return max(sunk - back, first), sunk, tuple(float(one[0]) for one in found)
 
 
+def _turn(path: Array, turn: Array) -> None:
+    """Turn the axes of a path (N, 2), in place and part by part: NumPy is slow on a long one."""
+    for part in np.array_split(path, 1 + len(path) // MANY):
+        part[:] = part @ turn.T
+
+
 def _upright(levitated: Array, fall: Array) -> Array:
     """Rotation, or rotation with reflection, that brings the fall down and the levitated orbit forward."""
     down = fall / np.hypot(*fall)
@@ -252,7 +270,7 @@ def _upright(levitated: Array, fall: Array) -> Array:
 
 def _noise(position: Array) -> float:
     """Scatter of neighbouring samples about the parabola through them [m]."""
-    return noise_by_differences(position, 3)
+    return noise_by_differences(position[:MANY], 3)
 
 
 def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:

@@ -79,8 +79,9 @@ def mended(
     many = len(time) > len(as_read[0]) and part == slice(None) and np.mean(missing.all(axis=1)) > FEW
     if part is None or many:  # the gate says what is missing where
         time, signals, part = *as_read, slice(None)
-    time, signals, words = time[part], signals[part].copy(), words + said
+    time, signals, words = time[part], signals[part], words + said
     missing, told = ~np.isfinite(signals), []
+    signals = signals.copy() if missing.any() else signals
     for c in np.flatnonzero(missing.any(axis=0)).tolist():
         known = ~missing[:, c]
         if float(np.mean(~known)) <= FEW and max(runs_of(~known)[1]) <= most:

@@ -37,6 +37,7 @@ from rotordrop.record.readers.numpy_files import recording_of_arrays
 from rotordrop.record.recording import MARKS, SPEED_UNITS, Channel, Recording, spelled, split_unit, whose_time
 from rotordrop.record.tacho import passages, readings_of_held_signal
 from rotordrop.require import numbers, require
+from rotordrop.series import stride_of
 from rotordrop.sketch import sketch
 from rotordrop.units import parse_quantity
 
@@ -256,11 +257,30 @@ class Record:
 
     def resolved(self) -> Array:
         """The same, made anew and not kept, part by part: copies of a minute would fill 150 MB."""
-        motion = np.empty((len(self.time), len(self.planes), 2))
+        motion = np.empty((len(self.planes), len(self.time), 2)).swapaxes(0, 1)  # each plane by itself
         for begin in range(0, len(motion), _PART):
             part = slice(begin, begin + _PART)
             motion[part] = planar_of(along_sensors(self.signals[part], self.sensors), self.planes)
         return motion
+
+    def thinned(self) -> Self:
+        """Give every so many-th sample of a long record, no copies of them; itself up to `MANY` samples."""
+        stride = stride_of(len(self.time))
+        return (
+            self
+            if stride == 1
+            else replace(self.samples(slice(None, None, stride)), sampling_rate=self.sampling_rate / stride)
+        )
+
+    def samples(self, keep: slice | NDArray[np.intp]) -> Self:
+        """Give some samples; the speed readings stay whole."""
+        return replace(
+            self,
+            time=self.time[keep],
+            signals=self.signals[keep],
+            missing=None if self.missing is None else self.missing[keep],
+            speed=None if self.speed is None else self.speed[keep],
+        )
 
     def of_channels(self, columns: Sequence[int]) -> Record:
         """The record of some of its sensors."""
@@ -321,14 +341,7 @@ class Record:
             raise RecordError(f"{reaches}; nothing lies between {start:.6g} s and {end:.6g} s")
         # a slice, unless the time goes back and forth: a copy of a minute would fill 40 MB
         first, last = int(inside[0]), int(inside[-1]) + 1
-        keep = slice(first, last) if last - first == len(inside) else inside
-        return replace(
-            self,
-            time=self.time[keep],
-            signals=self.signals[keep],
-            missing=None if self.missing is None else self.missing[keep],
-            speed=None if self.speed is None else self.speed[keep],
-        )
+        return self.samples(slice(first, last) if last - first == len(inside) else inside)
 
 
 def read_record(
@@ -398,10 +411,7 @@ def record_of(
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     recording = from_first_stamp(recording)
-    matched = [
-        replace(channel, values=np.where(no_values(channel.values), np.nan, channel.values))
-        for channel in match_sensors(recording, sensors, profile, place)
-    ]
+    matched = [_with_gaps(channel) for channel in match_sensors(recording, sensors, profile, place)]
     shared, notes = on_one_clock(matched, place)
     time, rate, rounded = even_clock(shared, place)
     signals, words = np.empty((len(time), len(sensors))), []
@@ -475,6 +485,12 @@ def _record_of_channels(
         of_speed = Channel(name=name, label=name, unit=spelled(speed[1]), values=values, time=clock)
         channels = [*channels, of_speed]
     return record_of(Recording(channels=tuple(channels)), machine.sensors, profile=rules)
+
+
+def _with_gaps(channel: Channel) -> Channel:
+    """A channel, NaN where a reading is no value."""
+    bad = no_values(channel.values)
+    return replace(channel, values=np.where(bad, np.nan, channel.values)) if bad.any() else channel
 
 
 def _columns(signals: Mapping[str, ArrayLike] | ArrayLike, names: list[str]) -> dict[str, Array]:

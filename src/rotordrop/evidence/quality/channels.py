@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, found
-from rotordrop.series import SIGMA_OF_MEDIAN, runs_of
+from rotordrop.series import SIGMA_OF_MEDIAN, runs_of, stride_of
 
 if TYPE_CHECKING:
     from rotordrop.record.record import Record
@@ -66,9 +66,10 @@ def damaged_samples(signals: Array) -> NDArray[np.bool_]:
 def check_channels(record: Record) -> list[Finding]:
     """Look at every channel by itself and at how it compares with the others."""
     findings: list[Finding] = []
-    columns = [np.ascontiguousarray(values) for values in record.signals.T]
+    columns = record.signals.T
     moves = np.array([float(np.ptp(v[np.isfinite(v)])) if np.isfinite(v).any() else 0.0 for v in columns])
-    for index, (name, values) in enumerate(zip(record.channel_names, columns, strict=True)):
+    for index, name in enumerate(record.channel_names):
+        values = np.ascontiguousarray(columns[index])
         others = np.delete(moves, index)
         typical = float(np.nanmedian(others)) if len(others) else float("nan")
         bad = np.flatnonzero(~np.isfinite(values))
@@ -185,7 +186,7 @@ def _steps(record: Record, channel: str, values: Array) -> list[Finding]:
 
 def _step_of(values: Array) -> float:
     """Usual distance between readings that differ [m]."""
-    levels = np.unique(values)
+    levels = np.unique(values[:: stride_of(len(values))])
     return float(np.median(np.diff(levels))) if len(levels) > 1 else 0.0
 
 

@@ -16,6 +16,7 @@ from rotordrop.evidence.paths import SLOWEST_FALL, drops_of, whirls_of
 from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.known import NINETY
 from rotordrop.machine.plausibility import USUAL_GAP
+from rotordrop.series import stride_of
 from rotordrop.units import GRAVITY
 
 if TYPE_CHECKING:
@@ -388,8 +389,8 @@ def first_motion(record: Record) -> tuple[int, Array]:
     Every channel is scaled by its own largest motion; half of the channels must have moved by a quarter of
     it.
     """
-    first = max(int(0.01 * record.sampling_rate), 8)
+    first, stride = max(int(0.01 * record.sampling_rate), 8), stride_of(len(record.signals))
     level = np.mean(record.signals[:first], axis=0)
-    away = np.abs(record.signals - level)
+    away = np.abs(record.signals[::stride] - level)
     moved = np.median(away / np.maximum(np.max(away, axis=0), 1e-15), axis=1) > 0.25
-    return int(np.argmax(moved)), level
+    return stride * int(np.argmax(moved)), level
