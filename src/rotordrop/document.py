@@ -142,7 +142,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
         raise UsageError(f"{path}: not valid TOML: {error}") from error
 
 
-def read_json(path: Path, made_by: str) -> dict[str, Any]:
+def read_json(path: str | Path, made_by: str) -> dict[str, Any]:
     """The object that a JSON file holds, without its digest if it has one.
 
     Raises
@@ -153,6 +153,7 @@ def read_json(path: Path, made_by: str) -> dict[str, Any]:
         If it holds other values than were written with its digest.
     """
     way_out = f"Give a file that '{made_by}' wrote."
+    path = Path(require(path, "path", str, PathLike))
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as fault:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal
 
+from rotordrop.errors import UsageError
+
 Progress = Callable[[str, float], None]
 """Called with the name of the present stage and the fraction done (0 to 1)."""
 
@@ -28,6 +30,8 @@ def _in_notebook() -> bool:
 @contextmanager
 def shown(progress: Shown, title: str) -> Iterator[Progress]:
     """Give the function that a long computation tells its progress."""
+    if not callable(progress) and progress is not None and progress is not False:
+        raise UsageError(f"progress is {progress!r}; expected a function, False or None.")
     if callable(progress):
         yield progress
     elif progress is None and is_shown():

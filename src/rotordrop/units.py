@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any, SupportsFloat, overload
 
 from rotordrop.errors import UsageError
+from rotordrop.require import numbers, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -315,6 +316,8 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     digits : int
         Significant digits.
     """
+    value = float(numbers(value, "value", ()))
+    require(digits, "digits", int, least=1)
     if kind == "speed":
         turns = value / (2 * math.pi)
         return f"{_rounded(turns, digits)} Hz ({_rounded(60 * turns, max(digits, 4))} rpm)"

@@ -17,6 +17,7 @@ from rotordrop.estimate import published
 from rotordrop.estimate.published import Drop, Joint, Value
 from rotordrop.known import NINETY
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
+from rotordrop.require import each
 from rotordrop.units import format_chance
 
 ByPath = Mapping[str, published.Parameter]
@@ -151,7 +152,7 @@ def changes(first: Drop, second: Drop) -> Changes:
     UsageError
         If the drops are not of one machine (see `unlike`), or a model does not fit its record.
     """
-    for drop in (first, second):
+    for drop in each((first, second), "drops", Drop):
         if not drop.consistent:
             raise UsageError(
                 f"{drop.record}: the model is not consistent with this record, so its parameters say "

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.estimate.simulated_coast_down import simulated_coast_down
+from rotordrop.evidence.given import require_drop
 from rotordrop.machine import Machine
 from rotordrop.progress import Shown, shown
 from rotordrop.record.record import Record
@@ -41,7 +42,9 @@ def waterfall(
     """
     require(machine, "machine", Machine)
     require(coast_down, "the coast-down", Record, str, Path)
+    require(choice, "choice", WaterfallChoice, none=True)
     if isinstance(coast_down, Record):
+        require_drop(coast_down, machine)
         signal = recorded_coast_down(machine, coast_down)
     else:
         signal = simulated_coast_down(Path(coast_down), machine)

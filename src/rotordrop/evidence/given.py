@@ -24,6 +24,13 @@ def require_drop(record: Any, machine: Any, name: str = "record", *, none: bool 
             )
 
 
+def require_tail(tail: Any, record: Record, machine: Machine) -> None:
+    """Refuse what is no tail of a record: it has the same channels."""
+    require_drop(tail, machine, "tail", none=True)
+    if tail is not None and tail.channel_names != record.channel_names:
+        raise RecordError(f"tail has {', '.join(tail.channel_names)}; give it all channels of its record")
+
+
 def given_drops(
     machine: Machine, records: Any, tails: Any, names: Any
 ) -> tuple[tuple[Record, ...], tuple[Record | None, ...], tuple[str, ...]]:
@@ -43,7 +50,9 @@ def given_drops(
     )
     for record, rest in zip(drops, rests, strict=True):
         require_drop(record, machine)
-        require_drop(rest, machine, "tail", none=True)
+        require_tail(rest, record, machine)
+    if names is not None and len(set(names)) < len(drops):
+        raise UsageError(f"names are {', '.join(map(str, names))}; expected one of its own for each record.")
     stems = [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(drops)]
     names = each(stems if names is None else names, "names", str, records=len(drops))
     seen: dict[str, str] = {}

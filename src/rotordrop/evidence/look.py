@@ -267,7 +267,7 @@ def look(
     Where nothing falls, the look has no drop but the contacts of a rotor that its magnets hold; where no two
     channels make a plane, it has the levels of the channels.
     """
-    gap, speed = _given(record, machine, gap, speed, read_by=(*mapping, *([profile] if profile else [])))
+    gap, speed = _given(record, machine, gap, speed, read_by=(mapping, profile))
     try:
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
@@ -333,7 +333,7 @@ def _given(
     require(record, "record", str, PathLike, Record)
     if require(machine, "machine", Machine, none=True) is not None and isinstance(record, Record):
         require_drop(record, machine)
-    if isinstance(record, Record) and (speed is not None or read_by):
+    if isinstance(record, Record) and (speed is not None or any(read_by)):
         raise UsageError("speed, mapping and profile tell how a file is read; expected none with a Record.")
     gap = None if gap is None else in_si(gap, "length", "gap")
     speed = None if speed is None else in_si(speed, "speed", "speed")

@@ -27,6 +27,7 @@ from rotordrop.elements.values import Acceleration, Number, PositiveTime, defaul
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
+from rotordrop.require import require
 from rotordrop.sketch import sketch
 from rotordrop.units import GRAVITY, format_quantity, in_si
 
@@ -328,7 +329,7 @@ class Machine(Description):
         from 0, as in `unbalances`: ``"unbalance.0.amount"``.
         """
         tree: dict[str, Any] = {}
-        for path, value in values.items():
+        for path, value in require(values, "values", Mapping).items():
             *keys, last = _resolved(self, path)
             branch = tree
             for key in keys:

@@ -36,7 +36,7 @@ from rotordrop.record.readers import read_recording
 from rotordrop.record.readers.numpy_files import recording_of_arrays
 from rotordrop.record.recording import MARKS, SPEED_UNITS, Channel, Recording, spelled, split_unit, whose_time
 from rotordrop.record.tacho import passages, readings_of_held_signal
-from rotordrop.require import numbers, require
+from rotordrop.require import each, numbers, require
 from rotordrop.series import stride_of
 from rotordrop.sketch import sketch
 from rotordrop.units import parse_quantity
@@ -84,10 +84,16 @@ class Record:
     """Choices made on reading, and damage worked around."""
 
     def __post_init__(self) -> None:
-        shape = (len(self.time), len(self.sensors))
+        object.__setattr__(self, "sensors", each(self.sensors, "sensors", Sensor))
+        numbers(self.sampling_rate, "sampling_rate", ())
+        shape = (numbers(self.time, "time").size, len(self.sensors))
         if np.shape(self.signals) != shape:
             words = f"{shape[0]} times and {shape[1]} sensors need {shape}"
             raise RecordError(f"signals have the shape {np.shape(self.signals)}; {words}")
+        if self.missing is not None and np.shape(self.missing) != shape:
+            raise RecordError(f"missing has the shape {np.shape(self.missing)}; expected {shape}")
+        if (self.speed_time is None) != (self.speed_readings is None):
+            raise RecordError("speed_time and speed_readings belong together; give both or none")
         readings = None if self.speed_time is None else np.shape(self.speed_time)
         lengths = {"time": None, "signals": None, "speed": shape[:1], "speed_time": None}
         for name, length in (lengths | {"speed_readings": readings, "marks": None}).items():
@@ -143,7 +149,7 @@ class Record:
             clock = np.asarray(parse_quantity(start, "time") + np.arange(count) / rate)
         else:
             unit_of_time = require(time_unit, "time_unit", str, among=_TIME_UNITS)
-            (clock,) = in_seconds([numbers(time, "time", finite=True)], [unit_of_time])
+            (clock,) = in_seconds([np.atleast_1d(numbers(time, "time", finite=True))], [unit_of_time])
         if clock.shape != (count,):
             words = f"time has the shape {clock.shape} and the signals have {count} samples"
             raise RecordError(f"{words}; give one time for each sample, or a sampling rate such as '20 kHz'")
@@ -192,7 +198,8 @@ class Record:
                 words = "no column 'time' and its index only counts rows; name the time 'time [s]'"
                 raise RecordError(f"the table has {words}")
             columns[f"time [{split_unit(named)[2]}]"] = index
-        rules = profile or Profile()
+        rules = rules_of(profile, ())
+        require(unit, "unit", str, Mapping, none=True)
         given, every = (unit, "") if isinstance(unit, Mapping) else ({}, unit or "")
         channels = [
             replace(one, unit=spelled(given.get(one.name) or given.get(one.label) or one.unit or every))
@@ -284,7 +291,8 @@ class Record:
 
     def of_channels(self, columns: Sequence[int]) -> Record:
         """The record of some of its sensors."""
-        chosen = list(columns)
+        most = len(self.sensors) - 1
+        chosen = [require(one, "column", int, least=0, most=most) for one in columns]
         return replace(
             self,
             signals=np.ascontiguousarray(self.signals[:, chosen]),
@@ -334,6 +342,7 @@ class Record:
 
     def window(self, start: float, end: float) -> Self:
         """Give the samples from `start` to `end` [s], no copies of them; the speed readings stay whole."""
+        numbers([start, end], "start and end")
         slack = 1e-3 / self.sampling_rate if np.isfinite(self.sampling_rate) else 0.0
         inside = np.flatnonzero((self.time >= start - slack) & (self.time <= end + slack))
         if not len(inside):
@@ -374,6 +383,7 @@ def read_record(
     """
     require(path, "path", str, PathLike)
     require(machine, "machine", Machine, none=True)
+    require(tail, "tail", bool)
     return open_record(path, machine, profile=rules_of(profile, mapping), tail=tail)[0]
 
 
@@ -411,7 +421,11 @@ def record_of(
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     recording = from_first_stamp(recording)
-    matched = [_with_gaps(channel) for channel in match_sensors(recording, sensors, profile, place)]
+    matched = [
+        replace(channel, values=np.where(bad, np.nan, channel.values)) if bad.any() else channel
+        for channel in match_sensors(recording, sensors, profile, place)
+        for bad in (no_values(channel.values),)
+    ]
     shared, notes = on_one_clock(matched, place)
     time, rate, rounded = even_clock(shared, place)
     signals, words = np.empty((len(time), len(sensors))), []
@@ -442,6 +456,8 @@ def record_of(
         notes.append(f"speed given by hand: {profile.speed.constant}")
     elif (of_speed := find_speed(recording, matched, profile, place)) is not None:
         known = ~no_values(of_speed.values)
+        if not known.any():
+            raise RecordError(f"{place}: {of_speed.label!r} holds no speed; give one by hand, '60 Hz'")
         when, readings = readings_of_held_signal(of_speed.time[known], of_speed.values[known])
         readings = readings * speed_factor(of_speed, profile, place)
         notes.append(f"shaft speed from {of_speed.label!r}")
@@ -485,12 +501,6 @@ def _record_of_channels(
         of_speed = Channel(name=name, label=name, unit=spelled(speed[1]), values=values, time=clock)
         channels = [*channels, of_speed]
     return record_of(Recording(channels=tuple(channels)), machine.sensors, profile=rules)
-
-
-def _with_gaps(channel: Channel) -> Channel:
-    """A channel, NaN where a reading is no value."""
-    bad = no_values(channel.values)
-    return replace(channel, values=np.where(bad, np.nan, channel.values)) if bad.any() else channel
 
 
 def _columns(signals: Mapping[str, ArrayLike] | ArrayLike, names: list[str]) -> dict[str, Array]:

@@ -13,6 +13,7 @@ from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
+from rotordrop.require import numbers, require
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.suspension import Support, suspension_of
@@ -79,7 +80,7 @@ def campbell_diagram(
     machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
 ) -> CampbellDiagram:
     """Campbell diagram of a machine with K lines at increasing speeds [rad/s], (S,), in a suspension."""
-    supports = suspension_of(machine, suspension)
+    supports = suspension_of(require(machine, "machine", Machine), suspension)
     fe = build_rotor_fe(machine)
     nodes = [support.node for support in supports]
     basis = reduce_rotor(fe, REDUCTION, nodes)
@@ -96,8 +97,9 @@ def campbell_lines(
     count: int = 10,
 ) -> CampbellDiagram:
     """Campbell diagram of a reduced rotor on any supports; arguments as in `campbell_diagram`."""
-    grid = np.atleast_1d(np.asarray(speeds, dtype=np.float64))
-    if grid.ndim != 1 or np.any(np.diff(grid) <= 0.0) or grid[0] < 0.0:
+    grid = np.atleast_1d(numbers(speeds, "speeds", finite=True))
+    require(count, "count", int, least=1)
+    if grid.ndim != 1 or not len(grid) or np.any(np.diff(grid) <= 0.0) or grid[0] < 0.0:
         raise UsageError("the speeds of a Campbell diagram must increase and not be negative")
     if grid[-1] == 0.0:
         raise UsageError("a Campbell diagram needs a speed above standstill")

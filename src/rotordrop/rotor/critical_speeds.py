@@ -13,6 +13,7 @@ from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
+from rotordrop.require import numbers, require
 from rotordrop.rotor.assembly import RotorFE, build_rotor_fe
 from rotordrop.rotor.reduction import RotorBasis
 from rotordrop.rotor.suspension import (
@@ -76,15 +77,14 @@ def critical_speed_map(
 
     By default 121 stiffnesses from 1e5 to 1e10 N/m, and static loads [N] that are the shares of the weight.
     """
-    grid = (
-        np.geomspace(*DEFAULT_STIFFNESS, 121)
-        if stiffness is None
-        else np.asarray(stiffness, dtype=np.float64)
-    )
-    if grid.ndim != 1 or not np.all(grid > 0.0):
-        raise UsageError(
-            f"the stiffnesses of a critical speed map must be positive, got {np.min(grid):.3g} N/m"
-        )
+    require(machine, "machine", Machine)
+    require(count, "count", int, least=1)
+    given = np.geomspace(*DEFAULT_STIFFNESS, 121) if stiffness is None else stiffness
+    grid = numbers(given, "stiffness", finite=True)
+    if grid.ndim != 1 or not len(grid) or not np.all(grid > 0.0):
+        raise UsageError("stiffness is no list of positive numbers [N/m]; expected one of the map at least.")
+    if loads is not None:
+        loads = numbers(loads, "loads", (len(machine.touchdown_bearings),), finite=True).tolist()
     fe = build_rotor_fe(machine)
     parts = equivalent_stiffness(machine, loads)
     masses = [float(bearing.support.mass) for bearing in machine.touchdown_bearings]

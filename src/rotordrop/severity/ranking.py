@@ -12,6 +12,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
+from rotordrop.require import each, require
 from rotordrop.units import format_chance
 
 CLEAR = 0.9
@@ -28,6 +29,10 @@ class DropSeverity:
     """Peak force [N] or stress [Pa]."""
     standard_error: float
     """Of the estimate of this one drop [unit of value]."""
+
+    def __post_init__(self) -> None:
+        require(self.value, "value", float)
+        require(self.standard_error, "standard_error", float, least=0.0)
 
     @classmethod
     def from_interval(cls, name: str, value: float, interval_90: tuple[float, float]) -> DropSeverity:
@@ -72,6 +77,9 @@ def rank_drops(
 
     Source: own method. Differs from the paper: section 5.3 ranks speeds by one drop each.
     """
+    drops = each(drops, "drops", DropSeverity)
+    require(drop_scatter, "drop_scatter", float, least=0.0, none=True)
+    require(more_is_worse, "more_is_worse", bool)
     if len(drops) < 2:
         raise UsageError(f"ranking: {len(drops)} drop given, at least two are needed")
     sign = 1.0 if more_is_worse else -1.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import SimulationError
-from rotordrop.require import require
+from rotordrop.require import each, numbers, require
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.units import InSI
 
@@ -37,6 +37,10 @@ class PlacedStart:
     (B, 2)."""
     velocity: Array
     """Velocity there [m/s], shape (B, 2)."""
+
+    def __post_init__(self) -> None:
+        for name in ("displacement", "velocity"):
+            numbers(getattr(self, name), name, finite=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +69,9 @@ class LevitatedStart:
     follows the runout of its sensors makes it; by default the response to the unbalance alone, shape (A,)."""
 
     def __post_init__(self) -> None:
+        for name in ("remanent_force", "offset"):
+            if getattr(self, name) is not None:
+                numbers(getattr(self, name), name, finite=True)
         require(self.rotor_angle, "rotor_angle", float)
         require(self.delay, "delay", float, least=0.0)
         require(self.remanence_time_constant, "remanence_time_constant", float, above=0.0)
@@ -183,6 +190,9 @@ class DropCase(Case):
         require(self.spin, "spin", str, among=get_args(SpinMode))
         require(self.most_steps, "most_steps", int, least=1)
         require(self.jump, "jump", UnbalanceJump, none=True)
+        require(self.reduction, "reduction", str, Reduction)
+        if self.magnets is not None:
+            each(self.magnets, "magnets", MagnetEvent)
         count = self.duration / self.output_step
         if not 1.0 - 1e-9 <= count <= MOST_OUTPUTS or self.duration > LONGEST:
             raise SimulationError(
@@ -218,8 +228,8 @@ STOP_SPEED = 0.01
 class CoastDownCase(Case):
     """One coast-down to simulate: a drop in windows of statistics, until the rotor stands."""
 
-    speed: float
-    """Rotor speed at power-off [rad/s]; positive from x to y."""
+    speed: InSI = InSI("speed")  # noqa: RUF009 - a descriptor, read by the dataclass
+    """Rotor speed at power-off [rad/s]; positive from x to y; a float, or a text such as ``"60 Hz"``."""
     duration: float | None = None
     """Length of the simulation [s]; None: until the rotor stands still."""
     rest: float = 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import magnitude
 from rotordrop.progress import Shown, shown
+from rotordrop.require import require
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate import _histories as H
@@ -60,7 +62,7 @@ def simulate_coast_down(
     machine: Machine | DropModel,
     case: CoastDownCase,
     *,
-    output: Path | None = None,
+    output: str | Path | None = None,
     resume: bool = False,
     progress: Shown = None,
     windows_at_most: int | None = None,
@@ -74,7 +76,7 @@ def simulate_coast_down(
         time constant.
     case : CoastDownCase
         Speed [rad/s], end, sampling, accuracy.
-    output : Path, optional
+    output : path-like, optional
         HDF5 file for the samples; without it only the statistics are kept.
     resume : bool
         Go on with a run to the same output that was killed; the result is the same to the last bit. A run
@@ -102,6 +104,12 @@ def simulate_coast_down(
     turns no faster than the stop speed it sticks, while races, supports and the swing go on.
     Not validated: after standstill the rotor is held; a real one still rocks with its swing.
     """
+    require(machine, "machine", Machine, DropModel)
+    require(case, "case", CoastDownCase)
+    require(output, "output", str, PathLike, none=True)
+    require(resume, "resume", bool)
+    require(windows_at_most, "windows_at_most", int, least=1, none=True)
+    output = None if output is None else Path(output)
     model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
     setup, run = _begun(model, case)
     nodes = tuple(sorted({sensor.node for sensor in model.machine.sensors}))

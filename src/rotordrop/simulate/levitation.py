@@ -13,6 +13,7 @@ from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
+from rotordrop.require import numbers
 from rotordrop.rotor.parameters import FASTEST, DropModel, pushes
 from rotordrop.simulate.case import CentredStart, LevitatedStart, PlacedStart, Simulated, StateStart
 from rotordrop.simulate.magnets import start_loop, with_springs_of
@@ -189,7 +190,7 @@ def levitated_static(model: DropModel, offset: Array | None, speed: float = 0.0)
     """
     p = model.parameters
     n_a, m = p.magnet_shape.shape
-    target = np.zeros((n_a, 2)) if offset is None else np.asarray(offset, dtype=np.float64)
+    target = np.zeros((n_a, 2)) if offset is None else numbers(offset, "offset", (n_a, 2))
     load = pushes(p, speed)
     border = p.magnet_shape.T
     matrix = np.block([[np.diag(p.eigenvalue), -border], [p.magnet_shape, np.zeros((n_a, n_a))]])

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wa
 from contextlib import ExitStack, nullcontext
 from functools import partial
 from importlib import import_module
-from os import cpu_count
+from os import PathLike, cpu_count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
@@ -86,6 +86,7 @@ def run_study(
     under another name and computed again.
     """
     require(study, "study", Study)
+    require(folder, "folder", str, PathLike)
     require(threads, "threads", int, none=True, least=1)
     place = open_folder(study, folder)
     with alone_in(place), shown(progress, study.name) as tell:

@@ -24,10 +24,10 @@ from rotordrop.evidence.quality import (
 )
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes
 from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.continuity import check_continuity, check_orbit
+from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.fall import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
-from rotordrop.evidence.quality.recorder import check_clock, check_filters, check_speed
+from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_filters, check_speed
 from rotordrop.evidence.quality.tail import check_rest_in_record
 from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
@@ -291,6 +291,14 @@ def test_a_fault_is_named_with_channel_and_time(fault, request, machine):
 def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):
     found = only(whole_drop, machine, severity="note")
     assert (found.kind, found.time) == ("record ends before standstill", pytest.approx(2.0))
+
+
+def test_what_repeats_by_itself_is_no_copy(drop):
+    """Without noise an orbit of 60 Hz at 20 kHz has the same readings every 1000 samples."""
+    turns = HZ * 60.0 * np.arange(4000) / 20e3
+    orbit = np.round(20.0 * np.cos(turns[:, None] - np.arange(4)), 2) * 1e-6
+    still = replace(drop.window(-0.25, -0.05005), signals=orbit, missing=None)
+    assert check_blocks(still) == []
 
 
 def test_sound_records_pass_without_a_word(whole_drop, tail, machine, fast_drop):
@@ -792,17 +800,6 @@ def test_lost_samples_in_the_fall(count, drop):
     assert found.time == pytest.approx(5e-3, abs=1.1e-3)
     missing = float(re.search(r"what they do in ([\d.]+) samples", found.message)[1])
     assert missing == pytest.approx(count, abs=0.5)
-
-
-def test_samples_lost_before_the_drop_turn_the_orbit(fast_drop):
-    assert check_orbit(levitated(fast_drop), fast_drop) == []
-    cut = without(fast_drop, -0.12, 20)
-    (found,) = check_orbit(levitated(cut), cut)
-    assert (found.kind, found.severity) == ("dropped block", "warning")
-    assert found.time == pytest.approx(-0.12, abs=0.02)
-    ahead = 360.0 * 20 / fast_drop.sampling_rate * levitated(fast_drop).frequency
-    seen = float(re.search(r"jumps by about ([+-][\d.]+)°", found.message)[1])
-    assert seen == pytest.approx(ahead, rel=0.2)
 
 
 def test_a_tail_whose_zero_moved_rests_beside_the_path_of_the_rotor(whole_drop, tail, machine):

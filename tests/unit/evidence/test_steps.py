@@ -1,75 +1,18 @@
 """Steps of the look at a record, each against what is known of its input."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
-from rotordrop.evidence.contacts import local_polynomial
-from rotordrop.evidence.events import first_sample
-from rotordrop.evidence.paths import split_drops, where_floating
-from rotordrop.evidence.quality.motion import strongest_line
+from rotordrop.evidence.paths import split_drops
 from rotordrop.evidence.rest import settled_tail
 from rotordrop.examples import example_record_path
 from rotordrop.machine import example_machine, example_path
 from rotordrop.record.record import read_record, save_record
 from rotordrop.record.sandbox import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
-
-RATE = 5000.0
-
-
-def test_a_rotor_is_far_where_any_plane_says_so():
-    far = np.zeros((10, 2), dtype=np.bool_)
-    assert first_sample(far) == 9
-    far[6:, 0], far[8:, 1] = True, True
-    assert first_sample(far) == 6
-    assert first_sample(far[:, ::-1]) == 6
-
-
-@pytest.mark.parametrize(
-    ("height", "away", "floating"), [(0.0, 0.45, True), (0.0, 0.6, False), (0.3, 0.59, True)]
-)
-def test_a_rotor_floats_within_half_the_gap_or_twice_its_own_height(height, away, floating):
-    """And never beyond 0.7 of the gap from where it floated."""
-    gap = 300e-6
-    levitated = np.array([0.0, height * gap])
-    position = np.tile(levitated, (4000, 1))
-    position[2000:, 0] = away * gap
-    path: Any = SimpleNamespace(gap=gap, levitated=levitated, position=position)
-    found = where_floating([path], RATE)
-    assert found[:2000].all() and found[2000:].all() == floating
-    high: Any = SimpleNamespace(gap=gap, levitated=np.array([0.0, 0.6 * gap]), position=position.copy())
-    high.position[:] = high.levitated + np.array([0.75 * gap, 0.0])
-    assert not where_floating([high], RATE).any()
-
-
-@pytest.mark.parametrize(("over_median", "found"), [(25.0, False), (90.0, True)])
-def test_a_line_stands_out_at_fifty_times_the_median_power(over_median, found):
-    """Four channels with noise and a tone; its size is set by the power in their sum."""
-    dice = np.random.default_rng(3)
-    time = np.arange(5000) / RATE
-    noise = dice.standard_normal((5000, 4))
-    tone = np.cos(2.0 * np.pi * 300.3 * time)[:, None]
-    window = np.hanning(5000)[:, None]
-
-    def ratio(size):
-        part = noise + size * tone
-        part = part / part.std(axis=0)
-        power = np.sum(np.abs(np.fft.rfft(window * part, 40000, axis=0)) ** 2, axis=1)
-        return float(power.max() / np.median(power))
-
-    sizes = np.linspace(0.0, 1.0, 101)
-    size = sizes[int(np.argmin([abs(ratio(s) - over_median) for s in sizes]))]
-    assert ratio(size) == pytest.approx(over_median, rel=0.2)
-    record: Any = SimpleNamespace(time=time, signals=noise + size * tone, sampling_rate=RATE)
-    line = strongest_line(record, 2.0)
-    assert (line is not None) == found
-    if line is not None:
-        assert line[0] == pytest.approx(300.3, abs=0.2) and line[1] == pytest.approx(1.0)
 
 
 def test_what_a_small_file_may_unpack_to_fits_five_times_into_the_memory_of_its_reader():
@@ -84,28 +27,6 @@ def test_what_a_small_file_may_unpack_to_fits_five_times_into_the_memory_of_its_
     refuse_bomb(UNPACKED_PER_BYTE * size // 8, size, "large.mat")
     with pytest.raises(RecordError, match=r"large\.mat claims"):
         refuse_bomb(UNPACKED_PER_BYTE * size // 8 + 1, size, "large.mat")
-
-
-SAMPLED = 20000.0
-
-
-def test_a_velocity_takes_both_sides_of_the_drop(drop):
-    """20 kHz, 1 µm noise: a raw difference errs by 0.028 m/s, the polynomial by its stated error."""
-    rng = np.random.default_rng(5)
-    time = np.arange(-60, 61) / SAMPLED
-    errors, stated = [], []
-    for _ in range(200):
-        values = (-0.074 * time - 4.9 * time**2 + 1e-6 * rng.normal(size=len(time)))[:, None]
-        value, slope, error = local_polynomial(time, values, 0.0, width=4e-3)
-        errors.append(slope[0] + 0.074)
-        stated.append(error[0])
-        assert abs(value[0]) < 2e-6
-    assert np.std(errors) < 2e-4
-    assert np.std(errors) == pytest.approx(np.mean(stated), rel=0.15)
-    with pytest.raises(
-        RecordError, match=r"3 samples within 5e-05 s of 0 s; a polynomial of order 2 needs at least 4"
-    ):
-        local_polynomial(drop.time, drop.signals, 0.0, width=1e-4)
 
 
 def test_rest_is_found_behind_the_motion_and_not_where_the_shaft_turns(tail, machine, whole_drop):

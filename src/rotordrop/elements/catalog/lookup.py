@@ -20,6 +20,7 @@ from rotordrop.elements.catalog.boundary import (
 )
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
+from rotordrop.errors import UnknownBearingError
 from rotordrop.known import NINETY
 from rotordrop.require import require
 
@@ -99,12 +100,13 @@ def find_bearing(
 
     Raises
     ------
-    LookupError
+    UnknownBearingError
         When neither is possible; the message names the nearest designations.
     """
     require(designation, "designation", str, hint="Write it as a text, '7203'")
     require(static_load_rating, "static_load_rating [N]", float, above=0.0, none=True)
     require(dynamic_load_rating, "dynamic_load_rating [N]", float, above=0.0, none=True)
+    require(rigidity, "rigidity", PairRigidity, none=True)
     return _found(designation, static_load_rating, dynamic_load_rating, rigidity)
 
 
@@ -117,12 +119,12 @@ def _found(
         return found
     read = read_designation(designation)
     if read is None:
-        raise LookupError(_unknown(designation, _nearest(designation)))
+        raise UnknownBearingError(_unknown(designation, _nearest(designation)))
     listed = _index().get(_key(_listed_name(read)))
     if listed is not None:
         return replace(listed, read=read)
     if _is_mistyped(read):
-        raise LookupError(_unknown(designation, _nearest(designation)))
+        raise UnknownBearingError(_unknown(designation, _nearest(designation)))
     return infer_from_designation(read, static, dynamic, rigidity)
 
 
@@ -183,7 +185,7 @@ def infer_from_designation(
         names = [replace(read, bore=bore).basic for bore in sorted(near)]
         at = f"series {read.series} at a bore of {1e3 * read.bore:g} mm"
         why = f": the boundary dimensions of {at} are not known"
-        raise LookupError(_unknown(read.written, names, why))
+        raise UnknownBearingError(_unknown(read.written, names, why))
     angle, angles = read.contact_angle, None
     if read.kind == "deep groove":
         angle = 0.0

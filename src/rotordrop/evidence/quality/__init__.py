@@ -16,13 +16,12 @@ import numpy as np
 from rotordrop.errors import NoDropError, NothingFallsError, RecordError
 from rotordrop.evidence.ends import held_planes
 from rotordrop.evidence.evidence import Evidence, Missing, known
-from rotordrop.evidence.given import require_drop
+from rotordrop.evidence.given import require_drop, require_tail
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
 from rotordrop.evidence.one_end import as_dropped, one_end
 from rotordrop.evidence.paths import Motion
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.continuity import check_orbit
 from rotordrop.evidence.quality.fall import (
     check_ends,
     check_exchanged,
@@ -87,7 +86,7 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
         The worst first; empty when there is nothing to say.
     """
     require_drop(record, machine)
-    require_drop(tail, machine, "tail", none=True)
+    require_tail(tail, record, machine)
     dropped = as_dropped(record, machine)
     return checked(Evidence(record=record, machine=dropped, tail=tail, name=record.name))
 
@@ -285,7 +284,6 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
     {"beginning": _begins},
     {"filters": _filters, "again": _again},
     {
-        "orbit": lambda e: check_orbit(e.floating, e.record.whole),
         "levitated": lambda e: check_levitated(e.floating, e.record.whole),
         "length": _length,
         "one end": _one_end,

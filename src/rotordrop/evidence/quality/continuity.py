@@ -2,7 +2,7 @@
 
 A rotor has position and velocity from one sample to the next, whatever machine it belongs to. Where parabolas
 before and after a place describe the motion, they meet there; where all channels jump by one time times their
-velocities, samples are missing. While it levitates, its orbit turns with the shaft: lost samples turn it on.
+velocities, samples are missing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.series import noise_by_differences
 
@@ -54,17 +53,6 @@ _SURELY = 2.0
 _SAME_WAY = 3.0
 """Standard deviations up to which channels agree on the missing time [1], and within which what is missing is
 a whole number of samples."""
-
-_TURNED = 6.0
-"""Standard deviations by which the orbit jumps in angle where samples are missing [1]: at a hundred places
-looked at, five have one chance in 10,000."""
-
-_LEAST_TURN = 0.5
-"""Least such jump over what the shaft turns in a sample [1]: what is lost is a whole number of them."""
-
-_PARTS = (8, 48)
-"""Parts of the levitated motion, half turns or more, in which the angle of its orbit is looked at: at least
-and at most [1]."""
 
 
 def check_continuity(record: Record) -> list[Finding]:
@@ -127,51 +115,3 @@ def _losses(part: Array, count: int) -> tuple[Array, Array, Array]:
     hidden = np.sqrt(_LEFT_OUT * (beyond + _SURELY * np.sqrt(4.0 * free * seeing)))
     sure = missing * np.sqrt(weight) - _KINK * np.linalg.norm(turned, axis=1) - hidden
     return np.maximum(sure, 0.0) * fits, jump, velocity
-
-
-def check_orbit(levitated: LevitatedModel, record: Record) -> list[Finding]:
-    """Find samples lost before the drop: the orbit of the levitated rotor is then ahead by an angle.
-
-    A whole number of turns that is lost shows nowhere, and changes nothing that follows from the record.
-    """
-    inside = (record.time >= levitated.start) & (record.time <= levitated.end)
-    time, signals = record.time[inside], record.signals[inside]
-    half_turns = max(round(2.0 * (levitated.end - levitated.start) * levitated.frequency / _PARTS[1]), 1)
-    turns = 0.5 * half_turns
-    if not np.isfinite(signals).all():
-        return []
-    noise = np.maximum(levitated.noise, 1e-12)
-    weight = levitated.amplitudes[0].conj() / noise**2
-    number = ((time - levitated.start) * levitated.frequency / turns).astype(int)
-    # what is left beside 1X, so that 2X and hum leave nothing in parts that hold no whole number of them
-    waves = np.exp(2j * np.pi * levitated.frequency * time)
-    left = signals - levitated.readings(time)
-    power = max(float(np.sum(np.abs(levitated.amplitudes[0]) ** 2 / noise**2)), 1e-300)
-    angle, error = np.zeros((2, int(number[-1])))
-    for part in range(len(angle)):
-        own = number == part
-        seen = 2.0 * np.mean(left[own] * waves[own].conj()[:, None], axis=0)
-        angle[part] = np.angle(power + np.sum(weight * seen))
-        error[part] = np.sqrt(2.0 / (power * np.sum(own)))
-    if len(angle) < _PARTS[0]:
-        return []
-    scaled = np.unwrap(angle) / error
-    places = np.arange(len(angle))
-    course = np.vander(places / len(places), 3) / error[:, None]
-    best, at, size = 0.0, 0, 0.0
-    for place in range(2, len(angle) - 1):
-        design = np.column_stack([course, (places >= place) / error])
-        inverse = np.linalg.pinv(design)
-        solved = inverse @ scaled
-        left = scaled - design @ solved
-        scatter = max(float(np.sqrt(left @ left / max(len(angle) - 4, 1))), 1.0)
-        sure = abs(float(solved[3])) / (float(np.linalg.norm(inverse[3])) * scatter)
-        if sure > best:
-            best, at, size = sure, place, float(solved[3])
-    least = _LEAST_TURN * 2.0 * np.pi * levitated.frequency / record.sampling_rate
-    if best < _TURNED or abs(size) < least:
-        return []
-    when = levitated.start + at * turns / levitated.frequency
-    turning = levitated.frequency
-    lasts = 1e3 * abs(size) / (2 * np.pi * turning)
-    return [found("orbit", time=when, size=np.degrees(size), turns=turning, sure=best, lasts=lasts)]

@@ -76,33 +76,34 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
 
 
 def check_blocks(record: Record) -> list[Finding]:
-    """Find blocks of samples that are there twice, and jumps of the motion from one sample to the next.
-
-    In a long record they are looked for about the fall; at rest on the bearings neither changes what is seen.
-    """
+    """Find blocks that are there twice and jumps of the motion, in a long record about its fall."""
     first = max(min(first_motion(record)[0] - MANY // 4, len(record.time) - MANY), 0)
     record = record.samples(slice(first, first + MANY))
     return _copies(record) or _jumps(record) or check_continuity(record)
 
 
 def _copies(record: Record) -> list[Finding]:
-    """Rows that repeat earlier rows one after the other: noise never does that."""
+    """Rows that repeat earlier rows one after the other, and do not follow what those followed."""
     signals = np.ascontiguousarray(record.signals) + 0.0
     odd: Any = 2 * np.random.default_rng(0).integers(2**61, size=signals.shape[1], dtype=np.uint64) + 1
     bits = signals.view(np.uint64)
     label = np.sum((bits ^ (bits >> np.uint64(29))) * odd, axis=1)  # one number per row, fast to sort
     order = np.argsort(label, kind="stable")
     same = label[order][1:] == label[order][:-1]
-    later, earlier = order[1:][same], order[:-1][same]
+    later = order[1:][same]
     lag = np.zeros(len(label), dtype=np.int64)
-    lag[later] = later - earlier
+    lag[later] = later - order[:-1][same]
     lag[1:][np.all(signals[1:] == signals[:-1], axis=1)] = 0  # held, which has its own name
     edges = np.append(0, np.flatnonzero(np.diff(lag)) + 1)
     lengths = np.diff(np.append(edges, len(lag))) * (lag[edges] > 0)
     start, length = int(edges[np.argmax(lengths)]), int(np.max(lengths))
-    if length < _SHORTEST_COPY:
+    earlier = start - int(lag[start])
+    # what repeats because nothing disturbs it goes on into the repetition as it did before
+    usual = np.median(np.abs(np.diff(signals, axis=0)), axis=0)
+    before = np.abs(signals[start - 1] - signals[earlier - 1])
+    if length < _SHORTEST_COPY or earlier == 0 or np.all(before <= 0.5 * usual):
         return []
-    at, copied = float(record.time[start]), record.time[start - lag[start]]
+    at, copied = float(record.time[start]), record.time[earlier]
     return [found("copy", time=at, count=length, earlier=copied)]
 
 
