@@ -79,7 +79,6 @@ CARRIED = (
 NO_DISTRIBUTION = (
     "No distribution of the stress is stated: its numbers have no ranges, and single numbers do not hold."
 )
-NO_INTERVALS = "Of the estimated history, without intervals of their own; mean and peak have theirs above."
 NO_IMPACT = "The rotor did not touch a bearing in this window."
 LEVELS: dict[str, Level] = {"stop": "bad", "warning": "warning", "note": "notice"}
 """Levels by severity of a finding, the gravest first."""
@@ -229,10 +228,9 @@ def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> 
         stress_box_figure(boxes),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
     )
-    told = stress_table(boxes)
-    if any(one.stress_band for one in bearings):
-        told = replace(told, note=f"{told.note} {NO_INTERVALS}")
-    return Section("Hertz stress", figures=(history, box), tables=(told,))
+    # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
+    tables = () if any(one.stress_band for one in bearings) else (stress_table(boxes),)
+    return Section("Hertz stress", figures=(history, box), tables=tables)
 
 
 def _impacts(bearings: Sequence[BearingDrop]) -> Section:
