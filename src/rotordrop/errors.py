@@ -173,10 +173,6 @@ class UsageError(RotordropError, ValueError):
     exit_code: ClassVar[int] = 64
 
 
-class UnknownBearingError(UsageError, LookupError):
-    """A designation that is in no catalogue, and of which nothing can be inferred."""
-
-
 def unknown_key(key: str, known: tuple[str, ...]) -> str:
     """Say that a key is not known, with the nearest one."""
     close = get_close_matches(key, known, 1, 0.6)

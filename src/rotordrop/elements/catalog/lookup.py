@@ -20,7 +20,7 @@ from rotordrop.elements.catalog.boundary import (
 )
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
 from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
-from rotordrop.errors import UnknownBearingError
+from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
 from rotordrop.require import require
 
@@ -28,6 +28,10 @@ _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.ra
 _FAMILIES = ("B", "HCB", "XCB", "HS", "HC", "XC")
 _HYBRID_PRELOAD = 0.6
 """Preload of hybrid over steel bearings of one class in the catalogue [1]."""
+
+
+class UnknownBearingError(UsageError, LookupError):
+    """A designation that is in no catalogue, and of which nothing can be inferred."""
 
 
 @dataclass(frozen=True, kw_only=True)
