@@ -7,11 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 from rotordrop.record.arrangement import fitting, pairs_of, planes_as_listed, sensors_of_planes
-from rotordrop.record.columns import find_speed, likeliest, options_for, worth_of
+from rotordrop.record.columns import find_speed, likeliest, options_for, units_missing
 from rotordrop.record.profile import Profile
-from rotordrop.record.recording import FULL_SCALE, SPEED_UNITS, Channel, Recording, called, listed
+from rotordrop.record.record import record_of
+from rotordrop.record.recording import Channel, Recording, called, listed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +36,9 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         hits = fitting(recording.channels, sensor.name)
         if sensor.name not in mapped and len(hits) == 1:
             mapped[sensor.name] = hits[0].label
+    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
+    if given.likely:
+        mapped = {**likely, **mapped}
     unmapped = [sensor.name for sensor in sensors if sensor.name not in mapped]
     missing: list[str] = []
     if unmapped:
@@ -44,7 +48,6 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     pairs = [] if sensors else pairs_of(recording.channels)[0]
     planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
     paired = [channel.label for _, pair, _ in pairs for channel in pair]
-    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
     looked_at = (likely | mapped).values() if sensors else paired or [c.label for c in recording.channels]
     used = [c for c in recording.channels if c.label in looked_at and c.label != given.speed.pulses]
     profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
@@ -52,7 +55,7 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     if speed is None and sensors:  # a look needs none
         missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
     sensitive = recording.sensitivities or (sensors and all(one.sensitivity is not None for one in sensors))
-    missing += _units_missing([c for c in used if c.label != speed], profile, sensitive=bool(sensitive))
+    missing += units_missing([c for c in used if c.label != speed], profile, sensitive=bool(sensitive))
     found = []
     for channel in recording.channels:
         span = f"{channel.values.min():.4g} to {channel.values.max():.4g} {channel.unit or '(no unit)'}"
@@ -65,25 +68,9 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     found.append(f"shaft speed: {speed or unsaid}")
     if not sensors and not planes:
         likely = planes_as_listed(recording)
+    if sensors and not missing:  # what a look would refuse
+        record_of(recording, tuple(sensors), profile=profile)
     return Guess(profile=profile, found=tuple(found), missing=tuple(missing), likely=likely)
-
-
-def _units_missing(used: Sequence[Channel], profile: Profile, *, sensitive: bool) -> list[str]:
-    """What has to be said of the units of displacements."""
-    bare, volts = [], False
-    for channel in used:
-        unit = profile.units.get(channel.label) or profile.unit or channel.unit
-        if channel.unit not in (*SPEED_UNITS, FULL_SCALE):
-            try:
-                volts |= worth_of(unit)[1] == "voltage"
-            except UsageError:
-                bare.append(f"{channel.label} ({unit!r} is none)" if unit else channel.label)
-    missing = [f"the unit of {listed(bare)}: --unit um"] if bare else []
-    if any(channel.unit == FULL_SCALE for channel in used):
-        missing.append('what full scale is: --full-scale "500 um"')
-    if volts and not (profile.sensitivity or sensitive):
-        missing.append('the sensitivity of the channels in volts: --sensitivity "8 mV/um"')
-    return missing
 
 
 def _with_speed(

@@ -170,6 +170,9 @@ def even_clock(channels: Sequence[Channel], place: str) -> tuple[Array, float, l
     # rows that stand twice in a file have one stamp and the same readings; rounded stamps have others
     copied = any(all(one.values[k] == one.values[k + 1] for one in channels) for k in stands)
     found, rate = even(time, copied=copied)
+    if np.isnan(rate):
+        words = f"most of {len(time)} times stand twice, and tell no sampling rate"
+        raise RecordError(f'{place}: {words}; say it in a profile, [time] step = "50 us"')
     rounded = len(stands) > 0 and bool(np.all(np.diff(found) > 0.0))
     return found, rate, ["time stamps are rounded; an even clock was put behind them"] if rounded else []
 

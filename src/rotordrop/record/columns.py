@@ -53,20 +53,34 @@ def match_sensors(
     if missing:
         # all of them at once, with what would map them
         present = [channel.label for channel in recording.channels]
-        close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
+        free = [
+            label for label in present if all(label != one.label for found in hits.values() for one in found)
+        ]
+        close = get_close_matches(wanted[missing[0]], free, 1, 0.5)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
         left = [f"; {one}" for one in (*recording.notes, *recording.warnings) if one.startswith("left out")]
-        likely = [*likeliest(recording, sensors).values()] or [c for c in recording.channels if not c.unit]
-        bare = {} if profile.unit else {"": 'unit = "um"', FULL_SCALE: 'full_scale = "500 um"'}
-        more = "".join(
-            f"; say there too {bare[u]}" for u in dict.fromkeys(c.unit for c in likely) if u in bare
+        likely = [*likeliest(recording, sensors).values()]
+        sensitive = bool(recording.sensitivities) or all(one.sensitivity is not None for one in sensors)
+        more = units_missing(
+            likely or [c for c in recording.channels if not c.unit], profile, sensitive=sensitive
         )
+        gone = {one.bearing or "" for one in sensors} - {
+            one.bearing or "" for one in sensors if hits[one.name]
+        }
+        pairs, _ = pairs_of([channel for channel in recording.channels if channel.label in free])
+        if gone and len(missing) < len(sensors) and not pairs:
+            raise UnmatchedError(
+                f"{place} has no channels of the plane {listed(sorted(gone))} (sensors {listed(missing)}); "
+                f"it has {listed(present)}",
+                "export them too, or set lost = true for these sensors in the machine file, or look at the "
+                "record without the machine",
+            )
         raise UnmatchedError(
             f"{place} has no channel {wanted[missing[0]]!r} for sensor {missing[0]}{several}{hint}; it has "
             f"{listed(present)}{''.join(left)}",
             f"say which is which, {options_for(recording, sensors, missing)}, or keep it in a profile with "
-            f"'rotordrop profile'{more}",
+            f"'rotordrop profile'{''.join(f'; say there too {one}' for one in more)}",
         )
     taken: list[Channel] = []
     for name, channels in hits.items():
@@ -150,6 +164,24 @@ def _named(
     return found
 
 
+def units_missing(used: Sequence[Channel], profile: Profile, *, sensitive: bool) -> list[str]:
+    """What has to be said of the units of displacements, each with the option of 'rotordrop profile'."""
+    bare, volts = [], False
+    for channel in used:
+        unit = profile.units.get(channel.label) or profile.unit or channel.unit
+        if channel.unit not in (*SPEED_UNITS, FULL_SCALE):
+            try:
+                volts |= worth_of(unit)[1] == "voltage"
+            except UsageError:
+                bare.append(f"{channel.label} ({unit!r} is none)" if unit else channel.label)
+    missing = [f"the unit of {listed(bare)}: --unit um"] if bare else []
+    if any(channel.unit == FULL_SCALE for channel in used):
+        missing.append('what full scale is: --full-scale "500 um"')
+    if volts and not (profile.sensitivity or sensitive):
+        missing.append('the sensitivity of the channels in volts: --sensitivity "8 mV/um"')
+    return missing
+
+
 def worth_of(unit: str) -> tuple[float, str]:
     """What one of a unit is in SI units and its kind, "length" or "voltage"; a unit may be "0.02 um" too."""
     if sensitivities_in(unit):  # "V (200 mV/mil)"
@@ -223,7 +255,7 @@ def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
     if not unit:
         raise RecordError(f'{words} has no unit; name it in the profile: [speed] unit = "Hz"')
     try:
-        return parse_quantity(f"1 {unit}", "speed")
+        return parse_quantity(unit if unit[:1].isdigit() else f"1 {unit}", "speed")
     except UsageError as error:
         ask = 'expected Hz, rpm or rad/s, name it in the profile: [speed] unit = "rpm"'
         more = f'or, if it holds pulses of a tacho, pulses = "{channel.label}"'

@@ -8,12 +8,14 @@ moves in no other.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.record.recording import listed
+from rotordrop.record.recording import Channel, listed
 from rotordrop.series import runs_of
 from rotordrop.units import format_quantity
 
@@ -30,6 +32,9 @@ SHORT, FEW = 0.5e-3, 0.01
 WHOLE, MOST_LOST = 0.2, 2**20
 """Share of a step by which an interval may differ from a multiple of it, and samples that are lost [1]
 (chosen)."""
+
+FEWEST_PAIRS, ZIGZAG = 20, 0.5
+"""Pairs of readings, and share of them that must go back, by which peak detection shows [1] (chosen)."""
 
 MOST_SET, QUIET, SLOWEST = 3, 0.5, 2000.0
 """Times that a clock is set back in a record, share of its range that a channel reaches in the part of the
@@ -52,6 +57,26 @@ def no_values(values: Array) -> NDArray[np.bool_]:
     return bad
 
 
+def without_pairs(channels: Sequence[Channel]) -> tuple[list[Channel], list[str]]:
+    """Middles where every interval has its least and its greatest reading, as peak detection writes them."""
+    half = len(channels[0].values) // 2
+    if half < FEWEST_PAIRS or any(len(one.values) != len(channels[0].values) for one in channels):
+        return list(channels), []
+    first, second = (np.stack([one.values[k : 2 * half : 2] for one in channels]) for k in (0, 1))
+    times = channels[0].time[: 2 * half].reshape(half, 2)
+    for low, high in ((first, second), (second, first)):
+        back = np.mean(high[:, :-1] > low[:, 1:], axis=1) > ZIGZAG
+        if not np.any(low > high) and np.all(
+            back if times[0, 0] < times[0, 1] else times[:, 0] == times[:, 1]
+        ):
+            middles = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
+            pairs = zip(channels, middles, strict=True)
+            words = "the readings are pairs, the least and the greatest of an interval (peak detection)"
+            words += f": their middles are read, {half} samples; export plain samples"
+            return [replace(one, values=v, time=times.mean(axis=1)) for one, v in pairs], [words]
+    return list(channels), []
+
+
 def mended(
     time: Array, signals: Array, names: Sequence[str]
 ) -> tuple[Array, Array, NDArray[np.bool_], list[str]]:
@@ -63,9 +88,7 @@ def mended(
     steps = np.diff(time)
     usual = float(np.median(steps))
     if len(time) > 2 and usual > 0.0 and np.any(np.abs(steps - usual) > WHOLE * usual):
-        time, words = _set_back(time, signals, steps, usual)
-        time, signals, said = _at_one_rate(time, signals, np.diff(time), usual)
-        words += said
+        time, signals, words = _at_one_rate(time, signals, steps, usual)
     as_read = time, signals
     time, signals = _with_lost(time, signals)
     missing = ~np.isfinite(signals)
@@ -95,11 +118,30 @@ def mended(
     return time, signals, missing, words
 
 
-def _set_back(time: Array, signals: Array, steps: Array, usual: float) -> tuple[Array, list[str]]:
+def gone_on(channels: Sequence[Channel]) -> tuple[tuple[Channel, ...], list[str]]:
+    """Channels on clocks that go on where theirs were set back, the speed with the others; words on it."""
+    clocks: dict[tuple[Any, ...], list[Channel]] = {}
+    for channel in channels:
+        steps = np.diff(channel.time)
+        back = np.flatnonzero(steps < -0.5 * abs(float(np.median(steps)))) if len(steps) else steps
+        if 0 < len(back) <= MOST_SET:
+            clocks.setdefault((len(steps), float(channel.time[0]), *back.tolist()), []).append(channel)
+    times, words = dict[int, Array](), list[str]()
+    for together in clocks.values():
+        signals = np.column_stack([channel.values for channel in together])
+        time, said = _set_back(together[0].time, signals)
+        times.update((id(channel), time) for channel in together)
+        words += said
+    return tuple(replace(one, time=times.get(id(one), one.time)) for one in channels), words
+
+
+def _set_back(time: Array, signals: Array) -> tuple[Array, list[str]]:
     """Times of a clock that was set back while the samples went on; rows that were copied stay."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
     back = np.flatnonzero(steps < -0.5 * usual)
-    copied = any(np.any(np.all(signals[: k + 1] == signals[k + 1], axis=1)) for k in back[:MOST_SET])
-    if not 0 < len(back) <= MOST_SET or copied:
+    copied = any(np.any(np.all(signals[: k + 1] == signals[k + 1], axis=1)) for k in back)
+    if not usual > 0.0 or copied:
         return time, []
     odd, jump = np.flatnonzero(np.abs(steps - usual) > WHOLE * usual), np.zeros(len(time))
     for k in back:  # a stamp that is wrong by itself goes back and forth

@@ -30,7 +30,7 @@ from rotordrop.record.axes import (
 from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock
 from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
 from rotordrop.record.event_date import event_of
-from rotordrop.record.missing import mended, no_values
+from rotordrop.record.missing import gone_on, mended, no_values, without_pairs
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.readers.numpy_files import recording_of_arrays
@@ -421,17 +421,19 @@ def record_of(
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     recording = from_first_stamp(recording)
+    channels, set_back = gone_on(recording.channels)
+    recording = replace(recording, channels=channels)
     matched = [
         replace(channel, values=np.where(bad, np.nan, channel.values)) if bad.any() else channel
         for channel in match_sensors(recording, sensors, profile, place)
         for bad in (no_values(channel.values),)
     ]
-    shared, notes = on_one_clock(matched, place)
+    plain, in_pairs = without_pairs(matched)
+    shared, notes = on_one_clock(plain, place)
     time, rate, rounded = even_clock(shared, place)
-    signals, words = np.empty((len(time), len(sensors))), []
-    for column, (channel, sensor) in enumerate(zip(shared, sensors, strict=True)):
-        signals[:, column], said = displacement(channel, sensor, recording, profile, place)
-        words += said
+    of_speed = None if profile.speed.constant else find_speed(recording, matched, profile, place)
+    signals, factor, words = _in_si(shared, sensors, of_speed, recording, profile, place)
+    words = [*set_back, *in_pairs, *words]
     even_time, signals, missing, said = mended(time, signals, [channel.label for channel in shared])
     time, rate = (time, rate) if np.array_equal(even_time, time) else even(even_time)
     words += said
@@ -454,12 +456,12 @@ def record_of(
     if profile.speed.constant is not None:
         when, readings = time[[0, -1]], np.full(2, parse_quantity(profile.speed.constant, "speed"))
         notes.append(f"speed given by hand: {profile.speed.constant}")
-    elif (of_speed := find_speed(recording, matched, profile, place)) is not None:
+    elif of_speed is not None:
         known = ~no_values(of_speed.values)
         if not known.any():
             raise RecordError(f"{place}: {of_speed.label!r} holds no speed; give one by hand, '60 Hz'")
         when, readings = readings_of_held_signal(of_speed.time[known], of_speed.values[known])
-        readings = readings * speed_factor(of_speed, profile, place)
+        readings = readings * factor
         notes.append(f"shaft speed from {of_speed.label!r}")
     elif pulses is not None:
         when, readings = passed.time, passed.speed
@@ -481,6 +483,33 @@ def record_of(
         notes=(*recording.notes, *notes, *rounded),
         warnings=(*recording.warnings, *dict.fromkeys(words)),
     )
+
+
+def _in_si(
+    shared: Sequence[Channel],
+    sensors: Sequence[Sensor],
+    of_speed: Channel | None,
+    recording: Recording,
+    profile: Profile,
+    place: str,
+) -> tuple[Array, float, list[str]]:
+    """Readings (N, S) [m], the unit of the speed [rad/s], and words; what is not known is asked at once."""
+    signals, factor, words = np.full((len(shared[0].time), len(sensors)), np.nan), 1.0, list[str]()
+    asked: list[RecordError] = []
+    for column, (channel, sensor) in enumerate(zip(shared, sensors, strict=True)):
+        try:
+            signals[:, column], said = displacement(channel, sensor, recording, profile, place)
+            words += said
+        except RecordError as error:
+            asked += [] if asked else [error]
+    try:
+        factor = speed_factor(of_speed, profile, place) if of_speed else 1.0
+    except RecordError as error:
+        asked.append(error)
+    if asked:
+        more = (str(error).removeprefix(f"{place}: ") for error in asked[1:])
+        raise RecordError("; also: ".join([str(asked[0]), *more]))
+    return signals, factor, words
 
 
 def _record_of_channels(

@@ -17,7 +17,8 @@ _SPELLINGS = {
     "m": "m м metre meter", "mm": "mm мм 毫米", "nm": "nm нм", "mil": "mil mils thou", "in": "in inch",
     "um": "um µm μm micron microns micrometer micrometre mikrometer мкм mkm 微米 ㎛",
     "V": "v volt volts в 伏", "mV": "mv мв", "s": "s sec second seconds sekunden с сек 秒",
-    "ms": "ms millisecond milliseconds мс 毫秒", "us": "us µs μs microsecond microseconds мкс 微秒",
+    "ms": "ms msec millisecond milliseconds мс 毫秒",
+    "us": "us µs μs usec µsec microsecond microseconds мкс 微秒",
     "ns": "ns nanosecond nanoseconds нс", "min": "min minute minutes", "h": "hour hours", "d": "day days",
     "Hz": "hz hertz гц", "rad/s": "rad/s",
     "rpm": "rpm 1/min u/min r/min tr/min min-1 min^-1 min⁻¹ /min об/мин 转/分",
@@ -26,9 +27,12 @@ _UNITS = {written: unit for unit, spellings in _SPELLINGS.items() for written in
 _MICRO_LOST = re.compile(r"(?:[^\x00-\x7f]{1,4}|\?{1,2})m")
 """What is left of "µm" where a text was written or read in another encoding."""
 
-_SPACED_UNIT = re.compile(r"(?i)(.*[^\s,]),?\s([µμu]m|мкм|mm|mils?|rpm|1/min|min-1|Hz|mV|об/мин|(?<=,\s)с)")
+_SPACED_UNIT = re.compile(
+    r"(?i)(.*[^\s,]),?\s([µμu]m|мкм|mm|mils?|rpm|1/min|min-1|Hz|Гц|mV|об/мин|(?<=,\s)с)"
+)
 _SENSITIVITY = re.compile(r"((?:(?<![^\s:=;,(])[+-])?\d+(?:[.,]\d+)?)\s*(m?V)\s*/\s*([uµμm]?m|mil)\b")
 _RPM = re.compile(r"(?i)(?:[a-z]+[ _.-])?n?rpm[ _.-]?\d{0,2}")
+_OPENS = {")": "(", "]": "[", "}": "{", ">": "<"}
 _LONGEST_NAME = 200
 """Characters of a column name or a unit that are looked at (chosen): damaged files hold megabytes."""
 
@@ -44,28 +48,7 @@ OWN_TIME = re.compile(
     re.IGNORECASE,
 )
 """What the time of one channel is called, "X1_time" or "time X1"."""
-
-_KEYS = {
-    "step": "dt step increment timestep sampletime sampleinterval samplinginterval samplingperiod "
-    "sampleperiod abtastintervall schrittweite deltax deltat xinc xincrement wfincrement hresolution",
-    "rate": "fs samplerate samplingrate samplingfrequency samplefrequency abtastrate abtastfrequenz rate",
-    "trigger": "triggersample triggerindex triggerposition pretriggersamples",
-    "before": "pretrigger pretriggertime vorlauf",
-    "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
-    "blocksize anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
-    "start": "t0 start starttime firstsample startoffset x0 xorg xorigin hoffset wfstartoffset",
-    "time unit": "xunit xunits xaxisunit hunit horizontalunit horizontalunits",
-    "names": "label title name names tracename channelname signalname pointname kanalname messstelle tag "
-    "tagname bezeichnung",
-    "units": "unit units einheit einheiten yunit yunits yunitlabel yaxisunit vunit verticalunit "
-    "verticalunits unitstring niunitdescription",
-    "factor": "scale scalefactor",
-    "per count": "factor faktor yinc yincrement gain slope conversionfactor calibrationfactor lsb resolution",
-    "offset": "yorg yorigin addoffset offset intercept",
-    "none": "fillvalue missingvalue",
-}
-_KINDS = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
-"""Keys of heads, attributes and variables in letters and digits only, as recorders write them."""
+_TIME_WITHIN = re.compile(r"(?<=[^\W_])[ _.:/-](?:time|zeit)(?=[ _.:/-][^\W_])", re.IGNORECASE)
 
 FULL_SCALE = "of full scale"
 """Unit of readings that a file holds as shares of a full scale it does not tell."""
@@ -106,15 +89,15 @@ class Recording:
     """Voltage at zero displacement [V] that it states for all channels."""
 
 
-def kind_of(key: str) -> str:
-    """What a key tells, by its letters and digits without a unit; empty for one that is not known."""
-    return _KINDS.get(re.sub(r"[^a-z0-9]", "", split_unit(key.rstrip(" :"))[0].lower()), "")
+def whose_time(name: str, names: Iterable[str] = ()) -> str | None:
+    """The channel whose time a column of this name holds, empty for that of all; None for no time.
 
-
-def whose_time(name: str) -> str | None:
-    """The channel whose time a column of this name holds, empty for that of all; None for no time."""
+    Of known `names` one may have the time within it, as Dewesoft has "Data1_time_X" for "Data1_X".
+    """
     if TIME_NAMES.fullmatch(name):
         return ""
+    if (within := _TIME_WITHIN.sub("", name)) != name and within in names:
+        return within
     own = OWN_TIME.fullmatch(name)
     return ("" if TIME_NAMES.match(name) else None) if own is None else own["before"] or own["behind"]
 
@@ -181,14 +164,16 @@ def split_unit(written: str) -> tuple[str, str, str]:
         return name.strip() or "time", name.strip() or "time", spelled(unit)
     if spaced := _SPACED_UNIT.fullmatch(written):  # "VE-101X um"; a V or s there may be part of the name
         return spaced[1], spaced[1], spelled(spaced[2])
-    if written.endswith((")", "]")):
-        name, mark, unit = written[:-1].rpartition("[" if written[-1] == "]" else "(")
+    for slash in re.finditer("/", written):  # "X / um", "X/um", "omega/(rad/s)"
+        name, unit = written[: slash.start()], written[slash.end() :]
+        apart = name[-1:] == " " or unit[:1] == " " or len(unit) > 2 or unit in ("um", "µm", "mm", "ms", "Hz")
+        if name.strip() and known_unit(unit) and (apart or TIME_NAMES.fullmatch(name)):
+            return name.strip(), name.strip(), spelled(unit.strip().strip("()"))
+    if opens := _OPENS.get(written[-1:]):
+        name, mark, unit = written[:-1].rpartition(opens)
         if mark:
             name, unit = name.strip(), unit.strip()
             return name, name, spelled(unit)
-    name, mark, unit = written.rpartition("/")
-    if mark and name.strip() and (name[-1] == " " or unit[:1] == " ") and known_unit(unit):
-        return name.strip(), name.strip(), spelled(unit)
     ending = re.fullmatch(r"(.+)[_.]([^\W\d_]+)", written)
     if ending and known_unit(ending[2]):
         return ending[1], written, spelled(ending[2])

@@ -24,6 +24,11 @@ def motion(time: np.ndarray) -> np.ndarray:
     return fell * FORMS + 8.0 * np.sin(377.0 * time[:, None] + np.arange(4))
 
 
+def turns(time: np.ndarray) -> np.ndarray:
+    """Speed [Hz] at times [s]."""
+    return 60.0 - 30.0 * (time - START)
+
+
 MICRONS = np.round(motion(TIME) + np.random.default_rng(7).normal(0.0, 0.3, (COUNT, 4)), 2)
 DATE = 1_773_480_413
 
@@ -52,6 +57,10 @@ class Reported:
     """What is noted or warned of, as a pattern."""
     question: str = ""
     """What is asked, as a pattern."""
+    step: float = STEP
+    """Time between samples [s]."""
+    turning: bool = False
+    """Whether the record holds the speed of `turns`."""
 
     written = Export.written
 
@@ -235,11 +244,85 @@ def of_matlab(path: Path) -> None:
     path.write_bytes(content)
 
 
+def counts_with_lists(path: Path) -> None:
+    """Counts, channels × samples, and lists of what each channel has."""
+    gain, offset = np.array([0.01, 0.01, 0.02, 0.02, 0.005]), np.array([0.0, 0.0, -50.0, -50.0, 40.0])
+    table = np.column_stack([MICRONS, turns(TIME)])
+    with h5py.File(path, "w") as file:
+        item = file.create_dataset("acq/samples", data=np.rint((table - offset) / gain).astype(np.int16).T)
+        item.attrs.update({"channel_names": [*NAMES, "SPEED"], "units": [*["um"] * 4, "Hz"], "gain": gain})
+        item.attrs.update({"offset": offset, "sample_rate_hz": 1.0 / STEP, "trigger_sample": 500})
+
+
+def pandas_fixed(path: Path) -> None:
+    """A data frame in the fixed format, its index the time, a unit with a slash."""
+    names = [*(f"{n} [um]".encode() for n in NAMES), b"speed [rad/s]"]
+    with h5py.File(path, "w") as file:
+        group = file.create_group("drop")
+        group.create_dataset("axis0", data=names)
+        group.create_dataset("axis1", data=TIME).attrs.update({"kind": "float", "name": "time [s]"})
+        group.create_dataset("block0_items", data=names)
+        table = np.column_stack([MICRONS, 2.0 * np.pi * turns(TIME)])
+        group.create_dataset("block0_values", data=table)
+
+
+def dewesoft(path: Path) -> None:
+    """A clock for each channel, its word in the middle of the name; the speed is read every 5 ms."""
+    own = {f"Data1_{n.replace(' ', '_')}_um": v[:, None] for n, v in zip(NAMES, MICRONS.T, strict=True)}
+    clocks = {name.replace("Data1_", "Data1_time_"): TIME[:, None] for name in own}
+    slow = {"Data1_time_n_rpm": TIME[::50, None], "Data1_n_rpm": 60.0 * turns(TIME[::50, None])}
+    savemat(path, own | clocks | slow | {"Sample_rate": 1.0 / STEP})
+
+
+def per_trace(*, ends: bool) -> bytes:
+    """Steps in the head for each trace, as Yokogawa has them; rows may end where the slow one has ended."""
+    head = ["TraceName," + ",".join((*NAMES, "SPEED")), "VUnit,um,um,um,um,rpm"]
+    head += [
+        f"HResolution,{','.join([f'{STEP:.1E}'] * 4)},5.0E-03",
+        "HOffset" + f",{START}" * 5,
+        "HUnit" + ",s" * 5,
+    ]
+    slow = [f",{60.0 * t:.3f}" for t in turns(TIME[::50])] + ["" if ends else ","] * COUNT
+    rows = [",".join(["", *(f"{v:.2f}" for v in row)]) + n for row, n in zip(MICRONS, slow, strict=False)]
+    return "\n".join([*head, *rows, ""]).encode()
+
+
+def peaks() -> bytes:
+    """The least and the greatest reading of each two samples under one time."""
+    pairs = MICRONS.reshape(-1, 2, 4)
+    values = np.stack([pairs.min(axis=1), pairs.max(axis=1)], axis=1).reshape(-1, 4)
+    return table(values=values, times=[f"{t:.4f}" for t in np.repeat(TIME[::2], 2)])
+
+
+def sheets(path: Path) -> None:
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    speed = [[float(t), float(turns(t))] for t in TIME[::50]]
+    for title, head, rows in (
+        ("NDE", ["X [um]", "Y [um]"], [row[:3] for row in ROWS]),
+        ("DE", ["X [um]", "Y [um]"], [[row[0], *row[3:]] for row in ROWS]),
+        ("n", ["Speed [Hz]"], speed),
+    ):
+        sheet = book.create_sheet(title)
+        for row in [["Time [s]", *head], *rows]:
+            sheet.append(row)
+    book.save(path.with_suffix(".xlsx"))
+    path.with_suffix(".xlsx").rename(path)
+
+
+def with_speed(times: list[str]) -> bytes:
+    lines = table(times=times).decode().splitlines()
+    ends = ["n/(1/min)", *(f"{60.0 * t:.3f}" for t in turns(TIME))]
+    return "\n".join([*(f"{line},{end}" for line, end in zip(lines, ends, strict=True)), ""]).encode()
+
+
 AFTER = slice(300, None)
 NUMBERS, COUNTS = [str(i) for i in range(COUNT)], {"values": 50 * MICRONS - 50, "digits": 0}
 ROWS = [[float(t), *map(float, row)] for t, row in zip(TIME, MICRONS, strict=True)]
 
 FROM_TRIGGER = [str(i - 500) for i in range(COUNT)]
+PLANES = tuple(f"{n[:-2]} {n[-1]}" for n in NAMES)
 LINES = table().splitlines(keepends=True)
 SLOW = [row[:-1] + (b",60\n" if k < 12 else b",\n") for k, row in enumerate(LINES[1:])]
 REPORTED = [
@@ -465,6 +548,7 @@ REPORTED = [
         "a.cfg",
         two_rates,
         kept=slice(0, COUNT, 2),
+        step=2 * STEP,
         late=2e-7,
         said="sampled at 10000 Hz and, from .* s on, at 5000 Hz",
     ),
@@ -513,6 +597,97 @@ REPORTED = [
             two_rates(path),
             path.write_text(path.read_text().replace("5000,1000", "5000,900")),
         ),
+    ),
+    *(
+        Reported(
+            f"{head!r} in the head",
+            "a.csv",
+            head + table(time="No", times=NUMBERS, names=names, unit=unit),
+            said=said,
+        )
+        for head, names, unit, said in (
+            (b"# sampling time Ts = 100 us\n# Trigger position: 500\n", NAMES, "um", ""),
+            (b"XInc:,1.0E-04\nStart:,0\nXOrg:,-5.0E-02\nXUnits:,second\n", NAMES, "um", ""),
+            (b"Sample Rate: 10 kS/s\nXOffset: -50 ms\n", [f"{n}/um" for n in NAMES], "", ""),
+            (b"Interval;0.1 ms\nPretrig,50,ms\n".replace(b";", b","), NAMES, "um", ""),
+            (b"Fs: 10 kHz\nTstart: -0.05\nXOffset: 7 div\n", NAMES, "um", "not used.*XOffset = 7 div"),
+        )
+    ),
+    *(
+        Reported(
+            f"{' '.join(clock)} beside a matrix",
+            "a.mat",
+            partial(savemat, mdict={"data": MICRONS, "labels": NAMES, "units": ["um"] * 4} | clock),
+        )
+        for clock in (
+            {"isi": 0.1, "isi_units": "ms", "start_sample": -50.0},
+            {"Tinterval": STEP, "Tstart": START},
+            {"srate": 1.0 / STEP, "pretrigger_samples": 500.0},
+        )
+    ),
+    Reported("counts with lists", "a.h5", counts_with_lists, turning=True),
+    Reported("a frame of pandas", "a.h5", pandas_fixed, [f"{n} [um]" for n in NAMES], turning=True),
+    Reported(
+        "a clock in the middle of a name",
+        "a.mat",
+        dewesoft,
+        [f"Data1_{n.replace(' ', '_')}_um" for n in NAMES],
+        turning=True,
+    ),
+    Reported("a slower trace", "a.csv", per_trace(ends=False), turning=True),
+    Reported("rows that end early", "a.csv", per_trace(ends=True), turning=True),
+    Reported(
+        "speed on a clock set back",
+        "a.csv",
+        with_speed([f"{t - (i > 99):.4f}" for i, t in enumerate(TIME)]),
+        said="the clock steps back",
+        turning=True,
+    ),
+    Reported(
+        "ticks of 8 bits",
+        "a.csv",
+        b"Ts: 0.1 ms\nPre-trigger: 50 ms\n" + table(time="tick", times=[str(i % 256) for i in range(COUNT)]),
+    ),
+    Reported(
+        "peak detection",
+        "a.csv",
+        peaks(),
+        values=MICRONS.reshape(-1, 2, 4).min(axis=1) / 2 + MICRONS.reshape(-1, 2, 4).max(axis=1) / 2,
+        said="pairs, the least and the greatest .* 600 samples",
+        step=2 * STEP,
+    ),
+    *(
+        Reported(f"{file}, a sheet for each plane", file, sheets, PLANES, turning=True)
+        for file in ("a.xlsx", "a.csv")
+    ),
+    Reported(
+        "thousands of France",
+        "a.txt",
+        table(
+            unit="nm",
+            separator="\t",
+            times=[f"{t:.4f}".replace(".", ",") for t in TIME],
+            change={
+                (i, k + 1): f"{1e3 * v:,.1f}".replace(",", "\u202f").replace(".", ",")
+                for (i, k), v in np.ndenumerate(MICRONS)
+            },
+        ),
+    ),
+    Reported(
+        "commas in numbers and between them",
+        "a.csv",
+        table().replace(b".", b","),
+        question="10 fields under 5 names",
+    ),
+    *(
+        Reported(f"durations as {form(-0.05)}", "a.csv", table(time="Time", times=[form(t) for t in TIME]))
+        for form in (
+            lambda t: f"{t:.4f} sec",
+            lambda t: f"{'-' if t < 0 else '+'}00:00:00.{round(abs(t) * 1e4):04d}",
+            lambda t: (
+                f"{-1 if t < 0 else 0} days +{'23:59:59' if t < 0 else '00:00:00'}.{round(1e4 * (t % 1)):04d}"
+            ),
+        )
     ),
 ]
 """All of them; `studies` and tests take them from here."""

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from tests.unit.record.reported import MICRONS, REPORTED, STEP, TIME
+from tests.unit.record.reported import MICRONS, REPORTED, TIME, turns
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile
@@ -30,10 +30,14 @@ def test_a_reported_file_is_read_or_asked_about(reported, tmp_path):
     apart = np.abs(1e6 * record.signals[:count] - expected)
     np.testing.assert_array_less(apart, reported.off)
     start = TIME[kept][0] if reported.start is None else reported.start
-    step = STEP * (2 if "two rates" in reported.kind else 1)
+    step = reported.step
     np.testing.assert_allclose(
         record.time[:count], start + step * np.arange(count), rtol=0.0, atol=reported.late
     )
     assert (0 if record.missing is None else int(record.missing.sum())) == reported.missing
     said = (*record.notes, *record.warnings, *arranged.notes)
+    if reported.turning:
+        read = record.time <= record.speed_time[-1]
+        apart = record.speed[read] / (2 * np.pi) - turns(record.time[read])
+        np.testing.assert_array_less(np.abs(apart), 0.02)
     assert any(re.search(reported.said, words) for words in said), said

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import gzip
 import tempfile
+import zipfile
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -33,7 +35,7 @@ LARGEST = 2**30
 
 _TEXT = "delimited:read_delimited"
 _FORMATS = {
-    "csv txt tsv asc dat log prn": _TEXT,
+    "csv txt tsv asc dat log prn tab xls": _TEXT,
     "lvm": "lvm:read_lvm",
     "h5 hdf5": "hdf5:read_hdf5",
     "mat": "matlab:read_matlab",
@@ -97,6 +99,9 @@ def find_reader(name: str, path: Path) -> Reader:
         with path.open("rb") as stream:
             begin = stream.read(8)
         inside = next((kind for sign, kind in _BEGINS.items() if begin.startswith(sign)), name)
+        if inside == "ZIP":  # a workbook by another name
+            with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
+                inside = "xlsx" if "xl/workbook.xml" in archive.namelist() else inside
         if inside != name and inside not in _SUPPLIED:
             words = "which is not read; export it as text, MAT, TDMS, HDF5 or universal file"
             raise RecordError(f"{path} is a file of the format {inside}, {words}")

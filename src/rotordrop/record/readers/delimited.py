@@ -7,14 +7,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.record.clock import TIME_UNITS, in_seconds
+from rotordrop.record.clock import FEWEST_STAMPS, TIME_UNITS, in_seconds
+from rotordrop.record.keys import Told, kind_of
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers.head import Head, read_head
 from rotordrop.record.readers.text import (
@@ -24,6 +25,7 @@ from rotordrop.record.readers.text import (
     find_layout,
     is_number,
     is_row,
+    is_span,
     plain_number,
     read_lines,
     stamp_parts,
@@ -31,7 +33,6 @@ from rotordrop.record.readers.text import (
 from rotordrop.record.recording import (
     Recording,
     damaged,
-    kind_of,
     known_unit,
     listed,
     plain_name,
@@ -48,8 +49,12 @@ _SAME_SPAN, _ENDED = 0.2, 0.9
 """Share of a record by which a second clock may begin or end elsewhere, and share of the rows before which a
 column that ends has a clock of its own [1] (chosen)."""
 
+_FEWEST_ROWS = 3
+"""Rows of one width that show that the channels beyond have ended (chosen)."""
+
 _COUNTERS = re.compile(
-    r"(sample|index|idx|number|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b", re.IGNORECASE
+    r"(sample|ticks?|cycle|index|idx|number|channel|point|punkt|scan|count|row|zeile|nr|no|n|i|#)\b",
+    re.IGNORECASE,
 )
 _ONLY_NUMBERS = {".": re.compile(r"[0-9.eE+-]*"), ",": re.compile(r"[0-9,eE+-]*")}
 """By decimal sign. Python reads ``1_000`` and digits of any script as numbers; no recorder writes them."""
@@ -107,6 +112,8 @@ def recording_of_lines(
     channels. Of others the first is read with a warning where they are `segments`, which a recorder writes.
     """
     layout, parts, firsts = find_layout(lines, path, profile.text), list[Recording](), list[int]()
+    _refuse_commas(lines, layout, path)
+    lines, layout = _padded(lines, layout, path, profile)
 
     def head_of(first: int) -> int:
         """Where the lines begin that stand between the rows above and the first row."""
@@ -124,6 +131,45 @@ def recording_of_lines(
             parts.append(_of_table(table, begin, whole, replace(layout, first=first), origin, path, profile))
             firsts.append(first)
     return _joined(parts, firsts, segments, path) if len(parts) > 1 else parts[0]
+
+
+def _refuse_commas(lines: list[str], layout: Layout, path: Path) -> None:
+    """Refuse numbers whose decimal commas are commas between columns too, which their names do not fill."""
+    above = next((fields_of(one, ",") for one in lines[: layout.first][::-1] if one.strip()), [])
+    numbers = any(is_number(field, ".") for field in above)
+    if layout.separator == "," and 1 < len(above) < layout.columns <= 2 * len(above) and not numbers:
+        words = (
+            f"has {layout.columns} fields under {len(above)} names: decimals are commas, as separators are"
+        )
+        ask = "export it with semicolons or tabs between columns, or decimal points"
+        raise RecordError(f"{path} {words}; {ask}")
+
+
+def _padded(lines: list[str], layout: Layout, path: Path, profile: Profile) -> tuple[list[str], Layout]:
+    """Lines as wide as the first row, where rows end early because slower channels have ended."""
+
+    def width(line: str) -> int:
+        """Number of fields of a row of numbers and blanks; none of others."""
+        fields = fields_of(line, layout.separator)
+        plain = all(field.lower() in BLANKS or is_number(field, layout.decimal) for field in fields)
+        return len(fields) if plain and any(fields) else 0
+
+    first, rows = layout.first, lines[layout.first :]
+    counts = {line.count(layout.separator) for line in rows[:-1]}
+    if layout.separator == " " or (len(counts) == 1 and not (first and width(lines[first - 1]))):
+        return lines, layout
+    while first and width(lines[first - 1]) >= width(lines[first]) > 0:
+        first -= 1
+    widths = list(takewhile(bool, map(width, lines[first:])))
+    levels = Counter(widths)
+    if len(levels) < 2 or min(levels.values()) < _FEWEST_ROWS or widths != sorted(widths, reverse=True):
+        return lines, layout
+    signs = {"separator": layout.separator, "decimal": layout.decimal, "first_data_line": None}
+    whole = find_layout(lines[first : first + levels[widths[0]]], path, profile.text.model_copy(update=signs))
+    rows = [
+        line + layout.separator * (widths[0] - own) for line, own in zip(lines[first:], widths, strict=False)
+    ]
+    return [*lines[:first], *rows, *lines[first + len(rows) :]], replace(whole, first=first)
 
 
 def _joined(parts: list[Recording], firsts: Sequence[int], segments: bool, path: Path) -> Recording:
@@ -179,8 +225,9 @@ def _of_table(
         if _COUNTERS.match(name) and np.all(np.diff(table.numbers[i]) == 1.0):
             continue
         # side by side, captures may differ in length: the shorter ends in blanks
-        several = len(clock.times) > 1
-        there = slice(int(np.max(np.flatnonzero(np.isfinite(time)), initial=-1)) + 1 if several else None)
+        several, held = len(clock.times) > 1 or i in clock.own, np.isfinite(time)
+        held = held & np.isfinite(table.numbers[i]) if i in clock.own else held
+        there = slice(int(np.max(np.flatnonzero(held), initial=-1)) + 1 if several else None)
         name, label, values = name or f"column {i + 1}", label or f"column {i + 1}", table.numbers[i][there]
         known = np.isfinite(values)
         ends = int(np.sum(known))
@@ -194,7 +241,7 @@ def _of_table(
                 values, scaled = values * factor + offset, [*scaled, label]
         channels.append(profile.channel(name, unit, values, time[there], label=label, clocked=True))
     notes += [f"whole numbers, taken times the factors of the head: {listed(scaled)}"] if scaled else []
-    texts = [head.labels[i] for i in table.texts]
+    texts = [head.labels[i] or f"column {i + 1}" for i in table.texts]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
     if head.count is not None and len(rows) < head.count:
         words = f"declares {head.count} samples and {len(rows)} are present"
@@ -328,8 +375,13 @@ class _Table:
         stamped = self.of_kind("time")
         if not stamped:
             return None
-        self.head.entries.setdefault("start", " ".join(self.rows[0][i] for i in stamped))
+        spans = all(is_span(self.rows[0][i]) for i in stamped)
+        if not spans:
+            self.head.entries.setdefault("start", " ".join(self.rows[0][i] for i in stamped))
         seconds, nanoseconds = np.zeros((2, len(self.rows)), dtype=np.int64)
+        for i in self.parts_of_second:
+            factor = 1e9 * TIME_UNITS[known_unit(self.columns[i][0]) or "s"]
+            nanoseconds += np.rint(np.nan_to_num(self.numbers[i]) * factor).astype(np.int64)
         dated = False
         for k, row in enumerate(self.rows):
             for i in stamped:
@@ -340,24 +392,33 @@ class _Table:
                 dated = dated or parts[0] >= 10 * _DAY
                 seconds[k] += parts[0]
                 nanoseconds[k] += parts[1]
+        if spans:
+            return np.asarray(seconds + 1e-9 * nanoseconds, dtype=np.float64)
         if not dated:  # the time of day begins again at midnight
             seconds[1:] += _DAY * np.cumsum(np.diff(seconds) < -_DAY // 2)
         return np.asarray((seconds - seconds[0]) + 1e-9 * (nanoseconds - nanoseconds[0]), dtype=np.float64)
 
+    @cached_property
+    def parts_of_second(self) -> list[int]:
+        """The column behind that of stamps that goes on with them, called "ms", "us" or "ns"."""
+        behind = [i + 1 for i in self.of_kind("time")[-1:] if i + 1 in self.numbers]
+        return [i for i in behind if known_unit(self.columns[i][0]) in ("ms", "us", "ns")]
+
     def clock(self) -> _Clock:
         """The clock of the rows: by hand, by columns of time or of dates, or even by what the head says."""
         by_hand, stamped = self.profile.time.step, self._stamped()
-        step = parse_quantity(by_hand, "time") if by_hand else self.head.step
+        step = parse_quantity(by_hand, "time") if by_hand else self.head.told.step
         still = stamped is not None and not np.ptp(stamped) > 0.0
         stamped = None if still else stamped  # the date of a column of its own is no clock
         at = self._time_columns(stamped is not None, step)
         found = self._by_columns(at) if at else None
         if found is not None and not by_hand:
-            return self._of_wide_table(found)
+            return self._of_wide_table(self._with_unused(found))
         # stamps of whole seconds say less than a sampling interval
         coarse = stamped is not None and step and stamped[-1] - stamped[0] < 0.5 * step * len(stamped)
+        coarse = coarse or (step and stamped is not None and len(np.unique(stamped)) < FEWEST_STAMPS)
         if stamped is not None and not coarse and not by_hand:
-            return self._of_wide_table(_Clock(times={0: stamped}))
+            return self._of_wide_table(_Clock(times={0: stamped}, used=self.parts_of_second))
         if step is None or step <= 0:
             why = " (its stamps stand still, they are coarser than the samples)" if still else ""
             have = f"no time column among {listed(one[1] for one in self.columns)}{why}"
@@ -367,35 +428,61 @@ class _Table:
 
     def _counted(self, step: float, used: Sequence[int], found: _Clock | None) -> _Clock:
         """An even clock of a step [s], or one by a counter where samples are missing."""
-        head, by_hand = self.head, self.profile.time.start
+        told, by_hand = self.head.told, self.profile.time.start
         counter = next((i for i in self.numbers if i not in used), next(iter(self.numbers)))
         values = self.numbers[counter]
         index, counters, of_trigger = np.arange(len(values), dtype=np.float64), [], False
-        ones = float(np.mean(np.diff(values) == 1.0)) if np.all(values == np.round(values)) else 0.0
+        whole = len(values) > 1 and bool(np.all(values == np.round(values)))
+        ones = float(np.mean(np.diff(values) == 1.0)) if whole else 0.0
         # where samples are missing a counter steps by more, and so tells it
         if ones == 1.0 or ones > (0.5 if _COUNTERS.match(self.columns[counter][0]) else 0.9):
             of_trigger = by_hand is None and bool(values[0] < 0.0 <= values[-1])
-            index = values - (0.0 if of_trigger or head.trigger_sample is not None else values[0])
+            index = values - (0.0 if of_trigger or told.sample is not None else values[0])
+            turn = float(np.max(values)) + 1.0  # of 8, 16 or 32 bits
+            index = np.unwrap(index, period=turn) if turn in (2.0**8, 2.0**16, 2.0**32) else index
             # beside every channel may stand its counter, which has no name
             alike = [i for i, own in self.numbers.items() if np.array_equal(own, values)]
             counters = [counter, *(i for i in alike if not self.columns[i][0] and i != counter)]
         offered = (
             parse_quantity(by_hand, "time") if by_hand else None,
             0.0 if of_trigger else None,
-            None if head.trigger_sample is None else -head.trigger_sample * step,
-            head.start,
+            told.begin(len(values), step),
             None if found is None else float(found.times[0][0]),
         )
         start = next((one for one in offered if one is not None), None)
         notes = ("no trigger in the file: record time counts from the first sample",) if start is None else ()
-        return _Clock(times={0: (start or 0.0) + step * index}, used=(*used, *counters), notes=notes)
+        own = dict[int, Array]()
+        for i, one in enumerate(self.head.clocks) if not self.profile.time.step else ():
+            own_step = one.step or step
+            begun = one.begin(len(values), own_step)
+            if own_step != step or begun not in (None, start):
+                own[i] = (start or 0.0 if begun is None else begun) + own_step * np.arange(
+                    len(values), dtype=np.float64
+                )
+        clock = _Clock(
+            times={0: (start or 0.0) + step * index}, own=own, used=(*used, *counters), notes=notes
+        )
+        return replace(clock, notes=(*notes, *self._unused(told)))
+
+    def _unused(self, told: Told) -> list[str]:
+        return [f"not used, the head of the file has: {listed(told.unused)}"] if told.unused else []
+
+    def _with_unused(self, clock: _Clock) -> _Clock:
+        """The clock of a column of times, with a note on what the head says otherwise."""
+        told, first = self.head.told, clock.of(0)
+        begun = told.begin(len(first), told.step or 0.0)
+        other = begun is not None and told.step and abs(begun - first[0]) > told.step
+        words = (
+            [f"the head has the first sample at {begun:.6g} s, its column of times is used"] if other else []
+        )
+        return replace(clock, notes=(*clock.notes, *self._unused(told), *words))
 
     def _by_columns(self, at: Sequence[int]) -> _Clock:
         """Times by columns: one for all, or one for each channel by its name or its place before it."""
-        step, first = self.head.step, self.numbers[at[0]]
-        usual = float(np.median(np.diff(first[np.isfinite(first)]))) if step else 0.0
+        step, first = self.head.told.step, self.numbers[at[0]]
+        usual = float(np.median(np.diff(first[np.isfinite(first)]))) if step and len(first) > 1 else 0.0
         told = [unit for unit, s in TIME_UNITS.items() if step and abs(usual * s / step - 1.0) < _UNEVEN]
-        units = [known_unit(self.columns[i][2] or self.head.time_unit) or "" for i in at]
+        units = [known_unit(self.columns[i][2] or self.head.told.time_unit) or "" for i in at]
         units = [self.profile.time.unit or unit or units[0] or "".join(told) for unit in units]
         # dates in numbers lose digits when they become floating-point numbers
         decimal = self.layout.decimal
@@ -409,7 +496,7 @@ class _Table:
         bare = not all(units) and isinstance(stamps[0], np.ndarray)
         notes = ["time column taken in seconds"] if bare else []
         names = {plain_name(self.columns[i][0]): i for i in self.numbers if i not in at}
-        whose = {i: plain_name(whose_time(self.columns[i][0]) or "") for i in at}
+        whose = {i: plain_name(self._whose_time(i) or "") for i in at}
         own = {names[plain]: times[i] for i, plain in whose.items() if plain in names}
         rest = [i for i in at if whose[i] not in names] or list(at)
         # each holds for the channels to its right; of clocks side by side the first does
@@ -438,15 +525,21 @@ class _Table:
         known = {i: own[np.isfinite(own)] for i in timed if np.isfinite(own := self.numbers[i]).any()}
         in_s = [i for i in known if columns[i][2] in ("s", "ms", "us", "ns")]
         grow = [i for i in in_s if np.all(np.diff(known[i]) > 0.0)]
-        found = [i for i in timed if whose_time(columns[i][0]) is not None or i in grow] or in_s[:1]
+        found = [i for i in timed if self._whose_time(i) is not None or i in grow] or in_s[:1]
         # a scope that names its channels only: the first column has no name and grows evenly
         even = [i for i, own in known.items() if _grows_evenly(own, step)]
         found = found or [i for i in even[:1] if i == next(iter(self.numbers)) and not columns[i][0]]
+        even = [
+            i for i, own in known.items() if i in even or (not columns[i][0] and _grows_evenly(own, None))
+        ]
         for i in even if found and found[0] in known else ():
             # what grows evenly over the time of the first is a clock too, whatever its name
             first, own = known[found[0]][[0, -1]], known[i][[0, -1]]
             found += [i] if np.all(np.abs(own - first) < _SAME_SPAN * np.ptp(first)) else []
         return sorted(set(found))
+
+    def _whose_time(self, column: int) -> str | None:
+        return whose_time(self.columns[column][0], [name for name, *_ in self.columns])
 
     def _of_wide_table(self, clock: _Clock) -> _Clock:
         """The clock, unless the rows of one instant name a channel each."""

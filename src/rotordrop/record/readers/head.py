@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 from rotordrop.record.event_date import dated_line
+from rotordrop.record.keys import Told, clock_told, kind_of
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers.text import Layout, fields_of, is_number
-from rotordrop.record.recording import TIME_NAMES, kind_of, known_unit, sensitivities_in, split_unit
+from rotordrop.record.recording import TIME_NAMES, known_unit, sensitivities_in, split_unit
 from rotordrop.units import parse_quantity
 
 _LONGEST_LINE = 500
@@ -34,13 +35,9 @@ class Head:
     """Name of every column with its unit in brackets."""
     entries: dict[str, str]
     """Keys and values as written."""
-    step: float | None
-    start: float | None
-    """Time between samples, and of the first one [s]."""
-    time_unit: str
-    """Unit of the time axis."""
-    trigger_sample: int | None
-    """Sample at which the record time is zero."""
+    told: Told
+    clocks: list[Told]
+    """The clock of all channels, and that of every column."""
     count: int | None
     """Number of samples."""
     by_column: dict[str, list[str]]
@@ -58,7 +55,8 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) ->
     as_read = [fields_of(line if given else line.lstrip("#% "), layout.separator) or [""] for line in lines]
     keyed = [_behind_one_key(row) for row in as_read]  # a single such row may name two clocks alike
     rows = keyed if sum(row is not own for row, own in zip(keyed, as_read, strict=True)) > 1 else as_read
-    names, units, used = ([], [], set()) if given else _names_and_units(rows, layout)
+    names, units, used = _names_and_units(rows, layout)
+    names = list(given or names)
     # rows that stand where the samples begin and are none: left out, the record would start later
     last = max(used, default=-1)
     damaged = [i for i in range(last + 1, len(rows)) if _was_a_row(lines[i], rows[i], layout, last >= 0)]
@@ -76,14 +74,9 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) ->
         f"{name} [{unit}]" if unit and not known_unit(split_unit(name)[2]) else name
         for name, unit in zip(names, units, strict=True)
     ]
-    for row in rows:
-        begins = {field for field in row[1:] if is_number(field, layout.decimal)}
-        if kind_of(row[0]) == "start" and len(begins) > 1:
-            words = f"the channels begin at {', '.join(sorted(begins))} ({row[0]}) and stand in one row"
-            raise RecordError(f"{path}: {words}; export them with times of their own")
-    labels = _told_apart(list(given) if given else labels, rows, used)
-    by_column = {kind_of(row[0]): _by_column(row, layout.columns) or [] for row in rows}
-    return _head(labels, entries, "\n".join(unused), by_column)
+    labels = _told_apart(labels, rows, used)
+    wide = [(row[0], _by_column(row, layout.columns) or []) for row in rows]
+    return _head(labels, entries, "\n".join(unused), wide, layout)
 
 
 def _behind_one_key(row: list[str]) -> list[str]:
@@ -118,33 +111,27 @@ def _told_apart(labels: list[str], rows: list[list[str]], used: set[int]) -> lis
     return named
 
 
-def _head(labels: list[str], entries: dict[str, str], text: str, by_column: dict[str, list[str]]) -> Head:
-    """What entries by their keys and the text as a whole say."""
-
-    def found(kind: str) -> tuple[str, str]:
-        """Text and unit of the first entry of a kind, empty where there is none."""
-        for key, value in entries.items():
-            if kind_of(key) == kind:
-                return value, split_unit(key)[2]
-        return "", ""
-
-    time_unit = known_unit(found("time unit")[0].partition(" ")[0]) or ""
-    step, rate = _number(*found("step"), "time", time_unit or "s"), _number(*found("rate"), "frequency", "Hz")
-    start, before = (_number(*found(kind), "time", time_unit or "s") for kind in ("start", "before"))
-    bare = "" if time_unit or found("before")[1] else found("before")[0]  # then "5000" counts samples
-    trigger = re.match(r"\d{1,15}(?!\d)", found("trigger")[0]) or re.fullmatch(r"\d{3,15}", bare)
-    count = found("count")[0].strip()
+def _head(
+    labels: list[str], entries: dict[str, str], text: str, wide: list[tuple[str, list[str]]], layout: Layout
+) -> Head:
+    """What entries by their keys, rows with a value for every column, and the text as a whole say."""
+    several = {key: row for key, row in wide if len(set(filter(None, row))) > 1}
+    told = clock_told({key: value for key, value in entries.items() if key not in several})
+    clocks = [
+        clock_told({key: row[i] for key, row in several.items() if row[i]}, told.time_unit)
+        for i in range(layout.columns)
+    ]
+    steps = [one.step for one in clocks if one.step]
+    count = next((value.strip() for key, value in entries.items() if kind_of(key) == "count"), "")
     offset = _VOLTAGE_OFFSET.search(text)
     return Head(
         labels=labels,
         entries=entries,
-        step=1.0 / rate if step is None and rate else step,
-        start=-abs(before) if start is None and before is not None else start,
-        time_unit=time_unit,
-        trigger_sample=int(trigger.group()) if trigger else None,
+        told=replace(told, step=min(steps)) if steps and told.step is None else told,
+        clocks=clocks,
         # a whole number and nothing else: "Samples: 5 per channel" declares no length
         count=round(float(count)) if re.fullmatch(r"[1-9]\d{0,9}|\d\.\d*[eE]\+?\d{1,2}", count) else None,
-        by_column=by_column,
+        by_column={kind_of(key): row for key, row in wide},
         sensitivities=sensitivities_in(text),
         voltage_offset=parse_quantity(f"{offset[1].replace(',', '.')} {offset[2]}", "voltage")
         if offset
@@ -163,7 +150,7 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
     for i, row in enumerate(rows):
         wide = _cut(row, columns)
         kind = kind_of(row[0]) if len(row) > 1 else ""
-        if kind in ("names", "units"):
+        if kind in ("names", "comment", "units"):
             if (values := _by_column(row, columns, alone=kind == "units")) is not None:
                 used.add(i)
                 units = values if kind == "units" else units
@@ -185,11 +172,20 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
         names = _cut(rows[last], columns) or names
         used.add(last)
     for i in sorted(used):
-        if kind_of(rows[i][0]) == "names" and len(rows[i]) > 1:
+        if kind_of(rows[i][0]) in ("names", "comment") and len(rows[i]) > 1:
             said = _by_column(rows[i], columns) or []
+            said = said if len(set(filter(None, said))) > 1 or columns < 3 else names
             units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
             names = [new or old for new, old in zip(said, names, strict=True)]
     names = [f"CH{name}" if name.isdigit() else name for name in names]
+    for i, row in enumerate(rows):  # a line for each channel, as Graphtec lists them
+        kinds = [kind_of(field) for field in row]
+        at = {kind: kinds.index(kind) for kind in ("names", "units") if kind in kinds[1:]}
+        listed = [line for line in rows[i + 1 :] if len(line) == len(row) and line[0] in names]
+        for line in listed if len(at) == 2 and i not in used and len(listed) > 1 else ():
+            k = names.index(line[0])
+            units[k] = units[k] or line[at["units"]]
+            names[k] = line[at["names"]] or names[k]
     return names, [unit.strip("[]()") for unit in units], used
 
 
@@ -283,15 +279,3 @@ def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
         entries.setdefault(key, values[0] if len(set(values)) == 1 else " ".join(fields[1:3]).strip())
     if (dated := dated_line(plain)) is not None:
         entries[dated[0]] = dated[1]
-
-
-def _number(value: str, unit: str, kind: str, default_unit: str) -> float | None:
-    """A header entry in SI units, None where it is no quantity of this kind."""
-    match = re.match(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*(\S*)", value)
-    if not match:
-        return None
-    unit = unit or known_unit(match[2]) or match[2] or default_unit
-    try:
-        return parse_quantity(f"{match[1].replace(',', '.')} {unit}", kind)
-    except UsageError:
-        return None

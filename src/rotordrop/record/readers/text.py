@@ -7,13 +7,14 @@ import re
 from collections import Counter
 from dataclasses import dataclass, replace
 from datetime import date
+from decimal import Decimal
 from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import TextLayout
-from rotordrop.record.recording import damaged
+from rotordrop.record.recording import damaged, known_unit
 
 BLANKS = frozenset(
     "|nan|-|--|---|*|**|***|****|*****|n/a|na|null|#n/a|invalid|#value!|#num!|#div/0!|over|overflow|overload|"
@@ -39,6 +40,12 @@ _STAMP = re.compile(
     r"(?:(?:[.,]|[:;](?=[0-9]{3}))(?P<part>[0-9]{1,12}))?)?"
     r"(?: ?(?P<half>[AP])M|Z|[+-][0-9]{2}:?[0-9]{2})?)?(?<=[0-9ZM])"
 )
+_SPAN = re.compile(
+    r"(?P<days>[+-]?[0-9]+) days?,? *(?P<of_day>[+-]?[0-9:.]+)?|(?P<sign>[+-])(?P<clock>[0-9]{1,2}:[0-9:.,]+)"
+    r"|(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?) ?(?P<unit>s|sec|ms|us|µs|min)"
+)
+"""Durations, as MATLAB and pandas write them: "-1 days +23:59:59.75", "-00:00:00.25", "0.05 sec"."""
+
 _A_NUMBER = re.compile(r"(^|[\s;,\"])[-+]?[.,]?\d")
 """Where a number begins, at the start of a field."""
 
@@ -143,7 +150,8 @@ def _encoding(content: bytes) -> str:
 def fields_of(line: str, separator: str) -> list[str]:
     """Split a line into its fields, quotes and outer blanks removed; within quotes nothing separates."""
     if separator == " ":
-        parts = line.split()
+        parts = line.strip(" \t").replace("\t", " ").split(" ")
+        parts = [part for part in parts if part]
     elif '"' in line:
         parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     else:
@@ -164,8 +172,12 @@ def find_layout(lines: list[str], path: Path, rules: TextLayout) -> Layout:
         fit
         for separator in ((rules.separator,) if rules.separator else _SEPARATORS)
         for decimal in ((rules.decimal,) if rules.decimal else (".", ","))
-        if separator != decimal and (fit := _fit(sample, separator, decimal)) is not None
+        if (separator != decimal or '"' in sample[0])
+        and (fit := _fit(sample, separator, decimal)) is not None
     ]
+    # a blank in a table with tabs or semicolons sets thousands or words apart
+    sure = [fit for fit in fits if fit[1].separator in ";\t" and fit[0][2] == len(sample)]
+    fits = [fit for fit in fits if not sure or fit[1].separator != " "]
     best = max(fits, key=lambda fit: fit[0], default=None)
     if best is None or best[0][2] < _LEAST_FITTING * len(sample):
         last = f"{lines[-1][:60]!r}"
@@ -213,7 +225,11 @@ def _kind(fields: list[str], decimal: str) -> ColumnKind:
     most = _MOSTLY * len(filled)
     if sum(is_number(field, decimal) for field in filled) >= most:
         return "number"
-    return "time" if sum(_STAMP.fullmatch(field) is not None for field in filled) >= most else "text"
+    return "time" if sum(_is_stamp(field) for field in filled) >= most else "text"
+
+
+def _is_stamp(field: str) -> bool:
+    return _STAMP.fullmatch(field) is not None or _SPAN.fullmatch(field) is not None
 
 
 def is_row(fields: list[str], layout: Layout) -> bool:
@@ -224,7 +240,7 @@ def is_row(fields: list[str], layout: Layout) -> bool:
     for field, kind in zip(fields, layout.kinds, strict=True):
         if kind == "text" or field.lower() in BLANKS:
             continue
-        if not (_STAMP.fullmatch(field) if kind == "time" else is_number(field, layout.decimal)):
+        if not (_is_stamp(field) if kind == "time" else is_number(field, layout.decimal)):
             return False
         some = True
     return some
@@ -245,6 +261,8 @@ def plain_number(field: str, decimal: str) -> str:
 
 def stamp_parts(field: str) -> tuple[int, int] | None:
     """Whole seconds and nanoseconds of a date, a time of day or both, from one origin; None for no such."""
+    if (span := _SPAN.fullmatch(field)) is not None:
+        return _of_span(span)
     match = _STAMP.fullmatch(field)
     if match is None:
         return None
@@ -262,3 +280,20 @@ def stamp_parts(field: str) -> tuple[int, int] | None:
         seconds += 3600 * hour + 60 * int(match["minute"]) + int(match["whole"] or 0)
         nanoseconds = int((match["part"] or "").ljust(9, "0")[:9])
     return seconds, nanoseconds
+
+
+def is_span(field: str) -> bool:
+    """Whether a field is a duration, whose zero is that of the record."""
+    return _SPAN.fullmatch(field) is not None
+
+
+def _of_span(span: re.Match[str]) -> tuple[int, int]:
+    """Whole seconds and nanoseconds of a duration."""
+    if span["number"]:
+        unit = known_unit(span["unit"]) or "s"
+        factor = {"s": 10**9, "ms": 10**6, "us": 10**3, "min": 60 * 10**9}[unit]
+        return divmod(round(Decimal(span["number"].replace(",", ".")) * factor), 10**9)
+    sign, clock = span["sign"] or "+", span["clock"] or (span["of_day"] or "0:00").lstrip("+")
+    seconds, nanoseconds = stamp_parts(clock.lstrip("-")) or (0, 0)
+    count = (-1 if "-" in sign + clock[:1] else 1) * (10**9 * seconds + nanoseconds)
+    return divmod(count + 86_400 * 10**9 * int(span["days"] or 0), 10**9)

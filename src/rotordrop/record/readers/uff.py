@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
+from dataclasses import replace
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -45,6 +46,7 @@ def read_uff(path: Path, profile: Profile) -> Recording:
     """Read the time histories of a universal file; channels are named in the first identification line."""
     content = path.read_bytes()
     channels: list[Channel] = []
+    points: list[str] = []
     others: list[str] = []
     entries: dict[str, str] = {}
     per_metre = None  # units of length, by dataset 164
@@ -72,6 +74,7 @@ def read_uff(path: Path, profile: Profile) -> Recording:
             else:
                 channels.append(profile.channel(name, unit, values, time, label=label))
                 entries.setdefault("id2", head[1].strip())
+                points.append(_point(head[5]))
             closing = _DELIMITER.match(content, _behind_blanks(content, at))
         else:
             others += [] if kind == b"164" else [f"dataset {kind.decode()[:6]}"]
@@ -83,8 +86,19 @@ def read_uff(path: Path, profile: Profile) -> Recording:
     if not channels:
         have = listed(others) or "no dataset"
         raise RecordError(f"{path} holds no time history of dataset 58 (it has {have}); export time signals")
+    if len(set(points)) == len(points) > len({one.label for one in channels}):  # one name for all
+        channels = [replace(one, name=p, label=p) for one, p in zip(channels, points, strict=True)]
     notes = (f"left out, no time histories: {listed(others)}",) if others else ()
     return Recording(channels=tuple(channels), metadata=entries, notes=notes)
+
+
+def _point(line: str) -> str:
+    """Where and along which axis a channel reads: entity, node and direction of the response."""
+    axis = line[51:55].strip()
+    sign = "-" if axis.startswith("-") else ""
+    letter = dict(zip("123", "XYZ", strict=True)).get(axis.lstrip("+-"), axis)
+    entity = line[31:41].strip().replace("NONE", "")
+    return f"{entity} {line[41:51].strip()} {sign}{letter}".strip()
 
 
 def _behind_blanks(content: bytes, at: int) -> int:

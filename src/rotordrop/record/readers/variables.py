@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,21 +16,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 from rotordrop.record.clock import TIME_UNITS, in_seconds
+from rotordrop.record.keys import Told, clock_told, kind_of
 from rotordrop.record.recording import (
     TIME_NAMES,
     Channel,
     Recording,
     damaged,
-    kind_of,
     known_unit,
     listed,
     split_unit,
     whose_time,
 )
 from rotordrop.record.sandbox import Content, Item
-from rotordrop.units import parse_quantity
 
 if TYPE_CHECKING:
     from rotordrop.record.profile import Profile
@@ -41,6 +39,12 @@ def is_samples(value: Any) -> bool:
     """Whether a variable can hold readings: numbers, more than one, in one or two dimensions."""
     array = isinstance(value, np.ndarray) and value.dtype.kind in "iufMm"
     return array and value.ndim in (1, 2) and value.size > 1
+
+
+_SHARED = ("units", "factor", "per count", "offset", "step", "rate", "start")
+"""What lists say of every column of a matrix."""
+_PANDAS = {"datetime": "ns", "timedelta": "ns"}
+"""Unit of the index of a table of pandas."""
 
 
 class _Stamps(NamedTuple):
@@ -64,14 +68,15 @@ class Variables:
     left_out: list[str] = field(default_factory=list)
     """Arrays of numbers that have no clock or no names."""
     _even: dict[tuple[float, float, int], Array] = field(default_factory=dict)
+    _clock_of: dict[int, Told] = field(default_factory=dict)
 
     def channels(self) -> list[Channel]:
         """A channel for each vector and each named column that is no clock; its label is its whole name."""
         found = []
         for item in self._series:
-            if item.name in self._clocks:
+            time, last = self._time(item), self._split(item.name)[1]
+            if item.name in self._clocks or (time is None and kind_of(last) in _SHARED):
                 continue
-            time, last = self._time(item), item.name.rpartition(self.sign)[2]
             if time is None and self.profile.time.step is None:
                 self.left_out.append(item.name)
                 continue
@@ -80,37 +85,56 @@ class Variables:
             found.append(self.profile.channel(name, unit, self._values(item), time, label=label))
         return found
 
+    def _split(self, name: str) -> tuple[str, str]:
+        """Group and last part of a name; in brackets nothing separates, "speed [rad/s]"."""
+        folder, _, last = name.rpartition(self.sign)
+        while folder and any(last.count(a) < last.count(b) for a, b in ("[]", "()")):
+            folder, _, before = folder.rpartition(self.sign)
+            last = f"{before}{self.sign}{last}"
+        return folder, last
+
     @cached_property
     def _series(self) -> list[Item]:
         """Vectors: those of the file and the named columns of its matrices."""
         found: list[Item] = []
         for item in self.content.items:
             array = np.squeeze(item.values)
-            names, units = self._list_of(item, array.shape, 0), self._list_of(item, array.shape, 1)
-            title, unit = self._title(item)
+            names, (title, unit) = self._names_of(item, array.shape), self._title(item)
             if array.ndim == 1:
                 found.append(replace(item, values=array))
             elif not names and title and array.shape[1] < len(array):
-                units = units or [unit] * array.shape[1]
                 names = [f"{title} {k}" for k in range(1, array.shape[1] + 1)]
             elif not names:
                 self.left_out.append(f"{item.name} ({array.shape}, whose columns have no names)")
+            shared = self._shared(item, len(names)) if array.ndim == 2 else {}
             for i, name in enumerate(names):
                 column = array[:, i] if array.shape[1] == len(names) else array[i]
-                said = {**item.attributes, "column of": item.name} | ({"unit": units[i]} if units else {})
+                said = {**item.attributes, **{k: v[i] for k, v in shared.items()}, "column of": item.name}
+                said |= {"unit": unit} if unit and "units" not in map(kind_of, said) else {}
                 values = np.ascontiguousarray(column)
                 found.append(Item(name=f"{item.name}{self.sign}{name}", values=values, attributes=said))
         return found
 
-    def _list_of(self, item: Item, shape: tuple[int, ...], units: int) -> list[str]:
-        """Names, or units, of the columns of a matrix: of the profile, else a list of as many texts."""
-        lists = [self.profile.text.names, *(v for scope in self._scopes(item) for v in scope.values())]
-        for texts in lists if not units else (v for _, v in self._said(item, "units", lists=True)):
+    def _names_of(self, item: Item, shape: tuple[int, ...]) -> list[str]:
+        """Names of the columns of a matrix: of the profile, else a list of as many texts, its own first."""
+        stem = self._split(item.name)[1].partition("_")[0]  # pandas has block1_items for block1_values
+        lists = [(k, v) for scope in self._scopes(item) for k, v in scope.items() if kind_of(k) != "units"]
+        lists.sort(key=lambda one: not one[0].startswith(f"{stem}_"))
+        for texts in (self.profile.text.names, *(texts for _, texts in lists)):
             if isinstance(texts, list | tuple) and len(shape) == 2 and len(texts) in shape[::-1]:
                 names = [text.strip() for text in texts if isinstance(text, str)]
-                if units or len(set(names)) == len(texts):
+                if len(set(names)) == len(texts):
                     return names
         return []
+
+    def _shared(self, item: Item, count: int) -> dict[str, Any]:
+        """What lists of as many entries as a matrix has columns say of each: units, factors, clocks."""
+        folder, items = self._split(item.name)[0], self.content.items
+        vectors = {self._split(one.name): np.ravel(one.values) for one in items if one.values.size == count}
+        beside = {last: values.tolist() for (place, last), values in vectors.items() if place == folder}
+        own, *above = self._scopes(item)
+        said = [one for scope in (*above[::-1], beside, own) for one in scope.items()]
+        return {k: v for k, v in said if isinstance(v, list) and len(v) == count and kind_of(k) in _SHARED}
 
     def _title(self, item: Item) -> tuple[str, str]:
         """Name and unit that stand beside an array in its structure; of a path its last part."""
@@ -124,16 +148,20 @@ class Variables:
     def _clocks(self) -> dict[str, _Stamps]:
         """The arrays that are clocks."""
         wanted, found, units = self.profile.time.channel, [], []
+        names = {split_unit(self._split(item.name)[1])[0] for item in self._series}
         for item in self._series:
-            folder, _, last = item.name.rpartition(self.sign)
-            name, label, unit = split_unit(last)
-            channel = whose_time(name)
+            folder, last = self._split(item.name)
+            index = str(item.attributes.get("name", "")) if last == "axis1" else ""  # of pandas
+            name, label, unit = split_unit(index or last)
+            counts = index and item.values.dtype.kind in "iu" and np.all(np.diff(item.values) == 1)
+            channel = None if counts else "" if index else whose_time(name, names)
+            unit = unit or _PANDAS.get(str(item.attributes.get("kind", "")).partition("64")[0], "")
             title = self._title(item)[0] if re.fullmatch("data|values?", last, re.IGNORECASE) else ""
             if TIME_NAMES.fullmatch(title):
                 channel, folder = "", folder.rpartition(self.sign)[0]  # a structure of name and samples
             said = str(next((value for _, value in self._said(item, "units")), unit)).partition(" since ")[0]
             told = self.profile.time.unit or known_unit(said) or ""
-            if told not in TIME_UNITS and not channel and not unit:
+            if told not in TIME_UNITS and (channel in names or not (channel or unit)):
                 told = ""  # the unit of the other columns of a table
             if (wanted in (name, label, item.name) if wanted else channel is not None) and (
                 told in ("", *TIME_UNITS)
@@ -149,7 +177,7 @@ class Variables:
     def _time(self, item: Item) -> Array | None:
         """The clock of an array [s]: in its attributes, named there, of its own, in its group, further up."""
         own, *above = self._scopes(item)
-        folder, _, last = item.name.rpartition(self.sign)
+        folder, last = self._split(item.name)
         named = f"{folder}{self.sign if folder else ''}{own.get('time', '')}"
         clocks = {name: one for name, one in self._clocks.items() if len(one.time) == len(item.values)}
         if (even := self._even_clock(item, own)) is not None:
@@ -166,15 +194,29 @@ class Variables:
         return None
 
     def _even_clock(self, item: Item, scope: Mapping[str, Any]) -> Array | None:
-        step, rate = self._number(item, scope, "step", "time"), self._number(item, scope, "rate", "frequency")
-        if not step and not rate:
+        step, count = self._told(scope).step, len(item.values)
+        if not step:
+            wrong = [(k, v) for k, v in scope.items() if kind_of(k) in ("step", "rate") and v not in ("", 0)]
+            if wrong and scope is item.attributes:
+                words = f"attribute {wrong[0][0]!r} of {item.name!r} is {wrong[0][1]!r:.60}, not a number"
+                raise damaged(self.path, f": {words}")
             return None
-        start = self._number(item, scope, "start", "time") + float(item.attributes.get("began_s", 0.0))
-        key = (start, step or rate, len(item.values))
+        told = [self._told(one) for one in self._scopes(item)]
+        begun = next((begin for one in told if (begin := one.begin(count, step)) is not None), None)
+        unused = listed(dict.fromkeys(words for one in told for words in one.unused))
+        self.notes.extend([f"not used: {unused}"] if unused else [])
+        if begun is None and "began_s" not in item.attributes:
+            self.notes.append("no trigger in the file: record time counts from the first sample")
+        start = (begun or 0.0) + float(item.attributes.get("began_s", 0.0))
+        key = (start, step, count)
         if key not in self._even:  # channels of one clock share its array
-            index = np.arange(len(item.values), dtype=np.float64)
-            self._even[key] = start + (index * step if step else index / rate)
+            self._even[key] = start + step * np.arange(count, dtype=np.float64)
         return self._even[key]
+
+    def _told(self, scope: Mapping[str, Any]) -> Told:
+        if id(scope) not in self._clock_of:
+            self._clock_of[id(scope)] = clock_told(scope)
+        return self._clock_of[id(scope)]
 
     def _values(self, item: Item) -> Array:
         """Readings: stored × factor + offset, NaN where the file has its value for none."""
@@ -189,27 +231,30 @@ class Variables:
     def _factor(self, item: Item) -> tuple[float, float]:
         """What one count is worth and where it is zero, by the attributes of the array or its structure."""
         scopes = self._scopes(item)[: 2 if self._folders(item)[0] else 1]
-        kinds = ("factor", "per count") if item.values.dtype.kind in "iu" else ("factor",)
         told = {
             f"{key} = {value:g}": value
-            for kind in kinds
+            for kind in ("factor", "per count")
             for scope in scopes
-            if (value := self._number(item, scope, kind, "dimensionless")) not in (0.0, 1.0)
-            for key in scope
-            if kind_of(key) == kind
+            for key, value in self._numbers(item, scope, kind)
+            if value not in (0.0, 1.0)
         }
+        if item.values.dtype.kind not in "iu":
+            counts = {f"{k} = {v:g}": v for one in scopes for k, v in self._numbers(item, one, "per count")}
+            self.notes.extend(f"not used, {item.name} holds no counts: {k}" for k in counts if k in told)
+            told = {key: value for key, value in told.items() if key not in counts}
         if len(set(told.values())) > 1:
             words = f"{item.name!r} has several factors, {', '.join(told)}"
             raise RecordError(f"{self.path}: {words}; keep the one that makes readings of its counts")
-        offset = sum(self._number(item, scope, "offset", "dimensionless") for scope in scopes)
+        offset = sum(value for scope in scopes for _, value in [*self._numbers(item, scope, "offset")][:1])
         return next(iter(told.values()), 1.0), offset
 
     def _name_and_unit(self, item: Item, last: str, label: str) -> tuple[str, str]:
         """Name without its unit, and the unit: of its attributes, in its name, beside it or further up."""
         own, folder = item.attributes, self._folders(item)[0]
         name, _, unit = split_unit(last)
-        if (told := next((v for k, v in own.items() if kind_of(k) == "units" and v), None)) is not None:
-            name, unit = last, str(told)
+        units = [v for k, v in own.items() if kind_of(k) == "units" and v and not isinstance(v, list)]
+        if units:
+            name, unit = last, str(units[0])
         title, of_title = self._title(item)
         if title:
             name, unit = title, unit or of_title
@@ -224,31 +269,29 @@ class Variables:
             self.notes.append(f'{name} {words} says it: [units] "{label}" = "0.02 {unit}"')
         return name, unit
 
-    def _said(self, item: Item, kind: str, *, lists: bool = False) -> Iterator[tuple[str, Any]]:
-        """Entries of a kind, those of the array first: single ones or lists."""
+    def _said(self, item: Item, kind: str) -> Iterator[tuple[str, Any]]:
+        """Single entries of a kind, those of the array first."""
         for scope in self._scopes(item):
             said = ((k, v) for k, v in scope.items() if kind_of(k) == kind and v != "")
-            yield from ((k, v) for k, v in said if isinstance(v, list) == lists)
+            yield from ((k, v) for k, v in said if not isinstance(v, list))
 
-    def _number(self, item: Item, scope: Mapping[str, Any], kind: str, quantity: str) -> float:
-        """A number in SI units that an entry gives; 0 where none does."""
+    def _numbers(self, item: Item, scope: Mapping[str, Any], kind: str) -> Iterator[tuple[str, float]]:
+        """Entries of a kind that are numbers."""
         for key, value in scope.items():
-            if kind_of(key) != kind or isinstance(value, list) or value == "":
-                continue
-            factor = TIME_UNITS.get(split_unit(key)[2], 1.0) if quantity == "time" else 1.0
-            with suppress(ValueError):
-                return float(value) * factor
-            with suppress(UsageError):
-                return parse_quantity(value, quantity)
-            if kind != "start" and scope is item.attributes:  # a start may be a date
-                words = f"attribute {key!r} of {item.name!r} is {value!r:.60}, not a number"
-                raise damaged(self.path, f": {words}")
-        return 0.0
+            if kind_of(key) == kind and not isinstance(value, list) and value != "":
+                try:
+                    yield key, float(value)
+                except ValueError as error:
+                    if scope is item.attributes:
+                        words = f"attribute {key!r} of {item.name!r} is {value!r:.60}, not a number"
+                        raise damaged(self.path, f": {words}") from error
 
     def _folders(self, item: Item) -> list[str]:
         """The groups around an array, the innermost first, the file as the last."""
-        parts = item.name.split(self.sign)[:-1]
-        return [self.sign.join(parts[:k]) for k in range(len(parts), -1, -1)]
+        folders = [self._split(item.name)[0]]
+        while folders[-1]:
+            folders.append(self._split(folders[-1])[0])
+        return folders
 
     def _scopes(self, item: Item) -> list[Mapping[str, Any]]:
         """What is said of an array, then what stands in these groups, by the last part of its name."""
@@ -293,5 +336,8 @@ def recording_of(
         ask = "a vector 't', or 'fs' and 't0', must stand beside the channels, or time.step in the profile"
         raise RecordError(f"{path}: {have}; {ask}, and names of columns in text.names")
     notes, warnings = ([line for line in said.get(k, "").split("\n") if line] for k in ("notes", "warnings"))
-    notes += [*variables.notes, *([f"left out, without a clock: {listed(names)}"] if names else [])]
+    notes += [
+        *dict.fromkeys(variables.notes),
+        *([f"left out, without a clock: {listed(names)}"] if names else []),
+    ]
     return Recording(channels=tuple(channels), metadata=said, notes=tuple(notes), warnings=tuple(warnings))
