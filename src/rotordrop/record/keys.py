@@ -21,7 +21,7 @@ _KEYS = {
     "periodedechantillonnage шагдискретизации периоддискретизации 采样间隔 采样周期",
     "rate": "fs samplerate samplingrate samplingfrequency samplefrequency abtastrate abtastfrequenz rate "
     "fsamp fsample samplefreq samplingfreq samprate sampfreq samplespersecond sps scanrate scanfrequency "
-    "fa srate acquisitionrate acquisitionfrequency datarate frequencedechantillonnage "
+    "fa fe srate acquisitionrate acquisitionfrequency datarate frequencedechantillonnage "
     "frequenceechantillonnage частотадискретизации частотаопроса 采样率 采样频率",
     "trigger": "triggersample triggerindex triggerposition pretriggersamples pretriggerpoints "
     "pretrigsamples pretrigpoints presamples prepoints triggerpoint triggerpos trigpos trigsample "
@@ -31,6 +31,7 @@ _KEYS = {
     "start": "t0 tstart x0 xorg xorigin xoffset xstart xzero tzero hoffset wfstartoffset startoffset "
     "timeoffset horizontaloffset horizoffset firstsample firsttime begintime tbegin begin starttime start",
     "first": "startsample firstsampleindex startindex",
+    "unsure": "delay triggerdelay horizontaldelay timedelay posttrigger posttriggersamples",
     "count": "samples samplecount numberofsamples numsamples nsamples points numberofpoints recordlength "
     "blocksize anzahlwerte anzahlmesswerte anzahlabtastwerte messwerte",
     "time unit": "xunit xunits xaxisunit hunit horizontalunit horizontalunits horzunits horizunits "
@@ -50,7 +51,7 @@ _KEYS = {
 _KINDS = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
 """Keys in letters and digits only; of several starts the one that stands first here counts."""
 
-_CLOCK = ("step", "rate", "trigger", "before", "start", "first")
+_CLOCK = ("step", "rate", "trigger", "before", "start", "first", "unsure")
 _SHORT, _FINAL = 6, ("fs", "ts", "dt")
 """Kinds of a clock; letters that a key of it has behind other words, or which it is then (chosen)."""
 
@@ -134,7 +135,8 @@ def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
             continue
         read.add(key)
     said = [(k, v) for kind in _CLOCK for k, v in found[kind] if k not in read]
-    said = [(k, v) for k, v in said if _NUMBER.match(str(v)) and not _A_DATE.search(str(v))]
+    said = [(k, v) for k, v in said if re.search("[1-9]", str(v)) and _NUMBER.match(str(v))]
+    said = [(k, v) for k, v in said if not _A_DATE.search(str(v))]
     return Told(
         step=step,
         start=start,

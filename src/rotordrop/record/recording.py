@@ -20,7 +20,7 @@ _SPELLINGS = {
     "ms": "ms msec millisecond milliseconds мс 毫秒",
     "us": "us µs μs usec µsec microsecond microseconds мкс 微秒",
     "ns": "ns nanosecond nanoseconds нс", "min": "min minute minutes", "h": "hour hours", "d": "day days",
-    "Hz": "hz hertz гц", "rad/s": "rad/s",
+    "Hz": "hz hertz гц", "kHz": "khz кгц", "MHz": "mhz", "rad/s": "rad/s",
     "rpm": "rpm 1/min u/min r/min tr/min min-1 min^-1 min⁻¹ /min об/мин 转/分",
 }  # fmt: skip
 _UNITS = {written: unit for unit, spellings in _SPELLINGS.items() for written in spellings.split()}

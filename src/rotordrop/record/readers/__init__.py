@@ -55,7 +55,7 @@ _BEGINS = {
     b"\x89HDF": "h5", b"MATLAB": "mat", b"TDSm": "tdms", b"RIFF": "wav", b"\x93NUMPY": "npy",
     b"|CF,": "imc FAMOS", b"DIAEXT": "DIAdem", b"DIADEM": "DIAdem", b"MDF ": "ASAM MDF", b"PAR1": "Parquet",
     b"ARROW1": "Feather", b"FEA1": "Feather", b"PK\x03\x04": "ZIP", b"\xd0\xcf\x11\xe0": "old Excel (.xls)",
-    b"%PDF": "PDF", b"<?xml": "XML (TDM)", b"DATASET ": "DADiSP", b"SQLite": "SQLite",
+    b"%PDF": "PDF", b"<?xml": "XML (TDM)", b"DATASET ": "DADiSP", b"IGOR": "Igor text", b"SQLite": "SQLite",
 }  # fmt: skip
 """How files begin whose suffix does not tell what they are: formats that are read, and others by name."""
 

@@ -269,7 +269,9 @@ def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
         re.split("[:=]", field, maxsplit=1) for field in fields if re.match(r"[^:=]{2,40}[:=]\s*\S", field)
     ]
     if plain and pairs and not re.fullmatch(r"[\d:.\-T ]+", fields[0]):
-        entries.update((key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key))
+        entries.update(
+            (key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key) or kind_of(key)
+        )
     if line.lstrip().startswith(("#", "%")):
         if plain and not pairs:
             entries.setdefault(f"comment {len(entries) + 1}", plain)
