@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotordrop.errors import UsageError
-from rotordrop.record.recording import known_unit, split_unit
+from rotordrop.record.recording import TIME_NAMES, known_unit, split_unit
 from rotordrop.units import parse_quantity
 
 _KEYS = {
@@ -95,7 +95,8 @@ def _word(key: str) -> str:
     plain = "".join(sign for sign in unicodedata.normalize("NFKD", name.lower()) if sign.isalnum())
     behind = [plain[k:] for k in range(1, len(plain) - _SHORT + 1)]
     behind += [word for word in name.lower().split()[1:][-1:] if word in _FINAL]
-    behind = [word for word in behind if _KINDS.get(word) in _CLOCK[:3]]
+    # "Time 1 - default sample rate" is the name of a column
+    behind = [word for word in behind if _KINDS.get(word) in _CLOCK[:3] and not TIME_NAMES.match(name)]
     return next((word for word in (plain, plain.removesuffix("s"), *behind) if word in _KINDS), "")
 
 
