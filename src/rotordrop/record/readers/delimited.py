@@ -137,7 +137,12 @@ def _refuse_commas(lines: list[str], layout: Layout, path: Path) -> None:
     """Refuse numbers whose decimal commas are commas between columns too, which their names do not fill."""
     above = next((fields_of(one, ",") for one in lines[: layout.first][::-1] if one.strip()), [])
     numbers = any(is_number(field, ".") for field in above)
-    if layout.separator == "," and 1 < len(above) < layout.columns <= 2 * len(above) and not numbers:
+    if (
+        layout.separator == ","
+        and 2 < len(above)
+        and layout.columns in (2 * len(above) - 1, 2 * len(above))
+        and not numbers
+    ):
         words = (
             f"has {layout.columns} fields under {len(above)} names: decimals are commas, as separators are"
         )
