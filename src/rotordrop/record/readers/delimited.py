@@ -139,7 +139,7 @@ def _refuse_commas(lines: list[str], layout: Layout, path: Path) -> None:
     numbers = any(is_number(field, ".") for field in above)
     if (
         layout.separator == ","
-        and 2 < len(above)
+        and len(above) > 2
         and layout.columns in (2 * len(above) - 1, 2 * len(above))
         and not numbers
     ):
