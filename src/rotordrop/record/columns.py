@@ -56,7 +56,7 @@ def match_sensors(
         free = [
             label for label in present if all(label != one.label for found in hits.values() for one in found)
         ]
-        close = get_close_matches(wanted[missing[0]], free, 1, 0.5)
+        close = get_close_matches(wanted[missing[0]], present, 1, 0.5)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
         left = [f"; {one}" for one in (*recording.notes, *recording.warnings) if one.startswith("left out")]

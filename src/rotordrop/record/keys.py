@@ -117,8 +117,8 @@ def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
     sample = share = None
     read = {*steps, *rates, *(key for key, own in starts.items() if own in (start, 0.0))}
     for key, value in [*found["trigger"], *found["before"], *found["first"]]:
-        kind, match = kind_of(key), _NUMBER.match(str(value))
-        if match is None or _A_DATE.search(str(value)):
+        kind, match = kind_of(key), _number_in(value)
+        if match is None:
             continue
         number, own = float(match[1].replace(",", ".")), known_unit(match[2]) or split_unit(key)[2]
         timed = own or (time_unit if kind != "trigger" else "")
@@ -135,26 +135,29 @@ def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
         else:
             continue
         read.add(key)
-    said = [(k, v) for kind in _CLOCK for k, v in found[kind] if k not in read]
-    said = [(k, v) for k, v in said if re.search("[1-9]", str(v)) and _NUMBER.match(str(v))]
-    said = [(k, v) for k, v in said if not _A_DATE.search(str(v))]
+    said = [(k, v) for kind in _CLOCK for k, v in found[kind] if k not in read and _number_in(v)]
     return Told(
         step=step,
         start=start,
         sample=sample,
         share=share,
         time_unit=time_unit,
-        unused=tuple(f"{key} = {value!s:.40}" for key, value in said),
+        unused=tuple(f"{key} = {value!s:.40}" for key, value in said if re.search("[1-9]", str(value))),
     )
+
+
+def _number_in(value: Any) -> re.Match[str] | None:
+    """The number that a value begins with and its unit; None for lists, dates and words."""
+    return None if isinstance(value, list) or _A_DATE.search(str(value)) else _NUMBER.match(str(value))
 
 
 def _quantities(found: list[tuple[str, Any]], kind: str, unit: str) -> Iterator[tuple[str, float]]:
     """Keys and numbers in SI units of those entries that are quantities of a kind."""
     for key, value in found:
-        match = None if isinstance(value, list) else _NUMBER.match(str(value))
-        if match is None or _A_DATE.search(str(value)):
+        match = _number_in(value)
+        if match is None:
             continue
-        own = match[2] or split_unit(key)[2] or unit or "s"
+        own = known_unit(match[2]) or split_unit(key)[2] or match[2] or unit or "s"
         per_second = _PER_SECOND.fullmatch(own) if kind == "frequency" else None
         own = f"{per_second[1].replace('m', 'M')}Hz" if per_second else known_unit(own) or own
         try:

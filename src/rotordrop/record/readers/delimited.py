@@ -136,13 +136,8 @@ def recording_of_lines(
 def _refuse_commas(lines: list[str], layout: Layout, path: Path) -> None:
     """Refuse numbers whose decimal commas are commas between columns too, which their names do not fill."""
     above = next((fields_of(one, ",") for one in lines[: layout.first][::-1] if one.strip()), [])
-    numbers = any(is_number(field, ".") for field in above)
-    if (
-        layout.separator == ","
-        and len(above) > 2
-        and layout.columns in (2 * len(above) - 1, 2 * len(above))
-        and not numbers
-    ):
+    twice = len(above) > 2 and layout.columns in (2 * len(above) - 1, 2 * len(above))
+    if layout.separator == "," and twice and not any(is_number(field, ".") for field in above):
         words = (
             f"has {layout.columns} fields under {len(above)} names: decimals are commas, as separators are"
         )
@@ -424,7 +419,10 @@ class _Table:
         coarse = coarse or (step and stamped is not None and len(np.unique(stamped)) < FEWEST_STAMPS)
         if stamped is not None and not coarse and not by_hand:
             return self._of_wide_table(_Clock(times={0: stamped}, used=self.parts_of_second))
-        if step is None or step <= 0:
+        # a column of a lower rate ends early
+        slow = [i for i, one in enumerate(self.head.clocks) if step and one.step and one.step > step]
+        full = [i for i in slow if i in self.numbers and np.isfinite(self.numbers[i][-1])]
+        if step is None or step <= 0 or (full and not by_hand):
             why = " (its stamps stand still, they are coarser than the samples)" if still else ""
             have = f"no time column among {listed(one[1] for one in self.columns)}{why}"
             ask = 'name it in the profile, time.channel = "..." or time.step = "50 us"'
@@ -461,13 +459,13 @@ class _Table:
             own_step = one.step or step
             begun = one.begin(len(values), own_step)
             if own_step != step or begun not in (None, start):
-                own[i] = (start or 0.0 if begun is None else begun) + own_step * np.arange(
-                    len(values), dtype=np.float64
-                )
-        clock = _Clock(
-            times={0: (start or 0.0) + step * index}, own=own, used=(*used, *counters), notes=notes
+                own[i] = (start or 0.0 if begun is None else begun) + own_step * np.arange(len(values))
+        return _Clock(
+            times={0: (start or 0.0) + step * index},
+            own=own,
+            used=(*used, *counters),
+            notes=(*notes, *self._unused(told)),
         )
-        return replace(clock, notes=(*notes, *self._unused(told)))
 
     def _unused(self, told: Told) -> list[str]:
         return [f"not used, the head of the file has: {listed(told.unused)}"] if told.unused else []

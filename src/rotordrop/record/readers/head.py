@@ -171,10 +171,11 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
         last = (full or alike)[-1]
         names = _cut(rows[last], columns) or names
         used.add(last)
+    alone = columns - layout.kinds.count("blank") < 3  # one channel beside its time
     for i in sorted(used):
         if kind_of(rows[i][0]) in ("names", "comment") and len(rows[i]) > 1:
             said = _by_column(rows[i], columns) or []
-            said = said if len(set(filter(None, said))) > 1 or columns < 3 else names
+            said = said if len(set(filter(None, said))) > 1 or alone else names
             units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
             names = [new or old for new, old in zip(said, names, strict=True)]
     names = [f"CH{name}" if name.isdigit() else name for name in names]

@@ -150,8 +150,7 @@ def _encoding(content: bytes) -> str:
 def fields_of(line: str, separator: str) -> list[str]:
     """Split a line into its fields, quotes and outer blanks removed; within quotes nothing separates."""
     if separator == " ":
-        parts = line.strip(" \t").replace("\t", " ").split(" ")
-        parts = [part for part in parts if part]
+        parts = [part for part in line.replace("\t", " ").split(" ") if part]
     elif '"' in line:
         parts = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
     else:

@@ -96,7 +96,7 @@ def _point(line: str) -> str:
     """Where and along which axis a channel reads: entity, node and direction of the response."""
     axis = line[51:55].strip()
     sign = "-" if axis.startswith("-") else ""
-    letter = dict(zip("123", "XYZ", strict=True)).get(axis.lstrip("+-"), axis)
+    letter = {"1": "X", "2": "Y", "3": "Z"}.get(axis.lstrip("+-"), axis)
     entity = line[31:41].strip().replace("NONE", "")
     return f"{entity} {line[41:51].strip()} {sign}{letter}".strip()
 

@@ -198,8 +198,7 @@ class Variables:
         if not step:
             wrong = [(k, v) for k, v in scope.items() if kind_of(k) in ("step", "rate") and v not in ("", 0)]
             if wrong and scope is item.attributes:
-                words = f"attribute {wrong[0][0]!r} of {item.name!r} is {wrong[0][1]!r:.60}, not a number"
-                raise damaged(self.path, f": {words}")
+                raise self._no_number(item, *wrong[0])
             return None
         told = [self._told(one) for one in self._scopes(item)]
         begun = next((begin for one in told if (begin := one.begin(count, step)) is not None), None)
@@ -231,17 +230,19 @@ class Variables:
     def _factor(self, item: Item) -> tuple[float, float]:
         """What one count is worth and where it is zero, by the attributes of the array or its structure."""
         scopes = self._scopes(item)[: 2 if self._folders(item)[0] else 1]
-        told = {
-            f"{key} = {value:g}": value
+        told, per_count = (
+            {
+                f"{key} = {value:g}": value
+                for scope in scopes
+                for key, value in self._numbers(item, scope, kind)
+                if value not in (0.0, 1.0)
+            }
             for kind in ("factor", "per count")
-            for scope in scopes
-            for key, value in self._numbers(item, scope, kind)
-            if value not in (0.0, 1.0)
-        }
-        if item.values.dtype.kind not in "iu":
-            counts = {f"{k} = {v:g}": v for one in scopes for k, v in self._numbers(item, one, "per count")}
-            self.notes.extend(f"not used, {item.name} holds no counts: {k}" for k in counts if k in told)
-            told = {key: value for key, value in told.items() if key not in counts}
+        )
+        if item.values.dtype.kind in "iu":
+            told |= per_count
+        else:
+            self.notes.extend(f"not used, {item.name} holds no counts: {one}" for one in per_count)
         if len(set(told.values())) > 1:
             words = f"{item.name!r} has several factors, {', '.join(told)}"
             raise RecordError(f"{self.path}: {words}; keep the one that makes readings of its counts")
@@ -283,8 +284,10 @@ class Variables:
                     yield key, float(value)
                 except ValueError as error:
                     if scope is item.attributes:
-                        words = f"attribute {key!r} of {item.name!r} is {value!r:.60}, not a number"
-                        raise damaged(self.path, f": {words}") from error
+                        raise self._no_number(item, key, value) from error
+
+    def _no_number(self, item: Item, key: str, value: Any) -> RecordError:
+        return damaged(self.path, f": attribute {key!r} of {item.name!r} is {value!r:.60}, not a number")
 
     def _folders(self, item: Item) -> list[str]:
         """The groups around an array, the innermost first, the file as the last."""
