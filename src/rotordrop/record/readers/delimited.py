@@ -434,7 +434,8 @@ class _Table:
         told, by_hand = self.head.told, self.profile.time.start
         counter = next((i for i in self.numbers if i not in used), next(iter(self.numbers)))
         values = self.numbers[counter]
-        index, counters, of_trigger = np.arange(len(values), dtype=np.float64), [], False
+        even = np.arange(len(values), dtype=np.float64)
+        index, counters, of_trigger = even, [], False
         whole = len(values) > 1 and bool(np.all(values == np.round(values)))
         ones = float(np.mean(np.diff(values) == 1.0)) if whole else 0.0
         # where samples are missing a counter steps by more, and so tells it
@@ -459,7 +460,7 @@ class _Table:
             own_step = one.step or step
             begun = one.begin(len(values), own_step)
             if own_step != step or begun not in (None, start):
-                own[i] = (start or 0.0 if begun is None else begun) + own_step * np.arange(len(values))
+                own[i] = (start or 0.0 if begun is None else begun) + own_step * even
         return _Clock(
             times={0: (start or 0.0) + step * index},
             own=own,
