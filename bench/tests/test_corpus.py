@@ -177,17 +177,14 @@ def test_a_version_beyond_a_limit_does_not_raise_it_for_the_next(change, limit):
     assert (found.before, found.after, found.kept) == (0.1, 0.1, False)
 
 
-@pytest.mark.parametrize(("count", "code", "said"), [(0, 0, "kept"), (15, 7, "BROKEN before too")])
-def test_a_comparison_ends_with_7_where_a_limit_is_broken(tmp_path, capsys, count, code, said):
+@pytest.mark.parametrize(("count", "code"), [(0, 0), (15, 7)])
+def test_a_comparison_ends_with_7_where_a_limit_is_broken(tmp_path, count, code):
     tables = [str(tmp_path / name) for name in ("before.csv", "after.csv")]
     for table in tables:
         rows = [row(i, code=7) if i < count else row(i) for i in range(150)]
         write_table(rows, plan_digest(), Path(table))
     found = tmp_path / "found.json"
     assert command(["corpus", "compare", *tables, "--json", str(found)]) == code
-    printed = capsys.readouterr()
-    assert said in printed.out
-    assert ("flagged of the right structure 0.1, at most 0.03" in printed.err) == bool(code)
     assert json.loads(found.read_text())["kept"] == (code == 0)
 
 

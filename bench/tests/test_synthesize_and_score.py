@@ -35,12 +35,9 @@ def test_names_count_and_faults_are_told_in_the_truth(folder, tmp_path):
     assert json.loads((tmp_path / "j").read_text())["origin"] == "simulated, not measured"
 
 
-def test_the_summary_says_that_nothing_was_measured(tmp_path, capsys):
+def test_a_violation_is_told_in_the_truth(tmp_path):
     arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--hdf5", "--violation", "contact exponent 1.5"]
     assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
-    assert "Simulated recordings of LP-400 gas turbine, low-pressure rotor (not measured)" in out
-    assert f"written: {tmp_path / 'synthetic_100Hz.h5'}" in out.replace("\n", "")
     truth = json.loads((tmp_path / "truth" / "synthetic_100Hz.json").read_text())
     assert truth["violations"]["contact"]["exponent"] == 1.5
     assert truth["contact.exponent"]["NDE"] == 1.5
@@ -60,11 +57,6 @@ def test_wrong_choices_name_the_right_ones(option, message, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_lists_are_printed(tmp_path, capsys):
-    assert run(["synthesize", LP400, "--speed", "60 Hz", "--output", str(tmp_path), "--fault", "list"]) == 0
-    assert "swapped ends" in capsys.readouterr().out
-
-
 def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
     truth = json.loads((folder / "truth" / "synthetic_060Hz_1.json").read_text())
     peak = truth["peak_force_N"]["NDE"]
@@ -73,10 +65,7 @@ def test_a_score_is_a_table_with_units_and_a_sentence(folder, tmp_path, capsys):
     estimate.write_text(json.dumps({"speed_Hz": 60.0, "bearings": {"NDE": fields}}))
     assert run(["score", str(estimate), str(folder / "truth" / "synthetic_060Hz_1.json")]) == 0
     out = capsys.readouterr().out
-    assert "NDE peak bearing force" in out
-    assert "(+2.0 %)" in out
-    assert "holds (± 10 %)" in out
-    assert "1 of 1 intervals of 90 % hold the true value." in out
+    assert "(+2.0 %)" in out and "holds (± 10 %)" in out
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import pytest
 
 import rotordrop
 from rotordrop import errors
-from rotordrop.cli import _output
 from rotordrop.cli import app as command_line
 
 VERBS = command_line.VerbTable.verbs()
@@ -188,13 +187,6 @@ def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".toml"] == ["cache"]
 
 
-def test_verbs_of_two_words_are_listed_by_their_first(capsys):
-    for call in (["study"], ["study", "--help"], ["study", "-h"]):
-        assert command_line.run(call) == 0
-        out = capsys.readouterr().out
-        assert all(f"rotordrop {verb}: " in out for verb in VERBS if verb.startswith("study "))
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -208,21 +200,3 @@ def test_verbs_of_two_words_are_listed_by_their_first(capsys):
 def test_options_that_would_be_ignored_are_refused(call, message, capsys):
     assert command_line.run(call) == 64
     assert message in capsys.readouterr().err
-
-
-def test_a_log_gets_a_line_on_the_progress_now_and_then(capsys, monkeypatch):
-    """An estimate of half a minute had said nothing where standard error is no terminal."""
-    monkeypatch.setattr(_output, "BETWEEN_LINES_S", 0.01)
-    with _output.progress_bar("estimating") as tell:
-        for stage, share in (("step 1 of 3", 0.0), ("step 2 of 3", 0.3)):
-            tell(stage, share)
-            told, until = "", time.monotonic() + 600.0
-            while stage not in told and time.monotonic() < until:
-                time.sleep(0.01)
-                told += capsys.readouterr().err
-            assert told == f"estimating: {stage} ({100 * share:.0f} %)\n"
-    assert capsys.readouterr() == ("", "")
-    monkeypatch.setattr(_output, "BETWEEN_LINES_S", 60.0)
-    with _output.progress_bar("estimating") as tell:
-        tell("done at once", 1.0)
-    assert capsys.readouterr() == ("", "")

@@ -72,19 +72,13 @@ def test_ctrl_c_while_a_file_is_written_leaves_the_earlier_one(option, file, tmp
     assert [(found.name, found.read_text()) for found in tmp_path.iterdir()] == [(file, "earlier")]
 
 
-def test_two_records_are_not_taken_for_a_machine_and_its_record(tmp_path, capsys):
-    """The second one was said to be no valid TOML."""
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [("look {0} {1}", "are two records"), (f"restart {LP400} {{0}}", "is not JSON (it is no UTF-8 text)")],
+)
+def test_a_record_in_place_of_another_file_is_refused(call, told, tmp_path, capsys):
     files = [tmp_path / "drop.csv", tmp_path / "tail.csv"]
     for file in files:
-        file.write_text("t;x\n0;1\n")
-    assert run(["look", *map(str, files)]) == 64
-    told = " ".join(capsys.readouterr().err.split())
-    assert "takes one record and its machine file (.toml)" in told and "are two records" in told
-
-
-def test_a_record_in_place_of_an_estimate_is_said_to_be_no_text(tmp_path, capsys):
-    record = tmp_path / "drop.csv"
-    record.write_bytes("Zeit;µm\n".encode("latin-1"))
-    assert run(["restart", LP400, str(record)]) == 64
-    told = " ".join(capsys.readouterr().err.split())
-    assert "is not JSON (it is no UTF-8 text)" in told and "codec" not in told
+        file.write_bytes("Zeit;µm\n".encode("latin-1"))
+    assert run(call.format(*files).split()) == 64
+    assert told in " ".join(capsys.readouterr().err.split())

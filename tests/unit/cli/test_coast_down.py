@@ -111,21 +111,15 @@ def test_every_number_of_a_coast_down_is_that_of_its_samples(coast):
     assert abs(found["energy_residual_J"]) < 1e-3 * found["energy_scale_J"]
 
 
-def test_a_coast_down_that_gives_up_is_written_and_ends_as_a_drop_that_does(
-    machine, tmp_path, monkeypatch, capsys
-):
-    """Its exit code was 0, its JSON could not be written, and "the first 0.2 s held the largest" was good."""
+def test_a_coast_down_that_gives_up_is_written_and_ends_as_a_drop_that_does(machine, tmp_path, monkeypatch):
+    """Its exit code was 0, and its JSON could not be written."""
     monkeypatch.setattr(coast_down, "MOST_STEPS_PER_WINDOW", 300)
     file = tmp_path / "c.json"
     arguments = ["coast-down", machine, "--speed", "60 Hz", "--certify", "--json", str(file)]
     assert run(arguments) == SimulationError.exit_code
-    shown = capsys.readouterr()
     found = json.loads(file.read_text())
-    assert found["outcome"] in shown.err
-    why = r"stopped at 0\.0\d+ s: 300 steps were not enough for one second\. Loosen the"
-    assert re.search(why, found["outcome"])
+    assert "300 steps were not enough" in found["outcome"]
     assert (found["finished"], found["standstill_time_s"], found.get("certificate")) == (False, None, None)
-    assert "s held the largest indentation" not in shown.out
 
 
 def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
@@ -134,6 +128,12 @@ def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
     assert "--resume needs the --output" in capsys.readouterr().err
     assert run([*arguments, "--until", "for ever"]) == 64
     assert "for ever" in capsys.readouterr().err
+
+
+def test_a_machine_without_drag_is_told_the_way_out(capsys):
+    lp400 = str(example_path("lp400"))
+    assert run(["coast-down", lp400, "--speed", "60 Hz", "--until", "0.1 s"]) == 5
+    assert "no aerodynamic drag" in capsys.readouterr().err
 
 
 def test_drag_from_a_recorded_coast_down_stops_the_rotor_as_recorded(tmp_path, capsys):
@@ -157,9 +157,7 @@ def test_waterfall_reads_a_simulated_coast_down(coast, machine, tmp_path, capsys
     (fall,) = found["planes"]["DE"]["waterfalls"]
     assert (fall["component"], fall["amplitude_kind"]) == ("x", "zero-to-peak")
     assert fall["resolution_hz"] == pytest.approx(20000 / 8192)
-    text, shown = page.read_text(), capsys.readouterr().out
-    assert "zero-to-peak" in text
-    assert "The first 0.2 s held the largest displacement" in shown
+    shown = capsys.readouterr().out
     kinds = [(entry["bearing"], entry["quantity"]) for entry in found["force_and_stress"]]
     assert ("DE", "bearing force") in kinds and len(kinds) == 6
     for line in found["lines"]:
@@ -210,24 +208,18 @@ def test_critical_speeds_of_the_paper(tmp_path, capsys):
     assert len(found["campbell"]["touchdown bearings"]["shapes_at_lowest_speed"]["real"][0]) == 36
     text = capsys.readouterr().out
     assert "134.0, 235.0" in text and "132.9, 206.4" in text
-    assert "Critical speed map" in page.read_text()
 
 
-def test_the_page_of_a_coast_down_states_maxima_and_certificate(machine, tmp_path, capsys):
-    page, numbers = tmp_path / "c.html", tmp_path / "c.json"
+def test_the_certificate_of_a_coast_down_changes_its_maxima_by_little(machine, tmp_path):
+    numbers = tmp_path / "c.json"
     arguments = ["coast-down", machine, "--speed", "60 Hz", "--until", "0.3 s", "--certify"]
-    assert run([*arguments, "--report", str(page), "--json", str(numbers)]) == 0
-    text = page.read_text()
-    assert "Does 0.2\u00a0s hold the maximum?" in text
-    for expected in ("Second by second", "Largest Hertz stress", "Friction law", "Energy balanced to"):
-        assert expected in text
+    assert run([*arguments, "--json", str(numbers)]) == 0
     certificate = json.loads(numbers.read_text())["certificate"]
     assert certificate["tighter_tolerance"] == pytest.approx(1e-7)
     assert max(max(row) for row in certificate["peak_change"]) < 0.05
-    assert "At a tolerance of 1e-07" in capsys.readouterr().out
 
 
-def test_waterfall_of_the_bundled_record(tmp_path, capsys):
+def test_waterfall_of_the_bundled_record(tmp_path):
     lp400 = str(example_path("lp400"))
     record = files("rotordrop") / "examples" / "lp400" / "drop_060.h5"
     numbers = tmp_path / "w.json"
@@ -241,7 +233,6 @@ def test_waterfall_of_the_bundled_record(tmp_path, capsys):
         assert plane["largest_displacement_time_s"] < 0.05
         assert plane["waterfalls"][0]["amplitude_kind"] == "peak-to-peak"
     assert any(line["label"].startswith("pendulum") for line in found["lines"])
-    assert "Simulated record." in capsys.readouterr().out
 
 
 LP400 = str(example_path("lp400"))
@@ -274,7 +265,6 @@ def test_a_record_without_speed_says_what_is_missing(tmp_path, capsys):
     by_hand.write_text('[speed]\nconstant = "60 Hz"\n')
     short += ["--profile", str(by_hand)]
     assert run(["waterfall", LP400, record, *short]) == 0
-    assert "The record has no speed that falls" in capsys.readouterr().out
     assert run(["waterfall", LP400, record, *short, "--against", "speed"]) == 64
     assert "has no rotor speed; use --against time" in capsys.readouterr().err
     with pytest.raises(RecordError, match="so it shows no drag; give a record with a speed channel"):
@@ -282,18 +272,11 @@ def test_a_record_without_speed_says_what_is_missing(tmp_path, capsys):
         with_recorded_drag(lp400, recorded_coast_down(lp400, read_record(record, lp400, profile=by_hand)))
 
 
-def test_a_record_too_short_for_a_frame_or_a_law_says_so(tmp_path, capsys):
+def test_a_record_too_short_for_a_turn_is_refused(tmp_path, capsys):
     record = str(recorded(tmp_path / "r.csv", seconds=1.5))
-    page = tmp_path / "w.html"
-    assert run(["waterfall", LP400, record, "--report", str(page)]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert "too short for a speed law" in told
-    assert "shorter than one frame; there is no waterfall" not in page.read_text()
-    short = str(recorded(tmp_path / "s.csv", seconds=0.9))
-    assert run(["waterfall", LP400, short, "--report", str(page)]) == 0
-    assert "shorter than one frame; there is no waterfall" in page.read_text()
+    assert run(["waterfall", LP400, record]) == 0
     capsys.readouterr()
-    recorded(tmp_path / "s.csv", seconds=0.04)  # it ends while the rotor bounces
+    short = str(recorded(tmp_path / "s.csv", seconds=0.04))  # it ends while the rotor bounces
     assert run(["waterfall", LP400, short]) != 0
     assert "the signal of 0.04 s holds no whole window of 4 turns" in capsys.readouterr().err
     assert run(["coast-down", LP400, "--speed", "60 Hz", "--drag-from", record]) == 3

@@ -2,7 +2,6 @@
 
 import json
 import tomllib
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 from rotordrop.cli import computer
@@ -23,21 +22,6 @@ def test_it_names_what_is_installed(capsys):
     assert told == {
         name: sorted(computer.bare(text).lower() for text in needs) for name, needs in extras.items()
     }
-
-
-def test_a_missing_package_and_a_missing_extra_are_told_with_the_way_out(capsys, monkeypatch):
-    known = computer.version
-
-    def stated(name):
-        if name in ("pint", "nptdms"):
-            raise PackageNotFoundError(name)
-        return known(name)
-
-    monkeypatch.setattr(computer, "version", stated)
-    assert run(["doctor"]) == 0
-    out = capsys.readouterr().out
-    assert "problem: pint is missing; install rotordrop again" in out
-    assert "missing: nptdms; pip install 'rotordrop[io]'" in out
 
 
 def test_requirements_lose_their_versions():

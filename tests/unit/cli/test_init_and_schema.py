@@ -41,12 +41,6 @@ def test_an_example_is_copied_whole(name):
     assert load_machine("there/machine.toml") == example_machine(name)
 
 
-def test_the_example_with_a_recording_says_that_it_is_simulated():
-    assert run(["init", "--example", "lp400"]) == 0
-    assert {"drop_060.h5", "drop_060_tail.csv", "README.md"} <= {one.name for one in Path("lp400").iterdir()}
-    assert "made by simulation" in Path("lp400/README.md").read_text(encoding="utf-8")
-
-
 def test_an_example_is_copied_wholly_or_not_at_all(capsys):
     Path("lp400").mkdir()
     Path("lp400/drop_060.h5").write_text("mine")

@@ -25,17 +25,10 @@ def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
     log, numbers = str(tmp_path / "drops.db"), tmp_path / "log.json"
     call = ["log", "add", log, estimate, "--bearings", "2026", "--recorded", "2026-03-14", "--duration"]
     assert run([*call, "51.6 s", "--cause", "converter fault"]) == 0
-    said = capsys.readouterr().out
-    assert "drop 1: drop.h5 at 60 Hz was logged" in said
-    assert "3200 to 3400 N" in said
     allowed = ["--machine", "LP-400", "--bearings", "2026", "--drops", "10", "--source", "contract 17"]
     assert run(["log", "allow", log, *allowed, "--json", str(numbers)]) == 0
     content = json.loads(numbers.read_text())
-    assert content["used"][0]["sentence"] == (
-        "LP-400, bearings 2026: 1 of 10 drops (10 %), allowed by contract 17"
-    )
-    assert content["drops"]["1"]["duration"] == 51.6
-    assert "no verdict on the state of a bearing" in content["statement"]
+    assert (content["used"][0]["drops"], content["drops"]["1"]["duration"]) == (1, 51.6)
     capsys.readouterr()
     assert run(["log", "export", log]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
@@ -46,32 +39,18 @@ def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
     table = tmp_path / "drops.csv"
     assert run(["log", "export", log, str(table)]) == 0
     assert list(csv.DictReader(table.open())) == rows
-    assert f"Table: {table}" in "".join(capsys.readouterr().out.split("\n"))
     assert run(["log", "remove", log, "1"]) == 0
-    assert "drop 1 was removed" in capsys.readouterr().out
 
 
-def test_a_drop_is_dated_by_its_recorder_unless_somebody_says_otherwise(tmp_path, estimate, capsys):
+def test_a_drop_is_dated_by_its_recorder_unless_somebody_says_otherwise(tmp_path, estimate):
     log, file = str(tmp_path / "drops.db"), tmp_path / "dated.json"
     document = json.loads(Path(estimate).read_text())
     file.write_text(json.dumps({**document, "recorded": "2026-03-14T15:09:26Z", "record_sha256": "d" * 64}))
     assert run(["log", "add", log, str(file)]) == 0
     assert run(["log", "add", log, estimate, "--recorded", "2026-03-15"]) == 0
-    shown = capsys.readouterr().out
-    assert "logged 2" not in shown
     assert run(["log", "show", log, "--json", str(tmp_path / "log.json")]) == 0
     drops = json.loads((tmp_path / "log.json").read_text())["drops"].values()
     assert [drop["recorded"] for drop in drops] == ["2026-03-14T15:09:26Z", "2026-03-15T00:00:00"]
-
-
-def test_an_allowance_for_a_machine_of_another_name_is_told(tmp_path, estimate, capsys):
-    log = str(tmp_path / "drops.db")
-    assert run(["log", "add", log, estimate]) == 0
-    capsys.readouterr()
-    for machine, told in (("LP-40", True), ("LP-400", False)):
-        assert run(["log", "allow", log, "--machine", machine, "--drops", "10", "--source", "x"]) == 0
-        none = f"no drop of {machine!r} is in the log, only of 'LP-400'; an allowance counts"
-        assert (none in " ".join(capsys.readouterr().out.split())) == told
 
 
 @pytest.mark.parametrize(

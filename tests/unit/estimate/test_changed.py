@@ -98,8 +98,6 @@ def test_a_change_is_said_with_its_interval_whatever_the_prior():
     one = of(found, "NDE.support.stiffness")
     assert one.factor and one.interval_90[0] < 1.5 < one.interval_90[1]
     assert one.probability > 0.999
-    assert "Between a and b changed:" in found.sentence()
-    assert "NDE.support.stiffness (× 1." in found.sentence()
     # Both estimates lean on one prior: the difference of their values is too small, that of records not.
     random, sizes = np.random.default_rng(8), []
     other = TRUTH | {"support.damping": 1.4 * TRUTH["support.damping"]}
@@ -113,12 +111,11 @@ def test_what_no_record_or_machine_shows_is_not_judged():
     """The spin-up tells no drag from inertia."""
     found = changes(*pair(8, **{"race.drag_coefficient": 17.0 * TRUTH["race.drag_coefficient"]}))
     assert not any("drag" in one.path for one in found.named)
-    assert "NDE.race.drag_coefficient of any size" in found.sentence()
     one, other = pair(9)
     blind = [part.model_copy(update={"estimate": part.prior}) for part in one.parameters]
     found = changes(one.model_copy(update={"parameters": blind}), other)
     assert not found.named and not any(change.determined for change in found.found)
-    assert found.sentence().count(" of any size") == len(found.found) == 2 * len(WATCHED)
+    assert len(found.found) == 2 * len(WATCHED)
     one, _ = pair(1)
     with pytest.raises(UsageError, match=r"'m' and 'n'; only drops of one machine"):
         changes(one, one.model_copy(update={"machine": "n"}))
@@ -224,7 +221,6 @@ def test_what_a_record_says_nothing_of_is_no_change():
     )
     assert not found.named
     assert not of(found, path).determined and of(found, path).may_hide
-    assert "Smaller changes than these may hide: NDE.friction.dynamic × 1.16" in found.sentence()
 
 
 @pytest.mark.parametrize(("place", "size"), [(0, 1e-6), (1, 0.01), (2, 0.01)])

@@ -1,6 +1,5 @@
 """A recorded coast-down counts from the centre of the bearing, wherever the rotor floated before."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from rotordrop import example_machine, example_record_path, look, read_record
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.spectrum.candidates import machine_candidates, swing_ranges
-from rotordrop.spectrum.indentation import displacement_history, find_settling, settling_words
+from rotordrop.spectrum.indentation import displacement_history, find_settling
 
 # Of the bundled recording, which is simulated: the DE floats 26.5 µm below the centre of its bearing.
 TRUE_GAP = {"NDE": 275e-6, "DE": 285e-6}
@@ -49,7 +48,6 @@ def test_the_gap_is_that_of_the_estimate_and_handed_on(machine, record, signal):
         assert found.largest_indentation == pytest.approx(beyond, abs=3e-6)
     assert found.largest == pytest.approx(TRUE_LARGEST["DE"], abs=1.5e-6)
     assert found.largest_time == pytest.approx(8.9e-3, abs=0.4e-3)
-    assert "above the rest of the last 1 s" in signal.centre
     # The interval is that of a normal error on both sides; a search may not leave it.
     for name, gap in signal.air_gap.items():
         found = with_found_air_gaps(machine, signal).bearing(name).air_gap
@@ -84,9 +82,6 @@ def test_neither_level_nor_swing_matter_and_time_counts_from_power_off(machine, 
         )
         assert 2 <= len(settled.touched) <= 8
         assert 0.015 < settled.contact_from < 0.06
-        words = settling_words(settled, moved, signal.sampling_rate)
-        told = float(re.search(r"at (\d+) µm from the centre in the end", words)[1])
-        assert 1e-6 * told == pytest.approx(signal.air_gap[name] + 4e-6, abs=3.5e-6)
 
 
 def test_impacts_are_those_of_a_look_at_the_record(machine, record, signal):
@@ -124,12 +119,10 @@ def test_a_record_that_ends_too_early_says_what_its_centre_is(machine, record):
     signal = recorded_coast_down(machine, cut(record, 0.3))
     for name, gap in signal.air_gap.items():
         assert abs(gap - TRUE_GAP[name]) < min(1.65 * signal.air_gap_error[name], 20e-6)
-    assert "of the circle in which the record shows the shaft" in signal.centre
     assert recorded_coast_down(machine, displaced(cut(record, 0.3), 20e-6)).air_gap == pytest.approx(
         signal.air_gap, abs=1e-6
     )
     signal = recorded_coast_down(machine, cut(record, 7e-3))
     assert signal.air_gap == {"NDE": 250e-6, "DE": 250e-6}
     assert signal.air_gap_error is None
-    assert "taken as the zero of the sensors, the air gap from the machine file" in signal.centre
     assert with_found_air_gaps(machine, signal) is machine

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from rotordrop import CoastDownCase, example_machine, simulate_coast_down
 from rotordrop.progress import shown
 
 
@@ -47,11 +46,3 @@ def test_notebooks_get_a_bar_and_who_gives_a_function_is_told(error, monkeypatch
         tell("step 1", 0.25)
     assert told == [("step 1", 0.25)]
     assert stream.getvalue() == ""
-
-
-@pytest.mark.parametrize(("progress", "drawn"), [(None, True), (False, False)])
-def test_a_coast_down_shows_how_far_it_is(error, progress, drawn):
-    stream = error(terminal=True)
-    case = CoastDownCase(speed=377.0, duration=0.01)
-    simulate_coast_down(example_machine("paper"), case, progress=progress)
-    assert ("0 s, 59.86 Hz" in stream.getvalue()) == drawn

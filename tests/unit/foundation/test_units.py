@@ -69,16 +69,22 @@ def test_value_in_si(kind, value, texts):
 @pytest.mark.parametrize(
     ("kind", "units"),
     [
-        ("length", "m mm um µm mil"),
-        ("time", "s ms us µs"),
-        ("frequency", "Hz kHz rpm"),
-        ("speed", "rad/s Hz rpm"),
-        ("angle", "rad deg"),
+        ("length", "m; mm; um; µm; mil"),
+        ("time", "s; ms; us; µs"),
+        ("frequency", "Hz; kHz; rpm"),
+        ("speed", "rad/s; Hz; rpm"),
+        ("angle", "rad; deg"),
+        ("pressure", "GPa; MPa"),
+        ("velocity", "mm/s"),
+        ("unbalance", "g mm"),
+        ("voltage_sensitivity", "mV/um"),
+        ("density", "kg/m^3"),
+        ("contact_stiffness", "N/m^1.111"),
     ],
 )
 def test_usual_units_are_those_of_the_unit_library(kind, units):
     """Brackets leave the short way, which needs no library."""
-    for unit in units.split():
+    for unit in units.split("; "):
         assert parse_quantity(f"3.25 {unit}", kind) == pytest.approx(
             parse_quantity(f"3.25 ({unit})", kind), rel=1e-14
         )
@@ -210,22 +216,6 @@ def test_a_moment_is_never_minus_zero(time, text):
 )
 def test_no_chance_is_certain(probability, text):
     assert format_chance(probability) == text
-
-
-@pytest.mark.parametrize(
-    ("kind", "short", "spelled"),
-    [
-        ("pressure", "GPa", "gigapascal"),
-        ("pressure", "MPa", "megapascal"),
-        ("velocity", "mm/s", "millimetre/second"),
-        ("unbalance", "g mm", "gram millimetre"),
-        ("voltage_sensitivity", "mV/um", "millivolt/micrometre"),
-        ("contact_stiffness", "N/m^1.111", "newton/metre^1.111"),
-        ("density", "kg/m^3", "kilogram/metre^3"),
-    ],
-)
-def test_what_is_read_without_the_unit_library_is_what_the_library_reads(kind, short, spelled):
-    assert parse_quantity(f"17.17 {short}", kind) == parse_quantity(f"17.17 {spelled}", kind)
 
 
 @pytest.mark.parametrize("gravity", [GRAVITY, 1.62])

@@ -228,8 +228,6 @@ def test_the_verb(tmp_path, capsys):
     call = ["study", "repeat", str(tmp_path / "machine.toml"), str(tmp_path / "drop.json"), "--threads", "1"]
     out = tmp_path / "r.json"
     assert run([*call, "--drops", "20", "--folder", str(tmp_path / "study"), "--json", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "holds no joint distribution" in said and "milder" in said
     first = json.loads(out.read_text())["quantities"][0]
     assert first["column"] == "NDE.peak_force" and 0.0 <= first["place"]["value"] <= 1.0
     assert run(["study", "repeat", str(tmp_path / "machine.toml"), "--folder", str(tmp_path / "x")]) == 64

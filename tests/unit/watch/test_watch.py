@@ -206,8 +206,6 @@ def test_records_of_unknown_machines_are_looked_at_and_bad_ones_are_quarantined(
     assert not any(isinstance(value, dict | list) for one in found.values() for value in one.values())
     (reason,) = kept.path.glob("quarantine/*/why.txt")
     assert reason.read_text() == "empty.csv is empty (0 bytes); export the recording again\n"
-    page = (kept.path / "overview.html").read_text()
-    assert "2 records need a person" in page and 'href="quarantine/' in page
     assert watched() == [] and len(reported()) == 2
     shutil.rmtree(reason.parent)  # somebody wants it to be tried again
     why = "empty.csv is empty (0 bytes); export the recording again"
@@ -244,12 +242,10 @@ def test_a_record_that_grew_replaces_what_was_taken_of_it(drops, kept, watcher, 
     assert [one["outcome"] for one in reported()] == ["quarantined"]
     assert len(list(kept.path.glob("quarantine/*"))) == 1
     (cut,) = kept.numbers()
-    said = watched(whole)
+    watched(whole)
     replaced = ["quarantined", "replaced", "quarantined"]
     assert [one["outcome"] for one in reported()] == replaced
     assert reported()[1]["sha256"] == reported()[0]["sha256"]
-    assert "a.csv: unknown machine, replaced: the file was taken before it was complete" in said[0]
-    assert "1 records need a person" in (kept.path / "overview.html").read_text()
     assert not (kept.path / "quarantine" / cut).exists()
     watched(whole[:5])  # and cut again: another copy that broke
     assert status_of(kept.job(cut))["outcome"] == "replaced"
@@ -273,34 +269,12 @@ def test_a_cut_drop_that_was_logged_leaves_the_log_when_its_file_grows(
     assert status_of(kept.job(estimated))["outcome"] == "replaced"
 
 
-def test_an_estimate_that_begins_is_said(drops, watcher, monkeypatch):
-    shutil.copy(DROP, drops / "4711.h5")
-    one, said = watcher()
-    state = {"state": "waiting"}
-    monkeypatch.setattr(one._runner, "ask", lambda *_: state)
-    one._look_round(time.monotonic() - 10.0)
-    one.turn()
-    assert said == []  # it waits
-    state["state"] = "running"
-    one.turn()
-    one.turn()
-    assert said == ["4711.h5: 4711, estimate begun"]
-
-
 def test_a_record_that_ends_too_early_needs_a_person(tmp_path, watcher, taken, hook, reported):
     taken("4711-cut.csv", "estimate", None, "4711")
-    one, said = watcher(hook=hook)
-    one.run(once=True)
+    watcher(hook=hook)[0].run(once=True)
     (news,) = reported()
     assert news["needs_person"] == f"{CUT}."
-    assert "needs a person: the file ends within line 9" in said[0]
     assert (tmp_path / "told").read_bytes().endswith(b"}\n")
-
-
-def test_a_cut_record_of_an_unknown_machine_is_said_to_be_cut(watcher, taken, hook, reported):
-    taken("a.csv", "look", {**LOOKED, "findings": [{"message": CUT, "severity": "warning"}]})
-    watcher(hook=hook)[0].run(once=True)
-    assert reported()[0]["needs_person"].endswith(f"; {CUT}")
 
 
 def test_an_estimate_is_logged_once_and_judged_by_the_limits(
@@ -397,5 +371,4 @@ def test_the_command_says_what_is_missing(tmp_path, machines, drops, capsys):
     assert run(["watch", str(tmp_path / "no"), *call[2:], str(tmp_path / "drops.db")]) == 64
     assert "is no folder" in capsys.readouterr().err
     assert run([*call, str(tmp_path / "drops.db")]) == 0
-    assert "overview.html" in capsys.readouterr().out.replace("\n", "")
     assert (tmp_path / "drops.kept" / "overview.html").exists()
