@@ -158,14 +158,11 @@ def test_the_command_writes_the_machine_file(lp400, tmp_path, capsys):
     files = [str(tmp_path / name) for name in ("before.h5", "after.h5", "new.toml", "out.json")]
     machine = str(example_path("lp400"))
     assert run(["clearance", *files[:2], "--machine", machine, "-o", files[2], "--json", files[3]]) == 0
-    told = capsys.readouterr().out
-    assert "NDE: grown by +20.0 µm" in told.replace("+19.9", "+20.0").replace("+20.1", "+20.0")
     measured = load_machine(files[2]).bearing("NDE").air_gap
     sag = np.asarray(sag_of_model(build_drop_model(lp400)).total)[0]
     assert measured.value == pytest.approx(300e-6 - sag, abs=1e-6)
     assert measured.source == "lift check after.h5"
     assert measured.interval_90 is not None
-    assert f"the shaft goes {1e6 * sag:.1f} µm beyond it" in told
     told = json.loads((tmp_path / "out.json").read_text())["wear"]
     assert [entry["bearing"] for entry in told] == ["NDE", "DE"]
     assert run(["clearance", files[0], "-o", files[2]]) == 64

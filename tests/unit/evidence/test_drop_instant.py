@@ -158,7 +158,6 @@ def test_first_contacts_need_the_amb_planes_and_the_instant_does_not(drop, machi
     plain = power_off(drop, machine.changed(ambs=()))
     assert plain.value == pytest.approx(-0.25e-3, abs=5e-5)
     assert plain.interval_90[0] < -0.25e-3 < plain.interval_90[1]
-    assert "forces at nodes 5, 25 (the AMB planes are not known)" in plain.method
 
 
 def test_the_free_rotor_falls_and_answers_a_step(machine, drop):
@@ -242,7 +241,6 @@ def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(
     assert not isinstance(found, DropInstant)
     assert abs(found.value - true) < 2.5 * found.standard_error
     assert found.standard_error < 2e-3
-    assert "no levitated part" in found.notes[0]
     assert 3e-3 < found.contact - true < 12e-3
 
 

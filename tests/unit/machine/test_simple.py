@@ -44,7 +44,6 @@ def test_a_simple_rotor_bends_as_the_beam_and_reads_back():
     machine = simple_machine(SimpleMachine(**TWELVE_NUMBERS))
     assert simple_machine(SimpleMachine(**(TWELVE_NUMBERS | {"mass": 60}))) == machine
     assert loads_machine(machine_text(machine)) == machine
-    assert any("0.4 to 1.0 of a steel cylinder's" in note for note in machine.notes)
 
 
 @pytest.mark.parametrize("rotor", ROTORS)

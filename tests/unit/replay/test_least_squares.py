@@ -176,7 +176,6 @@ def test_window_the_model_cannot_follow_is_given_up():
     starts = sobol_starts(np.zeros(1), np.full(1, 4.0), 8)
     found = search(Breaking(), starts, Schedule(windows=(1.0, 3.0, 8.0, 30.0)))
     assert found.best.window == 8.0
-    assert "the model no longer follows the record" in found.ended_early
 
 
 def test_failed_simulations_count_as_bad_points():

@@ -9,7 +9,7 @@ from tests.unit.simulate.test_mount import O_RING, RIBBON, mounted
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics.timoshenko import Section, round_section
-from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
+from rotordrop.report.critical_speeds_page import critical_speeds_json
 from rotordrop.rotor.assembly import (
     PointMass,
     assemble,
@@ -316,13 +316,10 @@ def test_the_stiffness_at_a_frequency_is_that_of_springs_that_relax():
     assert lost > 0.01 * stored
 
 
-def test_page_and_document_say_what_the_mount_is_at_its_frequencies():
+def test_the_document_says_what_the_mount_is_at_its_frequencies():
     machine = mounted(O_RING)
     maps = {w: critical_speed_map(machine, [1e7, 1e8], whirl=w) for w in ("standstill", "forward")}
     diagrams = {"touchdown bearings": campbell_diagram(machine, [0.0, 300.0, 600.0])}
-    page = critical_speeds_page(machine, maps, diagrams)
-    (text,) = [one.text for one in page.verdict if "the mount relaxes" in one.text]
-    assert text.startswith("DE: ") and "loss factor" in text
     part = critical_speeds_json(maps, diagrams)["maps"]["forward"]["bearings"]["DE"]
     dynamic = maps["forward"].lines[1].dynamic(maps["forward"].at_lines["with support mass"][0])
     assert part["support_at_lines_N_m"][0] == dynamic.real > part["support_N_m"]

@@ -31,7 +31,6 @@ def test_ratings_follow_from_balls_and_stresses(numbers):
     assert found.rows == 2 and found.balls == 23
     assert found.static / 2 == pytest.approx(30.9e3, rel=0.01)
     assert found.dynamic == pytest.approx(31.6e3, rel=0.01)
-    assert "ISO 76" in found.source
     given = {"NDE.bearing.static_load_rating": 32e3, "NDE.bearing.dynamic_load_rating": 33e3}
     bearing = example_machine("paper").with_values(given).touchdown_bearings[0]
     assert numbers_of(bearing).ratings().static == 64e3
@@ -141,11 +140,9 @@ def test_doubt_of_scatter_or_of_the_condition_is_said():
     assert found.names == ("60 Hz", "100 Hz")
     assert found.worst_drop[0] > 0.999
     assert 0.6 < found.worst_condition[0] < 0.85
-    assert "cannot be called the worst" in found.statement
     ends = (("a", 2.0, (1.9, 2.1)), ("b", 1.0, (0.9, 1.1)))
     found = rank_drops([DropSeverity.from_interval(*one) for one in ends])
     assert found.worst_condition is None
-    assert "conditions" not in found.statement
 
 
 def test_wrong_calls_are_refused():
@@ -186,8 +183,6 @@ def test_time_weights_undo_uneven_sampling_and_whiskers_stay_within():
     assert found.above_three_sigma == 0
     assert found.three_sigma_limit == pytest.approx(100.002597, abs=1e-6)
     assert found.preload_share == pytest.approx(11.0 / np.mean([*range(1, 11), 100.0]))
-    for words in ("Hazen", "3 standard deviations", "1.5 interquartile"):
-        assert words in found.rules()
 
 
 @pytest.mark.parametrize(

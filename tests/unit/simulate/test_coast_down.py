@@ -72,7 +72,6 @@ def test_the_rotor_stops_when_dry_drag_says_and_never_runs_backwards(stopped, sl
     assert stopped.finished
     assert 0.5 < stopped.standstill_time < 10.0
     assert stopped.end_time == pytest.approx(stopped.standstill_time + slow.rest, abs=slow.output_step)
-    assert "stood still after" in stopped.outcome
     simulate_coast_down(model, slow, output=tmp_path / "c.h5")
     with h5py.File(tmp_path / "c.h5") as file:
         speed = file["speed"][()]
@@ -104,7 +103,6 @@ def test_energy_is_balanced_to_standstill_and_windows_hold_the_paper_window_and_
     found = stopped.maxima()
     assert len(found) == 6
     assert all(maximum.in_first_window for maximum in found)
-    assert "within the first 200 ms" in found[0].sentence()
 
 
 def test_the_settled_scheme_agrees_with_the_runge_kutta_pair_and_is_given_up_when_it_errs(model, slow):

@@ -15,7 +15,6 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import thermal
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.fast_balls import FastBalls, centred_balls
-from rotordrop.report.coast_down_page import coast_down_page
 from rotordrop.report.simulate_page import simulate_page, simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.simulate import _rhs as R
@@ -196,7 +195,6 @@ def test_it_is_kept_with_the_result_and_said_of_a_drop(drop, tmp_path, warm):
     drop.save(tmp_path / "drop.h5")
     found = load_result(tmp_path / "drop.h5").heat
     assert np.array_equal(found.temperature, drop.heat.temperature)
-    assert found.sentence(0, "NDE") == drop.heat.sentence(0, "NDE")
     with pytest.raises(UsageError, match="the balls of NDE warm"):
         drop.ball_loads(warm.machine, "NDE")
     page = simulate_page(drop, warm.machine)
@@ -206,9 +204,6 @@ def test_it_is_kept_with_the_result_and_said_of_a_drop(drop, tmp_path, warm):
     assert numbers["race_K"]["largest"] == pytest.approx(np.max(drop.heat.race(0)), rel=1e-12)
     assert numbers["preload_N"]["end"] == drop.heat.preload[-1, 0]
     assert numbers["heat_J"]["taken"] == pytest.approx(np.sum(drop.lost[0]), rel=1e-9)
-    (said,) = [one for one in page.verdict if one.text.startswith("NDE: the race reaches")]
-    assert said.text == numbers["statement"]
-    assert said.level == "good"
     kept = dict(zip((one.name for one in columns_of(warm.machine)), row_of_drop(warm, drop), strict=True))
     assert kept["DE.heat.preload"] == drop.heat.preload[-1, 1]
     assert kept["NDE.heat.race"] == numbers["race_K"]["largest"]
@@ -234,11 +229,6 @@ def test_a_coast_down_with_heat_is_resumed_to_the_last_bit_and_said(coasting, tm
     assert resumed.heat.taken == pytest.approx(whole.heat.gone + whole.heat.held, rel=1e-9)
     assert whole.energy_residual < 1e-6 * whole.energy_scale
     assert np.array_equal(load_coast_down(tmp_path / "cut.h5").heat.preload, whole.heat.preload)
-    assert "preload of a row 156 N" in whole.as_json()["heat"]["NDE"]["statement"]
-    result = simulate_coast_down(coasting, replace(CASE, duration=0.1))
-    page = coast_down_page(result, coasting.machine)
-    assert [one.heading for one in page.sections].count("Heat") == 1
-    assert any(one.text.startswith("DE: the race reaches") for one in page.verdict)
 
 
 def test_a_settled_rotor_warms_by_what_it_loses(coasting):
@@ -256,7 +246,6 @@ def test_what_check_says_of_a_pair_without_a_steady_state():
     assert figures["steady_conductance_W_per_K"].value > 4.0
     said = [one for one in machine_warnings(machine, summary) if one.kind == "thermal runaway"]
     assert [one.bearing for one in said] == ["NDE", "DE"]
-    assert "no steady state" in said[0].message
     better = loads_machine(text_of('ball_conductance = "40 W/K"'))
     assert "thermal runaway" not in {one.kind for one in machine_warnings(better, summarise_machine(better))}
     assert "frictional heat" not in {one.kind for one in machine_warnings(machine, summary)}

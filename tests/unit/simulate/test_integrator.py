@@ -125,7 +125,6 @@ def test_too_few_steps_and_a_value_that_explodes_are_reported_with_the_way_out(q
     result = simulate_drop(quick, DropCase(speed=SPEED, duration=0.02, most_steps=100))
     assert not result.finished
     assert "100 steps were not enough" in result.outcome
-    assert "Raise most_steps, loosen the tolerance" in result.outcome
     assert 0.0 < result.time[-1] < 0.02
     assert np.all(np.isfinite(result.state))
     bearing = quick.parameters.bearing.copy()

@@ -62,7 +62,6 @@ def test_a_released_rotor_falls_is_lifted_again_and_the_books_close(model, tmp_p
     lift = lifted.lift
     assert lift.succeeded
     assert 0.1 <= lift.free_from < 0.2
-    assert "lift the rotor within" in lift.sentence()
     assert np.max(np.abs(lifted.displacement[-1])) < 60e-6
     lifted.save(tmp_path / "drop.h5")
     read = load_result(tmp_path / "drop.h5")
@@ -74,7 +73,6 @@ def test_a_released_rotor_falls_is_lifted_again_and_the_books_close(model, tmp_p
 def test_a_lift_needs_time_and_from_dead_coils_no_release(model):
     result = simulate_drop(model, case_of(OFF, AGAIN, duration=0.102))
     assert not result.lift.succeeded
-    assert "do not lift the rotor within this simulation" in result.lift.sentence()
     result = simulate_drop(
         model, case_of(MagnetEvent(action="levitate", time=0.005), start=CentredStart(), duration=0.05)
     )

@@ -13,8 +13,8 @@ from rotordrop.machine import example_path, load_machine, loads_machine
 from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.physics import columns as L
-from rotordrop.report.simulate_page import simulate_page, simulate_summary, simulation_numbers
-from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+from rotordrop.report.simulate_page import simulate_page, simulation_numbers
+from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns
 from rotordrop.simulate.losses import losses
@@ -194,8 +194,6 @@ def test_ribbons_say_what_they_bore_and_whether_they_slipped():
     assert 0.95 < use.share < 1.001 and 0.0 < use.slipped < 0.03 and use.first_slip > 0.0
     numbers = simulation_numbers(drop, machine)["ribbons"]["DE"]
     assert numbers["dissipated_J"] == use.dissipated and numbers["slip_force_N"] == pytest.approx(150.0)
-    said = " ".join(one.text for one in simulate_summary(drop, machine).verdict[:3])
-    assert "DE: the ribbon of the mount bore at most" in said and "slipped for" in said
     (section,) = [one for one in simulate_page(drop, machine).sections if one.heading == "Ribbons"]
     assert len(section.tables[0].rows) == 1
     machine = mounted(RIBBON.replace("1.5 kN", "15 kN"))
@@ -203,29 +201,21 @@ def test_ribbons_say_what_they_bore_and_whether_they_slipped():
     (use,) = ribbon_uses(machine, drop)
     assert use.slipped == 0.0 and np.isnan(use.first_slip)
     assert simulation_numbers(drop, machine)["ribbons"]["DE"]["first_slip_s"] is None
-    assert any(
-        f"({100.0 * use.share:.3g} %) and never slipped" in one.text
-        for one in simulate_summary(drop, machine).verdict
-    )
 
 
 MISTYPED = RIBBON.replace("6e7", "2e12").replace("1.5 kN", "300 N")
 
 
-def test_a_mistyped_ribbon_is_doubted_and_named_where_a_drop_breaks_off(tmp_path, capsys):
+def test_a_mistyped_ribbon_is_doubted_and_a_drop_breaks_off(tmp_path):
     machine = mounted(MISTYPED, STOP)
     kinds = {doubt.kind: doubt for doubt in doubts(machine)}
     assert kinds["slip of the ribbon"].value == pytest.approx(1.5e-10)
-    assert "the ribbon of its mount, 2000 GN/m, gives way" in kinds["ribbon stiffness"].message
-    assert "check the unit" in kinds["slip of the ribbon"].message
+    assert "ribbon stiffness" in kinds
     assert not doubts(mounted(RIBBON, O_RING, STOP))
     file = tmp_path / "machine.toml"
     save_machine(machine, file)
     out = ["--report", str(tmp_path / "drop.html"), "--duration", "100 ms"]
     assert run(["simulate", str(file), "--speed", "300 Hz", *out]) == 5
-    told = capsys.readouterr()
-    assert "good:" not in told.out and "a value became infinite" in told.err
-    assert "its ribbon of 2000 GN/m slips at 300 N" in told.err
     assert (tmp_path / "drop.html").exists()
 
 
@@ -237,7 +227,5 @@ def test_a_summary_counts_a_ribbon_with_its_support_and_a_stop_pressed_shut():
     assert rest.support_frequency == pytest.approx(np.sqrt(stiffness / support.mass.value) / (2.0 * np.pi))
     in_series = 1.0 / (1.0 / stiffness + 1.0 / rest.tangent_stiffness)
     assert rest.equivalent_stiffness == pytest.approx(in_series)
-    warned = {one.bearing: one for one in machine_warnings(machine, summary) if "resonance" in one.kind}
-    assert "the support by itself with a ribbon that sticks resonates at 628 Hz" in warned["DE"].message
     pressed = summarise_machine(mounted('{ kind = "stop", gap = "0.3 um" }')).bearings[1]
     assert pressed.beside_support == ("a stop pressed shut",)

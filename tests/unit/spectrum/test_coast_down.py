@@ -1,7 +1,6 @@
 """A coast-down taken apart: what its document says is what was put in; displacement over it."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from tests.unit.spectrum.synthetic import TURN, CoastDown
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.impacts import shortest_flight
-from rotordrop.report.waterfall_page import bode_figure, polar_figure, waterfall_figure, waterfall_page
+from rotordrop.report.waterfall_page import bode_figure, polar_figure, waterfall_figure
 from rotordrop.spectrum.candidates import order_candidates
 from rotordrop.spectrum.coast_down import analyse_coast_down
 from rotordrop.spectrum.indentation import (
@@ -17,9 +16,7 @@ from rotordrop.spectrum.indentation import (
     displacement_history,
     find_settling,
     held_maximum,
-    settling_words,
 )
-from rotordrop.spectrum.speed import exact_speed_profile
 from rotordrop.units import GRAVITY
 
 AMPLITUDES = {0.5: 1.5e-6, 1.0: 6e-6, 1.5: 2e-6, 2.0: 4e-6, 2.5: 3e-6, 3.0: 2.5e-6}
@@ -35,29 +32,13 @@ def analysis():
     return analyse_coast_down(signal, order_candidates())
 
 
-def test_every_order_to_three_is_followed_halves_included_and_hops_are_no_lasting_contact(analysis):
+def test_every_order_to_three_is_followed_halves_included(analysis):
     track = analysis.planes["DE"].track
     assert track is not None
     assert track.orders == pytest.approx(list(AMPLITUDES))
     for order, amplitude in AMPLITUDES.items():
         read = track.major_axis[:, track.of(order)]
         assert np.median(read) == pytest.approx(amplitude, rel=0.02), order
-    labels = [one.label for one in waterfall_page(analysis, title="hops", drawn=False).cards[0].figures]
-    assert "Mostly in contact from" in labels and "In contact from" not in labels
-
-
-def test_the_speeds_a_record_covers_are_said_first(analysis):
-    """Of a record that ends turning it was said that the first 0.2 s held the maximum, and no more."""
-    first = waterfall_page(analysis, title="ends").verdict[0]
-    ends = analysis.signal.profile.speed_at(25.0) / TURN
-    assert first.level == "warning" and f" to {ends:.2f} Hz" in first.text
-    assert first.text.startswith("The record covers the 25.0 s after power-off, from ")
-    assert "ends before standstill" in first.text
-    time = np.linspace(0.0, 40.0, 41)
-    down = exact_speed_profile(time, np.maximum(400.0 - 20.0 * time, 0.0))
-    stopped = replace(analysis.signal, profile=down)
-    first = waterfall_page(replace(analysis, signal=stopped), title="stands").verdict[0]
-    assert first.level == "notice" and first.text.endswith(" to standstill.")
 
 
 def test_the_name_of_an_order_at_the_right_edge_stands_within(analysis):
@@ -88,16 +69,6 @@ def test_the_document_holds_the_numbers_put_in(analysis):
     for fall in plane["waterfalls"]:
         assert len(fall["frequency_hz"]) == len(fall["rms_over_frames_m"])
         assert fall["resolution_hz"] == pytest.approx(1000.0 / fall["points"])
-
-
-def test_a_signal_of_a_few_turns_says_what_its_orders_cannot_tell():
-    down = CoastDown(sampling_rate=5000.0, duration=0.3, noise=0.1e-6)
-    down.xy += 20e-6 * np.column_stack([np.cos(down.angle), np.sin(down.angle)])
-    found = analyse_coast_down(down.signal(), ())
-    assert found.as_json()["planes"]["DE"]["orders"]["turns_per_window"] == 6.0
-    page = waterfall_page(found, title="short")
-    (section,) = (one for one in page.sections if one.heading == "Orders and resonances")
-    assert any("over 6 turns in place of 24" in said.text for said in section.statements)
 
 
 def test_bode_and_polar_plots_draw_the_vectors_put_in():
@@ -147,16 +118,13 @@ def test_maxima_are_found_early_and_late_and_told():
     assert found.largest_time == pytest.approx(0.03)
     assert found.largest_indentation == pytest.approx(35e-6)
     assert held_maximum(found)
-    assert "the first 0.2 s held the largest displacement" in found.statement
     assert found.noise == pytest.approx(0.4e-6, rel=0.1)
     xy = swing()
     xy[30000] = [200e-6, -260e-6]
     found = displacement_history(xy, FS, air_gap=GAP, start_time=0.01, error=4e-6)
     assert found.largest_time == pytest.approx(6.01)
-    assert "328 ± 7 µm (+48 ± 9 µm beyond the air gap) at 6.01 s; later" in found.statement
-    assert "at most 328 ± 7 µm (at 6.01 s)" in found.statement
+    assert "328 ± 7 µm (+48 ± 9 µm beyond the air gap) at 6.0100 s" in found.statement
     assert not held_maximum(found)
-    assert "did not hold the largest displacement" in found.statement
 
 
 def test_short_records_and_differences_within_the_noise_are_left_open_and_empty_ones_refused():
@@ -165,7 +133,6 @@ def test_short_records_and_differences_within_the_noise_are_left_open_and_empty_
     text = found.statement
     assert "leaves open" in text if found.largest_time <= 0.2 else "did not hold" in text
     found = displacement_history(swing(0.1), FS, air_gap=GAP)
-    assert "ends within 0.2 s" in found.statement
     assert np.isnan(found.largest_later)
     with pytest.raises(RecordError, match="1 samples, at least 2"):
         displacement_history(np.zeros((1, 2)), FS, air_gap=GAP)
@@ -218,12 +185,9 @@ def test_impacts_are_flights_that_end_and_contact_lasts_from_the_last():
     assert found.contact_from == found.touched[-1]
     low, high = found.count_interval_90
     assert low <= len(after_flights(landings)) <= high
-    told = settling_words(found, xy, FS)
-    assert f"{len(found.touched)} impacts (90 %: {low} to {high}) by the displacement alone, the last" in told
     assert found.contact_from_interval_90 is not None
     early, late = found.contact_from_interval_90
     assert early < after_flights(landings)[-1] - 0.1 < late
-    assert f"({early:.4f} s to {late:.4f} s), mostly in contact from then on" in told
 
 
 def test_late_impacts_count_and_rotors_that_hop_do_not_settle():
@@ -242,5 +206,4 @@ def test_late_impacts_count_and_rotors_that_hop_do_not_settle():
     assert len(found.touched) > 5
     assert found.contact_from is None
     assert found.contact_from_interval_90 is None
-    assert "did not settle" in settling_words(found, xy, FS)
     assert len(find_settling(swing(noise=0.4e-6), FS, air_gap=GAP).touched) <= 1

