@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Rule
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.ends import held_bearings
@@ -40,6 +42,8 @@ NOISE_FLOOR = 0.1e-6
 DEFAULT_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
 """How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
+TAIL_PASSES = 3
+"""Times that what the tail says is linearised [1]."""
 WATCHED = 8
 """Functions that are watched of a bearing, see `DropProblem.watched_rows`."""
 SMOOTHED_FRICTION_SPEED = 0.15
@@ -376,67 +380,75 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
 
     Vertically the rotor rests where gap and sag put it; horizontally it may be held aside by friction.
     """
-    start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
     # Noise slower than the levitated part moves the zero until the tail; it is taken to be as large as the
     # slowest part of what is seen there, as that of 1/f noise is.
-    form, wander = problem.sensor_form, np.zeros(n_c)
+    form, wander = problem.sensor_form, np.zeros(problem.n_channels)
     wander[form.noisy[::-1]] = form.noise_variance[::-1]
-    theta = mean[problem.parameter_slice].copy()
-    angles = np.array([float(sensor.angle) for sensor in problem.model.machine.sensors])
-    axes = np.array([np.cos(angles), np.sin(angles)])
-    place = settled_displacement(problem, theta)
-    slopes = np.zeros((n_c, n_p))
-    for k in range(n_p):
-        kinds = problem.targets.target[problem.targets.target[:, 0] == k, 1]
-        if P.ON_BEARING not in kinds and P.ON_LOAD not in kinds:
-            continue
-        trial = theta.copy()
-        trial[k] += problem.targets.step[k]
-        moved = settled_displacement(problem, trial) - place
-        slopes[:, k] = np.sum(axes * moved, axis=0) / problem.targets.step[k]
-    model = problem.model
-    gap = smallest_gap(model.machine)
+    bearings = problem.model.machine.touchdown_bearings
+    gap = smallest_gap(problem.model.machine)
     # on which place of its landing sleeves a rotor comes to rest is anybody's guess
-    reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in model.machine.touchdown_bearings)
-    nodes = np.array([sensor.node for sensor in model.machine.sensors])
+    reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in bearings)
+    weights, sigma = _tail_combinations(problem.model.machine.sensors, tail_level)
+    R = np.diag((sigma * gap) ** 2 + reach**2 + weights**2 @ wander)
+    observed, prior = weights @ np.nan_to_num(tail_level), mean.copy()
+    # Gain times gap and the sag under the weight are no straight lines; the second time is near enough.
+    for _ in range(TAIL_PASSES):
+        level, slopes = _rest_readings(problem, mean)
+        H = weights @ slopes
+        shown = H @ covariance
+        K = np.linalg.solve(shown @ H.T + R, shown).T
+        mean[:] = prior + K @ (observed - weights @ level - H @ (prior - mean))
+    covariance -= K @ shown
+
+
+def _rest_readings(problem: DropProblem, mean: Array) -> tuple[Array, Array]:
+    """Readings of the settled rotor [m], shape (C,), and their slopes by an estimate, shape (C, n)."""
+    start, n_p, n_c = problem.n_dynamic, len(problem.unknowns), problem.n_channels
+    gain, offset = (slice(start + n_p + k * n_c, start + n_p + (k + 1) * n_c) for k in range(2))
+    theta, model = mean[problem.parameter_slice].copy(), problem.model
+    angles = np.array([float(sensor.angle) for sensor in model.machine.sensors])
+    axes, slopes = np.array([np.cos(angles), np.sin(angles)]), np.zeros((n_c, len(mean)))
+    place = settled_displacement(problem, theta)
+    along, growth = np.sum(axes * place, axis=0), 1.0 + mean[gain]
+    for k, step in enumerate(problem.targets.step):
+        kinds = problem.targets.target[problem.targets.target[:, 0] == k, 1]
+        if P.ON_BEARING in kinds or P.ON_LOAD in kinds:
+            trial = theta.copy()
+            trial[k] += step
+            moved = settled_displacement(problem, trial) - place
+            slopes[:, start + k] = growth * np.sum(axes * moved, axis=0) / step
+    for c in range(n_c):
+        for k, per_unit in rest_terms(model, problem.unknowns, c, float(place[1, c])):
+            along[c] += theta[k] * per_unit
+            slopes[c, start + k] += growth[c] * per_unit
+    slopes[:, gain], slopes[:, offset] = np.diag(along), np.eye(n_c)
+    return growth * along + mean[offset], slopes
+
+
+def _tail_combinations(sensors: Sequence[Sensor], tail_level: Array) -> tuple[Array, Array]:
+    """Weights of the readings in what the tail says, shape (K, C), and how far the resting rotor may be from
+    what it predicts, over the air gap [1], shape (K,).
+
+    Two directions of a plane give the height and what friction may hold the rotor aside; a single one sees a
+    mixture.
+    """
+    angles, nodes = (np.array([float(getattr(one, of)) for one in sensors]) for of in ("angle", "node"))
+    weights, sigma = [np.zeros((0, len(sensors)))], [np.zeros(0)]
     for node in np.unique(nodes):
         chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
         if len(chosen) == 0:
             continue
-        for weights, sigma in _tail_combinations(angles[chosen]):
-            row = np.zeros(len(mean))
-            predicted, observed = 0.0, 0.0
-            for weight, c in zip(weights, chosen, strict=True):
-                along = float(axes[:, c] @ place[:, c])
-                for k, per_unit in rest_terms(model, problem.unknowns, int(c), float(place[1, c])):
-                    along += theta[k] * per_unit
-                    row[start + k] += weight * (1.0 + mean[start + n_p + c]) * per_unit
-                growth = 1.0 + mean[start + n_p + c]
-                predicted += weight * (growth * along + mean[start + n_p + n_c + c])
-                observed += weight * tail_level[c]
-                row[start + n_p + c] += weight * along
-                row[start + n_p + n_c + c] += weight
-                row[problem.parameter_slice] += weight * growth * slopes[c]
-            variance = (sigma * gap) ** 2 + reach**2 + float(weights**2 @ wander[chosen])
-            shown = covariance @ row
-            size = variance + float(row @ shown)
-            covariance -= np.outer(shown, shown) / size
-            mean += shown * ((observed - predicted) / size)
-
-
-def _tail_combinations(angles: Array) -> list[tuple[Array, float]]:
-    """Weights of the readings of one plane and how far the resting rotor may be from what they predict.
-
-    Distances are over the air gap [1]. Two directions give the height and what friction may hold the rotor
-    aside; a single one sees a mixture.
-    """
-    directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    if np.linalg.matrix_rank(directions, tol=0.05) == 2:
-        sideways, height = np.linalg.pinv(directions)
-        return [(height, TAIL_VERTICAL_SIGMA), (sideways, TAIL_HORIZONTAL_SIGMA)]
-    spread = np.hypot(directions[:, 0] * TAIL_HORIZONTAL_SIGMA, directions[:, 1] * TAIL_VERTICAL_SIGMA)
-    aligned = np.sign(directions @ directions[0])
-    return [(aligned / len(angles), float(np.mean(spread)))]
+        directions = np.column_stack([np.cos(angles[chosen]), np.sin(angles[chosen])])
+        if np.linalg.matrix_rank(directions, tol=0.05) == 2:
+            rows, own = np.linalg.pinv(directions)[::-1], [TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA]
+        else:
+            rows = np.sign(directions @ directions[0])[None] / len(chosen)
+            spread = np.hypot(*(directions * (TAIL_HORIZONTAL_SIGMA, TAIL_VERTICAL_SIGMA)).T)
+            own = [float(np.mean(spread))]
+        weights.append(np.zeros((len(rows), len(sensors))))
+        weights[-1][:, chosen] = rows
+        sigma.append(np.array(own))
+    return np.concatenate(weights), np.concatenate(sigma)
 
 
 _KIND_OF_ARRAY = {
