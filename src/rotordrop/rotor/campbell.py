@@ -70,12 +70,12 @@ class CampbellDiagram:
         return direction_name(float(np.nanmean(self.whirl[:, line])))
 
 
-@one_thread()
 def speed_grid(machine: Machine, highest: float | None = None) -> Array:
     """Speeds of a Campbell diagram from standstill to the highest [rad/s], shape (S,)."""
     return np.linspace(0.0, highest or BEYOND_NOMINAL * float(machine.speed.nominal), SPEEDS)
 
 
+@one_thread()
 def campbell_diagram(
     machine: Machine, speeds: ArrayLike, suspension: str = "touchdown bearings", *, count: int = 10
 ) -> CampbellDiagram:

@@ -42,8 +42,6 @@ NOISE_FLOOR = 0.1e-6
 DEFAULT_NOISE = 1e-6
 TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA = 2.8e-3, 0.1
 """How far the resting rotor may be from where gap and sag put it, over the air gap [1]."""
-TAIL_PASSES = 3
-"""Times that what the tail says is linearised [1]."""
 WATCHED = 8
 """Functions that are watched of a bearing, see `DropProblem.watched_rows`."""
 SMOOTHED_FRICTION_SPEED = 0.15
@@ -384,15 +382,13 @@ def apply_tail(problem: DropProblem, tail_level: Array, mean: Array, covariance:
     # slowest part of what is seen there, as that of 1/f noise is.
     form, wander = problem.sensor_form, np.zeros(problem.n_channels)
     wander[form.noisy[::-1]] = form.noise_variance[::-1]
-    bearings = problem.model.machine.touchdown_bearings
-    gap = smallest_gap(problem.model.machine)
+    machine = problem.model.machine
     # on which place of its landing sleeves a rotor comes to rest is anybody's guess
-    reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in bearings)
-    weights, sigma = _tail_combinations(problem.model.machine.sensors, tail_level)
-    R = np.diag((sigma * gap) ** 2 + reach**2 + weights**2 @ wander)
+    reach = max(bearing.landing_sleeve.reach_at_rest() for bearing in machine.touchdown_bearings)
+    weights, sigma = _tail_combinations(machine.sensors, tail_level)
+    R = np.diag((sigma * smallest_gap(machine)) ** 2 + reach**2 + weights**2 @ wander)
     observed, prior = weights @ np.nan_to_num(tail_level), mean.copy()
-    # Gain times gap and the sag under the weight are no straight lines; the second time is near enough.
-    for _ in range(TAIL_PASSES):
+    for _ in range(3):  # gain times gap and the sag under the weight are no straight lines
         level, slopes = _rest_readings(problem, mean)
         H = weights @ slopes
         shown = H @ covariance
@@ -426,29 +422,23 @@ def _rest_readings(problem: DropProblem, mean: Array) -> tuple[Array, Array]:
 
 
 def _tail_combinations(sensors: Sequence[Sensor], tail_level: Array) -> tuple[Array, Array]:
-    """Weights of the readings in what the tail says, shape (K, C), and how far the resting rotor may be from
-    what it predicts, over the air gap [1], shape (K,).
+    """Weights of readings, shape (K, C), and how far a resting rotor may be from them, over the gap, (K,).
 
-    Two directions of a plane give the height and what friction may hold the rotor aside; a single one sees a
-    mixture.
+    Two directions of a plane give what friction may hold the rotor aside and the height; one sees a mixture.
     """
     angles, nodes = (np.array([float(getattr(one, of)) for one in sensors]) for of in ("angle", "node"))
-    weights, sigma = [np.zeros((0, len(sensors)))], [np.zeros(0)]
+    weights, sigma = np.zeros((0, len(sensors))), []
     for node in np.unique(nodes):
-        chosen = np.flatnonzero((nodes == node) & np.isfinite(tail_level))
-        if len(chosen) == 0:
-            continue
-        directions = np.column_stack([np.cos(angles[chosen]), np.sin(angles[chosen])])
+        chosen = (nodes == node) & np.isfinite(tail_level)
+        directions = np.column_stack([np.cos(angles), np.sin(angles)]) * chosen[:, None]
         if np.linalg.matrix_rank(directions, tol=0.05) == 2:
-            rows, own = np.linalg.pinv(directions)[::-1], [TAIL_VERTICAL_SIGMA, TAIL_HORIZONTAL_SIGMA]
-        else:
-            rows = np.sign(directions @ directions[0])[None] / len(chosen)
-            spread = np.hypot(*(directions * (TAIL_HORIZONTAL_SIGMA, TAIL_VERTICAL_SIGMA)).T)
-            own = [float(np.mean(spread))]
-        weights.append(np.zeros((len(rows), len(sensors))))
-        weights[-1][:, chosen] = rows
-        sigma.append(np.array(own))
-    return np.concatenate(weights), np.concatenate(sigma)
+            weights = np.vstack([weights, np.linalg.pinv(directions)])
+            sigma += [TAIL_HORIZONTAL_SIGMA, TAIL_VERTICAL_SIGMA]
+        elif chosen.any():
+            own = directions[chosen]
+            weights = np.vstack([weights, np.sign(directions @ own[0]) / len(own)])
+            sigma.append(float(np.mean(np.hypot(*(own * (TAIL_HORIZONTAL_SIGMA, TAIL_VERTICAL_SIGMA)).T))))
+    return weights, np.array(sigma)
 
 
 _KIND_OF_ARRAY = {
