@@ -248,6 +248,18 @@ def test_the_tail_ties_gap_and_offset(loose):
     assert np.linalg.eigvalsh(covariance / np.outer(unit, unit))[0] > -1e-8
 
 
+def test_a_tail_far_from_the_guessed_gaps_is_met_at_both_ends(loose):
+    """Each plane sees both gaps: what the one has moved the other one begins with."""
+    angles = np.array([float(sensor.angle) for sensor in loose.model.machine.sensors])
+    lower = height_at_sensors(loose, loose.mean[loose.parameter_slice]) - 40e-6 * np.sin(angles)
+    mean, covariance = loose.mean.copy(), loose.covariance.copy()
+    apply_tail(loose, lower, mean, covariance)
+    first, n_c = loose.n_dynamic + len(loose.unknowns), loose.n_channels
+    gain, offset = mean[first : first + n_c], mean[first + n_c : first + 2 * n_c]
+    told = (1.0 + gain) * height_at_sensors(loose, mean[loose.parameter_slice]) + offset
+    assert np.abs(told - lower).max() < 0.2e-6, told - lower
+
+
 def test_the_tail_says_less_of_a_gap_where_a_landing_sleeve_may_be_oval(lp400, prepared, loose):
     oval = {
         f"{b.name}.landing_sleeve.oval": Known(value=20e-6, status="guess") for b in lp400.touchdown_bearings
