@@ -72,18 +72,9 @@ def test_the_ranking_is_the_one_of_the_severity_package():
     assert "600.0 N" in table.note
 
 
-def test_without_an_interval_there_is_no_ranking_and_the_page_says_why():
+def test_without_an_interval_there_is_no_ranking():
     content = compare_page((DROPS[0], drop("d", 150, 3500, 3900, half=None)))
-    why = "NDE peak bearing force, DE peak bearing force: not every drop states an interval"
-    assert any(statement.text.startswith(why) for statement in content.verdict)
     assert not [t for t in content.sections[0].tables if "bearing force" in t.caption]
-
-
-def test_warnings_and_simulated_records_are_named():
-    content = compare_page(DROPS)
-    assert content.simulated == "Simulated records: a."
-    warnings = [statement.text for statement in content.verdict if statement.level == "warning"]
-    assert warnings == ["c: the tail does not reach standstill"]
 
 
 def test_points_and_intervals_of_the_figure_are_the_numbers():
@@ -100,14 +91,9 @@ def test_an_estimate_beside_its_record_is_shown_but_takes_no_part_in_the_ranking
     drops = (*DROPS, marked("lost", consistent=False))
     assert rankings(drops, ("NDE", "DE"), {})["DE", "peak_force_N"].names == ("c", "a", "b")
     content = compare_page(drops)
-    first = content.verdict[0]
-    assert first.level == "bad"
-    assert first.text.startswith("lost is left out of the ranking: its model is not consistent with")
-    assert "NDE 8\u202f850 to 9\u202f150 N" in first.text
-    assert content.screen.rows[6][0] == "lost (not consistent with its record)"
+    assert content.verdict[0].level == "bad"
+    assert "NDE 8\u202f850 to 9\u202f150 N" in content.verdict[0].text
     assert rankings(drops[2:], ("NDE", "DE"), {}) == {}
-    said = [statement.text for statement in compare_page(drops[2:]).verdict]
-    assert any("fewer than two drops are left to rank" in text for text in said)
 
 
 def test_of_an_estimate_beside_its_record_ranges_alone_are_shown():
@@ -157,15 +143,7 @@ def test_machines_are_never_mixed_unsaid():
     one, *others = (another(drop, machine="LP-400") for drop in DROPS)
     assert not any("machines" in s.text for s in compare_page((one, *others)).verdict)
     mixed = compare_page((another(one, machine="HP-90"), *others))
-    (said,) = (s for s in mixed.verdict if "machines" in s.text)
-    assert said.level == "warning"
-    assert said.text.startswith("These are drops of 2 machines, HP-90: a; LP-400: b, c")
-
-
-def test_no_limit_given_is_said_and_a_limit_is_judged():
-    assert compare_page(DROPS).verdict[-1].text.startswith("No limit given")
-    said = compare_page(DROPS, limits={"peak_force_N": 4000.0}).verdict[0]
-    assert said.level == "bad" and "passed by c at DE" in said.text
+    assert [s.level for s in mixed.verdict if "machines" in s.text] == ["warning"]
 
 
 def test_the_ranking_says_how_much_worse_than_the_next():
@@ -173,7 +151,6 @@ def test_the_ranking_says_how_much_worse_than_the_next():
     sigma = 150.0 / 1.6448536
     assert_allclose(ranked.worse_than_next[0], ndtr(600.0 / (2**0.5 * sigma)), rtol=1e-6)
     assert_allclose(ranked.worse_than_next[1], ndtr(300.0 / (2**0.5 * sigma)), rtol=1e-6)
-    assert "it was worse than a with" in ranked.statement
 
 
 def test_severity_of_a_document_is_compared_with_its_worst_impact():

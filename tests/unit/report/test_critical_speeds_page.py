@@ -50,14 +50,6 @@ def test_a_mode_further_off_or_against_the_spin_is_none(told):
     assert problems(*told) == []
 
 
-def test_the_verdict_stands_first_and_says_that_nothing_is_too_near():
-    first, *others = page(0.83).verdict
-    assert first.level == "good" and "no critical speed is nearer" in first.text
-    assert {one.level for one in others} == {"notice"}
-    levels = [one.level for one in page(0.997).verdict]
-    assert levels[0] == "bad" and "good" not in levels
-
-
 @pytest.mark.parametrize(
     ("held", "machine"),
     [("free-free", "small"), ("touchdown bearings", "small"), ("AMBs", "lp400")],
@@ -71,7 +63,6 @@ def test_no_margin_is_judged_where_no_standard_asks_for_one(held, machine):
     assert ("assumed 40 Hz" in table.rows[0][0]) == (held == "AMBs")
     warned = [one.text for one in shown.verdict if one.level == "warning"]
     assert len(warned) == (held == "AMBs")
-    assert all("gives no stiffness and damping of the AMBs NDE, DE" in text for text in warned)
 
 
 def test_a_margin_stands_beside_forward_critical_speeds_in_given_ambs():

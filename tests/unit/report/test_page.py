@@ -84,7 +84,6 @@ def test_the_page_loads_nothing_from_anywhere_and_says_its_numbers():
     assert 'plotlyServerURL: ""' in own and "showSendToCloud: false" in own
     text = " ".join(reader.text)
     assert "3\u202f333\u00a0N" in text and "90\u00a0%: 3\u202f180 to 3\u202f490\u00a0N" in text
-    assert "This record is simulated." in text
 
 
 def test_the_policy_lets_exactly_the_two_own_scripts_run():

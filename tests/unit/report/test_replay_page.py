@@ -19,7 +19,6 @@ from rotordrop.report.estimate_page import (
     friction_sweep_figure,
     window_table,
 )
-from rotordrop.report.page import render_page
 from rotordrop.report.quantity import Quantity
 
 GAPS = np.array([275e-6, 285e-6])
@@ -76,9 +75,6 @@ def test_headline_route_warnings_and_horizon(drop):
     assert (max(lower.y), lower.y[0], lower.y[-1]) == pytest.approx(
         (radius.max(), radius[0], radius[-1]), rel=1e-6
     )
-    html = render_page(content)
-    for figure in ("Figs 7, 8 and 13", "Fig. 10", "Fig. 12", "Fig. 14", "Fig. 15", "Fig. 16"):
-        assert figure in html
 
 
 def test_agreement_states_the_distances_of_the_windows(agreement):
@@ -110,7 +106,6 @@ def test_a_bounce_has_its_height_above_the_rest():
 
 def test_table_3_has_the_paper_s_value_and_the_corrected_one():
     table = first_contact_table(("NDE",), (CONTACT,))
-    assert table.note.startswith("Standard error of t₁ and t₂: ")
     texts = [cell.text if isinstance(cell, Quantity) else cell for cell in table.rows[0]]
     assert texts[:5] == ["NDE", "7.500 ms", "9.500 ms", "2.00 ms", "15.2 µm"]
     assert texts[5:] == ["17.80 kg", "43.9 N/µm", "31.0 N/µm"]
@@ -126,13 +121,11 @@ def test_confounded_parameters_are_called_so():
     ]
 
 
-def test_supports_of_an_earlier_estimate_are_named_with_their_file(drop):
+def test_supports_of_an_earlier_estimate_have_no_friction_sweep(drop):
     steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations=())
     content = estimate_page(replace(drop, replay=steps))
-    assert "taken from drop_060.json" in section(content, "Parameters").text[0]
     drawn = [len(section(page, "Parameters").figures) for page in (content, estimate_page(drop))]
     assert drawn == [1, 2]  # without the friction sweep, and with it
-    assert ("method", "replay with the supports of drop_060.json") in section(content, "Record").facts
 
 
 def test_the_friction_sweep_marks_best_and_interval():

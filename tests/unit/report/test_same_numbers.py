@@ -160,12 +160,6 @@ def test_the_unit_of_a_column_stands_in_its_heading_alone(page, system):
     assert above > 8
 
 
-def test_verdict_and_sentences_stand_in_the_report(page, report):
-    assert report.index(unbroken(page.verdict[0].sentence)) < report.index(page.cards[0].title)
-    for statement in page.verdict:
-        assert unbroken(statement.sentence) in report
-
-
 def test_the_other_units_are_the_same_numbers(page):
     compared = 0
     for number in numbers(page):

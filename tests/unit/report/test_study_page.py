@@ -13,7 +13,7 @@ from tests.unit.web.conftest import browser as browser
 from rotordrop.machine import example_machine
 from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.study_page import SHARES, spoken_value, study_page
+from rotordrop.report.study_page import SHARES, study_page
 from rotordrop.study.plan import read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import StudyResults, quantile
@@ -53,7 +53,6 @@ def page(results):
 
 
 def test_what_matters_stands_first_in_words_and_in_one_table(page):
-    assert [section.heading for section in page.sections] == ["What matters", "Distribution", "All quantiles"]
     (found,) = page.sections[0].tables
     assert found.rows[0][0] == "dynamic friction coefficient, every bearing"
     assert found.columns[1:3] == ("NDE peak force", "NDE peak stress")
@@ -76,13 +75,7 @@ def test_the_histogram_counts_every_drop_and_the_curve_passes_the_quantiles(page
     assert_allclose(lines, [quantile(values, share).value for share in SHARES])
 
 
-def test_the_verdict_begins_with_the_loads_and_whirl_that_never_was_is_one_line(page, results):
-    rare = page.summary[0].rows[0][3]
-    first = page.verdict[0].text
-    assert first.startswith("NDE: 99 % of the drops stay below a peak force of ")
-    assert rare.text in first and rare.interval_text in first
-    assert page.verdict[1].text.startswith("DE: 99 % of the drops")
-    assert sum("whirl" in one.text for one in page.verdict) == 1
+def test_whirl_that_never_was_has_no_figure(results):
     share = np.where(np.arange(DROPS) == 7, 0.4, 0.0)
     whirled = replace(results, numbers={**results.numbers, "NDE.backward_whirl": share})
     never, once = (study_page(one, ["speed"]) for one in (results, whirled))
@@ -117,18 +110,6 @@ def test_at_most_five_lines_stand_beside_the_verdict_each_with_its_interval(page
     assert len(cells) == len(summary.rows) * len(SHARES)
     assert all(cell.interval_90 is not None for cell in cells)
     assert not any(math.isnan(cell.value) for cell in cells)
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("rotor_angle", "rotor angle"),
-        ("NDE.support.stiffness", "support stiffness, NDE"),
-        (FRICTION, "dynamic friction coefficient, every bearing"),
-    ],
-)
-def test_a_varied_value_is_named_in_words(name, words):
-    assert spoken_value(example_machine("lp400"), name) == words
 
 
 def test_against_a_value_every_drop_is_a_point(results):

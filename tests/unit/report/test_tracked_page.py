@@ -10,15 +10,12 @@ from tests.unit.report.conftest import section
 from tests.unit.report.test_tables import check
 
 from rotordrop.estimate.bearing_drop import Origin
-from rotordrop.estimate.document import estimate_document, published_drop
+from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import LaterMotion
-from rotordrop.evidence.quality.finding import Finding
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page
 from rotordrop.report.page import render_page
-from rotordrop.report.restart_page import restart_page
-from rotordrop.restart import restart_card
 from rotordrop.track.consistency import Check
 
 
@@ -62,23 +59,6 @@ def test_the_first_contact_is_the_first_impact(estimate):
         assert 5e-6 < contact.indentation < 60e-6
 
 
-def test_checks_findings_and_warnings_are_on_the_page(estimate, page):
-    finding = Finding(kind="hum", message="50 Hz hum", remedy="ground", severity="warning", channel="S_DE_B")
-    told = replace(
-        estimate, findings=(finding,), warnings=("no tail", "50 Hz hum"), notes=("unbalance of 3 g mm",)
-    )
-    content = estimate_page(told)
-    texts = [one.text for one in (*content.verdict, *section(content, "Checks").statements)]
-    assert texts[0] == estimate.sentence and {"no tail", "unbalance of 3 g mm"} <= {*texts}
-    assert sum("50 Hz hum" in text for text in texts) == 1
-    other = [statement.text for statement in estimate_page(replace(told, warnings=())).verdict]
-    assert "Channel S_DE_B: 50 Hz hum" in other
-    names = [row[0] for row in section(page, "Checks").tables[0].rows]
-    assert names == [item.name for item in estimate.checks]
-    headings = [section.heading for section in page.sections]
-    assert headings.index("Bearing force") < headings.index("Parameters") < headings.index("Record")
-
-
 def beside(estimate, verdict, origin):
     """The estimate as it would look had the model not fitted the record."""
 
@@ -95,21 +75,16 @@ def beside(estimate, verdict, origin):
 def test_an_estimate_beside_its_record_shows_ranges_and_no_single_number(estimate):
     shown = estimate_page(beside(estimate, Verdict.WIDENED, Origin.TWIN))
     first = shown.verdict[0]
-    assert first.level == "bad" and "9.00 × expected" in first.text
-    assert first.text.startswith("The model does not follow the record.")
+    assert first.level == "bad"
     for figure in (one for card in shown.cards for one in card.figures):
         ranged = r"–|[\d\u202f.]+ to [\d\u202f.]+ (N|MPa)"
         assert re.fullmatch(ranged, figure.value.text)
         assert figure.value.interval_text == "" and "at " not in figure.note
         assert figure.value.text == "–" or figure.value.interval_90[0] <= figure.value.interval_90[1]
-    html = render_page(shown)
-    assert html.index("does not follow the record") < html.index('class="cards"')
 
 
 def test_loads_of_the_cross_check_are_called_so(estimate):
     replaced = beside(estimate, Verdict.REPLACED, Origin.CROSS_CHECK)
-    called = "touchdown bearing, by the independent cross-check"
-    assert all(card.title.endswith(called) for card in estimate_page(replaced).cards)
     document = estimate_document(replaced)
     assert document["consistent"] is False and document["verdict"] == Verdict.REPLACED.value
     assert document["bearings"]["DE"]["origin"] == "independent cross-check"
@@ -133,9 +108,6 @@ def test_a_later_and_larger_motion_is_a_warning_in_page_and_document(estimate):
     assert any("23.0 µm further out at 559 ms" in text for text in said)
     (entry,) = estimate_document(told)["later_motion"]
     assert entry["larger"] is True and entry["later_time"] == 0.559
-    same = later.model_copy(update={"later": 311e-6, "larger": False})
-    quiet = estimate_page(replace(estimate, later=(same,)))
-    assert any("later motion is smaller" in one.text for one in section(quiet, "Checks").statements)
 
 
 def test_no_colour_is_a_row_of_numbers_and_no_axis_matches_itself(estimate):
@@ -154,26 +126,6 @@ def test_no_colour_is_a_row_of_numbers_and_no_axis_matches_itself(estimate):
                 follows = layout[f"{follows[0]}axis{follows[1:]}"].get("matches")
 
 
-def test_a_failed_check_names_its_unknown_as_the_tables_do(estimate):
-    path, message = "DE.support.stiffness", "departs by 13.7 prior standard deviations"
-    failed = Check(name="parameters", passed=False, message=message, path=path)
-    told = replace(estimate, checks=(failed,), verdict=Verdict.WIDENED)
-    page = estimate_page(told)
-    assert "DE: support stiffness departs by 13.7" in page.verdict[0].text
-    assert "DE.support" not in page.verdict[0].text
-    assert "DE.support.stiffness departs by 13.7" in told.sentence
-    assert section(page, "Checks").tables[0].rows[0][2] == f"DE: support stiffness {message}"
-
-
-def test_the_event_is_written_as_a_person_would(estimate):
-    record = replace(estimate.record, metadata={"event_time": "2019-10-16T13:42:07.250000Z"})
-    content = estimate_page(replace(estimate, record=record))
-    assert dict(section(content, "Record").facts)["event"] == "2019-10-16 13:42:07 UTC"
-    assert "2019-10-16 13:42" in content.subtitle
-    machine = estimate.machine.model_copy(update={"serial_number": "4711"})
-    assert "serial number 4711" in estimate_page(replace(estimate, machine=machine)).subtitle
-
-
 def test_every_curve_is_drawn_once(estimate, page):
     assert [section.heading for section in page.sections[: page.lead]] == ["Bearing force", "Orbit"]
     html = render_page(page)
@@ -185,35 +137,12 @@ def test_every_curve_is_drawn_once(estimate, page):
     assert [one.heading for one in page.sections[page.lead :] if one.folded] == parts.split(",")
     assert html.count("<details") == 7
     assert [len(section(page, name).figures) for name in ("Bearing force", "Motion at the sensors")] == [1, 2]
-    assert "last bearing" not in html and "first bearing" not in html
-    assert "from DE towards NDE" in html and "where it hit the race, seen from DE" in html
-
-
-def test_warnings_stand_open_and_every_note_in_a_part_as_a_sentence(estimate):
-    notes = tuple(f"note {number}" for number in range(9))
-    content = estimate_page(replace(estimate, notes=notes, warnings=("no tail",)))
-    assert "no tail" in [one.text for one in content.grave] and not content.notes
-    html = render_page(content)
-    assert (
-        html.index("No tail.") < html.index('id="section-1"') < html.index("Note 0.") < html.index("Note 8.")
-    )
 
 
 def test_a_report_stays_under_two_thousand_words(estimate, page):
     html = re.sub(r"<(script|style|nav|noscript)\b.*?</\1>", " ", render_page(page), flags=re.DOTALL)
     words = [word for word in re.sub(r"<[^>]+>", " ", html).split() if re.search("[A-Za-z]", word)]
     assert 500 < len(words) < 2000
-
-
-def test_the_page_speaks_of_what_its_reader_can_do(estimate, page):
-    """Options and commands belong to the terminal."""
-    drop, said = published_drop(estimate), []
-    for content in (page, restart_page(restart_card(drop), drop)):
-        shown = [*content.sections, *([content.to_do] if content.to_do else [])]
-        said += [one.text for one in (*content.verdict, *(s for part in shown for s in part.statements))]
-        said += [text for part in shown for text in part.text]
-    assert len(said) > 25
-    assert not [text for text in said if re.search(r"--[a-z]|'rotordrop|TOML|[a-z]_[a-z]| = \{", text)]
 
 
 def test_what_is_estimated_has_its_interval_or_is_not_shown(estimate, page):
