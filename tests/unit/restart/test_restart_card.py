@@ -201,12 +201,6 @@ def test_unknown_checks_and_outcomes_are_named(checks, message):
         restart_card(drop(), checks=checks)
 
 
-@pytest.mark.parametrize("texts", [["turning"], ["lift=good", "lift=bad"]])
-def test_a_check_has_one_outcome(texts):
-    with pytest.raises(UsageError, match="expected its outcome, each once"):
-        pairs(texts, "its outcome")
-
-
 def test_the_checks_that_are_asked_for_are_those_of_the_package():
     assert tuple(KNOWN_CHECKS) == CHECKS
 
