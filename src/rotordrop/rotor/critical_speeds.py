@@ -82,7 +82,7 @@ def critical_speed_map(
     given = np.geomspace(*DEFAULT_STIFFNESS, 121) if stiffness is None else stiffness
     grid = numbers(given, "stiffness", finite=True)
     if grid.ndim != 1 or not len(grid) or not np.all(grid > 0.0):
-        raise UsageError("stiffness is no list of positive numbers [N/m]; expected one of the map at least.")
+        raise UsageError(f"stiffness {given} is no list of positive numbers [N/m]; give one at least")
     if loads is not None:
         loads = numbers(loads, "loads", (len(machine.touchdown_bearings),), finite=True).tolist()
     fe = build_rotor_fe(machine)

@@ -88,6 +88,7 @@ def test_a_file_with_pulses_gives_speed_marks_and_phase(tmp_path, capsys):
     profile = tmp_path / "recorder.toml"
     call = ["profile", str(path), "--pulses", "KPH", "-o", str(profile)]
     assert run([*call, *(f"--map={name}={name}" for name in record.channel_names)]) == 0
+    capsys.readouterr()
     assert run(["look", str(path), "--profile", str(profile), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)["synchronous"]
     assert len(found) == 2

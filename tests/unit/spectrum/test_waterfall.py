@@ -242,5 +242,5 @@ def test_wrong_records_are_refused():
         fit_speed_profile([0, 1, 2, 3, 4, 3, 6, 7, 8], np.ones(9))
     with pytest.raises(RecordError, match="3 valid recorded speeds"):
         fit_speed_profile([0.0, 1.0, 2.0], np.ones(3))
-    with pytest.raises(RecordError, match=r"0 recorded speeds between 100\.0000 s and the end"):
+    with pytest.raises(RecordError, match=r"0 recorded speeds between 100 s and the end"):
         fit_drag(TIME, np.ones(TIME.size), start=100.0)
