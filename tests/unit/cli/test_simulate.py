@@ -103,7 +103,7 @@ def test_a_drop_of_millions_of_steps_says_so_first_and_stops_on_ctrl_c(tmp_path)
 def test_a_lift_stands_in_json(tmp_path):
     save_machine(looped_machine(), tmp_path / "machine.toml")
     arguments = ["simulate", str(tmp_path / "machine.toml"), "--speed", "60 Hz", "--duration", "0.11 s"]
-    arguments += ["--levitated", "--delay", "5 ms", "--relevitate", "60 ms", "--output-step", "0.1 ms"]
+    arguments += ["--levitated", "--magnets=5 ms: off", "--magnets=60 ms: levitate", "--output-step=0.1 ms"]
     assert run([*arguments, "--json", str(tmp_path / "drop.json")]) == 0
     told = json.loads((tmp_path / "drop.json").read_text())["magnets"]
     assert [event["time_s"] for event in told["events"]] == [0.005, 0.06]
