@@ -24,7 +24,7 @@ def test_from_upload_by_keys_to_figures_and_again_after_a_reload(browser, server
     assert server.token not in browser.evaluate("location.href")
     send(browser, list(files.values()))
     browser.until(LOOKED)
-    browser.until("document.getElementById('status').innerText.includes('The rotor was released at')")
+    browser.until("document.getElementById('status').innerText.includes('Released at')")
     browser.size(820, 1180)  # a tablet: the tabs had begun below its screen
     browser.until("document.getElementById('tabpanel').getBoundingClientRect().top < innerHeight - 150")
     assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth")
@@ -171,7 +171,7 @@ def test_a_record_of_rest_is_offered_as_the_tail(browser, server, tmp_path, file
     browser.until("!document.getElementById('sending').open")
     send(browser, [files[role] for role in ("machine", "beside", "record")] + made[-1:])
     press(browser, "usetail")
-    browser.until("document.getElementById('status').innerText.includes('The rotor was released at')")
+    browser.until("document.getElementById('status').innerText.includes('Released at')")
     assert browser.evaluate("dropname.innerText === 'drop_060' && !document.getElementById('usetail')")
     (job,) = server.ask("GET", "/api/jobs").told["jobs"]
     assert job["files"]["tail"]["name"] == "measured_17.csv"
