@@ -144,8 +144,8 @@ class Description(BaseModel):
         return {}
 
     def __dir__(self) -> list[str]:
-        own = (name for name in vars(type(self)) if not name.startswith("_"))
-        return sorted({"changed", *type(self).model_fields, *own} - set(dir(Description)))
+        own = {name for name in dir(type(self)) if not name.startswith("_")} - set(dir(Description))
+        return sorted({"changed", *type(self).model_fields} | own)
 
     @property
     def further_states(self) -> tuple[int, ...]:

@@ -50,9 +50,14 @@ class Column:
         return f"{self.bearing} {self.quantity.replace('_', ' ')} [{self.unit}]"
 
 
+def finest_time(estimate: Estimate) -> Array:
+    """Times of the force that has the most [s], shape (T,): one of the cross-check has samples alone."""
+    return max((bearing.force.time for bearing in estimate.bearings), key=len)
+
+
 def history_columns(estimate: Estimate) -> tuple[Array, tuple[Column, ...]]:
     """Time from power-off [s], shape (T,), and every history of every bearing against it."""
-    time = estimate.bearings[0].force.time
+    time = finest_time(estimate)
     return time, tuple(
         column for bearing in estimate.bearings for column in _columns(bearing, estimate.machine, time)
     )

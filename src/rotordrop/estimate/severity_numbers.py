@@ -12,7 +12,7 @@ from rotordrop.elements.race_bearing import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
-from rotordrop.known import Known
+from rotordrop.known import Known, Status
 from rotordrop.severity.fatigue import fatigue_share
 
 Factor = Callable[[float], float]
@@ -78,7 +78,8 @@ def _sum(parts: list[Known], unit: str) -> Known:
         (sum(low for low, _ in ends), sum(high for _, high in ends)) if len(ends) == len(parts) else None
     )
     value = sum(one.value for one in parts)
-    return Known(value=value, status=parts[0].status, interval_90=interval, unit=unit)
+    doubted: list[Status] = [one.status for one in parts if one.status != "determined"]
+    return Known(value=value, status=[*doubted, "determined"][0], interval_90=interval, unit=unit)
 
 
 def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.estimate.histories import finest_time
 from rotordrop.evidence.impacts import AFTER_LAST
 from rotordrop.files import write_json
 from rotordrop.jobs.traces import write_traces
@@ -251,16 +252,15 @@ def _label(estimate: Estimate, column: str) -> str:
 def _events(estimate: Estimate) -> list[dict[str, Any]]:
     """What happened when, times [s] from power-off: the estimate knows better than the first look.
 
-    A first touch has the interval of power-off and its own, by its timing or by the steps of the force. What
-    has no interval is left out.
+    A first touch has the interval of power-off and its own, by its timing or by the samples of the record.
+    What has no interval is left out.
     """
     events = [(0.0, "power-off")]
     timed = [contact.timing_error for contact in estimate.replay.contacts] if estimate.replay else []
     for number, bearing in enumerate(estimate.bearings):
         if bearing.impacts:
             first = min(impact.start for impact in bearing.impacts)
-            step = float(np.median(np.diff(bearing.force.time)))
-            own = math.hypot(timed[number] if timed else 0.0, step / math.sqrt(12.0))
+            own = timed[number] if timed else 1.0 / (math.sqrt(12.0) * estimate.record.sampling_rate)
             low, high = estimate.drop_instant.interval_90
             half = math.hypot(0.5 * (high - low), NINETY * own)
             events.append((first, f"first touch at {bearing.name} (± {1e3 * half:.2g} ms)"))
@@ -310,7 +310,7 @@ def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[
 
     Where a history has a clock of its own it is read off between its samples by straight lines.
     """
-    grid = np.asarray(estimate.bearings[0].force.time)
+    grid = finest_time(estimate)
     columns: dict[str, Array] = {}
     names: list[dict[str, Any]] = []
     for b, bearing in enumerate(estimate.bearings):

@@ -72,7 +72,8 @@ class CampbellDiagram:
 
 def speed_grid(machine: Machine, highest: float | None = None) -> Array:
     """Speeds of a Campbell diagram from standstill to the highest [rad/s], shape (S,)."""
-    return np.linspace(0.0, highest or BEYOND_NOMINAL * float(machine.speed.nominal), SPEEDS)
+    end = BEYOND_NOMINAL * float(machine.speed.nominal) if highest is None else highest
+    return np.linspace(0.0, end, SPEEDS)
 
 
 @one_thread()

@@ -81,8 +81,10 @@ def critical_speed_map(
     require(count, "count", int, least=1)
     given = np.geomspace(*DEFAULT_STIFFNESS, 121) if stiffness is None else stiffness
     grid = numbers(given, "stiffness", finite=True)
-    if grid.ndim != 1 or not len(grid) or not np.all(grid > 0.0):
-        raise UsageError(f"stiffness {given} is no list of positive numbers [N/m]; give one at least")
+    if grid.ndim != 1 or not len(grid):
+        raise UsageError("stiffness is no list of numbers [N/m]; give one at least")
+    if not np.all(grid > 0.0):
+        raise UsageError(f"stiffness must be positive, got {grid.min():g} N/m")
     if loads is not None:
         loads = numbers(loads, "loads", (len(machine.touchdown_bearings),), finite=True).tolist()
     fe = build_rotor_fe(machine)

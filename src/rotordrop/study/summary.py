@@ -57,8 +57,8 @@ class StudyResults:
         return f"<StudyResults {self.study.name}: {len(self)} drops, {lost} failed; {', '.join(self.varied)}>"
 
     def _repr_html_(self) -> str:
-        share = np.arange(1, len(self) + 1) / max(len(self), 1)
-        forces = {n: (np.sort(v), share) for n, v in self.numbers.items() if n.endswith(".peak_force")}
+        found = {n: np.sort(v[np.isfinite(v)]) for n, v in self.numbers.items() if n.endswith(".peak_force")}
+        forces = {name: (v, np.arange(1, len(v) + 1) / max(len(v), 1)) for name, v in found.items()}
         return sketch(repr(self), "peak force [N]", "share below [1]", forces)
 
     @property

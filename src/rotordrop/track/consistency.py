@@ -244,18 +244,14 @@ def _departure_check(name: str, departures: list[Departure], noted: bool, *, wid
         message=message,
         path=farthest.path,
         remedy=farthest.remedy,
+        widening=1.0 + WIDER * max(min(sigmas, NOTED_DEPARTURE) - DEPARTURE_LIMIT, 0.0) if widens else 1.0,
     )
     if check.passed or not noted or (widens and sigmas >= NOTED_DEPARTURE):
         return check
     note = f"{message}; the readings are followed all the same"
     if not widens:
         return replace(check, passed=True, note=note)
-    return replace(
-        check,
-        passed=True,
-        note=f"{note}, and all intervals are wider for it",
-        widening=1.0 + WIDER * (sigmas - DEPARTURE_LIMIT),
-    )
+    return replace(check, passed=True, note=f"{note}, and all intervals are wider for it")
 
 
 def direction_check(problem: DropProblem) -> Check:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
@@ -30,7 +30,12 @@ class Alternative:
     @property
     def name(self) -> str:
         """What it is called."""
-        return " and ".join(one.name for one in self.extensions) or "the base model"
+        return named(self.extensions)
+
+
+def named(extensions: Iterable[Extension]) -> str:
+    """What a model with some extensions is called."""
+    return " and ".join(one.name for one in extensions) or "the base model"
 
 
 def worth_keeping(alternatives: Sequence[Alternative]) -> tuple[Alternative, ...]:

@@ -16,7 +16,7 @@ from rotordrop.track.forces import ForceHistory, force_history
 from rotordrop.track.input_state import InputEstimate
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Forward, Smoothed
-from rotordrop.twin.mixture import Alternative, probabilities
+from rotordrop.twin.mixture import Alternative, named, probabilities
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Accepted, Search, track_drops
 from rotordrop.twin.steps import Steps
@@ -85,6 +85,11 @@ class TrackedDrop:
     def consistent(self) -> bool:
         """Whether all checks passed."""
         return all(check.passed for check in self.checks)
+
+    @property
+    def named(self) -> str:
+        """The model by its extensions."""
+        return named(one.extension for one in self.accepted)
 
     @property
     def sees_all_directions(self) -> bool:

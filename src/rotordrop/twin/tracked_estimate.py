@@ -130,7 +130,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         unbalance=unbalance,
         structure=(
             *(one.structure(problem.model.machine, values, believed=judged.fits) for one in drop.accepted),
-            *(one.structure() for one in drop.others if judged.fits),
+            *(one.structure() for one in drop.others if judged.fits and one.name != drop.named),
         ),
         cross_check=_comparisons(drop, judged),
         innovations=_innovations(drop),

@@ -61,7 +61,7 @@ MEAN_STRESS_ERROR = 0.10
 """Relative error of a mean stress that rests on the preload of the machine file [1]: by its third root."""
 
 INCONSISTENT: Status = "the model does not fit the record"
-"""Status of a number whose interval had to be widened to hold the cross-check."""
+"""Status of a number of a model that is not believed; it holds the cross-check, where there is one."""
 OF_CROSS_CHECK: Status = "of the cross-check: the model does not fit the record"
 """Status of a number that does not rest on the twin, because the twin lost the record."""
 CUT: Status = "the estimated part ends during this contact"
@@ -95,7 +95,7 @@ class Loads:
 
 def widening_of(checks: Iterable[Check]) -> float:
     """Factor on all intervals by the checks of a drop [1]: what is noted widens, what fails doubles them."""
-    return max(check.widening if check.passed else INCONSISTENT_WIDENING for check in checks)
+    return max(max(one.widening, 1.0 if one.passed else INCONSISTENT_WIDENING) for one in checks)
 
 
 def with_form_error(forces: ForceHistory, sigma: float) -> ForceHistory:
@@ -475,7 +475,8 @@ def race_moved(forces: ForceHistory, b: int, gap: Known, widening: float, doubt:
     at = int(np.argmax(radius))
     sigma = math.hypot(*(place[at] / radius[at] * forces.displacement_sigma[at, b]))
     apart = MODEL_GAP_ERROR * float(radius[at])  # gains and offsets stretch it as they stretch the gap
-    half, step = NINETY * widening * forces.indentation_sigma[:, b], float(forces.time[1] - forces.time[0])
+    half = NINETY * widening * forces.indentation_sigma[:, b]
+    step = forces.substeps * float(forces.time[1] - forces.time[0])
     begun = []
     for moved, outside in ((0.0, 0.0), (half, step), (-half, 0.0)):
         first, samples = runs_of(forces.indentation[:, b] + moved > 0.0)
@@ -537,7 +538,8 @@ def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float
 
 def _impact_holding(impact: Impact, cross_check: InputEstimate, b: int) -> Impact:
     """An impact whose intervals hold what the cross-check finds in its time."""
-    during = (cross_check.time >= impact.start) & (cross_check.time <= impact.end)
+    step = cross_check.time[1] - cross_check.time[0]  # a contact may lie between two samples
+    during = (cross_check.time >= impact.start - step) & (cross_check.time <= impact.end + step)
     if not during.any() or impact.peak_force.value <= 0.0:
         return impact
     ratio = float(cross_check.magnitude[during, b].max()) / impact.peak_force.value

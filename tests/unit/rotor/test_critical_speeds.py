@@ -159,7 +159,7 @@ def test_lines_that_cross_are_followed_through():
     [
         (
             lambda paper, _: critical_speed_map(paper, [0.0, 1e6]),
-            r"\[0.0, 1000000.0\] is no list of positive numbers",
+            r"must be positive, got 0 N/m",
         ),
         (
             lambda _, fe: critical_speeds(fe, [spring(2, 1e6)], whirl="sideways"),

@@ -129,7 +129,8 @@ def test_departures_that_are_no_note_fail_and_are_named(impacts, impacts_smoothe
     one = departed(impacts, impacts_smoothed, paths, by)
     loud = replace(one.filtered, innovations=louder * one.filtered.innovations)
     check = checks_of(impacts, replace(one, filtered=loud))["parameters"]
-    assert not check.passed and check.note == "" and check.widening == 1.0
+    assert not check.passed and check.note == ""
+    assert check.widening == pytest.approx(1.0 + 2.0 * (min(by, NOTED_DEPARTURE) - DEPARTURE_LIMIT))
     assert check.said().startswith(f"{paths[0]} departs by")
 
 

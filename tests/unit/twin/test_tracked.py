@@ -188,6 +188,8 @@ def test_the_interval_of_a_mean_force_has_a_part_by_the_record(workshop):
     cancelled = 1e3 * by_record(1e-3)
     assert 100.0 * by_record(1e-2) == pytest.approx(cancelled, rel=1e-2)
     late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])
+    samples = forces.magnitude_sigma[late, 0][:: forces.substeps]  # steps between samples know no more
+    assert cancelled == pytest.approx(NINETY * np.linalg.norm(samples) / len(samples), rel=1e-2)
     length, sigma = forces.magnitude[late, 0], 100.0 * forces.magnitude_sigma[late, 0]
     lengthened = NINETY * float(np.mean(np.hypot(length, sigma) - length))
     assert lengthened > 10.0 * cancelled

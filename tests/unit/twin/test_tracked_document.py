@@ -255,6 +255,7 @@ def test_an_impact_is_sure_whose_flight_is_one_with_the_race_nearer_and_farther(
     forces = ForceHistory(
         **{
             **blank,
+            "substeps": 1,
             "time": time,
             "displacement": place,
             "displacement_sigma": np.full_like(place, 2e-6),
