@@ -25,7 +25,7 @@ from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.fall import fell_as_described
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
-from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_filters, check_speed
+from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_coupling, check_speed
 from rotordrop.evidence.quality.tail import check_rest_in_record
 from rotordrop.known import Known
 from rotordrop.record.axes import sensor_planes
@@ -251,8 +251,20 @@ FAULTS = {
     "damage": ("drop+", damaged, "damage on reading", None, "line 7"),
     "drift": ("drop+", signals(wander), "drift", A, "it wanders by"),
     "hum hides": ("drop", hum(100e-6, 60.0), "hum", EVERY, "mains hum of 60 Hz"),
-    "low-pass 50": ("whole_drop", through(50.0, "low"), "recorder low-pass", None, "has smoothed both"),
-    "low-pass 200": ("whole_drop", through(200.0, "low"), "recorder low-pass", None, "has smoothed both"),
+    "low-pass 50": (
+        "whole_drop",
+        through(50.0, "low"),
+        "recorder low-pass",
+        None,
+        "holds no force of impacts",
+    ),
+    "low-pass 200": (
+        "whole_drop",
+        through(200.0, "low"),
+        "recorder low-pass",
+        None,
+        "holds no force of impacts",
+    ),
     "coupled 0.3": ("whole_drop", through(0.3, "high"), "AC coupling", None, "cannot rise"),
     "coupled 1": ("whole_drop", through(1.0, "high"), "AC coupling", None, "cannot rise"),
     "late 0.5 ms": ("drop+", late(1, 5e-4), "late channel", B, "about 0.4 ms late"),
@@ -660,17 +672,28 @@ def test_zeros_of_a_coarse_recorder_while_the_rotor_floats_at_zero_are_none(drop
 
 
 @pytest.mark.parametrize("size", [0.15, 1.0, 4.0])
-def test_filters_are_found_whatever_the_size_of_the_air_gap(size, whole_drop):
+def test_coupling_is_found_whatever_the_size_of_the_air_gap(size, whole_drop):
     """A reading at rest of less than 50 µm was not looked at: a machine with a small gap passed."""
-    for kind, corner in (("AC coupling", 1.0), ("recorder low-pass", 100.0)):
-        signals = size * filtered(whole_drop.signals, 20e3, corner, "high" if corner == 1.0 else "low")
-        assert [finding.kind for finding in filters_of(replace(whole_drop, signals=signals))] == [kind]
-    assert filters_of(replace(whole_drop, signals=size * whole_drop.signals)) == []
+    creeping = replace(whole_drop, signals=size * filtered(whole_drop.signals, 20e3, 1.0, "high"))
+    assert [finding.kind for finding in check_coupling(creeping, 0.0)] == ["AC coupling"]
+    assert check_coupling(replace(whole_drop, signals=size * whole_drop.signals), 0.0) == []
 
 
-def filters_of(record):
-    levitated = fit_levitated(record, -5e-3, speed=float(record.speed_readings[0]))
-    return check_filters(record, levitated, 0.0, bounces=460.0)
+@pytest.mark.parametrize(
+    ("corner", "order", "seen"),
+    [(300.0, 2, True), (300.0, 4, True), (400.0, 8, True), (1200.0, 1, False), (1200.0, 8, False)],
+)
+@pytest.mark.parametrize("noise", ["before", "after"])
+def test_a_low_pass_is_found_that_takes_what_impacts_make(corner, order, seen, noise, whole_drop, machine):
+    smooth = sosfilt(
+        butter(order, corner, fs=20e3, output="sos"), whole_drop.signals - whole_drop.signals[0], axis=0
+    )
+    if noise == "after":
+        smooth += np.random.default_rng(1).normal(0.0, 0.45e-6, smooth.shape)
+    kinds = [
+        one.kind for one in check_record(replace(whole_drop, signals=smooth + whole_drop.signals[0]), machine)
+    ]
+    assert ("recorder low-pass" in kinds) == seen
 
 
 def test_a_second_drop(whole_drop, machine):

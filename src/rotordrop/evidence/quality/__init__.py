@@ -39,6 +39,7 @@ from rotordrop.evidence.quality.finding import (
     stops,
 )
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
+from rotordrop.evidence.quality.low_pass import check_low_pass
 from rotordrop.evidence.quality.motion import (
     check_gaps,
     check_length,
@@ -52,7 +53,7 @@ from rotordrop.evidence.quality.recorder import (
     check_again,
     check_blocks,
     check_clock,
-    check_filters,
+    check_coupling,
     check_speed,
 )
 from rotordrop.evidence.quality.tail import check_rest_in_record, check_tail
@@ -203,10 +204,12 @@ def _begins(evidence: Evidence) -> list[Finding]:
 
 
 def _filters(evidence: Evidence) -> list[Finding]:
-    instant = known(evidence.beginning).coarse.instant
-    return check_filters(
-        evidence.falling, evidence.falling_floats, instant, _bounces(evidence) / (2.0 * np.pi)
-    )
+    record, start = evidence.falling, known(evidence.beginning)
+    seen = check_coupling(record, start.coarse.instant)
+    if seen or evidence.held:
+        return seen
+    turning = 2.0 * np.pi * start.levitated.frequency
+    return check_low_pass(record, evidence.base, turning, start.coarse.instant)
 
 
 def _again(evidence: Evidence) -> list[Finding]:

@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotordrop.arrays import Array
 from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.evidence.quality.motion import first_motion
 from rotordrop.series import MANY, median_of_five
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.levitated import LevitatedModel
     from rotordrop.evidence.paths import Motion
     from rotordrop.record.record import Record
 
@@ -129,25 +127,6 @@ def _jumps(record: Record) -> list[Finding]:
     return [found("jump", time=float(record.time[at]), count=len(alone), size=by)]
 
 
-_FILTERED, _DOUBTFUL, _FAR_TOO_SMOOTH = 0.05, 0.3, 0.01
-"""Acceleration from 500 Hz to 2 kHz over that from 30 to 150 Hz (medians of the power) after a drop, below
-which a record is refused and doubted where its noise is coloured, and doubted whatever its noise [1].
-
-572 simulated records of rotors of 5, 60 and 140 kg have 0.022 to 130, behind a low-pass of 200 Hz to 0.037:
-heavy rotors on soft supports are as smooth as filtered ones, and only the noise tells."""
-
-_BOUNCES = 200.0
-"""Frequency at which a rotor bounces on its supports below which it is smoother than those [Hz]: force pulses
-have a power that falls with the fourth power of the frequency over that of the bounce. Of 50 records rotors
-of 1.6 and 6 t, of 127 and 82 Hz, have 0.022 and 0.0067 at least, behind a low-pass of 100 Hz 2e-5."""
-
-_COLOURED = 0.05
-"""Power of the levitated readings, without orbit and hum, from 500 Hz to 2 kHz over that from 100 to 250 Hz,
-below which a filter has taken their noise too [1]; 0.25 to 1.5 in 235 simulated records, at most 0.005 behind
-a low-pass of up to 300 Hz."""
-
-_BEFORE = (100.0, 250.0)
-_HIGH, _LOW = (500.0, 2000.0), (30.0, 150.0)
 _RISEN = 0.75
 """A rest that comes back to this share of its depth within the record leaks away."""
 
@@ -159,44 +138,7 @@ _SUNK, _DEEP = 0.03, 0.5
 show it read more than the second share of the deepest [1]."""
 
 
-def check_filters(record: Record, levitated: LevitatedModel, drop: float, bounces: float) -> list[Finding]:
-    """See whether impacts and rest of a dropped rotor are as sharp and as lasting as they must be.
-
-    `bounces` is the frequency of the rigid rotor on its supports [Hz].
-    """
-    return [*_low_pass(record, levitated, drop, bounces), *_coupling(record, drop)]
-
-
-def _low_pass(record: Record, levitated: LevitatedModel, drop: float, bounces: float) -> list[Finding]:
-    inside = (record.time > drop) & (record.time < drop + 0.2)
-    if record.sampling_rate < 2.2 * _HIGH[1] or int(inside.sum()) < 0.1 * record.sampling_rate:
-        return []
-    ratio = _bands(np.diff(record.signals[inside], 2, axis=0), record.sampling_rate, _LOW)
-    # in a short window the orbit is no line among others: what is left beside it is noise
-    floating = (record.time >= levitated.start) & (record.time <= levitated.end)
-    left = record.signals[floating] - levitated.readings(record.time[floating])
-    noise = _bands(left, record.sampling_rate, _BEFORE)
-    smoothest = _FAR_TOO_SMOOTH * min(bounces / _BOUNCES, 1.0) ** 4
-    if ratio >= (_DOUBTFUL if noise < _COLOURED else smoothest):
-        return []
-    surely = ratio < _FILTERED and noise < _COLOURED
-    bands = {"high": _HIGH[0], "low": _LOW[1], "below": _BEFORE[1]}
-    return [found("low-pass", bands, severity="stop" if surely else None, ratio=ratio, noise=noise)]
-
-
-def _bands(signals: Array, rate: float, low: tuple[float, float]) -> float:
-    """Median power from 500 Hz to 2 kHz over that of a lower band, median of the channels; 1 if too short."""
-    count = len(signals)
-    if count < 8 * rate / (low[1] - low[0]):
-        return 1.0
-    window = np.hanning(count)[:, None]
-    power = np.abs(np.fft.rfft((signals - np.mean(signals, axis=0)) * window, axis=0)) ** 2
-    frequency = np.fft.rfftfreq(count, 1.0 / rate)
-    high, below = (np.median(power[(frequency >= a) & (frequency < b)], axis=0) for a, b in (_HIGH, low))
-    return float(np.median(high / np.maximum(below, 1e-300)))
-
-
-def _coupling(record: Record, drop: float) -> list[Finding]:
+def check_coupling(record: Record, drop: float) -> list[Finding]:
     """A rotor at rest stays at rest; behind a high-pass its reading creeps back to zero."""
     block, time = 0.1, record.time
     if time[-1] < drop + 0.2 + 4 * block:
