@@ -33,7 +33,7 @@ _STANDS_OUT = 12.0
 _APART = 1.5
 """Two tones are told apart when they differ by this many cycles over the window (chosen)."""
 
-_FEWEST_TURNS, _FEWEST_SAMPLES = 2.0, 50
+_FEWEST_TURNS, _FEWEST_SAMPLES = 1.5, 50
 """Levitated turns and samples that the fit needs (chosen): seven numbers of each channel come from them."""
 
 SLOW, _ORBIT = 5.0, (0.1, 1.0)

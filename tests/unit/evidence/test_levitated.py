@@ -51,7 +51,7 @@ def test_the_levitated_part_ends_before_the_fall_and_needs_its_length(drop):
     np.testing.assert_allclose(model.noise, 0.45e-6, rtol=0.05)
     assert fit_levitated(record, 0.0, speed=150.03 * HZ).end == record.time[-1]
     with pytest.raises(
-        RecordError, match=r"20 ms of levitated rotor before -0.23 s are 1.2 revolutions; at least 2"
+        RecordError, match=r"20 ms of levitated rotor before -0.23 s are 1.2 revolutions; at least 1.5"
     ):
         fit_levitated(drop, -0.23, speed=60.0 * HZ)
 
