@@ -3,7 +3,8 @@
 Where the rotor floated is a poor centre: a controller holds it some hundredths of the gap beside. What
 touches lies on the circle: the place of the first touch, the reversals of impacts, the arc of the swing.
 A reversal lies beyond the circle by ``β v``, with v the velocity of approach and ``β`` the inverse natural
-frequency of the rotor on its contact; at rest it lies beyond by ``g β²``.
+frequency of the rotor on its contact; at rest it lies beyond by ``g β²``, and where it runs round with the
+angular velocity w by ``w² r β²`` more.
 """
 
 from __future__ import annotations
@@ -169,17 +170,20 @@ def find_wall(
         # a touch that is dated so well is placed by the speed of the fall as well
         astray = math.hypot(_ROUND * size, touch.error * fall_speed(size))
 
-    def residual(sought: Array, hits: Impacts, lying: NDArray[np.int64]) -> Array:
+    def residual(sought: Array, hits: Impacts, lying: NDArray[np.int64], outward: Array) -> Array:
         centre, gap, beta, lever = sought[:2], sought[2], math.exp(sought[3]), sought[5]
 
         def beyond(here: Array, aside: Array) -> Array:
             return np.asarray(np.hypot(*(here + lever * aside - centre).T) - gap)
 
         deepest = sunk + hits.deepest
-        depth = beta * hits.approach
+        pressed = outward[deepest] * beta**2
+        depth = pressed + np.hypot(pressed, beta * hits.approach)
         strays = _STRAYS * depth / (_ROUND * size)
         impacts = (beyond(place[deepest], apart[deepest]) - depth) / np.hypot(1.0, strays) / (_ROUND * size)
-        rest = beyond(place[lying], apart[lying]) - GRAVITY * beta**2 * math.exp(sought[4])
+        pressed = outward[lying] * beta**2
+        rest = beyond(place[lying], apart[lying]) - pressed - GRAVITY * beta**2 * math.exp(sought[4])
+        rest = rest / np.hypot(1.0, _STRAYS * pressed / (_ROUND * size))
         parts = [
             _robust(impacts),
             np.sqrt(np.log1p(strays**2)),  # of the likelihood: errors that are expected larger cost
@@ -209,14 +213,11 @@ def find_wall(
         lying = _lying(
             radius, sunk + (int(hits.deepest[-1]) if len(hits.deepest) else 0), rate, sought[2], noise
         )
-        before, (sought, slopes) = (
-            sought,
-            _least_squares(partial(residual, hits=hits, lying=lying), sought, low, high),
-        )
+        frozen = partial(residual, hits=hits, lying=lying, outward=_outward(path - sought[:2], rate))
+        before, (sought, slopes) = sought, _least_squares(frozen, sought, low, high)
         if np.max(np.abs(sought[:3] - before[:3])) < 1e-7:
             break
     exact = given is not None and given[1] == 0.0
-    frozen = partial(residual, hits=hits, lying=lying)
     mean, error = _moments(frozen, sought, slopes, low, high, len(hits.deepest))
     gap = given[0] if given is not None and exact else float(mean[2])
     return Wall(
@@ -313,6 +314,14 @@ def _first_size(place: Array, floated: Array, sunk: int) -> float:
     lies = math.hypot(*(np.median(late if len(late) else place[-1:], axis=0) - floated))
     strays = float(np.percentile(np.hypot(*(place[sunk:] - floated).T), 80))
     return max(lies, 0.9 * strays)
+
+
+def _outward(place: Array, rate: float) -> Array:
+    """Centrifugal acceleration of a motion (N, 2) about a centre [m/s²], by its turn over a stretch."""
+    half = min(max(int(0.5 * _BIN * rate), 2), (len(place) - 1) // 2)
+    angle = np.pad(np.unwrap(np.arctan2(place[:, 1], place[:, 0])), half, mode="edge")
+    turning = (angle[2 * half :] - angle[: -2 * half]) * rate / (2.0 * half)
+    return np.asarray(turning**2 * np.hypot(*place.T))
 
 
 def _lying(radius: Array, since: int, rate: float, gap: float, noise: float) -> NDArray[np.int64]:
