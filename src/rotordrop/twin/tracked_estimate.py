@@ -170,15 +170,13 @@ def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
 def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, InputEstimate | None]:
     """The drop with one check more, and the estimate without contact law, if one is made.
 
-    A twin whose innovations are white may still be wrong where its contact law is: a peak that is a factor
-    apart from the cross-check is not called consistent, nor is one with a beam in place of the rotor, whose
-    innovations are white by larger process noise, beyond the accuracy of the cross-check. That one takes
-    nothing from the twin, since what it says of gaps and sensors may be as wrong as what it says of forces.
-    Where noise would hide as much of the forces of the twin from it, it says nothing against them. A quick
-    estimate does without it, but not for a bearing with play, whose force no study has validated.
+    A twin whose innovations are white may still be wrong where its contact law is, or an extension: a peak
+    beyond the accuracy of the cross-check is not called consistent. That one takes nothing from the twin,
+    since what it says of gaps and sensors may be as wrong as what it says of forces. Where noise would hide
+    as much of the forces of the twin from it, it says nothing against them. A quick estimate does without it,
+    but not for a bearing with play, whose force no study has validated.
     """
     problem = drop.problem
-    departs = is_beyond_accuracy if problem.model.machine.rotor.form_errs else is_beyond_factor
     with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
     if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
         return drop, None
@@ -186,7 +184,9 @@ def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inpu
         check = drop.without_contact_law()
         peaks = drop.forces.magnitude.max(axis=0)
         apart = [
-            b for b, peak in enumerate(peaks) if b not in problem.held and departs(float(peak), check, b)
+            b
+            for b, peak in enumerate(peaks)
+            if b not in problem.held and is_beyond_accuracy(float(peak), check, b)
         ]
         if not apart:
             return drop, check
@@ -197,7 +197,7 @@ def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inpu
             f"without a contact law {check.peak[b]:.0f} N"
             for b in apart
         }
-        beyond = [b for b in apart if departs(float(shown[b]), check, b)]
+        beyond = [b for b in apart if is_beyond_accuracy(float(shown[b]), check, b)]
         noted = [
             f"{said[b]}, where noise would leave {shown[b]:.0f} N to be seen of it"
             for b in apart
