@@ -26,8 +26,8 @@ _SEEN = 10.0
 """Power of the simulated drop over that of the levitated readings from which a band tells [1]."""
 
 _LACKS = 8.0
-"""What the highest two bands that tell must lack [dB]: 212 drops of the corpus, of machines other than described
-too, lack 6 at most; behind a second-order low-pass of 300 Hz a rotor of 60 kg lacks 11."""
+"""What the highest two bands that tell must lack [dB]. In 212 drops of the corpus, some of machines other
+than described, they lack 6 at most; behind one of 300 Hz of second order those of a 60 kg rotor lack 11."""
 
 _IMPACTS = 0.95
 """Part of the power of the velocity, which impacts change, up to which a band tells of them [1]."""
