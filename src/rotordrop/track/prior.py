@@ -23,7 +23,7 @@ START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 
 START_VELOCITY_SIGMA, BENDING_VELOCITY_SIGMA, RACE_VELOCITY_SIGMA = 0.28, 0.021, 1.4e-3
 """Their velocities at power-off over that of a free fall through the air gap [1]."""
 START_ORBIT_SIGMA = 0.03
-"""Radius of the orbit of the levitated rotor over the air gap [1]."""
+"""Radius of the orbit of the levitated rotor over the air gap [1]; modes below the speed bend as far on it."""
 RACE_SPIN_SIGMA = 0.3
 """Spin of a race at power-off [rad/s]."""
 SPEED_SIGMA = 0.5
@@ -124,6 +124,7 @@ def _rotor_prior(
     weight = np.sqrt(model.fe.total_mass)
     frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
     softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
+    orbit = START_ORBIT_SIGMA * gap * weight * (omega / np.maximum(frequency, omega)) ** 2
     sag = np.zeros(basis.shapes.shape[0])
     if len(model.machine.ambs) >= 2:
         sag = np.asarray(levitated_sag(model.fe, model.machine), dtype=np.float64)
@@ -141,7 +142,6 @@ def _rotor_prior(
         position = BENDING_POSITION_SIGMA * gap * weight * softer**2 + 0.2 * np.abs(amplitude)
         velocity = BENDING_VELOCITY_SIGMA * falling * weight * softer
         position[rigid] = START_POSITION_SIGMA * gap * weight
-        circling = START_ORBIT_SIGMA * gap * omega
-        velocity[rigid] = math.hypot(START_VELOCITY_SIGMA * falling, circling) * weight
-        sigma[part] = position
-        sigma[layout.velocity_of(part)] = velocity
+        velocity[rigid] = START_VELOCITY_SIGMA * falling * weight
+        sigma[part] = np.hypot(position, orbit)
+        sigma[layout.velocity_of(part)] = np.hypot(velocity, omega * orbit)
