@@ -461,6 +461,21 @@ EXTENSIONS: tuple[Extension, ...] = (
 )
 
 
+STATED: tuple[Parameter, ...] = (
+    Parameter(
+        path="modal_damping",
+        owner="rotor",
+        label="damping ratio of the bending modes of the rotor",
+        kind="dimensionless",
+        measured_by="the free rotor, ringing after a hammer blow",
+        guess_sigma=0.5,
+        given_sigma=0.2,
+        entries=(Entry(array="modes", column=1, rule=Rule.RATIO),),
+    ),
+)
+"""Unknown wherever it is not zero: above its first bending mode a rotor rings for most of a drop."""
+
+
 def _form(path: str, label: str, sigma: float) -> Parameter:
     return Parameter(
         path=path,

@@ -337,7 +337,8 @@ def structure_unknowns(model: DropModel) -> Iterator[Unknown]:
     for owner in owners:
         for index, (name, part) in enumerate(parts_of(machine, owner)):
             for row in structure_rows(owner):
-                if (quantity := row.stated(part)) is None:
+                quantity = row.stated(part)
+                if quantity is None or (row.logarithmic and not float(quantity)):
                     continue
                 scale, limits = (1.0, None) if row.scaled is None else row.scaled(part, load)
                 known = prior(row, quantity, scale=scale)

@@ -48,10 +48,10 @@ class ParameterTargets(NamedTuple):
     standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
     same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
     (P,) the model takes the bound: what drifts without being seen must not make it unstable. ``mean`` (P,)
-    is the prior mean. ``eigenvalue`` (m,) are those of the rotor as described. ``acts`` (P, B + 1) flags
-    the bearings on whose forces a parameter acts, and in the last column whether it acts on the rotor's
-    own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the targets that write where it
-    writes, in their order: what has to be written again when it alone changes.
+    is the prior mean. ``eigenvalue`` and ``damping`` (m,) are those of the rotor as described. ``acts``
+    (P, B + 1) flags the bearings on whose forces a parameter acts, and in the last column whether it acts on
+    the rotor's own. ``together`` lists for each parameter, from ``starts`` (P + 1,) on, the targets that
+    write where it writes, in their order: what has to be written again when it alone changes.
     """
 
     target: Integers
@@ -68,6 +68,7 @@ class ParameterTargets(NamedTuple):
     upper: Array
     mean: Array
     eigenvalue: Array
+    damping: Array
 
 
 @by_reference
@@ -147,7 +148,10 @@ def write_targets(
             p.load[row, column] = value
         elif kind == SCALE_MODES:
             for j in range(p.eigenvalue.shape[0]):
-                p.eigenvalue[j] = value * targets.eigenvalue[j]
+                if column == 0:
+                    p.eigenvalue[j] = value * targets.eigenvalue[j]
+                else:
+                    p.damping[j] = value * targets.damping[j]
         else:
             if not cleared:
                 fill(p.unbalance_cos, 0.0)

@@ -23,7 +23,7 @@ START_POSITION_SIGMA, BENDING_POSITION_SIGMA, RACE_POSITION_SIGMA = 0.12, 6e-3, 
 START_VELOCITY_SIGMA, BENDING_VELOCITY_SIGMA, RACE_VELOCITY_SIGMA = 0.28, 0.021, 1.4e-3
 """Their velocities at power-off over that of a free fall through the air gap [1]."""
 START_ORBIT_SIGMA = 0.03
-"""Radius of the orbit of the levitated rotor over the air gap [1]; modes below the speed bend as far on it."""
+"""Radius of the orbit of the levitated rotor over the air gap [1]; slower modes bend as far on it."""
 RACE_SPIN_SIGMA = 0.3
 """Spin of a race at power-off [rad/s]."""
 SPEED_SIGMA = 0.5

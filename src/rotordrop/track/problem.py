@@ -501,6 +501,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         upper=np.array([u.bounds[1] for u in unknowns]),
         mean=np.array([u.begin for u in unknowns]),
         eigenvalue=model.parameters.eigenvalue,
+        damping=model.parameters.damping,
     )
 
 

@@ -276,7 +276,7 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
     seen = set()
     for unknown in flight.unknowns:
         name, path = unknown.owner, unknown.parameter.path
-        if unknown.scope != "machine":
+        if unknown.scope != "machine" or name not in names:
             continue
         before, after, value = single(flight, unknown)
         row = names.index(name)
@@ -289,6 +289,15 @@ def test_every_parameter_of_a_bearing_sets_its_own_entries_and_no_others(flight)
         if path in ("air_gap", "contact.stiffness", "race.inertia", "preload"):
             assert after.bearing[row, first] == pytest.approx(value)
     assert seen == set(COLUMNS)
+
+
+def test_the_damping_of_the_bending_modes_is_that_of_all_and_nothing_else(flight):
+    unknown = next(one for one in flight.unknowns if one.path == "rotor.modal_damping")
+    before, after, value = single(flight, unknown)
+    np.testing.assert_allclose(after.damping, value / 0.005 * before.damping)
+    assert value != pytest.approx(0.005) and np.count_nonzero(before.damping) > 2
+    for part in set(before._fields) - {"damping"}:
+        np.testing.assert_array_equal(getattr(before, part), getattr(after, part))
 
 
 def test_another_exponent_keeps_the_force_at_a_typical_indentation(flight):

@@ -11,17 +11,21 @@ from tests.unit.track.conftest import flight_of, place_of
 from rotordrop import build_drop_model, example_machine, read_record
 from rotordrop.elements.table import EXTENSIONS, parameter
 from rotordrop.errors import IdentificationError, RecordError
+from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.rotor.reduction import Reduction
-from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior
+from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior, smallest_gap
+from rotordrop.simulate.levitation import levitated_orbit
+from rotordrop.track.prior import START_ORBIT_SIGMA, prior_at_power_off
 from rotordrop.track.problem import (
     NOISE_FLOOR,
     TAIL_VERTICAL_SIGMA,
     RecordedDrop,
     apply_tail,
     build_problem,
+    sensor_rows,
     settled_displacement,
     transferred,
 )
@@ -416,3 +420,17 @@ def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers():
     expected = r"does not rest on the touchdown bearing NDE \(-\d+ N of .* 584 N\).* expected it between them"
     with pytest.raises(IdentificationError, match=expected):
         build_problem(build_drop_model(beside, COARSE_BASIS), drop)
+
+
+@pytest.mark.parametrize("speed", [300.0, 500.0, 700.0])
+def test_bending_on_the_orbit_of_the_levitated_rotor_lies_in_the_prior(speed, model):
+    """A controller that follows the runout of its sensors holds an orbit of some hundredths of the gap."""
+    omega, gap = 2.0 * np.pi * speed, smallest_gap(model.machine)
+    rows = sensor_rows(model)
+    covariance = prior_at_power_off(model, (), rows, np.zeros(len(rows)), (omega, 0.1), SlowNoise())[1]
+    for phase in (0.0, 2.0, 4.0):
+        held = START_ORBIT_SIGMA * gap * np.exp([0.0, 1j * phase])
+        bent = levitated_orbit(model, omega, held)[model.basis.n_rigid :]
+        for amplitudes, modes in zip(bent.T, (model.layout.modal_x, model.layout.modal_y), strict=True):
+            sigma = np.sqrt(np.diag(covariance)[modes])[model.basis.n_rigid :]
+            assert np.all(np.abs(amplitudes[:2]) < 3.0 * sigma[:2])
