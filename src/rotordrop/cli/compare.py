@@ -100,7 +100,7 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.estimate.published import read_drop
     from rotordrop.files import finite
-    from rotordrop.report.changed_section import told_changes
+    from rotordrop.report.told_changes import told_changes
     from rotordrop.report.content import ReportContent, Statement
 
     if len(estimates) != 2:

@@ -13,6 +13,7 @@ from typer import Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, text_option
 from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places
+from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import ConsistencyError, UsageError
 
 if TYPE_CHECKING:
@@ -42,9 +43,6 @@ def estimate(
     report: Annotated[
         Path | None, file_option("--report", "Write the report, one offline HTML file per drop.")
     ] = None,
-    since: Annotated[
-        Path | None, file_option("--since", "Earlier estimate (.json), for what changed.")
-    ] = None,
     operator: Annotated[str, text_option("NAME", "Who, for the report.")] = "",
     output: Annotated[
         Path | None,
@@ -66,7 +64,6 @@ def estimate(
     """
     from rotordrop.estimate.document import combined, estimate_document
     from rotordrop.estimate.histories import require_format
-    from rotordrop.estimate.published import read_drop
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_screen, estimate_summary
@@ -79,7 +76,7 @@ def estimate(
             "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
         )
     machine, *records = options.machine_first(machine, *records)
-    description, earlier = load_machine(machine), None if since is None else read_drop(since)
+    description = load_machine(machine)
     if quick and method is Method.tracked and not is_calibrated(description):
         raise UsageError(
             f"--quick needs a calibrated machine; supports and contacts of {machine.name} are guesses. "
@@ -93,16 +90,17 @@ def estimate(
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
     chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
     with progress_bar("estimating") as progress:
-        estimates = estimate_drops(description, read, tails, method=chosen, progress=progress)
+        # in a thread of its own: compiled code would keep Ctrl-C waiting
+        estimates = interruptible(
+            lambda: estimate_drops(description, read, tails, method=chosen, progress=progress)
+        )
     used = [
         ("machine file", machine),
         *(("record", path) for path in records),
         *(("tail", path) for path in tail or []),
-        *(() if since is None else (("earlier estimate", since),)),
     ]
     origin = origin_here(sys.argv[1:], used, operator)
-    whole = bool(reports) or since is not None
-    pages = [estimate_page(e, origin, earlier) if whole else estimate_summary(e, origin) for e in estimates]
+    pages = [(estimate_page if reports else estimate_summary)(made, origin) for made in estimates]
     screens = pages if everything else [estimate_screen(made) for made in estimates]
     for made, place in zip(estimates, outputs, strict=False):
         made.save(place)
@@ -110,8 +108,7 @@ def estimate(
         made.data(place)
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
-    words = {"Report": reports, "Histories": outputs, "Tables": folders}
-    written = [f"{word}: {place}" for word, places in words.items() for place in places]
+    written = ", ".join(map(str, (*reports, *outputs, *folders)))
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
     deliver(numbers, json, lambda out: _summarise(screens, written, out))
@@ -121,13 +118,13 @@ def estimate(
         raise ConsistencyError(f"{names}: {inconsistent[0].sentence}")
 
 
-def _summarise(pages: Sequence[ReportContent], written: Sequence[str], out: Console) -> None:
+def _summarise(pages: Sequence[ReportContent], written: str, out: Console) -> None:
     from rotordrop.report.terminal import print_summary
 
     for page in pages:
         print_summary(page, out)
-    for line in written:
-        out.print(line)
+    if written:
+        out.print(f"Written: {written}")
 
 
 def _read(

@@ -26,7 +26,6 @@ from rotordrop.report.quantity import Quantity
 
 if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate
-    from rotordrop.estimate.published import Drop
     from rotordrop.evidence.look import Look
     from rotordrop.jobs.workspace import Job
     from rotordrop.machine import Machine
@@ -97,16 +96,14 @@ def write_look(seen: Look, made: Path, machine: str) -> None:
     )
 
 
-def write_estimate(
-    estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any], since: Drop | None = None
-) -> None:
+def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any]) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
     from rotordrop.estimate.document import estimate_document
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_content import weight_shares
 
-    content = estimate_page(estimate, _origin(job, options, "estimate"), since)
+    content = estimate_page(estimate, _origin(job, options, "estimate"))
     names, grid, columns = histories_of(estimate)
     loads = weight_shares(estimate.machine)
     places = []

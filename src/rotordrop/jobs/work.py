@@ -12,12 +12,11 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.document import parse_toml
-from rotordrop.errors import DamagedFileError, MachineFileError, RotordropError, UnmatchedError, UsageError
-from rotordrop.estimate.published import Drop, read_drop
+from rotordrop.errors import MachineFileError, RotordropError, UnmatchedError, UsageError
 from rotordrop.files import write_json
 from rotordrop.jobs.results import write_check, write_estimate, write_look, write_waterfall
-from rotordrop.jobs.runner import Verb, result_folder
-from rotordrop.jobs.workspace import Job, Workspace, is_path
+from rotordrop.jobs.runner import Verb
+from rotordrop.jobs.workspace import Job, is_path
 from rotordrop.jobs.written import SYSTEMS
 from rotordrop.machine import load_machine
 from rotordrop.machine.machine import Machine
@@ -180,22 +179,7 @@ def _estimate(job: Job, made: Path, options: dict[str, Any], progress: Progress)
     name = job.read()["name"]
     estimate = estimate_drop(machine, record, tail, method=method, name=name, progress=progress)
     progress("drawing", 1.0)
-    write_estimate(estimate, job, made, options, _since(job))
-
-
-def _since(job: Job) -> Drop | None:
-    """The estimate of the last drop that came before with the same machine file."""
-    told = job.read()
-    machine = told["files"]["machine"]["sha256"]
-    for other in Workspace(job.path.parent.parent).jobs():  # the newest first
-        with suppress(UsageError, DamagedFileError, FileNotFoundError):  # whoever opens that drop is told
-            known = other.read()
-            same = known["files"].get("machine", {}).get("sha256") == machine
-            if same and known["created"] < told["created"]:
-                folder = result_folder(other, "estimate", "document.json")
-                if folder is not None:
-                    return read_drop(folder / "document.json")
-    return None
+    write_estimate(estimate, job, made, options)
 
 
 def _waterfall(job: Job, made: Path, options: dict[str, Any], progress: Progress) -> None:

@@ -267,7 +267,7 @@ class UsedShare:
         """The share in words."""
         who = f"{self.machine}, bearings {self.bearing_set}"
         if self.allowed_drops is None and self.allowed_seconds is None:
-            return f"{who}: {_drops(self.drops)}; no limit given"
+            return f"{who}: {_drops(self.drops)}; no allowance given"
         left_out = f", {_drops(self.untimed)} without duration left out" if self.untimed else ""
         parts = [
             _share(self.drops, self.allowed_drops, " drops", "", self.drops_passed_at),

@@ -48,7 +48,7 @@ def match_sensors(
     hits = {name: fitting(recording.channels, channel) for name, channel in wanted.items()}
     if profile.likely and not all(hits.values()):
         found = likeliest(recording, sensors)
-        hits = {name: channels or [found[name]] * (name in found) for name, channels in hits.items()}
+        hits |= {name: [channel] for name, channel in found.items() if not hits[name]}
     missing = [name for name in wanted if not hits[name]]
     if missing:
         # all of them at once, with what would map them
@@ -104,15 +104,24 @@ RULE = "planes in their order, X a quarter turn before Y"
 def likeliest(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Channel]:
     """The likeliest channel of each sensor, where as many pairs of channels as planes are found."""
     pairs, _ = pairs_of(recording.channels)
-    planes = list(dict.fromkeys(sensor.bearing for sensor in sensors))
-    members = [[sensor for sensor in sensors if sensor.bearing == plane] for plane in planes]
-    if len(pairs) != len(planes) or any(len(found) != 2 for found in members):
+    members = _by_plane(sensors)
+    if len(pairs) != len(members) or any(len(found) != 2 for found in members):
         return {}
     return {
         sensor.name: channel
         for (_, pair, _), found in zip(pairs, members, strict=True)
         for channel, sensor in zip(pair, seats(pair, found), strict=True)
     }
+
+
+def _by_plane(sensors: Sequence[Sensor]) -> list[list[Sensor]]:
+    """The sensors of each plane: those at one end, or at one node where an end has several planes."""
+    ends: dict[object, list[Sensor]] = {}
+    nodes: dict[object, list[Sensor]] = {}
+    for sensor in sensors:
+        ends.setdefault(sensor.bearing, []).append(sensor)
+        nodes.setdefault(sensor.node, []).append(sensor)
+    return [*(ends if max(map(len, ends.values()), default=0) < 3 else nodes).values()]
 
 
 def options_for(recording: Recording, sensors: Sequence[Sensor], missing: Sequence[str]) -> str:
@@ -123,10 +132,13 @@ def options_for(recording: Recording, sensors: Sequence[Sensor], missing: Sequen
     planes: dict[str, list[str]] = {}
     at = {sensor.name: sensor for sensor in sensors}
     for name, channel in likely.items():
-        told = f"{channel.label} {math.degrees(float(at[name].angle)):.4g} deg"
-        planes.setdefault(at[name].bearing or "", []).append(told)
+        entry = f"{channel.label} {math.degrees(float(at[name].angle)):.4g} deg"
+        planes.setdefault(at[name].bearing or "", []).append(entry)
     lacking = {at[name].bearing or "" for name in missing}
-    maps = mapped(*(f"{plane}: {', '.join(two)}" for plane, two in planes.items() if plane in lacking))
+    told = [f"{plane}: {', '.join(two)}" for plane, two in planes.items() if plane in lacking]
+    if any(len(two) > 2 for two in planes.values()):  # an end with two planes has no name for each
+        told = [f"{name}={likely[name].label}" for name in missing]
+    maps = mapped(*told)
     return f"likeliest {maps} ({RULE}), or {mapped(LIKELY)}"
 
 
@@ -203,8 +215,8 @@ def displacement(
     suffixed = channel.label == sensor.name != channel.name and channel.label.startswith(channel.name)
     unit = profile.units.get(channel.label) or profile.unit or ("" if suffixed else channel.unit)
     if not unit:
-        what = f"channel {channel.label!r} has no unit"
-        raise RecordError(f'{place}: {what}; name it in the profile: unit = "um"')
+        ask = "name it in the profile: unit = \"um\", as 'rotordrop profile --unit um' writes it"
+        raise RecordError(f"{place}: channel {channel.label!r} has no unit; {ask}")
     try:
         factor, kind = worth_of(unit)
     except UsageError as error:

@@ -143,7 +143,7 @@ def _card(result: CoastDownResult, index: int) -> Card:
     name, (forward, backward) = result.bearing_names[index], result.whirl_time[index]
     largest = (
         fact(
-            f"Largest {maximum.quantity}",
+            f"Largest {maximum.quantity}{' into the race' * (maximum.quantity == 'indentation')}",
             maximum.value,
             QUANTITIES[maximum.quantity][0],
             note=f"at {shown(maximum.time, 'time')}",

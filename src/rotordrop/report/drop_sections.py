@@ -38,7 +38,7 @@ from rotordrop.report.content import (
     folded,
     table,
 )
-from rotordrop.report.quantity import Quantity, places_of, round_steps, shown, with_interval
+from rotordrop.report.quantity import Quantity, one_line, places_of, round_steps, shown, with_interval
 from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table
 from rotordrop.report.style import (
     GRID,
@@ -121,9 +121,7 @@ def moment_of(peak: Peak) -> str:
     low, high = peak.time_interval_90
     if high - low < ANOTHER_PEAK:
         return with_interval(peak.time, "time", peak.time_interval_90)
-    early = "" if peak.time - low < ANOTHER_PEAK else f", at the earliest {shown(low, 'time', 4)}"
-    late = "" if high - peak.time < ANOTHER_PEAK else f", at the latest {shown(high, 'time', 4)}"
-    return f"{shown(peak.time, 'time', 4)}{early}{late}"
+    return one_line(Quantity(value=peak.time, kind="time", interval_90=(low, high), places=2))
 
 
 def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = True) -> Statement:

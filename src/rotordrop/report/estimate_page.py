@@ -29,11 +29,10 @@ from rotordrop.estimate.estimate import (
     TimedContact,
 )
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimate.published import Agreement, Drop
+from rotordrop.estimate.published import Agreement
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.known import NINETY, Correlation, Known
-from rotordrop.report.changed_section import changed_section
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Column,
@@ -143,15 +142,10 @@ ASSUMED = (
 """What every estimate takes for granted."""
 
 
-def estimate_page(
-    estimate: Estimate,
-    origin: Origin | None = None,
-    since: Drop | None = None,
-) -> ReportContent:
+def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
     """Build the report on one recorded drop, followed or replayed.
 
-    Everything it says of the drop comes from the estimate; the origin says how it was made, and an earlier
-    estimate of the machine, as published, is compared with this one.
+    Everything it says of the drop comes from the estimate; the origin says how it was made.
     """
     summary = estimate_summary(estimate, origin)
     return replace(
@@ -161,7 +155,7 @@ def estimate_page(
         summary=(),
         facts=(),
         to_do=_next(estimate),
-        sections=_sections(estimate, summary, since),
+        sections=_sections(estimate, summary),
         lead=FRONT,
     )
 
@@ -347,7 +341,7 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
     return tuple((name, text) for name, text in facts.items() if text)
 
 
-def _sections(estimate: Estimate, summary: ReportContent, since: Drop | None) -> tuple[Section, ...]:
+def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]:
     """Force and orbit, and the seven parts behind them."""
     names = [bearing.name for bearing in estimate.bearings]
     steps = estimate.replay
@@ -366,7 +360,6 @@ def _sections(estimate: Estimate, summary: ReportContent, since: Drop | None) ->
     agreement = () if estimate.agreement is None else (agreement_section(estimate.agreement),)
     speed = () if steps is None else (speed_section(estimate, steps),)
     friction = () if steps is None or steps.friction is None else (friction_section(steps.friction),)
-    changed = () if since is None else (changed_section(estimate, since),)
     unseen = unseen_in(estimate.notes)
     elsewhere = {*summary.grave, *map(Statement, unseen), *_next(estimate).statements}
     notes = Section("", statements=tuple(one for one in summary.verdict[1:] if one not in elsewhere))
@@ -375,7 +368,7 @@ def _sections(estimate: Estimate, summary: ReportContent, since: Drop | None) ->
         orbit,
         impacts,
         folded("Motion at the sensors", motion, *agreement, *speed),
-        folded("Parameters", _parameters(estimate), *friction, *changed),
+        folded("Parameters", _parameters(estimate), *friction),
         folded("Checks", notes, _checks(estimate)),
         folded("Severity", stress, _severity(estimate), printed=True),
         folded(
@@ -665,8 +658,8 @@ def _other(check: CrossCheck) -> Quantity:
 
 LONGEST_VERDICT, LONGEST = 270, 185
 """Characters of the verdict and of another statement: three lines and two of a terminal."""
-LINES, WIDTH = 18, 100
-"""Of a terminal."""
+LINES, WIDTH = 16, 100
+"""Of a terminal; two more say what was written."""
 MORE = " … (--all)"
 MEAN = "mean_force_0p15_0p2_N"
 ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement")

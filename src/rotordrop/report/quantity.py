@@ -56,6 +56,7 @@ PLACES_OF_SCIENCE = (-4, 7)
 NO_INTERVAL = "–"
 """In place of an estimated number whose interval is not known."""
 FIXED_PLACES = {"count": 0, "probability": 1}
+BEYOND_GAP = "Beyond the air gap, support included"
 THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
 _OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
 
@@ -140,7 +141,9 @@ class Quantity:
                 return self._with_unit(chance.removesuffix(" %"))
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
-            rpm = written(60 * turns, max(0, 3 - _magnitude(60 * turns)))
+            places = self._places()
+            shown = turns if places is None else round(turns, places)
+            rpm = written(60 * shown, max(0, 3 - _magnitude(60 * shown)))
             return f"{self.number} Hz ({rpm} rpm)"
         return self._with_unit(self.number)
 

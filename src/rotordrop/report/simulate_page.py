@@ -31,7 +31,7 @@ from rotordrop.report.content import (
 )
 from rotordrop.report.drop_sections import drop_sections, headline_card, speed_figure, static_limit_statement
 from rotordrop.report.machine_content import machine_sections, weight_shares
-from rotordrop.report.quantity import shown
+from rotordrop.report.quantity import BEYOND_GAP, shown
 from rotordrop.report.style import (
     FROM_POWER_OFF,
     SERIES,
@@ -216,7 +216,7 @@ def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
     figures.insert(2, fact("Peak pressure, rotor on race", pressure, "pressure", note=note))
     if bearing.first_contact is not None and bearing.air_gap is not None:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
-        figures.append(fact("Furthest beyond the air gap", deepest, "length", 3))
+        figures.append(fact(BEYOND_GAP, deepest, "length", 3))
     places = ((f"{bearing.name}.face", "Peak axial force"), (stop_of(bearing.name), "Peak force on the stop"))
     for place, label in places:
         there = result.contacts_at(place)

@@ -143,6 +143,8 @@ def in_seconds(figure: go.Figure) -> None:
     for mark in figure.layout.annotations:
         if mark.xref and "domain" not in mark.xref and mark.xref != "paper":
             mark.x /= MILLI
+    for axis in figure.select_xaxes():
+        axis.range = axis.range and [end / MILLI for end in axis.range]
     figure.for_each_xaxis(lambda axis: axis.title.update(text=FROM_POWER_OFF) if axis.title.text else None)
 
 
@@ -371,6 +373,8 @@ class Panel:
     """Marked with its value, time and interval."""
     certain: bool = True
     """Whether the value of the peak holds; else it is marked with its interval alone."""
+    span: tuple[float, float] | None = None
+    """Ends of the time axis [s], where they are not those of what is drawn."""
     series: bool = False
     """Whether the curves take the colours of a series instead of those of their roles."""
 
@@ -383,6 +387,7 @@ class Panel:
             histories=tuple(history.between(start, end) for history in self.histories),
             band=None if self.band is None else self.band.between(start, end),
             levels=(),
+            span=(start, end),
         )
 
 
@@ -410,6 +415,8 @@ def time_panels(
             _draw(figure, panel, scale, unit, i, j, legend)
             if j == 1 or panel.axis != row[j - 2].axis:  # one title for neighbours that show the same
                 figure.update_yaxes(title_text=axis_title(panel.axis, unit), row=i, col=j)
+            if panel.span is not None:  # else the words beside a peak would stretch it
+                figure.update_xaxes(range=[MILLI * end for end in panel.span], row=i, col=j)
     label_time(figure, row=len(rows))
     drawn = [history.time for row in rows for panel in row for history in panel.histories]
     if any(float(np.ptp(time)) > LONG for time in drawn if len(time)):
@@ -469,12 +476,12 @@ def _mark(
         showarrow=True,
         arrowhead=2,
         arrowcolor=MUTED,
-        ax=34,
-        ay=4,
+        ax=20,
+        ay=10,
         xanchor="left",
         align="left",
         bgcolor=OVER,
-        font={"size": 11.5, "color": INK},
+        font={"size": 11, "color": INK},
         row=row,
         col=column,
     )

@@ -30,7 +30,7 @@ from rotordrop.report.content import (
     table,
     verdict_column,
 )
-from rotordrop.report.quantity import NO_BREAK, Quantity, shown, with_error, written
+from rotordrop.report.quantity import BEYOND_GAP, NO_BREAK, Quantity, shown, with_error, written
 from rotordrop.report.style import (
     COLOURS,
     FROM_POWER_OFF,
@@ -117,35 +117,24 @@ def waterfall_page(
         history, settled = plane.history, plane.settling
         at = f"at {shown(history.largest_time, 'duration', 3)}"
         last = math.nan if settled.contact_from is None else settled.contact_from
-        figures = tuple(
-            KeyFigure(label, Quantity(value=value, kind=kind, interval_90=between, digits=3), note)
-            for label, value, kind, between, note in (
-                ("Largest displacement", history.largest, "length", history.largest_interval_90, at),
-                (
-                    "Beyond the air gap",
-                    history.largest_indentation,
-                    "length",
-                    history.largest_indentation_interval_90,
-                    "",
-                ),
-                (
-                    "Largest after 0.2 s",
-                    history.largest_later,
-                    "length",
-                    history.largest_later_interval_90,
-                    "",
-                ),
-                ("Impacts", len(settled.touched), "count", settled.count_interval_90, BY_DISPLACEMENT),
-                (
-                    CONTACT_FROM.capitalize(),
-                    last,
-                    "duration",
-                    settled.contact_from_interval_90,
-                    AFTER_POWER_OFF,
-                ),
-            )
+        beyond = (history.largest_indentation, "length", history.largest_indentation_interval_90)
+        later = (history.largest_later, "length", history.largest_later_interval_90)
+        told = [
+            ("Largest displacement", history.largest, "length", history.largest_interval_90, at),
+            (BEYOND_GAP, *beyond, ""),
+            ("Largest after 0.2 s", *later, ""),
+        ]
+        if analysis.signal.recorded:  # a simulation knows its contacts, and need not guess them
+            between = (settled.count_interval_90, settled.contact_from_interval_90)
+            told += [
+                ("Impacts", len(settled.touched), "count", between[0], BY_DISPLACEMENT),
+                (CONTACT_FROM.capitalize(), last, "duration", between[1], AFTER_POWER_OFF),
+            ]
+        figures = (
+            KeyFigure(label, Quantity(value=value, kind=kind, interval_90=ends, digits=3), note)
+            for label, value, kind, ends, note in told
         )
-        cards.append(Card(f"{name} plane", figures))
+        cards.append(Card(f"{name} plane", tuple(figures)))
     return ReportContent(
         title=title,
         subtitle="times count from power-off",
@@ -261,7 +250,10 @@ def line_table(analysis: CoastDownAnalysis) -> Table:
 
 
 def where_of(line: Line) -> str:
-    """Order or frequency of a line with its error."""
+    """Order or frequency of a line with its error; from where to where one moves that is a sum of both."""
+    if line.kind == "combination":
+        first, *_, last = line.path.frequency
+        return f"{first:.0f} to {last:.0f} Hz".replace(" ", NO_BREAK)
     matches = line.name.matches
     # Where the speed changed too little to tell, the name says which of the two it is.
     an_order = line.kind == "order" or bool(matches and matches[0].candidate.kind == "order")

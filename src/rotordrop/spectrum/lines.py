@@ -180,11 +180,12 @@ def _joined(lines: Sequence[Line]) -> list[Line]:
 
 
 def _same(line: Line, other: Line) -> bool:
-    """Whether two entries are one line: in different planes, or in one plane at different times."""
+    """Whether two entries are one line: in two planes, or in one at two times or within their errors."""
     if line.label != other.label:
         return False
     apart = line.first_seen >= other.last_seen - 1.0 or other.first_seen >= line.last_seen - 1.0
-    if set(line.forward) & set(other.forward) and not (apart and line.named):
+    one = abs(line.frequency - other.frequency) <= line.frequency_error + other.frequency_error
+    if set(line.forward) & set(other.forward) and not (line.named and (apart or one)):
         return False
     if "combination" in (line.kind, other.kind):
         return line.kind == other.kind
@@ -201,9 +202,9 @@ def _merged(line: Line, other: Line) -> Line:
     strong, weak = (line, other) if line.amplitude >= other.amplitude else (other, line)
     return replace(
         strong,
-        amplitude_xy={**strong.amplitude_xy, **weak.amplitude_xy},
-        forward={**strong.forward, **weak.forward},
-        backward={**strong.backward, **weak.backward},
+        amplitude_xy={**weak.amplitude_xy, **strong.amplitude_xy},
+        forward={**weak.forward, **strong.forward},
+        backward={**weak.backward, **strong.backward},
         first_seen=min(line.first_seen, other.first_seen),
         last_seen=max(line.last_seen, other.last_seen),
         confidence=max(line.confidence, other.confidence),

@@ -71,7 +71,7 @@ class Fleet:
                 return None, f"its {where} holds the serial numbers {serials}; expected one"
         return None, (
             f"neither its name nor its head holds a serial number of {self.folder} "
-            f"({len(self.machines)} machine files)"
+            f"(machine files: {len(self.machines)})"
         )
 
 

@@ -24,7 +24,7 @@ from typing import Any
 from rotordrop.errors import OutputError, RecordError, RotordropError, UsageError
 from rotordrop.estimate.published import read_drop
 from rotordrop.files import clear_of_no_file
-from rotordrop.jobs.runner import Runner, Verb, result_folder, state_of, take_lock
+from rotordrop.jobs.runner import Runner, Verb, published_run, result_folder, state_of, take_lock
 from rotordrop.jobs.workspace import Job
 from rotordrop.ledger.book import LoggedAlreadyError, add_drop, drop_of_estimate, logged_drops, remove_drop
 from rotordrop.watch.fleet import Fleet, read_fleet
@@ -39,7 +39,7 @@ from rotordrop.watch.kept import (
     status_of,
 )
 from rotordrop.watch.overview import write_overview
-from rotordrop.watch.scalars import REPLACED, line_of, scalars_of
+from rotordrop.watch.scalars import REPLACED, VERBS, line_of, scalars_of
 
 SETTLES_S = 2.0
 """How long size and date of a file must stay the same [s]; chosen, not measured."""
@@ -322,6 +322,7 @@ class Watcher:
                 bearings = status["serial"] if watched is None else watched.bearings
                 status["logged"] = self._logged(job, bearings)
             status["scalars"] = scalars_of(job, status, watched)
+            _tell_page(job, status)
             keep_status(job, status)
         if self.hook is not None and status["outcome"] != REPLACED and not status.get("hooked"):
             run_hook(self.hook, status["scalars"])
@@ -380,6 +381,13 @@ class Watcher:
         )
         ended = time.monotonic()
         self._next_overview = ended + max(self.every, (ended - now) / OVERVIEW_SHARE)
+
+
+def _tell_page(job: Job, status: dict[str, Any]) -> None:
+    """Keep with a drop why the result that was found needs a person, for the page to say it."""
+    if (verb := VERBS.get(status["outcome"])) is not None:
+        told = {"run": published_run(job, verb), "text": status["scalars"]["needs_person"]}
+        job.write(job.read() | {"judged": told})
 
 
 def _digest_of(files: set[Arrived]) -> str:

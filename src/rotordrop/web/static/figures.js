@@ -46,10 +46,11 @@ export function canvasPen(canvas) {
       if (fill) { c.fillStyle = fill; c.fill(); }
       if (stroke) { c.lineWidth = size; c.strokeStyle = stroke; c.stroke(); }
     },
-    text(words, x, y, colour, { align = "left", size = 11, weight = "", turned = false } = {}) {
+    text(words, x, y, colour, { align = "left", size = 11, weight = "", turned = false, halo = "" } = {}) {
       c.save(); c.translate(x, y);
       if (turned) { c.rotate(-Math.PI / 2); }
       c.font = `${weight} ${size}px system-ui, sans-serif`; c.textAlign = align; c.fillStyle = colour;
+      if (halo) { c.lineWidth = 4; c.lineJoin = "round"; c.strokeStyle = halo; c.strokeText(words, 0, 0); }
       c.fillText(words, 0, 0); c.restore();
     }
   };

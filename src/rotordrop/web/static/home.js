@@ -18,9 +18,12 @@ function stateOf(job) {
   if (estimate?.state === "failed") { return ["estimate failed", "bad"]; }
   return [estimate?.state === "cancelled" ? "cancelled" : look?.result ? (job.row?.falls === false ? "no drop" : "looked at") : "files only", ""];
 }
+// Why a drop needs a person, as `watch` judged its latest result by the limits of the owner.
+export const judged = ({ states, judged: told }) => (Object.values(states).some(({ result }) => result && result === told?.run) ? told.text : "");
 // What is said of a drop in the list: that it is damaged or cannot be read, or the verdict of its estimate.
 function statementOf(job) {
   const error = job.damaged || job.row?.damaged || (job.states.look?.state === "failed" ? job.states.look.error : "");
+  if (!error && job.row?.statement?.level !== "bad" && judged(job)) { return { text: judged(job), level: "warning" }; }
   return error ? { text: error, level: "bad" } : job.row?.verb === "estimate" || job.row?.statement?.level === "bad" ? job.row.statement : null;
 }
 

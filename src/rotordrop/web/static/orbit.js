@@ -50,15 +50,15 @@ export function drawOrbit(pen, { name, gap, gapIs, paths, cursor, force, impacts
   pen.text(name, 6, 14, tone.ink, { size: 12.5, weight: "600" });
   if (gap) {
     const known = gap[1] - gap[0] <= 1e-6, words = known ? `gap ${shown(gap[1], "length")}` : `gap ${written(gap[0] / factor("length"))} to ${shown(gap[1], "length")} (${gapIs})`;
-    pen.text(words, pen.width - 6, 14, tone.limit, { align: "right" });
+    pen.text(words, pen.width - 6, pen.height - 5, tone.limit, { align: "right" });
   }
   const f = factor("length"), ten = f * 10 ** Math.floor(Math.log10(reach / f || 1)), step = ten * [5, 2, 1].find((one) => one * ten <= reach || one === 1);
   for (const value of [-step, step]) {
     const [x] = at(value, 0), [, y] = at(0, value), words = written(value / f, 2);
     pen.line([[x, cy - 3], [x, cy + 3]], tone.muted);
     pen.line([[cx - 4, y], [cx, y]], tone.muted);
-    pen.text(words, x, cy + 14, tone.muted, { size: 10, align: "center" });
-    pen.text(words, cx + 6, y + 3, tone.muted, { size: 10 });
+    pen.text(words, x, cy + 14, tone.muted, { size: 10, align: "center", halo: tone.back });
+    pen.text(words, cx + 6, y + 3, tone.muted, { size: 10, halo: tone.back });
   }
   pen.text(unit("length"), 6, pen.height - 5, tone.muted, { size: 10 });
 }

@@ -2,7 +2,7 @@
 import * as address from "./address.js";
 import { pan, play, setMark, setView, setWindow, stepCursor, zoom } from "./cursor.js";
 import { keep } from "./figures.js";
-import { askRemoval, leaveHome, redrawHome, running, showHome } from "./home.js";
+import { askRemoval, judged, leaveHome, redrawHome, running, showHome } from "./home.js";
 import { drawAll, loadView } from "./panels.js";
 import { askChannels, chooseFiles, sendExample, tailPair, tellFormats, useTail } from "./sending.js";
 import * as server from "./server.js";
@@ -71,7 +71,8 @@ function showStatus() {
   const failed = [state.report, "estimate", "look"].find((verb) => states[verb]?.state === "failed");
   if (failed) { say(states[failed].error, "bad", ...(failed === "look" ? waysOut(states[failed].error) : [])); }
   else if (state.estimate) {
-    say(state.estimate.statement.text, state.estimate.statement.level, ...state.estimate.headline.map(({ name, label, number }) => {
+    const { text: said, level: grade } = state.estimate.statement, needs = judged(state.job);
+    say(needs && grade === "good" ? `${said} ${needs}` : said, needs && grade === "good" ? "warning" : grade, ...state.estimate.headline.map(({ name, label, number }) => {
       const [text, interval] = number[units.chosen()];
       return make("span", { class: "headline", of: [make("span", { text: `${name} ${label} ` }), make("strong", { text }), make("span", { class: "note", text: interval ? ` (90 %: ${interval})` : "" })] });
     }));
@@ -200,6 +201,8 @@ async function openDrop(told) {
     by("main").hidden = true;
     state.job = await server.job(told.drop);
     shown = "";
+    const { id, files, states, damaged } = state.job; // one that `watch` kept was estimated without a look
+    if (files?.record && !states.look && !damaged) { state.job = await server.begin(id, "look").catch(() => state.job); }
   }
   by("actions").hidden = by("views").hidden = false;
   by("dropname").textContent = by("dropname").title = state.job.name;

@@ -1,10 +1,11 @@
-"""What changed since the last drop stands in the report, in the words of its tables."""
+"""What changed since the last drop is told in the words of the tables."""
 
 import copy
 
-from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.changed import changes
+from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.published import drop_of
-from rotordrop.report.changed_section import changed_section
+from rotordrop.report.told_changes import told_changes
 
 
 def test_a_wider_gap_before_is_named_in_words(estimate):
@@ -13,5 +14,5 @@ def test_a_wider_gap_before_is_named_in_words(estimate):
     known["value"] -= 60e-6
     known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
     document["joint"] = None
-    (first, *_) = changed_section(estimate, drop_of(document, "before.json")).statements
+    first, _ = told_changes(changes(drop_of(document, "before.json"), published_drop(estimate)))
     assert first.level == "warning" and "NDE: air gap (" in first.text

@@ -3,33 +3,12 @@
 from __future__ import annotations
 
 from rotordrop.elements.table import row_of
-from rotordrop.errors import UsageError
-from rotordrop.estimate.changed import Change, Changes, asked_for, changes
-from rotordrop.estimate.document import published_drop
-from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimate.published import Drop
-from rotordrop.report.content import Column, Section, Statement, Table, table
+from rotordrop.estimate.changed import Change, Changes, asked_for
+from rotordrop.report.content import Column, Statement, Table, table
 from rotordrop.report.quantity import Quantity, written
-from rotordrop.report.restart_page import evidence_table
-from rotordrop.restart.evidence import indicators
 from rotordrop.units import format_chance
 
-HEADING = "Since the last drop"
 NOTE = f"{asked_for()}, with the probability of at least that; found from: what shows in 19 of 20 cases."
-
-
-def changed_section(estimate: Estimate, since: Drop) -> Section:
-    """Compare a drop with an earlier estimate of the machine, as published."""
-    drop = published_drop(estimate)
-    try:
-        found = changes(since, drop)
-    except UsageError as error:
-        return Section(HEADING, (f"{since.record}: {error}.",))
-    statement, told = told_changes(found)
-    tables = (told,) if found.found else ()
-    if of_damage := indicators(drop, [since]):
-        tables = (*tables, evidence_table(sorted(of_damage, key=lambda one: -one.ratio)))
-    return Section(HEADING, statements=(statement,), tables=tables)
 
 
 def told_changes(found: Changes) -> tuple[Statement, Table]:
