@@ -11,27 +11,18 @@ if TYPE_CHECKING:
 
 def held_planes(record: Record, machine: Machine) -> tuple[bool, ...]:
     """Whether the magnet nearest to a plane stays on, plane by plane."""
-    position = machine.rotor.node_positions
-
-    def stays(node: int) -> bool:
-        near = min(machine.ambs, key=lambda amb: abs(position[amb.node - 1] - position[node - 1]))
-        return near.stays_on
-
-    return tuple(bool(machine.ambs) and stays(plane.node) for plane in record.planes)
+    return tuple(_stays(machine, plane.node) for plane in record.planes)
 
 
 def held_bearings(machine: Machine) -> tuple[str, ...]:
     """Names of the touchdown bearings whose nearest magnet stays on."""
-    if not any(amb.stays_on for amb in machine.ambs):
-        return ()
-    position = machine.rotor.node_positions
-    return tuple(
-        bearing.name
-        for bearing in machine.touchdown_bearings
-        if min(
-            machine.ambs, key=lambda amb: abs(position[amb.node - 1] - position[bearing.node - 1])
-        ).stays_on
-    )
+    return tuple(one.name for one in machine.touchdown_bearings if _stays(machine, one.node))
+
+
+def _stays(machine: Machine, node: int) -> bool:
+    place = machine.rotor.node_positions
+    near = min(machine.ambs, key=lambda amb: abs(place[amb.node - 1] - place[node - 1]), default=None)
+    return near is not None and near.stays_on
 
 
 def falling(record: Record, machine: Machine) -> Record:

@@ -305,15 +305,13 @@ def nominal_gaps(machine: Machine, record: Record) -> Array:
 
 
 def planes_at_bearings(machine: Machine, record: Record) -> set[int]:
-    """Numbers of the sensor planes nearest to the touchdown bearings; between them the rotor bends more."""
-    position = machine.rotor.node_positions
-    return {
-        min(
-            range(len(record.planes)),
-            key=lambda p: abs(position[bearing.node - 1] - position[record.planes[p].node - 1]),
-        )
-        for bearing in machine.touchdown_bearings
-    }
+    """Numbers of the planes nearest to their touchdown bearings; between them the rotor bends more."""
+    place = machine.rotor.node_positions
+    nearest: dict[str, tuple[float, int]] = {}
+    for number, plane in enumerate(record.planes):
+        away = abs(place[_bearing_at(machine, plane).node - 1] - place[plane.node - 1])
+        nearest[plane.bearing] = min((away, number), nearest.get(plane.bearing, (np.inf, 0)))
+    return {number for _, number in nearest.values()}
 
 
 def expected_gap(machine: Machine, plane: Plane) -> tuple[float, float]:
@@ -378,8 +376,8 @@ RINGING = 5e-6
 """Ringing of the released sag [m] (chosen); it lasts as long as the fall."""
 
 INDEPENDENT = 4.0
-"""Readings of a plane during the fall that count as independent, because ringing is no white noise [1]
-(chosen)."""
+"""Readings of a plane during the fall, or stretches of a swing, that count as independent: their errors are
+alike [1] (chosen)."""
 
 MARGIN = 4e-4
 """Time before the first contact that the parabola keeps away from [s] (chosen): it is seen in smoothed

@@ -181,7 +181,8 @@ class Evidence:
         from rotordrop.evidence.paths import motion_of
 
         whole = self.falling
-        return sought(lambda: motion_of(whole, gaps=(None,) * len(whole.planes), angles_known=True))
+        alone = (None,) * len(whole.planes)
+        return sought(lambda: motion_of(whole, gaps=alone, angles_known=True, machine=self.machine))
 
     @cached_property
     def power_off(self) -> PowerOff:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from operator import attrgetter, itemgetter
 from os import PathLike
 from pathlib import Path as FilePath
@@ -67,9 +66,6 @@ from rotordrop.record.record import Record, open_record
 from rotordrop.require import require
 from rotordrop.sketch import sketch
 from rotordrop.units import format_quantity, in_si
-
-RELEASE_ERROR = 2e-3
-"""Half width to which a look knows the release [s]."""
 
 LARGEST_GAP, LARGEST_SPAN = 0.1, 10.0
 """Largest length taken for an air gap, and largest span of readings that are looked at [m] (chosen): readings
@@ -183,16 +179,14 @@ class Look:
     def first_end(self) -> str | None:
         """The plane that is touched first; None where the planes are less apart than their errors."""
         touched = sorted(
-            (plane.touch, 0.5 * (plane.touch_interval_90[1] - plane.touch_interval_90[0]), plane.plane)
+            (plane.touch, plane.touch_interval_90[1] - plane.touch, plane.plane)
             for plane in self.planes
             if plane.touch is not None and plane.touch_interval_90 is not None
         )
         if not touched or len(touched) < len(self.planes):
             return None
-        for (first, error, _), (then, doubt, _) in pairwise(touched[:2]):
-            if then - first <= math.hypot(error, doubt):
-                return None
-        return touched[0][2]
+        (first, error, name), (then, doubt, _) = (*touched, (math.inf, 0.0, ""))[:2]
+        return name if then - first > math.hypot(error, doubt) else None
 
     def timeline(self) -> tuple[tuple[float, str], ...]:
         """Events in the order of time: time of the record [s] and words, intervals on that clock (90 %)."""
@@ -289,7 +283,7 @@ def look(
         gaps = tuple(one for one, stays in zip(gaps, ends.held, strict=True) if not stays)
     stated = arrangement is None or arrangement.angles_known
     try:
-        motion = motion_of(fell, gaps=gaps, angles_known=stated)
+        motion = motion_of(fell, gaps=gaps, angles_known=stated, machine=machine)
         if evidence is None and stated:
             turning = _speed_at(read, float(motion.time[int(np.argmin(motion.floats))]))
             findings = ranked([*findings, *check_alone(fell, motion, turning)])
@@ -520,7 +514,7 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
     during = (motion.time >= drop.release) & (motion.time <= drop.end)
     window = during & (motion.time <= drop.release + INDEX_WINDOW)
     found = []
-    for path, settling in zip(motion.paths, drop.settlings, strict=True):
+    for path, settling in zip(motion.at_bearings, drop.settlings, strict=True):
         radius = np.where(during, path.radius, 0.0)
         at = int(np.argmax(radius))
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
@@ -618,7 +612,7 @@ _DOCUMENT: dict[str, Part] = {
     "drops": _rows(
         lambda seen: seen.drops,
         release_s=_read_off(NUMBER, "release"),
-        release_interval_90_s=(PAIR, lambda one: [one.release - RELEASE_ERROR, one.release + RELEASE_ERROR]),
+        release_interval_90_s=_read_off(PAIR, "release_interval_90"),
         end_s=_read_off(NUMBER, "end"),
         permanent_contact_s=_read_off(MAYBE, "permanent_contact"),
         permanent_contact_interval_90_s=_read_off(MAYBE_PAIR, "permanent_contact_interval_90"),

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import NothingFallsError, RecordError
-from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations
+from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations, planes_at_bearings
 from rotordrop.evidence.impacts import BEGUN, Settling, find_impacts
 from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import CENTRED, Wall, find_wall
 from rotordrop.known import NINETY
+from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import FOLLOWED_TURNS, WhirlSpell, whirl_spells
 from rotordrop.record.record import Record
@@ -34,6 +35,13 @@ its magnets catch swings back.
 Chosen: a mass on magnets of 40 Hz and a tenth of critical damping that rubs for 20 ms reaches 0.37, one that
 bounces half as fast as it falls 0.8.
 """
+
+_RELEASED = 2e-3
+"""Half width to which a fall from rest dates the release [s]."""
+
+_ORBIT, _LEAVES = 0.05, 1.1
+"""Length of the levitated motion whose orbit counts [s], and how far outside that orbit, over its radius, a
+rotor has left it [1] (chosen)."""
 
 _LEAST_FALL = 0.5 * USUAL_GAP[0]
 """A dropped rotor goes at least this far [m] (chosen)."""
@@ -58,6 +66,8 @@ class Path:
     """The clearance circle, with what the record leaves open; its centre is that of `position`."""
     noise: float
     """Standard deviation of the readings beside their motion [m]."""
+    at_bearing: bool = True
+    """Whether no other plane is nearer to its touchdown bearing; else the path meets no race."""
 
     @property
     def gap(self) -> float:
@@ -85,10 +95,17 @@ class Motion:
     @property
     def walls(self) -> dict[str, Wall]:
         """The circle in which the shaft moves, by the bearing that is nearest."""
-        return {path.name: path.wall for path in self.paths}
+        return {path.name: path.wall for path in self.at_bearings}
+
+    @property
+    def at_bearings(self) -> tuple[Path, ...]:
+        """The paths in the planes nearest to the touchdown bearings."""
+        return tuple(path for path in self.paths if path.at_bearing)
 
 
-def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: bool) -> Motion:
+def motion_of(
+    record: Record, *, gaps: tuple[Gap | None, ...], angles_known: bool, machine: Machine | None = None
+) -> Motion:
     """Find down, centre and gap in every plane.
 
     Parameters
@@ -101,6 +118,8 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     angles_known : bool
         Whether the angles of the sensors are known. Where not, the fall shows where down is, and which way
         round the plane is seen follows from the orbit before it, taken as running counter-clockwise.
+    machine : Machine, optional
+        Tells which of several planes is nearest to a touchdown bearing; without it each is.
 
     Raises
     ------
@@ -113,6 +132,7 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
     # where the rotor lies: the last quarter after the fall
     rest_from = sunk + max(3 * (len(raw) - sunk) // 4, 1) if len(raw) - sunk > 8 else len(raw) - 1
     rest = np.median(raw[rest_from::stride], axis=0)
+    near = set(range(raw.shape[1])) if machine is None else planes_at_bearings(machine, record)
     paths: list[Path] = []
     turns = []
     for number, plane in enumerate(record.planes):
@@ -129,7 +149,8 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
         _turn(apart, turn)
         paths.append(
             Path(
-                name=plane.bearing,
+                name=plane.bearing if number in near else ", ".join(plane.names),
+                at_bearing=number in near,
                 position=position,
                 bearing_position=apart,
                 levitated=turn @ (floated - wall.centre),
@@ -147,10 +168,10 @@ def motion_of(record: Record, *, gaps: tuple[Gap | None, ...], angles_known: boo
         if wall.touch is None or wall.touch.at(radius[:, None])[0] > (1.0 + BEYOND) * wall.gap:
             wall = replace(wall, touch=crossing(radius, begin, rate, wall.gap, wall.gap_error))
         paths[number] = replace(path, wall=wall)
-    sought = [path for path, given in zip(paths, gaps, strict=True) if given is None]
-    notes = [_gap_note(path) for path in sought if not path.wall.determined]
-    if len(notes) < len(sought):
-        notes.append("air gap by where the rotor touched; give it where it is known")
+    sought = [path for path, given in zip(paths, gaps, strict=True) if given is None and path.at_bearing]
+    open_ones = ", ".join(path.name for path in sought if not path.wall.determined)
+    how = f"not determined by this record at {open_ones}" if open_ones else "by where the rotor touched"
+    notes = [f"air gap {how}; give it where it is known"] if sought else []
     if not angles_known:
         notes.append("vertical and sense of rotation taken from the record")
     return Motion(
@@ -194,15 +215,6 @@ def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
         paths=tuple(paths),
         floats=np.ones(len(record.time), dtype=np.bool_),
         notes=("displacements count from where the rotor usually is; the record shows no centre",),
-    )
-
-
-def _gap_note(path: Path) -> str:
-    low, high = (1e6 * end for end in path.wall.interval_90)
-    return (
-        f"{path.name}: air gap not determined by this record, because the rotor touched its race in too few "
-        f"directions and hardly swung: {low:.0f} to {high:.0f} µm are possible (90 %), {1e6 * path.gap:.0f} "
-        "µm are taken; give it where it is known"
     )
 
 
@@ -372,7 +384,9 @@ class Drop:
     """One fall from levitation, to the next levitation or the end of the record."""
 
     release: float
-    """When the rotor began to fall [s], to about 2 ms."""
+    """When the rotor began to fall [s]."""
+    release_interval_90: tuple[float, float]
+    """Interval that holds it with 90 % probability [s]."""
     end: float
     """When it was lifted again, or the record ends [s]."""
     lifted: bool
@@ -419,7 +433,8 @@ def drops_of(motion: Motion) -> tuple[Drop, ...]:
             continue
         found.append(
             Drop(
-                release=release,
+                release=release[0],
+                release_interval_90=release[1],
                 end=float(motion.time[stop - 1]),
                 lifted=bool(len(later)),
             )
@@ -427,16 +442,28 @@ def drops_of(motion: Motion) -> tuple[Drop, ...]:
     return tuple(found)
 
 
-def _release(motion: Motion, start: int, stop: int) -> float | None:
-    """When a fall of gravity began that reached a share of the gap where it did; None where nothing fell."""
-    begun = []
-    for path in motion.paths:
+def _release(motion: Motion, start: int, stop: int) -> tuple[float, tuple[float, float]] | None:
+    """When a fall of gravity began that reached a share of the gap where it did, and its interval [s].
+
+    An unbalance flings a rotor above its bending mode aside: where it left its orbit later than by gravity,
+    either may date the release. None where nothing fell.
+    """
+    time, begun, early, late = motion.time, [], [], []
+    for path in motion.at_bearings:
         sunk = path.levitated[1] - path.position[start - 1 : stop, 1] > FALLEN_SHARE * path.gap
         if not sunk.any():
             return None
-        fallen = float(motion.time[start - 1 + int(np.argmax(sunk))])
-        begun.append(fallen - fall_time(FALLEN_SHARE * path.gap))
-    return max(min(begun), float(motion.time[0]))
+        begun.append(float(time[start - 1 + int(np.argmax(sunk))]) - fall_time(FALLEN_SHARE * path.gap))
+    release = max(min(begun), float(time[0]))
+    held = int(np.searchsorted(time, release - _RELEASED))
+    first = max(held - int(_ORBIT * motion.rate), 0)
+    for path in motion.at_bearings if held > first else ():
+        away = np.hypot(*(path.position[first:stop] - path.levitated).T)
+        reach = _LEAVES * float(np.max(away[: held - first]))
+        late.append(float(time[first + int(np.argmax(away > reach))]))
+        early.append(late[-1] - fall_time(2.0 * reach))
+    flung = max(0.5 * (min(late) - release), 0.0) if late and release < max(early) else 0.0
+    return release + flung, (release + min(flung - _RELEASED, 0.0), release + flung + max(_RELEASED, flung))
 
 
 def with_impacts(motion: Motion, drop: Drop) -> Drop:
@@ -445,17 +472,19 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
     inside = slice(first, int(np.searchsorted(motion.time, drop.end, side="right")))
     time = motion.time[inside]
     impacts, settlings = [], []
-    for path in motion.paths:
+    for path in motion.at_bearings:
         place = path.bearing_position[inside]
         hits = find_impacts(place, motion.rate, path.gap, path.noise)
-        touched, begun = time[hits.touched], np.full(len(hits.touched), BEGUN)
+        touched, surely, perhaps = (time[at] for at in (hits.touched, hits.surely, hits.perhaps))
+        begun = np.full(len(touched), BEGUN)
         touch, centre = path.wall.touch, NINETY * float(path.wall.centre_error.max())
         if (
             len(touched)
             and touch is not None
             and abs(touch.sample - first - hits.touched[0]) < 3e-3 * motion.rate
         ):
-            touched[0], begun[0] = touch.when(motion.time), touch.error
+            touched[0] = surely[0] = perhaps[0] = touch.when(motion.time)
+            begun[0] = touch.error
         for begins, error, at, approach, rebound in zip(
             touched, begun, hits.deepest, hits.approach, hits.rebound, strict=True
         ):
@@ -475,7 +504,7 @@ def with_impacts(motion: Motion, drop: Drop) -> Drop:
                     depth_interval_90=(depth - doubt, depth + doubt),
                 )
             )
-        settlings.append(Settling.of(touched, time[hits.surely], time[hits.perhaps], drop.end))
+        settlings.append(Settling.of(touched, surely, perhaps, drop.end))
     return replace(drop, impacts=tuple(sorted(impacts, key=lambda hit: hit.time)), settlings=tuple(settlings))
 
 

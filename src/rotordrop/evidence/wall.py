@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.evidence.events import INDEPENDENT
 from rotordrop.evidence.impacts import Impacts, find_impacts
 from rotordrop.evidence.touch import Touch, first_touch
 from rotordrop.known import NINETY
@@ -40,6 +41,10 @@ _ROUND = 0.01
 
 _STRAYS = 0.35
 """Standard deviation of the depth of a reversal over ``β v`` [1] (chosen)."""
+
+_WHIRLED = 0.3
+"""Standard deviation of the gap of a rotor that ends in a whirl over how far it is pressed beyond it [1]: a
+shaft that runs round bends otherwise than one that is thrown back (chosen)."""
 
 _USUAL_BETA = (6e-4, 1.2)
 """Inverse frequency of rotor on contact [s] and the standard deviation of its logarithm: 5 kg have 2e-4, 6 t
@@ -69,9 +74,6 @@ _BIN = 5e-3
 """Length of a stretch that shows where a swinging rotor lies [s] (chosen)."""
 
 _MOST_BINS = 400
-_INDEPENDENT = 4.0
-"""Stretches of a swing count like so many independent places: their errors are alike [1]."""
-
 _STEPS = np.array([1e-5, 1e-5, 1e-5, 0.3, 0.3, 0.05])
 """Sizes of the unknowns of a wall: centre [m], radius [m], logarithms of ``β`` and sag, lever [1]."""
 
@@ -114,7 +116,7 @@ class Wall:
     def interval_90(self) -> tuple[float, float]:
         """Interval that holds the radius with 90 % probability [m]."""
         half = NINETY * self.gap_error
-        return self.gap - half, self.gap + half
+        return max(self.gap - half, 0.1 * self.gap), self.gap + half
 
     @property
     def determined(self) -> bool:
@@ -161,7 +163,10 @@ def find_wall(
     noise = noise_by_differences(place, 3)
     floated = np.mean(place[:begin], axis=0)
     apart = (place - floated) - (other - np.mean(other[:begin], axis=0))
-    size = _first_size(place, floated, sunk)
+    # how far the rotor lies from where it floated, or strays where it ends in a whirl
+    late = slice(min(sunk + 3 * (len(place) - sunk) // 4, len(place) - 1), None)
+    lies = math.hypot(*(np.median(place[late], axis=0) - floated))
+    size = max(lies, 0.9 * float(np.percentile(np.hypot(*(place[sunk:] - floated).T), 80)))
     down = (place[sunk] - floated) / math.hypot(*(place[sunk] - floated))
     touch = first_touch(place, floated, rate, begin, size, noise)
     touched = None
@@ -187,13 +192,13 @@ def find_wall(
         parts = [
             _robust(impacts),
             np.sqrt(np.log1p(strays**2)),  # of the likelihood: errors that are expected larger cost
-            _robust(rest / (_ROUND * size)) / math.sqrt(max(len(lying) / _INDEPENDENT, 1.0)),
+            _robust(rest / (_ROUND * size)) / math.sqrt(max(len(lying) / INDEPENDENT, 1.0)),
             (centre - floated) / (CENTRED * size),
             [
                 (sought[3] - math.log(_USUAL_BETA[0])) / _USUAL_BETA[1],
                 sought[4] / _SAG_DOUBT,
                 (lever - _LEVER[0]) / _LEVER[1],
-                (gap / size - 1.0) / _UNLIKE,
+                ((gap + np.median(outward[late]) * beta**2) / size - 1.0) / _UNLIKE,
             ],
         ]
         if touched is not None:
@@ -204,7 +209,7 @@ def find_wall(
 
     start = size if given is None else given[0]
     sought = np.array([*floated, start, math.log(_USUAL_BETA[0]), 0.0, _LEVER[0]])
-    low = np.array([*(floated - size), 0.5 * size, -10.0, -3.0, -0.5])
+    low = np.array([*(floated - size), 0.2 * size, -10.0, -3.0, -0.5])
     high = np.array([*(floated + size), 1.6 * size, -4.0, 3.0, 0.5])
     for _ in range(10):
         path = place + sought[5] * apart
@@ -213,18 +218,21 @@ def find_wall(
         lying = _lying(
             radius, sunk + (int(hits.deepest[-1]) if len(hits.deepest) else 0), rate, sought[2], noise
         )
-        frozen = partial(residual, hits=hits, lying=lying, outward=_outward(path - sought[:2], rate))
+        outward = _outward(path - sought[:2], rate)
+        frozen = partial(residual, hits=hits, lying=lying, outward=outward)
         before, (sought, slopes) = sought, _least_squares(frozen, sought, low, high)
         if np.max(np.abs(sought[:3] - before[:3])) < 1e-7:
             break
     exact = given is not None and given[1] == 0.0
     mean, error = _moments(frozen, sought, slopes, low, high, len(hits.deepest))
     gap = given[0] if given is not None and exact else float(mean[2])
+    doubt = _WHIRLED * max(size - gap, 0.0) if np.median(outward[late]) > GRAVITY else 0.0
+    doubt = doubt if given is None else min(doubt, given[1])
     return Wall(
         centre=mean[:2].copy(),
         centre_error=error[:2],
         gap=gap,
-        gap_error=0.0 if exact else math.hypot(float(error[2]), GAIN * gap),
+        gap_error=0.0 if exact else math.hypot(float(error[2]), GAIN * gap, doubt),
         lever=float(mean[5]),
         touch=touch,
     )
@@ -306,14 +314,6 @@ def _least_squares(
 def _robust(error: Array) -> Array:
     """Errors over their standard deviations whose squares grow like a line when large (pseudo-Huber)."""
     return np.asarray(np.sign(error) * np.sqrt(2.0 * (np.sqrt(1.0 + error**2) - 1.0)))
-
-
-def _first_size(place: Array, floated: Array, sunk: int) -> float:
-    """How far the rotor lies from where it floated, or strays where it ends in a whirl [m]."""
-    late = place[sunk + 3 * (len(place) - sunk) // 4 :]
-    lies = math.hypot(*(np.median(late if len(late) else place[-1:], axis=0) - floated))
-    strays = float(np.percentile(np.hypot(*(place[sunk:] - floated).T), 80))
-    return max(lies, 0.9 * strays)
 
 
 def _outward(place: Array, rate: float) -> Array:

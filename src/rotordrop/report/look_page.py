@@ -10,7 +10,6 @@ from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.impacts import AFTER_LAST
-from rotordrop.evidence.look import RELEASE_ERROR
 from rotordrop.evidence.paths import TOO_SLOW
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.report.content import (
@@ -43,9 +42,7 @@ MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
 ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
-VAGUE = 0.05
-"""A length whose 90 % interval reaches further to either side is shown as a range [1] (chosen)."""
-RELEASE = f"the release (± {1e3 * RELEASE_ERROR:g} ms)"
+RELEASE = "the release"
 """What a look counts time from."""
 SENSOR_PLANES = f"Displacement in the planes of the sensors; time counts from {RELEASE}."
 
@@ -229,10 +226,7 @@ def _spectrum(level: Level) -> Figure:
 
 def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
     record = seen.record
-    planes = [
-        f"{path.name}: {', '.join(s.name for s in record.sensors if s.bearing == path.name)}"
-        for path in seen.motion.paths
-    ]
+    planes = [f"{plane.bearing}: {', '.join(plane.names)}" for plane in record.planes]
     span = f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
     return (
         ("record", str(record.path.name if record.path else record.name)),
@@ -253,7 +247,8 @@ def _verdict(seen: Look) -> list[Statement]:
             f"{AFTER_LAST}."
         )
     low, high = drop.count_interval_90
-    release = f"{format_moment(drop.release)} (± {1e3 * RELEASE_ERROR:g} ms)"
+    half = 1e3 * (drop.release_interval_90[1] - drop.release)
+    release = f"{format_moment(drop.release)} (± {half:.2g} ms)"
     count = len(seen.impacts)
     hits = f"{count} impact{'' if count == 1 else 's'} ({low} to {high})"
     touched = " First end: not determined." if len(seen.planes) > 1 else ""
@@ -319,9 +314,7 @@ def _gap_figure(plane: PlaneLook) -> KeyFigure:
 
 
 def _found(value: float, interval: tuple[float, float]) -> Quantity:
-    """A length with its interval; the interval alone where a number would say too much."""
-    vague = interval[1] - interval[0] > 2.0 * VAGUE * value
-    return Quantity(value=value, kind="length", interval_90=interval, digits=3, range_only=vague)
+    return Quantity(value=value, kind="length", interval_90=interval, digits=3)
 
 
 def _synchronous(found: Synchronous) -> list[KeyFigure]:
