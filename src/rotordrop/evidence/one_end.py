@@ -50,16 +50,12 @@ class OneEnd:
 
     def words(self, record: Record) -> str:
         """What happened, in words."""
-        ends = {
-            held: " and ".join(
-                plane.bearing for plane, stays in zip(record.planes, self.held, strict=True) if stays == held
-            )
-            for held in (True, False)
-        }
-        most = max(far for far, stays in zip(self.moved, self.held, strict=True) if stays)
+        planes = tuple(zip(record.planes, self.held, self.moved, strict=True))
+        held, fell = (" and ".join(p.bearing for p, stays, _ in planes if stays == s) for s in (True, False))
+        most = max(far for _, stays, far in planes if stays)
         return (
-            f"{ends[True]} stayed held by its magnets, {1e6 * most:.0f} µm from where it levitated in the "
-            f"median; {ends[False]} fell"
+            f"{held} stayed held by its magnets, {1e6 * most:.0f} µm from where it levitated in the median; "
+            f"{fell} fell"
         )
 
 

@@ -36,12 +36,9 @@ Chosen: a mass on magnets of 40 Hz and a tenth of critical damping that rubs for
 bounces half as fast as it falls 0.8.
 """
 
-_RELEASED = 2e-3
-"""Half width to which a fall from rest dates the release [s]."""
-
-_ORBIT, _LEAVES = 0.05, 1.1
-"""Length of the levitated motion whose orbit counts [s], and how far outside that orbit, over its radius, a
-rotor has left it [1] (chosen)."""
+_RELEASED, _ORBIT, _LEAVES = 2e-3, 0.05, 1.1
+"""Half width to which a fall from rest dates the release, length of the levitated motion whose orbit counts
+[s], and how far outside that orbit, over its radius, a rotor has left it [1] (chosen)."""
 
 _LEAST_FALL = 0.5 * USUAL_GAP[0]
 """A dropped rotor goes at least this far [m] (chosen)."""
@@ -301,7 +298,6 @@ def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
 
 _FOLLOWED = 2e-4
 """Time between the angles by which a whirl is followed [s] (chosen)."""
-
 
 TOO_SLOW = 5e-3
 """By how much velocities of impacts by straight lines over 1 ms are too small at most [m/s]."""

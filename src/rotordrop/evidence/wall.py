@@ -43,8 +43,8 @@ _STRAYS = 0.35
 """Standard deviation of the depth of a reversal over ``β v`` [1] (chosen)."""
 
 _WHIRLED = 0.3
-"""Standard deviation of the gap of a rotor that ends in a whirl over how far it is pressed beyond it [1]: a
-shaft that runs round bends otherwise than one that is thrown back (chosen)."""
+"""Standard deviation of the gap of a rotor that ends in a whirl over how far it is pressed beyond it [1]
+(chosen): a shaft that runs round bends."""
 
 _USUAL_BETA = (6e-4, 1.2)
 """Inverse frequency of rotor on contact [s] and the standard deviation of its logarithm: 5 kg have 2e-4, 6 t

@@ -67,9 +67,6 @@ _REFUTED = 0.12
 _LARGEST = 1.0
 """Largest error of a gain that is sought [1]: what is more shows in every fall."""
 
-_LEVEL = 1e-3
-"""Least share of the fall that a level sensor is taken to see [1]: it weighs next to nothing (chosen)."""
-
 _SEPARABLE = 1e-9
 """Least singular value over the largest one that still tells unknowns apart [1]."""
 
@@ -218,7 +215,7 @@ def _fitted(
     left = response_at(rotor.table_of_start(speed, float(since[-1])), since)[:, of_plane] * toward
     turning = np.exp(1j * speed * since)[:, None, None] * np.eye(len(record.planes))[of_plane] * toward
     parts = [column for seen in (left, turning) for column in (seen.real, -seen.imag)]
-    seen = np.where(np.abs(unit[:, 1]) < _LEVEL, _LEVEL, unit[:, 1])
+    seen = np.where(np.abs(unit[:, 1]) < 1e-3, 1e-3, unit[:, 1])  # a level sensor weighs next to nothing
     falls = -0.5 * gravity * since[:, None, None] ** 2 * np.diag(seen)
     columns = np.concatenate([*parts, falls], axis=-1) / noise[None, :, None]
     readings = record.signals[inside] * gains / noise
