@@ -60,6 +60,7 @@ from rotordrop.json_schema import (
 from rotordrop.known import NINETY
 from rotordrop.machine import Machine
 from rotordrop.record.arrangement import Arrangement
+from rotordrop.record.axes import sees_both_directions
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record
@@ -275,11 +276,12 @@ def look(
         raise RecordError(f"{read.name} cannot be looked at: {blocking[0]}")
     findings, gaps = _gaps(read, evidence, gap, findings)
     guessed = (*read.notes, *(arrangement.notes if arrangement else ()))
-    fell, every = read, gaps
-    ends = one_end(read, None if None in gaps else np.array([one[0] for one in gaps if one]))
+    every = gaps
+    fell, gaps = _living(read, gaps, findings)
+    ends = one_end(fell, None if None in gaps else np.array([one[0] for one in gaps if one]))
     if ends is not None:
-        guessed = (ends.words(read), *guessed)
-        fell = read.of_channels(ends.columns(read, held=False))
+        guessed = (ends.words(fell), *guessed)
+        fell = fell.of_channels(ends.columns(fell, held=False))
         gaps = tuple(one for one, stays in zip(gaps, ends.held, strict=True) if not stays)
     stated = arrangement is None or arrangement.angles_known
     try:
@@ -468,6 +470,19 @@ def _checked(record: Record) -> tuple[Finding, ...]:
     damage = [found("damage", words=words) for words in record.warnings]
     findings = damage + check_clock(record) + check_channels(record)
     return ranked(findings if stops(findings) else findings + check_blocks(record))
+
+
+def _living(
+    record: Record, gaps: tuple[Gap | None, ...], findings: Iterable[Finding]
+) -> tuple[Record, tuple[Gap | None, ...]]:
+    """The record without its dead channels and the planes that they leave half blind, and the gaps of it."""
+    dead = {one.channel for one in findings if one.kind == "dead channel"}
+    living = [one for one in record.sensors if one.name not in dead]
+    seeing = [sees_both_directions([s for s in living if s.node == p.node]) for p in record.planes]
+    if not dead or not any(seeing):
+        return record, gaps
+    columns = [i for i, s in enumerate(record.sensors) if s in living and seeing[record.plane_of[i]]]
+    return record.of_channels(columns), tuple(one for one, sees in zip(gaps, seeing, strict=True) if sees)
 
 
 def _gaps(

@@ -88,6 +88,8 @@ def one_end(record: Record, gaps: Array | None = None) -> OneEnd | None:
     if gaps is None:
         size = np.full(len(moved), float(np.max(moved)))
     held, fell = moved < NEAR * size, moved > AWAY * size
+    dead = np.ptp(record.signals, axis=0) == 0.0  # says nothing of its end
+    held &= [not dead[list(plane.columns)].any() for plane in record.planes]
     if not held.any() or not fell.any() or not (held | fell).all():
         return None
     return OneEnd(held=tuple(held.tolist()), moved=tuple(moved.tolist()))

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError
-from rotordrop.record.arrangement import fitting, pairs_of, planes_as_listed, sensors_of_planes
+from rotordrop.record.arrangement import (
+    fitting,
+    given_planes,
+    pairs_of,
+    planes_as_listed,
+    sensors_of_planes,
+)
 from rotordrop.record.columns import find_speed, likeliest, options_for, units_missing
 from rotordrop.record.profile import Profile
 from rotordrop.record.record import record_of
@@ -31,7 +37,7 @@ class Guess:
 
 def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor] = ()) -> Guess:
     """Complete a profile from a recording that was read with it, for sensors that need a channel each."""
-    mapped = given.channels | sensors_of_planes(recording, sensors, given)
+    mapped = given.channels | (sensors_of_planes(recording, sensors, given) if sensors else {})
     for sensor in sensors:
         hits = fitting(recording.channels, sensor.name)
         if sensor.name not in mapped and len(hits) == 1:
@@ -45,9 +51,12 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         free = [channel.label for channel in recording.channels if channel.label not in mapped.values()]
         options = options_for(recording, sensors, unmapped)
         missing.append(f"channels of {listed(unmapped)}: {options} (there are {listed(free)})")
-    pairs = [] if sensors else pairs_of(recording.channels)[0]
-    planes = given.planes or {name: f"{one.label}, {other.label}" for name, (one, other), _ in pairs}
-    paired = [channel.label for _, pair, _ in pairs for channel in pair]
+    pairs = {name: [one.label for one in pair] for name, pair, _ in pairs_of(recording.channels)[0]}
+    if given.planes and not sensors:
+        pairs = {n: [one.label for one, _ in pair] for n, pair in given_planes(recording, given)}
+    pairs = {} if sensors else pairs
+    planes = given.planes or {name: ", ".join(pair) for name, pair in pairs.items()}
+    paired = [label for pair in pairs.values() for label in pair]
     looked_at = (likely | mapped).values() if sensors else paired or [c.label for c in recording.channels]
     used = [c for c in recording.channels if c.label in looked_at and c.label != given.speed.pulses]
     profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})

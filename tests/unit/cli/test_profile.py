@@ -104,6 +104,10 @@ def test_every_command_that_reads_a_record_takes_a_map(command, tmp_path, monkey
     call = command.format(record=RECORD, machine=LP400).split()
     assert run([*call, "--map", "middle: S_NDE_A, S_NDE_B"]) == UsageError.exit_code
     assert "'middle' names 2 channels; the machine has the planes NDE, DE" in capsys.readouterr().err
+    if command.startswith("profile"):  # without a machine the map makes the planes
+        assert run(["profile", RECORD, "--map", "middle: S_NDE_A, S_NDE_B", "-o", "made.toml"]) == 0
+        assert load_profile("made.toml").planes == {"middle": "S_NDE_A, S_NDE_B"}
+        Path("made.toml").unlink()
     assert list(tmp_path.iterdir()) == []
 
 

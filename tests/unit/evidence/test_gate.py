@@ -216,6 +216,7 @@ FAULTS = {
     "double rate": ("drop", clock(2.0), RATE, None, "so the clock is wrong"),
     "2 % fast": ("drop+", clock(1.02), RATE, None, "of the speed channel, +2.0 % or more"),
     "ms for s": ("drop", clock(1e-3, unit=1e3), RATE, None, "the clock gives 20 Hz over"),
+    "s for ms": ("drop", clock(1e3, unit=1e-3), RATE, None, "in which no rotor moves by"),
     "no speed": ("drop", no_speed, "speed missing", None, "S_NDE_A"),
     "rpm for Hz": ("drop", speed(lambda r, _: 60 * r), "wrong speed unit", "speed", "rpm taken for Hz"),
     "Hz for rpm": ("drop", speed(lambda r, _: r / 60), "wrong speed unit", "speed", "Hz taken for rpm"),

@@ -46,6 +46,10 @@ def test_the_record_shows_which_end_was_held(known, drop, synthetic):
     assert found is not None
     assert found.held == (True, False)
     assert [amb.stays_on for amb in as_dropped(drop.record, known).ambs] == [True, False]
+    still = synthetic.record.signals.copy()
+    still[:, 0] = 0.0  # a dead channel says nothing of its end
+    seen = look(replace(synthetic.record, signals=still))
+    assert one_end(seen.record) is None and [one.plane for one in seen.planes] == [FELL]
     assert one_end(synthetic.record) is None
     assert as_dropped(synthetic.record, known) is known
 

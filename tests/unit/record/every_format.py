@@ -69,11 +69,21 @@ def _mat(path: Path, packed: bool) -> None:
     scipy.io.savemat(path, {"t": TIME, "speed_Hz": SPEED} | columns, do_compression=packed)
 
 
+def _mat_structures(path: Path) -> None:
+    """One structure per channel, as several recorders export."""
+    said = {"unit": "um", "dt": STEP, "t0": TIME[0]}
+    entries = [said | {"name": name, "data": READINGS[:, i]} for i, name in enumerate(NAMES)]
+    scipy.io.savemat(path, {"channels": np.array(entries, dtype=object)})
+
+
 def _mat_73(path: Path) -> None:
+    """HDF5 behind 512 bytes of its own, a structure, text as numbers."""
     with h5py.File(path, "w", userblock_size=512) as file:
         columns = {f"{name}_um": READINGS[:, i] for i, name in enumerate(NAMES)}
-        for name, values in ({"t": TIME, "speed_Hz": SPEED} | columns).items():
-            file.create_dataset(name, data=np.atleast_2d(values)).attrs["MATLAB_class"] = np.bytes_("double")
+        columns |= {"t": TIME, "speed_Hz": SPEED, "note": [ord(sign) for sign in "LP-400"]}
+        for name, values in columns.items():
+            item = file.create_dataset(f"drop/{name}", data=np.atleast_2d(values).T)
+            item.attrs["MATLAB_class"] = np.bytes_("char" if name == "note" else "double")
     content = bytearray(path.read_bytes())
     content[:512] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508, b" ") + b"\x00\x02IM"
     path.write_bytes(content)
@@ -192,6 +202,11 @@ def _xlsx(path: Path) -> None:
     book.save(path)
 
 
+def _npy(path: Path) -> None:
+    columns = {f"{name}_um": READINGS[:, i] for i, name in enumerate(NAMES)} | {"speed_Hz": SPEED}
+    np.save(path, np.rec.fromarrays([TIME, *columns.values()], names=["t", *columns]))
+
+
 def _npz(path: Path) -> None:
     np.savez(path, t=TIME, speed_Hz=SPEED, **{f"{name}_um": READINGS[:, i] for i, name in enumerate(NAMES)})
 
@@ -215,13 +230,19 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "COMTRADE ASCII": ("dat", lambda path: _comtrade(path, "ASCII")),
     "COMTRADE binary": ("dat", lambda path: _comtrade(path, "BINARY")),
     "COMTRADE cfg": ("cfg", lambda path: _comtrade(path, "ASCII")),
+    "COMTRADE BINARY32": ("cfg", lambda path: _comtrade(path, "BINARY32")),
+    "COMTRADE FLOAT32": ("cfg", lambda path: _comtrade(path, "FLOAT32")),
     "WAV": ("wav", lambda path: as_wav(path, READINGS, 5000)),
+    "WAV 24": ("wav", lambda path: as_wav(path, READINGS, 5000, 24)),
+    "WAV 32": ("wav", lambda path: as_wav(path, READINGS, 5000, 32)),
     "NPY": ("npy", lambda path: np.save(path, READINGS)),
+    "NPY fields": ("npy", _npy),
     "NPZ": ("npz", _npz),
     "HDF5": ("h5", lambda path: save_record(record(), path)),
     "HDF5 gzip": ("h5", _hdf5_packed),
     "MAT plain": ("mat", lambda path: _mat(path, packed=False)),
     "MAT packed": ("mat", lambda path: _mat(path, packed=True)),
+    "MAT structures": ("mat", _mat_structures),
     "MAT 7.3": ("mat", _mat_73),
     "TDMS": ("tdms", lambda path: as_tdms(record(), path)),
     "UFF text": ("uff", lambda path: as_uff(record(), path, binary="")),
@@ -233,16 +254,13 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
 NEEDS = {"TDMS": "nptdms", "UFF text": "pyuff", "UFF binary": "pyuff", "Excel": "openpyxl"}
 """Packages beyond those always there."""
 
-CARRIES = {
-    "WAV": 500e-6 / 2**15,
-    "COMTRADE binary": 0.01e-6,
-    "COMTRADE ASCII": 0.01e-6,
-    "COMTRADE cfg": 0.01e-6,
+CARRIES = {"WAV": 500e-6 / 2**15, "WAV 24": 500e-6 / 2**23, "WAV 32": 500e-6 / 2**31} | {
+    f"COMTRADE {kind}": 0.01e-6 for kind in ("binary", "ASCII", "cfg", "BINARY32", "FLOAT32")
 }
 """Steps in which a format carries the readings [m]; the others carry them whole."""
 
-WITHOUT_SPEED = ("UFF text", "UFF binary")
-BY_HAND = ("WAV", "NPY")
+WITHOUT_SPEED = ("UFF text", "UFF binary", "MAT structures")
+BY_HAND = ("WAV", "WAV 24", "WAV 32", "NPY")
 """Formats that say neither speed nor unit: `BY_PROFILE` does."""
 
 

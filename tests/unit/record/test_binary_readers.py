@@ -45,39 +45,6 @@ def test_matlab_files_need_a_clock_and_equal_lengths(short, machine, tmp_path):
         read_recording(path, Profile())
 
 
-def test_a_structure_of_matlab_73_is_read(short, machine, tmp_path):
-    """HDF5 behind 512 bytes of its own, text as numbers."""
-    path = tmp_path / "drop.mat"
-    columns = {f"{name}_um": short.signals[:, i] * 1e6 for i, name in enumerate(short.channel_names)}
-    with h5py.File(path, "w", userblock_size=512) as file:
-        for name, values in (columns | {"t": short.time, "note": [ord(sign) for sign in "LP-400"]}).items():
-            item = file.create_dataset(f"drop/{name}", data=np.atleast_2d(values).T)
-            item.attrs["MATLAB_class"] = np.bytes_("char" if name == "note" else "double")
-    content = bytearray(path.read_bytes())
-    content[:512] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(508, b" ") + b"\x00\x02IM"
-    path.write_bytes(content)
-    record = read_record(path, machine)
-    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
-    assert "LP-400" in record.metadata.values()
-    path.write_bytes(content[:600])
-    with pytest.raises(RecordError, match=r"no intact HDF5 file .*it has 600 bytes"):
-        read_record(path, machine)
-
-
-def test_matlab_structures_with_name_and_unit(short, machine, tmp_path):
-    """One structure per channel, as several recorders export."""
-    path = tmp_path / "drop.mat"
-    entries = [
-        {"name": name, "unit": "um", "data": short.signals[:, i] * 1e6, "dt": 5e-5, "t0": short.time[0]}
-        for i, name in enumerate(short.channel_names)
-    ]
-    scipy.io.savemat(path, {"channels": np.array(entries, dtype=object)})
-    record = read_record(path, machine)
-    np.testing.assert_allclose(record.signals, short.signals, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(record.time, short.time, rtol=0, atol=1e-12)
-
-
 def test_a_packed_matlab_variable_with_a_flipped_byte_is_refused(short, machine, tmp_path):
     path = tmp_path / "drop.mat"
     as_matlab(short, path)

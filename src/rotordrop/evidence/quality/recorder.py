@@ -25,6 +25,10 @@ SLOWEST = 2000.0
 NO_FALL = 200.0
 """Sampling rate below which the whole fall of a rotor, some milliseconds, lies between two samples [Hz]."""
 
+NO_RECORDER, FASTEST = 1e6, 0.03
+"""Sampling rate that no recorder of displacements has [Hz], and mean speed over a record from which on its
+clock is then too fast [m/s] (chosen): a rotor falls 0.25 mm within 7 ms."""
+
 _GAP, _JITTERED_GAP = 1.5, 2.5
 """Interval over the usual one from which a sample is missing [1]; the second where all intervals scatter."""
 
@@ -47,6 +51,11 @@ def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     if drop and rate < NO_FALL:
         lasts = record.duration
         return [found("no-fall-between", rate=rate, lasts=lasts, in_ms=1e3 * rate, lasts_ms=1e-3 * lasts)]
+    spans = np.fmax.reduce(record.signals, axis=0) - np.fmin.reduce(record.signals, axis=0)
+    span = float(np.fmax.reduce(spans, initial=0.0))
+    if drop and rate > NO_RECORDER and span > FASTEST * record.duration:
+        slow = {"slower": 1e-3 * rate, "longer": 1e3 * record.duration}
+        return [found("fall-too-fast", slow, rate=rate, lasts=record.duration, span=span)]
     wrong = np.flatnonzero(~(steps > 0))
     if len(wrong):
         at = int(wrong[0])
