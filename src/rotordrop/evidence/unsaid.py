@@ -16,6 +16,7 @@ from rotordrop.record.arrangement import (
     sensors_of_planes,
 )
 from rotordrop.record.columns import find_speed, likeliest, options_for, units_missing
+from rotordrop.record.keys import speed_told
 from rotordrop.record.profile import Profile
 from rotordrop.record.record import record_of
 from rotordrop.record.recording import Channel, Recording, called, listed
@@ -93,4 +94,5 @@ def _with_speed(
         if (channel := find_speed(recording, taken, profile, "the recording")) is not None:
             speed = rules.model_copy(update={"channel": channel.label})
             return profile.model_copy(update={"speed": speed}), channel.label
-    return profile, None
+    constant, told = speed_told(recording.metadata)
+    return profile, None if constant is None else told

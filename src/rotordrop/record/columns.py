@@ -146,9 +146,9 @@ def find_speed(
     recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
 ) -> Channel | None:
     """Find the channel of the shaft speed, or None when the file has none."""
-    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
     if profile.speed.channel is not None or profile.speed.pulses is not None:
-        return _named(free, profile.speed.channel, "speed channel", recording, place)
+        return find_named(recording, taken, profile.speed.channel, "speed channel", place)
+    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
     in_speed_unit = [channel for channel in free if channel.unit in SPEED_UNITS]
     candidates = in_speed_unit or [channel for channel in free if _SPEED_NAMES.match(channel.name)]
     if len(candidates) > 1:
@@ -158,17 +158,11 @@ def find_speed(
     return candidates[0] if candidates else None
 
 
-def find_pulses(
-    recording: Recording, taken: Sequence[Channel], profile: Profile, place: str
+def find_named(
+    recording: Recording, taken: Sequence[Channel], name: str | None, what: str, place: str
 ) -> Channel | None:
-    """Find the channel of tacho pulses that the profile names, or None when it names none."""
-    free = [channel for channel in recording.channels if all(channel is not other for other in taken)]
-    return _named(free, profile.speed.pulses, "channel of pulses", recording, place)
-
-
-def _named(
-    free: list[Channel], name: str | None, what: str, recording: Recording, place: str
-) -> Channel | None:
+    """Find the channel beside those taken that the profile names, or None when it names none."""
+    free = (channel for channel in recording.channels if all(channel is not other for other in taken))
     found = next((one for one in free if name in (one.label, one.name)), None)
     if found is None and name is not None:
         have = listed(channel.label for channel in recording.channels)

@@ -104,10 +104,9 @@ def _clock(found: re.Match[str]) -> str:
     hour = int(found["h"])
     if found["half"]:
         hour = hour % 12 + (12 if found["half"][0] in "pP" else 0) if 1 <= hour <= 12 else 24
-    micro = (found["part"] or "")[:6].ljust(6, "0")
-    try:
-        clock = time(hour, int(found["min"]), int(found["s"] or 0), int(micro))
-    except ValueError:
+    micro = int((found["part"] or "")[:6].ljust(6, "0"))
+    if max(hour - 23, int(found["min"]) - 59, int(found["s"] or 0) - 59) > 0:
         return ""
+    clock = time(hour, int(found["min"]), int(found["s"] or 0), micro)
     zone = (found["zone"] or "").upper().replace("UTC", "Z")
     return clock.isoformat("auto" if clock.microsecond or clock.second else "minutes") + zone

@@ -25,9 +25,9 @@ _KEYS = {
     "frequenceechantillonnage частотадискретизации частотаопроса 采样率 采样频率",
     "trigger": "triggersample triggerindex triggerposition pretriggersamples pretriggerpoints "
     "pretrigsamples pretrigpoints presamples prepoints triggerpoint triggerpos trigpos trigsample "
-    "trigindex trigpoint triggerlocation triggersampleindex triggerlage triggerposten",
+    "trigindex trigpoint triggerlocation triggersampleindex triggerlage triggerpunkt pointdedeclenchement",
     "before": "pretrigger pretriggertime pretrig pretrigtime pretriggerduration vorlauf vorlaufzeit "
-    "timebeforetrigger",
+    "timebeforetrigger predeclenchement",
     "start": "t0 tstart x0 xorg xorigin xoffset xstart xzero tzero hoffset wfstartoffset startoffset "
     "timeoffset horizontaloffset horizoffset firstsample firsttime begintime tbegin begin starttime start",
     "first": "startsample firstsampleindex startindex",
@@ -41,12 +41,15 @@ _KEYS = {
     "comment": "comment comments kommentar kommentare bemerkung",
     "units": "unit units einheit einheiten yunit yunits yunitlabel yaxisunit vunit verticalunit vertunits "
     "verticalunits unitstring niunitdescription engunits engineeringunit channelunit unitlabel "
-    "physicalunit unite ydimension единицы",
+    "physicalunit unite ydimension displacementunit lengthunit единицы",
     "factor": "scale scalefactor",
     "per count": "factor faktor yinc yincrement gain slope conversionfactor calibrationfactor lsb "
     "resolution multiplier scaling unitspercount valuepercount",
     "offset": "yorg yorigin addoffset offset intercept zerooffset",
     "none": "fillvalue missingvalue nodata nodatavalue novalue invalidvalue",
+    "speed": "speed rpm rotorspeed shaftspeed machinespeed rotationalspeed rotationspeed nominalspeed omega "
+    "runningspeed operatingspeed samplespeed speedofrotation drehzahl nenndrehzahl rotordrehzahl "
+    "betriebsdrehzahl vitesse vitessederotation частотавращения 转速",
 }
 _KINDS = {key: kind for kind, keys in _KEYS.items() for key in keys.split()}
 """Keys in letters and digits only; of several starts the one that stands first here counts."""
@@ -55,10 +58,16 @@ _CLOCK = ("step", "rate", "trigger", "before", "start", "first", "unsure")
 _SHORT, _FINAL = 6, ("fs", "ts", "dt")
 """Kinds of a clock; letters that a key of it has behind other words, or which it is then (chosen)."""
 
+SAME_SPEED, NO_SHAFT = 0.01, 3e4
+"""Share by which the speeds of a head may differ and be one [1], and what no shaft has [rad/s] (chosen)."""
+
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eEdD][+-]?\d+)?)\s*([^\s;)]*(?: ?min)?)")
+_SAMPLES = re.compile(r"\d{3,15}|\d+ ?(?:samples?|points?|pts)", re.IGNORECASE)
 _PER_SECOND = re.compile(
     r"(?i)([kmg]?)(?:s|sa|samp|samples?|pts|points|1|hz)?(?:(?:/|\s?per\s?)s(?:ec|econd)?|ps)"
 )
+_THOUSANDS = re.compile(r"\s*\d{1,3}[.,]\d{3}\s*(?!\d|[Hh]z)")
+"""What may be thousands or decimals, "6.600 rpm"."""
 _A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d+[-.]\d|\d ?[A-Za-z]{3,}\.? \d")
 
 
@@ -127,7 +136,7 @@ def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
         elif kind == "first":  # in the unit of the step, which is said for both
             start = dict(_quantities([(key, value)], "time", time_unit)).get(key) if time_unit else start
             sample = sample if time_unit else -number
-        elif timed or (kind == "before" and not re.fullmatch(r"\d{3,15}", str(value).strip())):
+        elif timed or (kind == "before" and not _SAMPLES.fullmatch(str(value).strip())):
             before = dict(_quantities([(key, value)], "time", time_unit)).get(key)
             start = -abs(before) if start is None and before is not None else start
         elif number == round(number):
@@ -144,6 +153,18 @@ def clock_told(entries: Mapping[str, Any], unit: str = "") -> Told:
         time_unit=time_unit,
         unused=tuple(f"{key} = {value!s:.40}" for key, value in said if re.search("[1-9]", str(value))),
     )
+
+
+def speed_told(entries: Mapping[str, Any]) -> tuple[float | None, str]:
+    """The one speed [rad/s] that entries of a head give, and words on it or on what is not used."""
+    last = {key: kind_of(key) or kind_of(re.split("[./]", key)[-1]) for key in entries}
+    said = [(k, v) for k, v in entries.items() if last[k] == "speed" and _number_in(v)]
+    sure = _quantities([(k, v) for k, v in said if not _THOUSANDS.match(str(v))], "speed", "?")
+    found = [value for _, value in sure if abs(value) < NO_SHAFT]
+    told = ", ".join(f"{key} = {value!s:.40}" for key, value in said)
+    if found and max(found) - min(found) <= SAME_SPEED * abs(found[0]):
+        return found[0], f"speed of the head of the file: {told}"
+    return None, f"not used, the head of the file has no one speed with a unit: {told}" if told else ""
 
 
 def _number_in(value: Any) -> re.Match[str] | None:

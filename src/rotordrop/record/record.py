@@ -28,8 +28,9 @@ from rotordrop.record.axes import (
     sensor_planes,
 )
 from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock
-from rotordrop.record.columns import displacement, find_pulses, find_speed, match_sensors, speed_factor
+from rotordrop.record.columns import displacement, find_named, find_speed, match_sensors, speed_factor
 from rotordrop.record.event_date import event_of
+from rotordrop.record.keys import speed_told
 from rotordrop.record.missing import gone_on, mended, no_values, without_pairs
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
@@ -442,7 +443,7 @@ def record_of(
     marks = next((c.values for c in recording.channels if c.name == MARKS and c.unit == "s"), None)
     when: Array | None = None
     readings: Array | None = None
-    pulses = find_pulses(recording, matched, profile, place)
+    pulses = find_named(recording, matched, profile.speed.pulses, "channel of pulses", place)
     if pulses is not None:
         passed = passages(
             pulses.time,
@@ -453,9 +454,15 @@ def record_of(
         )
         marks = passed.marks if passed.marks.size else None
         words += passed.warnings
+    constant, told = None, ""
     if profile.speed.constant is not None:
-        when, readings = time[[0, -1]], np.full(2, parse_quantity(profile.speed.constant, "speed"))
-        notes.append(f"speed given by hand: {profile.speed.constant}")
+        constant = parse_quantity(profile.speed.constant, "speed")
+        told = f"speed given by hand: {profile.speed.constant}"
+    elif of_speed is None and pulses is None:
+        constant, told = speed_told(recording.metadata)
+    notes += [told] if told else []
+    if constant is not None:
+        when, readings = time[[0, -1]], np.full(2, constant)
     elif of_speed is not None:
         known = ~no_values(of_speed.values)
         if not known.any():
@@ -475,7 +482,7 @@ def record_of(
         speed=None if when is None or readings is None else np.interp(time, when, readings),
         speed_time=when,
         speed_readings=readings,
-        speed_by_hand=profile.speed.constant is not None or recording.metadata.get(SPEED_SOURCE) == BY_HAND,
+        speed_by_hand=constant is not None or recording.metadata.get(SPEED_SOURCE) == BY_HAND,
         marks=marks,
         path=path,
         sha256=sha256,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
@@ -20,8 +22,10 @@ _SPELLINGS = {
     "ms": "ms msec millisecond milliseconds мс 毫秒",
     "us": "us µs μs usec µsec microsecond microseconds мкс 微秒",
     "ns": "ns nanosecond nanoseconds нс", "min": "min minute minutes", "h": "hour hours", "d": "day days",
-    "Hz": "hz hertz гц", "kHz": "khz кгц", "MHz": "mhz", "rad/s": "rad/s",
-    "rpm": "rpm 1/min u/min r/min tr/min min-1 min^-1 min⁻¹ /min об/мин 转/分",
+    "Hz": "hz hertz гц", "kHz": "khz кгц", "MHz": "mhz",
+    "rad/s": "rad/s rad/sec rad_s rad_per_s rad_per_sec radps rad·s⁻¹", "deg": "deg ° degree degrees grad",
+    "rad": "rad radian radians",
+    "rpm": "rpm 1/min u/min r/min tr/min rev/min min-1 min^-1 min⁻¹ /min об/мин 转/分 1_min u_min r_min",
 }  # fmt: skip
 _UNITS = {written: unit for unit, spellings in _SPELLINGS.items() for written in spellings.split()}
 _MICRO_LOST = re.compile(r"(?:[^\x00-\x7f]{1,4}|\?{1,2})m")
@@ -52,6 +56,9 @@ _TIME_WITHIN = re.compile(r"(?<=[^\W_])[ _.:/-](?:time|zeit)(?=[ _.:/-][^\W_])",
 
 FULL_SCALE = "of full scale"
 """Unit of readings that a file holds as shares of a full scale it does not tell."""
+
+_LENGTHS = ("m", "mm", "um", "nm", "mil", "in")
+_PHASE = re.compile(r"phase|phasor|lag\b", re.IGNORECASE)
 
 MARKS = "mark_passages"
 """Channel of a saved record that holds when a mark of the shaft passed [s]."""
@@ -100,6 +107,33 @@ def whose_time(name: str, names: Iterable[str] = ()) -> str | None:
         return within
     own = OWN_TIME.fullmatch(name)
     return ("" if TIME_NAMES.match(name) else None) if own is None else own["before"] or own["behind"]
+
+
+def of_polar(recording: Recording, place: object) -> Recording:
+    """The recording with x and y in place of a radius and an angle for each of two planes or more."""
+    bare = [one for one in recording.channels if not one.unit]
+    angles = [one for one in recording.channels if one.unit in ("deg", "rad")]
+    angles = angles or [one for one in bare if _PHASE.search(one.name)]
+    radii = [one for one in recording.channels if one.unit in _LENGTHS]
+    radii = radii or [one for one in bare if all(one is not other for other in angles)]
+    positive = [one for one in radii if not np.nanmin(one.values, initial=0.0) < 0.0]
+    if not 2 <= len(angles) <= len(positive):
+        return recording
+    named, pairs = listed(one.label for one in angles), list(zip(radii, angles, strict=False))
+    several = len(radii) > len(angles) or any(len(r.values) != len(a.values) for r, a in pairs)
+    if several or any(_PHASE.search(one.name) for one in angles):
+        words = f"the angles {named} may be those of the shaft, of a tone or of a mark"
+        ask = "or one 'radius [um]' and one 'angle [deg]' for each"
+        raise RecordError(f"{place}: {words}; export x and y of each plane and no angles, {ask}")
+    xy: dict[int, Channel] = {}
+    for radius, angle in pairs:
+        turned = np.radians(angle.values) if angle.unit == "deg" else angle.values
+        for one, axis, share in ((radius, "X", np.cos), (angle, "Y", np.sin)):
+            name = f"{radius.name} {axis}"
+            xy[id(one)] = replace(radius, name=name, label=name, values=radius.values * share(turned))
+    note = f"{named} are taken as angles from x to y, with the radii {listed(one.label for one in radii)}"
+    channels = tuple(xy.get(id(one), one) for one in recording.channels)
+    return replace(recording, channels=channels, notes=(*recording.notes, note))
 
 
 def plain_name(name: str) -> str:
@@ -174,7 +208,7 @@ def split_unit(written: str) -> tuple[str, str, str]:
         if mark:
             name, unit = name.strip(), unit.strip()
             return name, name, spelled(unit)
-    ending = re.fullmatch(r"(.+)[_.]([^\W\d_]+)", written)
-    if ending and known_unit(ending[2]):
-        return ending[1], written, spelled(ending[2])
+    for ending in re.finditer(r"(?<=.)[_.](?=.)", written):  # "X_um", "n_1_min", "omega_rad/s"
+        if known := known_unit(written[ending.end() :]):
+            return written[: ending.start()], written, known
     return written, written, "rpm" if _RPM.fullmatch(written) else ""

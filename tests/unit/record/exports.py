@@ -141,7 +141,12 @@ NI = [
     Export("NI", "LVM, decimal comma", "a.lvm", labview("No", decimal=",")),
     Export("NI", "LVM, commas between", "a.lvm", labview("One", separator=",")),
     Export("NI", "LVM, comments", "a.lvm", labview("One", comments=True)),
-    Export("NI", "LVM, segments that follow", "a.lvm", labview("No", segments=(range(25), range(25, COUNT)))),
+    Export(
+        "NI",
+        "LVM, segments, the first of one row",
+        "a.lvm",
+        labview("No", segments=(range(1), range(1, COUNT))),
+    ),
     Export(
         "NI",
         "LVM, no head",

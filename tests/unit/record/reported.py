@@ -102,10 +102,18 @@ def beside(first: str, second: str) -> bytes:
     return "\n".join([head, *lines, ""]).encode()
 
 
-def below() -> bytes:
+def polar(head: str, unit: float) -> bytes:
+    """Radius and angle of both planes."""
+    planes = [MICRONS[:, k] + 1j * MICRONS[:, k + 1] for k in (0, 2)]
+    rows = np.column_stack([TIME, *(one for xy in planes for one in (abs(xy), np.angle(xy) / unit))])
+    return "\n".join([head, *(",".join(f"{v:.5f}" for v in row) for row in rows), ""]).encode()
+
+
+def below(name: str) -> bytes:
     """A table for each point, one below the other."""
-    heads = (f"Point Name,{n},\nX (ms),Y (um),\n" for n in NAMES)
-    rows = ("".join(f"{1e3 * t:.4f},{v},\n" for t, v in zip(TIME, w, strict=True)) for w in MICRONS.T)
+    heads = (f"{name.format(n)}\nX (ms),Y (um){',' * name.endswith(',')}\n" for n in NAMES)
+    end = ",\n" if name.endswith(",") else "\n"
+    rows = ("".join(f"{1e3 * t:.4f},{v}{end}" for t, v in zip(TIME, w, strict=True)) for w in MICRONS.T)
     return "\n".join(map("".join, zip(heads, rows, strict=True))).encode()
 
 
@@ -152,8 +160,8 @@ def matrix(path: Path, unit: object = "um") -> None:
 
 def compound(path: Path) -> None:
     with h5py.File(path, "w") as file:
-        rows = np.rec.fromarrays([TIME, *MICRONS.T], names=["Time", *NAMES])
-        file.create_dataset("table", data=np.asarray(rows)).attrs["unit"] = "um"
+        rows = np.rec.fromarrays([1e6 * TIME, *MICRONS.T, 60.0 * turns(TIME)], names=["t_us", *NAMES, "rpm"])
+        file.create_dataset("table", data=np.asarray(rows)).attrs["displacement_unit"] = "um"
 
 
 def workbook(*rows: list[object]) -> Callable[[Path], None]:
@@ -230,8 +238,8 @@ def fortran() -> bytes:
 
 
 def melted() -> bytes:
-    rows = [f"{TIME[i]:.4f},{n},{MICRONS[i, k]}" for i in range(COUNT) for k, n in enumerate(NAMES)]
-    return "\n".join(["time,variable,value", *rows, ""]).encode()
+    rows = [f"{n},{TIME[i]:.4f},{MICRONS[i, k]}" for i in range(COUNT) for k, n in enumerate(NAMES)]
+    return "\n".join(["Tag,time,value", *rows, ""]).encode()
 
 
 def of_matlab(path: Path) -> None:
@@ -318,6 +326,7 @@ def with_speed(times: list[str]) -> bytes:
 
 
 AFTER = slice(300, None)
+LIST = b"".join(b"CH%d,%s,5,Off,um\n" % (k, n.encode()) for k, n in enumerate(NAMES, start=1))
 NUMBERS, COUNTS = [str(i) for i in range(COUNT)], {"values": 50 * MICRONS - 50, "digits": 0}
 ROWS = [[float(t), *map(float, row)] for t, row in zip(TIME, MICRONS, strict=True)]
 
@@ -335,7 +344,7 @@ REPORTED = [
             said=r"1 of 1200 samples of NDE Y are missing, the first at -0\.04 s",
             off=1.0,
         )
-        for code in ("", *"9.91E+37 9.9E34 1E+30 1E+12 -9999 32767 -- n/a INVALID ****".split())
+        for code in ("", *"9.91E+37 9.9E34 1E+30 1E+12 -9999 32767 -- n/a INVALID **** inf -∞ 1e999".split())
     ),
     Reported(
         "two missing readings",
@@ -452,7 +461,7 @@ REPORTED = [
     Reported("times of two digits", "a.csv", few_digits(), names=COUNTED, late=1e-5, said="rounded"),
     Reported("exponents D", "a.txt", fortran(), names=("NDE_X", "NDE_Y", "DE_X", "DE_Y")),
     Reported("logic channels", "a.csv", hioki(), names=COUNTED),
-    Reported("a table of HDF5", "a.h5", compound),
+    Reported("a table of HDF5", "a.h5", compound, turning=True),
     Reported("a matrix of HDF5", "a.h5", matrix, start=0.0),
     Reported("a unit for each column", "a.h5", partial(matrix, unit=[b"um"] * 4), start=0.0),
     Reported("muxed signals", "a.mat", scope, ("NDE 1", "NDE 2", "DE 1", "DE 2")),
@@ -468,10 +477,55 @@ REPORTED = [
         )
         for first, second in (("A [s]", "B [s]"), ("Time 1", "Time 2"), ("Abszisse [s]",) * 2, ("",) * 2)
     ),
+    Reported(
+        "rows of settings",
+        "a.csv",
+        LINES[0] + b"hw=Clock,hw=A,hw=B,hw=A,hw=B\nFilter=,DC,DC,DC,OFF\n" + b"".join(LINES[1:]),
+    ),
+    Reported(
+        "counts below a list of channels",
+        "a.txt",
+        b"; Rate: 10 kS/s\n; Pretrigger: 500 samples\n; Ch\tName\tUnit\tScale\tOffset\n"
+        + b"".join(f"; {k}\t{n}\tum\t0.02\t{k}\n".encode() for k, n in enumerate(NAMES, start=1))
+        + b"".join(
+            b"\t".join(b"%d" % round(50 * (v - k)) for k, v in enumerate(row, start=1)) + b"\n"
+            for row in MICRONS
+        ),
+        said="times the factors",
+    ),
+    Reported(
+        "values alone",
+        "a.csv",
+        b"\n".join(b",".join(b"%.2f" % v for v in row) for row in MICRONS),
+        question=r"text\.names = .*with \[time\] step",
+    ),
     Reported("signs apart", "a.csv", table().replace(b",-", b",-   ")),
     Reported("a head of %", "a.txt", fortran().replace(b"#", b"%"), ("NDE_X", "NDE_Y", "DE_X", "DE_Y")),
     Reported("pages", "a.csv", b"".join([*LINES[:601], b"\nPage 2\n", LINES[0], *LINES[601:]])),
-    Reported("points below each other", "a.csv", below()),
+    *(
+        Reported(f"points below each other, {name}", "a.csv", below(name), question=question)
+        for name, question in (
+            ("Point Name,{},", ""),
+            ("Point Name: {}", ""),
+            ("Point", "tables of one time; export again as one table"),
+        )
+    ),
+    *(
+        Reported(
+            head,
+            "a.csv",
+            polar(head, unit),
+            ("R1 X", "R1 Y", "R2 X", "R2 Y"),
+            question=question,
+            said="angles",
+        )
+        for head, unit, question in (
+            ("t,R1 [um],Phi1 [deg],R2 [um],Phi2 [deg]", np.pi / 180, ""),
+            ("t,R1_um,Phi1_rad,R2_um,Phi2_rad", 1.0, ""),
+            ("t,A Amp [um],A Phase [deg],B Amp [um],B Phase [deg]", 1.0, "A Phase, B Phase may be those of"),
+            ("t,A Mag,A Phase,B Mag,B Phase", 1.0, r"one 'radius \[um\]' and one 'angle"),
+        )
+    ),
     Reported(
         "a slow column without its times",
         "a.csv",
@@ -511,6 +565,27 @@ REPORTED = [
             (b"Sample Rate: 10,000 Hz\nPreTrigger,500\n", {"time": "No", "times": NUMBERS}, b"", {}),
             (b"Fs: 10000 Hz\nPre-trigger samples,500\n", {"time": "No", "times": FROM_TRIGGER}, b"", {}),
             (b"Factor,,.02,.02,.02,.02\nOffset,,1,1,1,1\n", COUNTS, b"", {"said": "times the factors"}),
+            *(
+                (head.encode(), {}, b"", {"said": f"speed of the head of the file: {key} = "})
+                for head, key in (
+                    ("Speed (rpm),3600\n", r"Speed \(rpm\)"),
+                    ("RPM: 3600\n", "RPM"),
+                    ("Rotor speed = 60 Hz\n", "Rotor speed"),
+                    ("# Drehzahl 3600 U/min\n", "Drehzahl"),
+                    ("Nominal Speed,3600,rpm\n", "Nominal Speed"),
+                    ("Vitesse de rotation (tr/min) : 3600\n", r"Vitesse de rotation \(tr/min\)"),
+                )
+            ),
+            *(
+                (head, {}, b"", {"said": "has no one speed with a unit: "})
+                for head in (
+                    b"RPM: 3.600\n",
+                    b"Speed,20,kHz\n",
+                    b"Speed: 3600 rpm\nNominal speed: 3000 rpm\n",
+                )
+            ),
+            (b"CH,Signal name,Range,Filter\n" + LIST, {"names": COUNTED}, b"", {"names": NAMES}),
+            (b"", {"time": "No", "times": NUMBERS}, b"", {"question": "no sampling interval"}),
             (b"", {}, b"Max,1,2,3,4\nMin,0,0,0,0\n", {"said": "below the rows: 'Max 1 2 3 4'"}),
             (b"", {}, b"\nGroup,2\nn,1\n1,2\n", {"said": "below the rows: 'Group 2'"}),
             (b"", {}, b"\nGroup,2\n" + table(), {"question": "export again as one table"}),
@@ -582,11 +657,16 @@ REPORTED = [
         table(time="Time", times=["14.03.2026 09:26:53"] * COUNT),
         question=r"\(its stamps stand still, they are coarser than the samples\) and no sampling interval",
     ),
-    Reported("one value a row", "a.csv", melted(), question="one value a row: .* names 4 channels"),
+    Reported("one value a row", "a.csv", melted(), question="one value a row: its column 'Tag' names 4"),
     Reported("a table of MATLAB", "a.mat", of_matlab, question="objects .MATLAB table. that only"),
     *(
         Reported(kind, "a.dat", begin + bytes(60), question=f"of the format {kind}")
-        for kind, begin in (("imc FAMOS", b"|CF,2,1,1;"), ("XML", b"<?xml "), ("DADiSP", b"DATASET X"))
+        for kind, begin in (
+            ("ZIP, which is not read; unpack it", b"PK\x03\x04"),
+            ("imc FAMOS", b"|CF,2,1,1;"),
+            ("XML", b"<?xml "),
+            ("DADiSP", b"DATASET X"),
+        )
     ),
     Reported("HDF5 by another name", "a.dat", hdf5(scale_factor=0.02)),
     Reported(
@@ -609,6 +689,9 @@ REPORTED = [
             (b"# sampling time Ts = 100 us\n# Trigger position: 500\n", NAMES, "um", ""),
             (b"XInc:,1.0E-04\nStart:,0\nXOrg:,-5.0E-02\nXUnits:,second\n", NAMES, "um", ""),
             (b"Sample Rate: 10 kS/s\nXOffset: -50 ms\n", [f"{n}/um" for n in NAMES], "", ""),
+            ("Fs: 10 kHz\nPoint de d\u00e9clenchement : 500\n".encode(), NAMES, "um", ""),
+            ("Fs: 10 kHz\nPr\u00e9-d\u00e9clenchement : 50 ms\n".encode(), NAMES, "um", ""),
+            (b"# Fs 10 kHz\nPretrigger: 500 samples\nTriggerpunkt,500\n", NAMES, "um", ""),
             (b"Interval;0.1 ms\nPretrig,50,ms\n".replace(b";", b","), NAMES, "um", ""),
             (b"Fs: 10 kHz\nTstart: -0.05\nXOffset: 7 div\n", NAMES, "um", "not used.*XOffset = 7 div"),
         )
@@ -623,6 +706,7 @@ REPORTED = [
             {"isi": 0.1, "isi_units": "ms", "start_sample": -50.0},
             {"Tinterval": STEP, "Tstart": START},
             {"srate": 1.0 / STEP, "pretrigger_samples": 500.0},
+            {"srate": 1.0 / STEP, "TriggerIndex": 501.0},
         )
     ),
     Reported("counts with lists", "a.h5", counts_with_lists, turning=True),

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, cast
 
 from rotordrop.errors import RecordError
-from rotordrop.record.recording import Recording
+from rotordrop.record.recording import Recording, of_polar
 from rotordrop.record.sandbox import refuse_bomb
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def read_recording(path: Path, profile: Profile) -> Recording:
     name = profile.format if profile.format and path.suffix != ".gz" else path.suffix.lstrip(".").lower()
     if name == "dat" and any(path.with_suffix(suffix).is_file() for suffix in (".cfg", ".CFG")):
         name = "comtrade"
-    return find_reader(name, path)(path, profile)
+    return of_polar(find_reader(name, path)(path, profile), path)
 
 
 def refuse_large(path: Path) -> None:
@@ -103,7 +103,12 @@ def find_reader(name: str, path: Path) -> Reader:
             with suppress(zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
                 inside = "xlsx" if "xl/workbook.xml" in archive.namelist() else inside
         if inside != name and inside not in _SUPPLIED:
-            words = "which is not read; export it as text, MAT, TDMS, HDF5 or universal file"
+            ask = (
+                "unpack it and give the file inside"
+                if inside == "ZIP"
+                else "export it as text, MAT, TDMS, HDF5"
+            )
+            words = f"which is not read; {ask}" + " or universal file" * (inside != "ZIP")
             raise RecordError(f"{path} is a file of the format {inside}, {words}")
         name = inside
     if name in _SUPPLIED:

@@ -179,16 +179,24 @@ def _joined(parts: list[Recording], firsts: Sequence[int], segments: bool, path:
     if len({label for named in labels for label in named}) == sum(map(len, labels)):
         beside = tuple(channel for part in parts for channel in part.channels)
         return replace(first, channels=beside, warnings=warnings)
+    longest = max((part.channels[0].time for part in parts), key=len)
+    step = (longest[-1] - longest[0]) / max(len(longest) - 1, 1)
     for part, named in zip(parts[1:], labels[1:], strict=True):
         last, after = pieces[-1].channels[0].time, part.channels[0].time
-        step = (last[-1] - last[0]) / max(len(last) - 1, 1)
         # the time of each segment may count from its own start
-        shift = _began(part) - _began(first) if after[0] <= last[-1] else 0.0
-        if named != labels[0] or abs(after[0] + shift - last[-1] - step) > 0.5 * step:
+        shifts = (
+            one
+            for one in (0.0, _began(part) - _began(first))
+            if abs(after[0] + one - last[-1] - step) <= 0.5 * step
+        )
+        shift = next(shifts, None)
+        if named != labels[0] or shift is None:
             words = f"the file holds {len(parts)} segments that do not follow each other"
             if not segments:
-                what = f"the head stands again in line {firsts[1]}: {words}"
-                raise RecordError(f"{path}: {what}; keep one of them, or export again as one table")
+                together = len(after) == len(last) and after[0] == last[0]
+                words = f"the file holds {len(parts)} tables of one time" if together else words
+                ask = "export again as one table" if together else "keep one, or export again as one table"
+                raise RecordError(f"{path}: the head stands again in line {firsts[1]}: {words}; {ask}")
             ask = f"(first_data_line = {firsts[1] + 1} under [text] of a profile reads the second)"
             return replace(first, warnings=(*first.warnings, f"{words}; the first is read {ask}"))
         pieces.append(replace(part, channels=tuple(replace(c, time=c.time + shift) for c in part.channels)))
@@ -216,7 +224,9 @@ def _of_table(
 ) -> Recording:
     """The recording of one table, whose head begins at a line."""
     rows, notes, warnings = _intact_rows(lines, complete, layout, path)
-    head = read_head(lines[begin : layout.first], layout, profile, path)
+    first = [plain_number(row[0], layout.decimal) for row in rows if is_number(row[0], layout.decimal)]
+    timed = bool(profile.time.step) or _grows_evenly(np.array(first, dtype=np.float64), None)
+    head = read_head(lines[begin : layout.first], layout, profile, path, timed=timed)
     table = _Table(rows=rows, layout=layout, head=head, profile=profile, path=path)
     clock = table.clock()
     channels, scaled = [], list[str]()
@@ -241,7 +251,7 @@ def _of_table(
                 values, scaled = values * factor + offset, [*scaled, label]
         channels.append(profile.channel(name, unit, values, time[there], label=label, clocked=True))
     notes += [f"whole numbers, taken times the factors of the head: {listed(scaled)}"] if scaled else []
-    texts = [head.labels[i] or f"column {i + 1}" for i in table.texts]
+    texts = [head.labels[i].rstrip(":") or f"column {i + 1}" for i in table.texts]
     notes += [f"left out, no numbers: {', '.join(texts)}"] if texts else []
     if head.count is not None and len(rows) < head.count:
         words = f"declares {head.count} samples and {len(rows)} are present"

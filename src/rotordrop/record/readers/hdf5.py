@@ -150,9 +150,10 @@ def _items(name: str, dataset: Any, file: Any, attributes: dict[str, Any], path:
     except OSError as error:
         raise damaged(path, f": {name!r} cannot be unpacked ({str(error).splitlines()[0]})") from error
     if values.dtype.names:
+        attributes |= {f"{name}/{key}": value for key, value in own.items()}
         columns = ((key, np.ascontiguousarray(values[key])) for key in values.dtype.names)
         return [
-            Item(name=f"{name}/{key}", values=column, attributes=own)
+            Item(name=f"{name}/{key}", values=column, attributes={})
             for key, column in columns
             if column.dtype.kind in "iuf"
         ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 from rotordrop.errors import RecordError
@@ -17,9 +17,6 @@ from rotordrop.units import parse_quantity
 
 _LONGEST_LINE = 500
 """Characters of a line that are looked at (chosen)."""
-
-_LONGEST_UNIT = 10
-"""Characters of a unit that is not known (chosen)."""
 
 _OF_CLOCK = 2
 """Fields of a clock that may stand beyond the columns: its start and its step."""
@@ -47,15 +44,23 @@ class Head:
     """Volts per metre [V/m], and at zero displacement [V]."""
 
 
-def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) -> Head:
-    """Read the comment and header lines above the columns."""
+def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path, *, timed: bool) -> Head:
+    """Read the comment and header lines above the columns, whose first may be a clock (`timed`)."""
+    if layout.separator != ";":
+        lines = [re.sub(r"^\s*;", "#", line) for line in lines]
     given = profile.text.names
     if given is not None and len(given) != layout.columns:
         raise RecordError(f"{path} has {layout.columns} columns and the profile names {len(given)}")
     as_read = [fields_of(line if given else line.lstrip("#% "), layout.separator) or [""] for line in lines]
+    as_read = [  # "Point Name: NDE X"
+        re.split(r"\s*:\s*", row[0], maxsplit=1)
+        if len(row) == 1 and kind_of(row[0].partition(":")[0]) == "names"
+        else row
+        for row in as_read
+    ]
     keyed = [_behind_one_key(row) for row in as_read]  # a single such row may name two clocks alike
     rows = keyed if sum(row is not own for row, own in zip(keyed, as_read, strict=True)) > 1 else as_read
-    names, units, used = _names_and_units(rows, layout)
+    names, units, used, of_list = _exampleand_units(rows, layout)
     names = list(given or names)
     # rows that stand where the samples begin and are none: left out, the record would start later
     last = max(used, default=-1)
@@ -66,7 +71,9 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) ->
         raise RecordError(f"{path}, {words}")
     if not given and not any(names):
         line = f"the line above the numbers reads {lines[-1][:60]!r}" if lines else "there is no header"
-        ask = 'name them in the profile, text.names = ["Time [s]", ...], or export each channel as a column'
+        timed = timed or clock_told(_entries(lines, rows, set(), layout)).step is not None
+        example = '"Time [s]", ...]' if timed else '"X1 [um]", ...], with [time] step = "50 us"'
+        ask = f"name them in the profile, text.names = [{example}, or export each channel as a column"
         raise RecordError(f"{path}: no row names the {layout.columns} columns ({line}); {ask}")
     unused = [line[:_LONGEST_LINE] for i, line in enumerate(lines) if i not in used]
     entries = _entries(unused, rows, used, layout)
@@ -76,6 +83,7 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path) ->
     ]
     labels = _told_apart(labels, rows, used)
     wide = [(row[0], _by_column(row, layout.columns) or []) for row in rows]
+    wide += of_list.items()
     return _head(labels, entries, "\n".join(unused), wide, layout)
 
 
@@ -139,17 +147,58 @@ def _head(
     )
 
 
-def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], list[str], set[int]]:
-    """Name and unit of every column, empty where none is said, and the rows that say it.
+def _exampleand_units(
+    rows: list[list[str]], layout: Layout
+) -> tuple[list[str], list[str], set[int], dict[str, list[str]]]:
+    """Name and unit of every column, empty where none is said, the rows that say it, and what a list says.
 
     Names stand in the last row as wide as the table that is no row of units, or behind a key such as
     ``Label``; units in a row of their own, whose first field may be a word, or behind a key as ``VUnit``.
+    A list has a line for each channel below a row of keys.
     """
     columns = layout.columns
-    names, units, used = [""] * columns, [""] * columns, set()
-    for i, row in enumerate(rows):
+    lists = {i: lines for i in range(len(rows)) if (lines := _listed(rows[i:]))}
+    used = {k for i, lines in lists.items() for k in range(i, i + len(lines) + 1)}
+    kinds = [_kind_of_row(row, layout) for row in rows]
+    units = _units(rows, kinds, columns, used)
+    names = [""] * columns
+    free = [(i, _cut(row, columns)) for i, row in enumerate(rows) if i not in used and not kinds[i]]
+    may = [[i for i, row in free if row and _may_name(row, layout, alike)] for alike in (False, True)]
+    if last := [i for found in may for i in found[-1:]][:1]:
+        names = _cut(rows[last[0]], columns) or names
+        used.add(last[0])
+    alone = columns - layout.kinds.count("blank") < 3  # one channel beside its time
+    for i in sorted(used):
+        if kinds[i] in ("names", "comment"):
+            said = _by_column(rows[i], columns) or []
+            said = said if len(set(filter(None, said))) > 1 or alone else names
+            units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
+            names = [new or old for new, old in zip(said, names, strict=True)]
+    names = [f"CH{name}" if name.isdigit() else name for name in names]
+    told = _of_lists([(rows[i], lines) for i, lines in lists.items()], names)
+    for key, said in told.items():
+        if kind_of(key) == "names":
+            units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
+            names = [new or old for new, old in zip(said, names, strict=True)]
+        elif kind_of(key) == "units":
+            units = [old or new for new, old in zip(said, units, strict=True)]
+    return names, [unit.strip("[]()") for unit in units], used, told
+
+
+def _kind_of_row(row: list[str], layout: Layout) -> str:
+    """What a key before the values of a row tells; where the first column holds words it may be its name."""
+    alone = len(row) < 2 or (len(row) == layout.columns and layout.kinds[0] == "text")
+    kind = "" if alone else kind_of(row[0])
+    return kind if kind != "speed" else ""
+
+
+def _units(rows: list[list[str]], kinds: list[str], columns: int, used: set[int]) -> list[str]:
+    """Units of the columns; adds the rows that say them, or names behind a key, to those used."""
+    units = [""] * columns
+    for i, (row, kind) in enumerate(zip(rows, kinds, strict=True)):
+        if i in used:
+            continue
         wide = _cut(row, columns)
-        kind = kind_of(row[0]) if len(row) > 1 else ""
         if kind in ("names", "comment", "units"):
             if (values := _by_column(row, columns, alone=kind == "units")) is not None:
                 used.add(i)
@@ -157,37 +206,27 @@ def _names_and_units(rows: list[list[str]], layout: Layout) -> tuple[list[str], 
         elif not kind and wide is not None and _are_units(wide):
             units = ["" if field in ("-", "1") else field for field in wide]
             used.add(i)
-    full = [
-        i
-        for i, row in enumerate(rows)
-        if i not in used and not kind_of(row[0]) and (wide := _cut(row, columns)) and _may_name(wide, layout)
-    ]
-    alike = [
-        i
-        for i, row in enumerate(rows)
-        if i not in used and len(set(filter(None, row[1:]))) == 1 and _may_name(row, layout, True)
-    ]
-    if full or alike:
-        last = (full or alike)[-1]
-        names = _cut(rows[last], columns) or names
-        used.add(last)
-    alone = columns - layout.kinds.count("blank") < 3  # one channel beside its time
-    for i in sorted(used):
-        if kind_of(rows[i][0]) in ("names", "comment") and len(rows[i]) > 1:
-            said = _by_column(rows[i], columns) or []
-            said = said if len(set(filter(None, said))) > 1 or alone else names
-            units = [unit or split_unit(name)[2] for unit, name in zip(units, names, strict=True)]
-            names = [new or old for new, old in zip(said, names, strict=True)]
-    names = [f"CH{name}" if name.isdigit() else name for name in names]
-    for i, row in enumerate(rows):  # a line for each channel, as Graphtec lists them
-        kinds = [kind_of(field) for field in row]
-        at = {kind: kinds.index(kind) for kind in ("names", "units") if kind in kinds[1:]}
-        listed = [line for line in rows[i + 1 :] if len(line) == len(row) and line[0] in names]
-        for line in listed if len(at) == 2 and i not in used and len(listed) > 1 else ():
-            k = names.index(line[0])
-            units[k] = units[k] or line[at["units"]]
-            names[k] = line[at["names"]] or names[k]
-    return names, [unit.strip("[]()") for unit in units], used
+    return units
+
+
+def _listed(rows: list[list[str]]) -> list[list[str]]:
+    """Lines below a row of keys, one for each channel, which their first fields count."""
+    if "names" not in map(kind_of, rows[0][1:]):
+        return []
+    counted = re.compile(r"\D*\d{1,3}")
+    found = takewhile(lambda row: len(row) >= len(rows[0]) and counted.fullmatch(row[0]), rows[1:])
+    return lines if len(lines := list(found)) > 1 else []
+
+
+def _of_lists(lists: list[tuple[list[str], list[list[str]]]], names: list[str]) -> dict[str, list[str]]:
+    """What lists say of the columns, by their keys; of columns without names one line says each."""
+    told: dict[str, list[str]] = {}
+    for keys, lines in lists:
+        called = [split_unit(one)[0] for one in names] if any(names) else [line[0] for line in lines]
+        at = {line[0]: line for line in lines} if len(called) == len(names) else {}
+        for place, key in enumerate(keys[1:], start=1):
+            told[key] = [at[name][place] if name in at else "" for name in called[: len(names)]]
+    return {key: row for key, row in told.items() if len(row) == len(names)}
 
 
 def _trimmed(row: list[str]) -> list[str]:
@@ -205,7 +244,7 @@ def _are_units(row: list[str]) -> bool:
     """Whether a row below the names gives units: most are known, none is long; its first may be a word."""
     said = _filled(row[1:])
     known = sum(known_unit(field) is not None for field in said)
-    return known > 0.5 * len(said) and all(len(field) <= _LONGEST_UNIT for field in said)
+    return known > 0.5 * len(said)
 
 
 def _cut(row: list[str], columns: int) -> list[str] | None:
@@ -220,7 +259,8 @@ def _cut(row: list[str], columns: int) -> list[str] | None:
 def _may_name(row: list[str], layout: Layout, alike: bool = False) -> bool:
     """Whether a row can name columns: most fields filled, no numbers, one word for all only where it may."""
     one = len(row) > 2 and len(set(filter(None, row[1:]))) == 1
-    if sum(map(bool, row)) <= len(row) // 2 or (one and not alike):
+    settings = any(re.match(r"[\w -]+=", field) for field in row)
+    if settings or sum(map(bool, row)) <= len(row) // 2 or (one and not alike):
         return False
     if TIME_NAMES.match(row[0]) and all(field.isdigit() for field in row[1:]):
         return True  # channels that have numbers for names
@@ -273,8 +313,11 @@ def _collect(line: str, separator: str, entries: dict[str, str]) -> None:
         entries.update(
             (key.strip(), value.strip()) for key, value in pairs if not re.search(r"\d$", key) or kind_of(key)
         )
+    said = re.fullmatch(r"([^\d:=]+?)\s+([+-]?\d.*)", plain)  # "# Speed 6600 rpm"
     if line.lstrip().startswith(("#", "%")):
-        if plain and not pairs:
+        if said and kind_of(said[1]):
+            entries.setdefault(said[1], said[2])
+        elif plain and not pairs:
             entries.setdefault(f"comment {len(entries) + 1}", plain)
     elif len(fields) > 1 and (key := fields[0].rstrip(": ")) and ":" not in key:
         # one value for all channels, or one and the same for each

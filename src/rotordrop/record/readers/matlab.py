@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.errors import RecordError
+from rotordrop.record.keys import kind_of
 from rotordrop.record.recording import Channel, Recording, damaged, known_unit
 from rotordrop.record.sandbox import Content, Item, plain, refuse_bomb, unpack
 
@@ -42,8 +43,16 @@ def read_matlab(path: Path, profile: Profile) -> Recording:
             item.name.removesuffix(_TESTLAB), item.values, profile, content.attributes, path
         )
     ]
+    counted = {  # from 1, as MATLAB does
+        key: value - 1
+        for key, value in content.attributes.items()
+        if isinstance(value, float | int)
+        and kind_of(key.rpartition(".")[2]) == "trigger"
+        and "pre" not in key.lower()
+    }
     rest = tuple(item for item in content.items if not item.name.endswith(_TESTLAB))
-    return recording_of(Content(items=rest, attributes=content.attributes), path, profile, ".", found=found)
+    content = Content(items=rest, attributes={**content.attributes, **counted})
+    return recording_of(content, path, profile, ".", found=found)
 
 
 def _testlab_channels(

@@ -159,7 +159,8 @@ class Variables:
             title = self._title(item)[0] if re.fullmatch("data|values?", last, re.IGNORECASE) else ""
             if TIME_NAMES.fullmatch(title):
                 channel, folder = "", folder.rpartition(self.sign)[0]  # a structure of name and samples
-            said = str(next((value for _, value in self._said(item, "units")), unit)).partition(" since ")[0]
+            said = unit if unit in TIME_UNITS else next((v for _, v in self._said(item, "units")), unit)
+            said = str(said).partition(" since ")[0]
             told = self.profile.time.unit or known_unit(said) or ""
             if told not in TIME_UNITS and (channel in names or not (channel or unit)):
                 told = ""  # the unit of the other columns of a table
