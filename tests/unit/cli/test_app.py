@@ -47,18 +47,6 @@ def test_each_verb_has_help_and_a_line_that_fits(verb):
     assert "--json" in options or verb in {"init", "profile", "serve", "watch"}, "it computes nothing"
 
 
-@pytest.mark.parametrize(
-    ("word", "told"),
-    [
-        ("--no-such-option", "No such option: --no-such-option\nSee 'rotordrop --help'."),
-        ("frobnicate", "there is no command 'frobnicate'; try 'rotordrop --help'"),
-    ],
-)
-def test_an_unknown_verb_is_a_wrong_call_with_a_suggestion(word, told):
-    done = call(word)
-    assert (done.returncode, done.stdout, done.stderr) == (64, "", f"rotordrop: {told}\n")
-
-
 @pytest.fixture
 def verb_folder(tmp_path, monkeypatch):
     """Let the command line have verbs whose modules lie in a folder of the test."""
@@ -185,18 +173,3 @@ def test_ctrl_c_while_a_cold_cache_is_compiled_ends_with_130(tmp_path, seconds):
     assert err.strip().splitlines()[-1] == "rotordrop: stopped; nothing was left half written"
     assert "Traceback" not in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix != ".toml"] == ["cache"]
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (["look", "a.h5", "b.toml", "--split", "x", "--json", "y"], "--split does not go with --json"),
-        (["look", "a.h5", "--split", "x"], "--split needs the machine file too"),
-        (["compare", "a.json", "b", "--changes", "--report", "x"], "--changes does not go with --report"),
-        (["compare", "a.json", "--changes"], "--changes compares two estimates, and 1 are given"),
-        (["convert", "a.toml", "--to", "ross", "--gap", "1 mm"], "--to ross does not go with --gap"),
-    ],
-)
-def test_options_that_would_be_ignored_are_refused(call, message, capsys):
-    assert command_line.run(call) == 64
-    assert message in capsys.readouterr().err

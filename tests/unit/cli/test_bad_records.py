@@ -70,15 +70,3 @@ def test_ctrl_c_while_a_file_is_written_leaves_the_earlier_one(option, file, tmp
     assert run([*arguments, option, str(tmp_path / file)]) == INTERRUPTED
     assert "stopped; nothing was left half written" in " ".join(capsys.readouterr().err.split())
     assert [(found.name, found.read_text()) for found in tmp_path.iterdir()] == [(file, "earlier")]
-
-
-@pytest.mark.parametrize(
-    ("call", "told"),
-    [("look {0} {1}", "are two records"), (f"restart {LP400} {{0}}", "is not JSON (it is no UTF-8 text)")],
-)
-def test_a_record_in_place_of_another_file_is_refused(call, told, tmp_path, capsys):
-    files = [tmp_path / "drop.csv", tmp_path / "tail.csv"]
-    for file in files:
-        file.write_bytes("Zeit;µm\n".encode("latin-1"))
-    assert run(call.format(*files).split()) == 64
-    assert told in " ".join(capsys.readouterr().err.split())

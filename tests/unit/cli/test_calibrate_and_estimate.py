@@ -298,11 +298,6 @@ def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_pat
     assert not output.exists()
 
 
-def test_quick_needs_a_calibrated_machine(capsys):
-    assert run(["estimate", LP400, RECORD, "--quick"]) == USAGE
-    assert "--quick needs a calibrated machine" in words(capsys.readouterr().err)
-
-
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])
 def test_a_tail_of_another_recorder_has_a_profile_of_its_own(verb, tmp_path, capsys, monkeypatch):
     """Also one without a speed, as recorders of slow data have none."""

@@ -27,13 +27,3 @@ def test_json_on_standard_output_is_json_and_nothing_else(capsys):
     assert found["bearings"]["DE"]["load_N"] == pytest.approx(409.08, rel=1e-4)
     assert len(found["levitated_sag_m"]) == 36
     assert found["defaults"]
-
-
-def test_a_bad_file_leaves_no_output_and_says_where(tmp_path, capsys):
-    bad = tmp_path / "bad.toml"
-    bad.write_text(example_path("paper").read_text(encoding="utf-8").replace('name = "', 'nmae = "', 1))
-    files = ["--json", str(tmp_path / "m.json"), "--report", str(tmp_path / "m.html")]
-    assert run(["check", str(bad), *files]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and "bad.toml:" in err and "nmae" in err
-    assert list(tmp_path.iterdir()) == [bad]

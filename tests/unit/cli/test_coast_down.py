@@ -122,20 +122,6 @@ def test_a_coast_down_that_gives_up_is_written_and_ends_as_a_drop_that_does(mach
     assert (found["finished"], found["standstill_time_s"], found.get("certificate")) == (False, None, None)
 
 
-def test_an_unfinished_run_is_not_taken_for_another(coast, machine, capsys):
-    arguments = ["coast-down", machine, "--speed", "60 Hz", "--until", "0.2 s"]
-    assert run([*arguments, "--resume"]) == 64
-    assert "--resume needs the --output" in capsys.readouterr().err
-    assert run([*arguments, "--until", "for ever"]) == 64
-    assert "for ever" in capsys.readouterr().err
-
-
-def test_a_machine_without_drag_is_told_the_way_out(capsys):
-    lp400 = str(example_path("lp400"))
-    assert run(["coast-down", lp400, "--speed", "60 Hz", "--until", "0.1 s"]) == 5
-    assert "no aerodynamic drag" in capsys.readouterr().err
-
-
 def test_drag_from_a_recorded_coast_down_stops_the_rotor_as_recorded(tmp_path, capsys):
     """Dry and linear drag known: the fitted drag, handed over, gives the recorded fall of speed again."""
     record = recorded(tmp_path / "record.csv", seconds=12.0)
@@ -236,24 +222,6 @@ def test_waterfall_of_the_bundled_record(tmp_path):
 
 
 LP400 = str(example_path("lp400"))
-ERRORS = [
-    ("waterfall {lp400} nowhere.h5", 3, r"nowhere\.h5"),
-    ("waterfall {lp400} {lp400}", 3, r"lp400\.toml"),
-    ("coast-down {lp400} --speed 60Hz --until -1s", 5, "-1"),
-    ("waterfall {lp400} r.csv --overlap 1.5", 64, "--overlap.*0.95"),
-    ("coast-down {lp400} --speed 60Hz --drag-from no.h5", 3, "no.h5"),
-    ("critical-speeds {lp400} --held strings", 64, "strings"),
-]
-
-
-@pytest.mark.parametrize(("call", "code", "words"), ERRORS)
-def test_mistakes_are_named_with_the_way_out(call, code, words, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert run(call.format(lp400=LP400).split()) == code
-    told = capsys.readouterr().err
-    assert re.search(words, told), told
-    assert "Traceback" not in told
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_record_without_speed_says_what_is_missing(tmp_path, capsys):

@@ -290,20 +290,3 @@ def test_a_name_from_a_file_cannot_command_the_terminal(tmp_path, capsys):
 
 def _told(capsys):
     return " ".join(capsys.readouterr().err.split())
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("critical-speeds", "machine.toml", "--data"),
-        ("estimate", "machine.toml", "record.csv", "--data"),
-        ("look", "record.h5", "machine.toml", "--split"),
-    ],
-)
-def test_a_file_is_no_folder_for_results_and_that_is_said_before_anything_is_computed(
-    tmp_path, capsys, words
-):
-    (tmp_path / "notes.txt").write_text("mine")
-    assert run([*words, str(tmp_path / "notes.txt")]) == 64
-    assert "notes.txt' is a file" in capsys.readouterr().err
-    assert (tmp_path / "notes.txt").read_text() == "mine"

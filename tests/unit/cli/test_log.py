@@ -51,22 +51,3 @@ def test_a_drop_is_dated_by_its_recorder_unless_somebody_says_otherwise(tmp_path
     assert run(["log", "show", log, "--json", str(tmp_path / "log.json")]) == 0
     drops = json.loads((tmp_path / "log.json").read_text())["drops"].values()
     assert [drop["recorded"] for drop in drops] == ["2026-03-14T15:09:26Z", "2026-03-15T00:00:00"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ("show {log}", "is not there; 'rotordrop log add' makes a log"),
-        ("add {log}", "nothing to add"),
-        ("add {log} {log}", "cannot be read (No such file or directory). Give a file"),
-        ("add {log} {estimate} --recorded 14.3.2026", "'14.3.2026' is not a date"),
-        ("export {log} {log}", "is the log itself; name another file"),
-        ("remove {log} first", "'first' is not the number of a drop"),
-        ("allow {log} --drops 3 --source x", "name it with --machine"),
-    ],
-)
-def test_a_wrong_call_says_what_was_expected(tmp_path, estimate, capsys, arguments, message):
-    log = tmp_path / "drops.db"
-    assert run(["log", *arguments.format(log=log, estimate=estimate).split()]) == 64
-    assert message in capsys.readouterr().err
-    assert not log.exists()

@@ -20,7 +20,7 @@ def study_file(tmp_path_factory):
     return file
 
 
-def test_a_study_runs_shows_and_helps(study_file, tmp_path):
+def test_a_study_runs_shows_and_helps(study_file, tmp_path, capsys):
     numbers, page, drops, again = (tmp_path / name for name in ("s.json", "s.html", "s.h5", "again.json"))
     call = ["study", "run", str(study_file), "--by", "speed", "--threads", "1"]
     assert run([*call, "--json", str(numbers), "--report", str(page), "--output", str(drops)]) == 0
@@ -36,17 +36,5 @@ def test_a_study_runs_shows_and_helps(study_file, tmp_path):
     assert json.loads(again.read_text()) == content
     assert (folder / "shards" / "000000.npy").read_bytes() == before
     assert run(["study", "show", str(folder)]) == 0
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        ("show {empty}", "is not a study folder"),
-        ("run {file} --by spead --threads 1", "did you mean 'speed'"),
-        ("run {empty} --folder x", "leave out --folder"),
-    ],
-)
-def test_what_cannot_be_done_is_said(study_file, tmp_path, capsys, call, words):
-    study_file.with_suffix("").mkdir(exist_ok=True)
-    assert run(["study", *call.format(empty=tmp_path, file=study_file).split()]) == 64
-    assert words in capsys.readouterr().err
+    assert run([*call[:3], "--by", "spead"]) == 64
+    assert "did you mean 'speed'" in capsys.readouterr().err

@@ -118,11 +118,6 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
     )
 
 
-def test_numbers_without_simple_are_refused(capsys, tmp_path):
-    assert run(["init", str(tmp_path / "m.toml"), "--set", "mass=60 kg"]) == 64
-    assert "numbers of a machine belong to --simple" in capsys.readouterr().err
-
-
 DYROBES = "Ele,L,OD,ID,Mass OD,Material\n,mm,mm,mm,mm,\n1,100,60,0,60,\n2,300,80,20,100,\n3,100,60,0,60,\n"
 
 
@@ -190,15 +185,11 @@ def test_a_table_has_positions_or_lengths(load):
 
 
 @pytest.mark.parametrize("separator", [";", ",", "\t"])
-def test_any_usual_separator_will_do(load, separator):
+def test_any_usual_separator_will_do_and_commas_in_numbers_where_they_separate_nothing(load, separator):
     assert load(BY_POSITION.replace(";", separator)).rotor == load(BY_POSITION).rotor
-
-
-@pytest.mark.parametrize("separator", [";", "\t"])
-def test_numbers_may_have_decimal_commas_where_commas_separate_nothing(load, separator):
-    table = BY_POSITION.replace("100;60", "100,5;60,25")
-    with_commas = table.replace(";", separator)
-    assert load(with_commas).rotor == load(table.replace(",", ".")).rotor
+    if separator != ",":
+        table = BY_POSITION.replace("100;60", "100,5;60,25")
+        assert load(table.replace(";", separator)).rotor == load(table.replace(",", ".")).rotor
 
 
 @pytest.mark.parametrize(
