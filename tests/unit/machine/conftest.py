@@ -46,27 +46,10 @@ position = "0.7 m"
 air_gap = "250 um"
 bore_radius = "30.25 mm"
 bearing = { designation = "XCB71914-E", preload = "heavy" }
-
-[[sensors]]
-name = "A"
-node = 2
-angle = "135 deg"
-
-[[sensors]]
-name = "B"
-node = 2
-angle = "45 deg"
-
-[[sensors]]
-name = "C"
-node = 8
-angle = "135 deg"
-
-[[sensors]]
-name = "D"
-node = 8
-angle = "45 deg"
-"""
+""" + "".join(
+    f'\n[[sensors]]\nname = "{name}"\nnode = {node}\nangle = "{angle} deg"\n'
+    for name, node, angle in (("A", 2, 135), ("B", 2, 45), ("C", 8, 135), ("D", 8, 45))
+)
 
 
 @pytest.fixture(scope="session")

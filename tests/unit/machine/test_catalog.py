@@ -8,7 +8,7 @@ from tests.reference.ball_bearing_catalogue import geometry_of
 from tests.reference.closed_forms import lift_off_force
 
 from rotordrop.elements.catalog.designation import read_designation
-from rotordrop.elements.catalog.lookup import ball_size, designations, find_bearing, search_bearings
+from rotordrop.elements.catalog.lookup import designations, find_bearing, search_bearings
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 
@@ -67,15 +67,6 @@ def test_a_ball_more_would_be_seen():
     more = round(1.1 * bearing.complement.ball_count)
     constants = bearing_constants(replace(geometry_of(bearing, bearing.preload["medium"]), ball_count=more))
     assert abs(axial_rigidity(constants) / bearing.axial_rigidity["medium"] - 1.0) > 0.05
-
-
-@pytest.mark.parametrize(
-    ("name", "size"),
-    [(name, "small") for name in ("HS71914C", "HC71914C", "XC7014C")]
-    + [(name, "standard") for name in ("B7014C", "HCB7014C", "XCB7014C")],
-)
-def test_the_series_tells_the_size_of_the_balls(name, size):
-    assert ball_size(name) == size
 
 
 def test_a_mistake_is_answered_with_the_nearest():

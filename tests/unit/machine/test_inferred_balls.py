@@ -16,7 +16,7 @@ from rotordrop.elements.catalog.inference import (
     pair_rigidity,
     static_rating,
 )
-from rotordrop.elements.catalog.lookup import designations, find_bearing
+from rotordrop.elements.catalog.lookup import ball_size, designations, find_bearing
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
@@ -24,8 +24,9 @@ from rotordrop.physics.hertz import compliance, race_contact
 
 
 @pytest.mark.parametrize("name", designations())
-def test_the_boundary_dimensions_are_those_of_both_catalogues(name):
+def test_sizes_and_boundary_dimensions_are_those_of_both_catalogues(name):
     listed, read = find_bearing(name), read_designation(name)
+    assert ball_size(name) == read.balls
     assert read.bore == pytest.approx(listed.bore)
     outside, width = boundary_dimensions(read.series, read.bore)
     assert outside == pytest.approx(listed.outside_diameter)

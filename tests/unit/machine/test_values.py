@@ -162,13 +162,15 @@ def test_three_sensors_in_two_planes_are_read_and_pass_the_gate(name, marked):
     assert loads_machine(machine_text(machine), example_path("lp400").parent) == machine
 
 
-@pytest.mark.parametrize("marked", [True, False])
-def test_one_sensor_per_plane_is_refused(marked):
-    with pytest.raises(MachineFileError, match="the sensors resolve only 2 of the 4 rigid motions"):
-        without(["S_NDE_A", "S_DE_B"], example_path("lp400").parent, marked)
+ONE_A_PLANE, EVERY = ["S_NDE_A", "S_DE_B"], ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
+FEW = [
+    (ONE_A_PLANE, True, "the sensors resolve only 2 of the 4 rigid motions"),
+    (ONE_A_PLANE, False, "the sensors resolve only 2 of the 4 rigid motions"),
+    (EVERY, True, "the 0 sensors sit in 0 plane"),
+]
 
 
-def test_a_machine_without_any_working_sensor_is_refused_as_such():
-    every = [sensor.name for sensor in example_machine("lp400").sensors]
-    with pytest.raises(MachineFileError, match="the 0 sensors sit in 0 plane"):
-        without(every, example_path("lp400").parent, True)
+@pytest.mark.parametrize(("names", "marked", "told"), FEW)
+def test_one_sensor_per_plane_or_none_that_works_is_refused(names, marked, told):
+    with pytest.raises(MachineFileError, match=told):
+        without(names, example_path("lp400").parent, marked)
