@@ -83,33 +83,16 @@ def test_a_function_has_a_process_and_a_group_of_its_own(told, monkeypatch, copi
 
 
 @forks
-def test_all_are_copies_of_one_process_that_has_imported_what_they_need(told):
+def test_all_are_copies_of_one_process_with_limits_of_their_own_and_one_that_fails_ends(told):
     found = []
-    for name in ("a", "b", "c"):
-        one, reads = told("said", name)
+    for function in ("said", "limited", "failing", "said"):
+        one, reads = told(function, f"{len(found)}")
         found.append(one)
         ended(reads)
-    assert len({one["self"] for one in found}) == 3
+    assert len({one["self"] for one in found}) == 4
     assert {one["begun"] for one in found} == {one["parent"] for one in found} == {found[0]["begun"]}
-
-
-@forks
-def test_limits_are_those_of_one_copy(told):
-    limited, reads = told("limited", "a")
-    ended(reads)
-    free, reads = told("said", "b")
-    ended(reads)
-    assert limited["memory"] == 2**29
-    assert free["memory"] == resource.getrlimit(resource.RLIMIT_DATA)[0]
-
-
-@forks
-def test_a_copy_that_fails_ends_and_takes_no_orders(told):
-    one, reads = told("failing", "a")
-    ended(reads)
-    other, reads = told("said", "b")
-    ended(reads)
-    assert other["parent"] == one["parent"]
+    free = resource.getrlimit(resource.RLIMIT_DATA)[0]
+    assert [one["memory"] for one in found] == [free, 2**29, free, free]
 
 
 @forks

@@ -127,20 +127,15 @@ def test_what_json_cannot_hold_is_refused_before_writing(tmp_path, content):
 
 @pytest.mark.skipif(os.name != "posix", reason="links, pipes and modes as on POSIX")
 class TestWhatStandsThereIsKept:
-    def test_a_link_stays_a_link_and_its_target_is_new(self, tmp_path):
+    @pytest.mark.parametrize("before", [["old"], []])
+    def test_a_link_stays_a_link_and_its_target_is_new(self, tmp_path, before):
         (tmp_path / "kept").mkdir()
-        target = tmp_path / "kept" / "result.json"
-        target.write_text("old")
-        (tmp_path / "link.json").symlink_to(target)
-        write_text(tmp_path / "link.json", "new")
-        assert (tmp_path / "link.json").is_symlink()
-        assert target.read_text() == "new"
-
-    def test_a_link_to_nothing_makes_its_target(self, tmp_path):
-        (tmp_path / "link.json").symlink_to("result.json")
-        write_text(tmp_path / "link.json", "new")
-        assert (tmp_path / "link.json").is_symlink()
-        assert (tmp_path / "result.json").read_text() == "new"
+        target, link = tmp_path / "kept" / "result.json", tmp_path / "link.json"
+        for text in before:
+            target.write_text(text)
+        link.symlink_to(target if before else "kept/result.json")
+        write_text(link, "new")
+        assert link.is_symlink() and target.read_text() == "new"
 
     def test_a_pipe_takes_the_text_and_stays_a_pipe(self, tmp_path):
         pipe = tmp_path / "pipe"

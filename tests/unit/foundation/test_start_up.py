@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -186,7 +187,7 @@ WRONG = {
     "no unit": (lambda: made(unit=None), "unit is None; expected a text or a Mapping. Say it"),
     "rate below zero": (lambda: made(time="-20 kHz"), "sampling rate in time is -2.*positive"),
     "time backwards": (lambda: made(time=TIME[::-1]), "the time runs backwards.*sort"),
-    "unit of time": (lambda: made(time_unit="h"), "time_unit is 'h'; expected one of s, ms"),
+    "unit of time": (lambda: made(time_unit="h"), "time_unit is 'h'; expected one of s, ms, us, min"),
     "columns of other names": (lambda: made(signals=pd.DataFrame(SIGNALS, None, list("abcd"))), "no channel"),
     "two levels": (
         lambda: framed(pd.MultiIndex.from_product([[0], TIME])),
@@ -227,7 +228,39 @@ WRONG = {
         "tail has sensor .* for another machine",
     ),
     "half a node": (lambda: force(nodes=[2.5]), r"nodes\[0\] is 2.5"),
+    "a mask of another shape": (
+        lambda: replace(RECORD, missing=np.zeros((3, 4), dtype=bool)),
+        r"missing has the shape \(3, 4\); expected \(200, 4\)",
+    ),
+    "readings without times": (
+        lambda: replace(RECORD, speed_time=None),
+        "speed_time and speed_readings belong together; give both or none",
+    ),
+    "names for sensors": (
+        lambda: replace(RECORD, sensors=NAMES),
+        r"sensors\[0\] is 'S_NDE_A'; expected a Sensor",
+    ),
+    "no such channel": (lambda: RECORD.of_channels([9]), "column is 9; expected a whole number"),
+    "tail of two": (
+        lambda: rd.check_record(RECORD, MACHINE, RECORD.of_channels([0, 1])),
+        "tail has S_NDE_A, S_NDE_B; give it all",
+    ),
+    "no bearing": (lambda: rd.find_bearing("zzz"), "no bearing 'zzz'.*give the geometry"),
+    "speeds that are texts": (
+        lambda: rd.campbell_diagram(MACHINE, ["60 Hz"]),
+        "speeds is a list that is no array of real",
+    ),
+    "a load too few": (
+        lambda: rd.critical_speed_map(MACHINE, [1e6], loads=[1.0]),
+        r"loads has the shape \(1,\); expected \(2,\)",
+    ),
     # what was given for what
+    "a path for a drop": (lambda: rd.changes("a.json", "b.json"), r"drops\[0\] is 'a.json'; expected a Drop"),
+    "numbers for drops": (lambda: rd.rank_drops([1.0, 2.0]), r"drops\[0\] is 1.0; expected a DropSeverity"),
+    "a case of a drop": (
+        lambda: rd.simulate_coast_down(MACHINE, case()),
+        "case is a DropCase; expected a CoastDownCase",
+    ),
     "exchanged": (
         lambda: rd.estimate_drop(RECORD, MACHINE),
         "machine is a Record; expected a Machine.*load_",

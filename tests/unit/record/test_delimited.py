@@ -2,80 +2,56 @@
 
 import numpy as np
 import pytest
+from tests.unit.record.test_ninety_recorders import COUNT, NAMES, READINGS, STEP, rows
 
 from rotordrop import example_machine, read_record
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.record.profile import Clock, Profile, TextLayout
 
-TIME = np.arange(-4, 16) * 5e-5
-READINGS = np.array([[8.18, -6.98, -16.85, -16.31]]) + np.arange(20)[:, None] * np.array(
-    [[-0.73, 0.2, 1.5, -3.25]]
-)
+TIME = np.arange(-4, COUNT - 4) * STEP
 SPEED_HZ = 60.0
 
 
-def rows(separator, decimal, time, scale=1.0, digits=2, speed=SPEED_HZ):
-    lines = []
-    for i in range(len(TIME)):
-        fields = [
-            *([] if time is None else [time(i)]),
-            *(f"{scale * v:.{digits}f}" for v in READINGS[i]),
-            f"{speed:.2f}",
-        ]
-        lines.append(separator.join(fields).replace(".", decimal))
-    return lines
+def text_of(head, separator, first, **more):
+    """A head and the rows below it, each behind its entry of the first column."""
+    table = rows(separator, ".", lambda i: [str(first[i])], **more)
+    return "\n".join([head, *(separator.join(row) for row in table)]) + "\n"
 
 
-NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
-
-
-def recorder():
-    head = [
-        "# AMB controller event recorder;firmware 4.2.1",
-        "# Machine: LP-400;fs [Hz]: 20000;pre-trigger [s]: 0.0002",
-    ]
-    names = ";".join(["Time [s]", *(f"{n} [um]" for n in NAMES), "Speed [Hz]"])
-    return "\n".join([*head, names, *rows(";", ".", lambda i: f"{TIME[i]:.5f}")]) + "\n", "utf-8"
-
-
-def without_time():
-    head = ['"Start","2019-10-16T13:42:07.250000Z"', '"dt (s)",0.00005000', '"Trigger sample",4']
-    head += [
-        ",".join(f'"{n}"' for n in ["Channel", *NAMES, "N"]),
-        '"Unit","um","um","um","um","Hz"',
-        '"Sample",1,2,3,4,5',
-    ]
-    return "\n".join([*head, *rows(",", ".", str, digits=3)]) + "\n", "utf-8"
-
-
-def volts():
-    head = [
-        "# raw sensor voltages, sensitivity 8.000 mV/um all channels, offset 0 V",
-        "# Speed in rpm (hold)",
-    ]
-    names = "\t".join(["Time_ms", *(f"{n}_V" for n in NAMES), "Speed_rpm"])
-    body = rows("\t", ".", lambda i: f"{1e3 * TIME[i]:.3f}", scale=8e-3, digits=5, speed=3600.0)
-    return "\n".join([*head, names, *body]) + "\n", "utf-8"
-
-
-LAYOUTS = [recorder, without_time, volts]
+COLUMNS = ("Time [s]", *(f"{n} [um]" for n in NAMES), "Speed [Hz]")
+HEAD = ("# AMB controller event recorder;firmware 4.2.1", "# fs [Hz]: 20000;pre-trigger [s]: 0.0002")
+RECORDER = text_of("\n".join([*HEAD, ";".join(COLUMNS)]), ";", [f"{t:.5f}" for t in TIME])
+WITHOUT_TIME = text_of(
+    '"Start","2019-10-16T13:42:07.250000Z"\n"dt (s)",0.00005000\n"Trigger sample",4\n'
+    '"Channel","S_NDE_A","S_NDE_B","S_DE_A","S_DE_B","N"\n"Unit","um","um","um","um","Hz"\n"Sample",1,2,3,4,5',
+    *(",", range(COUNT)),
+    digits=3,
+)
+VOLTS = text_of(
+    "# raw sensor voltages, sensitivity 8.000 mV/um all channels, offset 0 V\n# Speed in rpm (hold)\n"
+    + "\t".join(["Time_ms", *(f"{n}_V" for n in NAMES), "Speed_rpm"]),
+    *("\t", [f"{1e3 * t:.3f}" for t in TIME]),
+    scale=8e-3,
+    digits=5,
+    speed="3600.00",
+)
+LAYOUTS = {"recorder": RECORDER, "without time": WITHOUT_TIME, "volts": VOLTS}
 
 
 @pytest.fixture
 def write(tmp_path):
-    def put(text, name="drop.csv", encoding="utf-8"):
+    def put(text, name="drop.csv"):
         path = tmp_path / name
-        path.write_bytes(text.encode(encoding))
+        path.write_bytes(text.encode())
         return path
 
     return put
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-def test_every_layout_gives_the_same_record(layout, write, machine):
-    text, encoding = layout()
-    record = read_record(write(text, encoding=encoding), machine)
+@pytest.mark.parametrize("text", LAYOUTS.values(), ids=LAYOUTS)
+def test_every_layout_gives_the_same_record(text, write, machine):
+    record = read_record(write(text), machine)
     assert record.channel_names == tuple(NAMES)
     np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=0, atol=1e-9)
     np.testing.assert_allclose(record.time, TIME, rtol=0, atol=1e-12)
@@ -85,28 +61,22 @@ def test_every_layout_gives_the_same_record(layout, write, machine):
 
 
 def test_layouts_that_lack_names_or_voltages_take_them_from_elsewhere(write, machine):
-    text, _ = volts()
-    path = write(text.split("\n", 1)[1])
+    path = write(VOLTS.split("\n", 1)[1])
     np.testing.assert_allclose(read_record(path, machine).signals, READINGS * 1e-6, rtol=0, atol=1e-9)
-    text, _ = volts()
-    record = read_record(write(text.replace("8.000 mV/um", "7.870 mV/um")), machine)
+    record = read_record(write(VOLTS.replace("8.000 mV/um", "7.870 mV/um")), machine)
     np.testing.assert_allclose(record.signals, READINGS * 1e-6 * 8.0 / 7.87, rtol=0, atol=1e-9)
     assert any("7.87 mV/µm" in words and "8.00 mV/µm" in words for words in record.warnings)
-    text, _ = volts()
-    record = read_record(write(text.replace("offset 0 V", "offset -0.4 V")), machine)
+    record = read_record(write(VOLTS.replace("offset 0 V", "offset -0.4 V")), machine)
     np.testing.assert_allclose(record.signals, (READINGS + 50.0) * 1e-6, rtol=0, atol=1e-9)
-    body = "\n".join(rows(";", ".", lambda i: f"{TIME[i]:.5f}")) + "\n"
-    path = write(body)
+    path = write(RECORDER.split("\n", 3)[3])
     with pytest.raises(RecordError, match=r"no row names the 6 columns \(there is no header\)"):
         read_record(path, machine)
-    names = ("Time [s]", *(f"{n} [um]" for n in NAMES), "Speed [Hz]")
-    record = read_record(path, machine, profile=Profile(text=TextLayout(names=names)))
+    record = read_record(path, machine, profile=Profile(text=TextLayout(names=COLUMNS)))
     np.testing.assert_allclose(record.signals, READINGS * 1e-6, rtol=0, atol=1e-9)
 
 
 def test_sampling_interval_by_profile(write, machine):
-    text, _ = without_time()
-    text = text.replace('"dt (s)",0.00005000\n', "").replace('"Trigger sample",4\n', "")
+    text = WITHOUT_TIME.replace('"dt (s)",0.00005000\n', "").replace('"Trigger sample",4\n', "")
     path = write(text)
     with pytest.raises(
         RecordError, match=r"no time column among Channel, S_NDE_A, .* and no sampling interval"
@@ -121,10 +91,9 @@ def test_sampling_interval_by_profile(write, machine):
 
 @pytest.mark.parametrize("cut", [3, 12, 25])
 def test_a_truncated_file_keeps_the_intact_rows_and_says_so(cut, write, machine):
-    text = recorder()[0]
-    record = read_record(write(text[:-cut]), machine)
-    assert len(record.time) == 19
-    assert any("truncated" in words and "19 complete rows" in words for words in record.warnings)
+    record = read_record(write(RECORDER[:-cut]), machine)
+    assert len(record.time) == COUNT - 1
+    assert any("truncated" in words and f"{COUNT - 1} complete rows" in words for words in record.warnings)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +101,7 @@ def test_a_truncated_file_keeps_the_intact_rows_and_says_so(cut, write, machine)
     [
         (" \n ", "drop.csv", "", r"drop.csv is blank \(3 bytes\)"),
         ("no numbers\nat all\nhere\n", "drop.csv", "", r"no columns of numbers .*line 3 reads 'here'"),
-        (recorder()[0], "drop.csv", "utf-9", r"cannot be read as utf-9"),
+        (RECORDER, "drop.csv", "utf-9", r"cannot be read as utf-9"),
         ("a", "drop.xyz", "", r"no reader for 'xyz'; known are .*csv.*tdms"),
         (
             "Time [s];S_NDE_A [um]\n",

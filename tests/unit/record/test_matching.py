@@ -32,79 +32,69 @@ def recording(*names, unit="um", extra=()):
     return Recording(channels=(*(channel(name, unit) for name in names), *extra))
 
 
+def numbered(*names):
+    """Channels each of which reads its number."""
+    channels = [channel(name, values=np.full(10, float(k))) for k, name in enumerate(names)]
+    return Recording(channels=tuple(channels))
+
+
 SENSORS = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
 
 
 def test_a_sensor_takes_the_channel_of_its_name_or_place(machine):
     record = record_of(recording("s-nde-a", "S NDE B", "sDEa", "S_DE_B"), machine.sensors)
     assert record.signals.shape == (10, 4)
-    channels = tuple(channel(f"CH{k}", values=np.full(10, float(k))) for k in range(4))
-    given = ["NDE: CH1, CH0", "DE: CH2, CH3"]
-    record = record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given))
+    rules = rules_of(None, ["NDE: CH1, CH0", "DE: CH2, CH3"])
+    record = record_of(numbered("CH0", "CH1", "CH2", "CH3"), machine.sensors, profile=rules)
     np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 2e-6, 3e-6])
     plain = tuple(s.model_copy(update={"name": s.name.removeprefix("S_")}) for s in machine.sensors)
     for names in (SENSORS, [f"Ch{k}: {name}" for k, name in enumerate(SENSORS, start=1)]):
         assert record_of(recording(*names), plain).channel_names == ("NDE_A", "NDE_B", "DE_A", "DE_B")
 
 
-@pytest.mark.parametrize(
-    ("names", "rules", "said"),
-    [
-        (
-            ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_C"),
-            {},
-            r"no channel 'S_DE_B' for sensor S_DE_B \(did you mean 'S_NDE_B'\?\); it has S_",
-        ),
-        (SENSORS, {"S_XX": "ch1"}, r"names a sensor 'S_XX'; the machine has S_NDE_A, S_NDE_B"),
-        (SENSORS, {"S_NDE_B": "S_NDE_A"}, r"'S_NDE_A' is mapped to two sensors, .* S_NDE_B"),
-    ],
+WHOLE, OTHER = recording(*SENSORS), recording(*SENSORS[:3], "S_DE_C")
+TWICE = Recording(channels=tuple(channel(n, label=f"{g}/{n}") for g in "ab" for n in SENSORS))
+BARE, ROAD = (recording(*SENSORS, extra=(channel("Speed", unit),)) for unit in ("", "km/h"))
+SPEEDS = recording(
+    *SENSORS, extra=(channel("N1", "rpm", np.full(10, 3600.0)), channel("N2", "Hz", np.full(10, 50.0)))
 )
-def test_channels_that_do_not_fit_the_sensors_are_named(names, rules, said, machine):
+REFUSED = [
+    (OTHER, {}, r"no channel 'S_DE_B' for sensor S_DE_B \(did you mean 'S_NDE_B'\?\); it has S_"),
+    (WHOLE, {"channels": {"S_XX": "c"}}, r"names a sensor 'S_XX'; the machine has S_NDE_A, S_NDE_B"),
+    (WHOLE, {"channels": {"S_NDE_B": "S_NDE_A"}}, r"'S_NDE_A' is mapped to two sensors, .* S_NDE_B"),
+    (TWICE, {}, r"sensor S_NDE_A fits the channels 'a/S_NDE_A', 'b/S_NDE_A'"),
+    (recording(*SENSORS, unit=""), {}, r"channel 'S_NDE_A' has no unit; name it in the profile"),
+    (BARE, {}, r"the speed channel 'Speed' has no unit"),
+    (ROAD, {}, r"the speed channel 'Speed' is in 'km/h'; expected Hz, rpm or rad/s"),
+    (SPEEDS, {}, r"'N1', 'N2' could all be the shaft speed"),
+    (SPEEDS, {"speed": SpeedSource(channel="N3")}, r"no speed channel 'N3'; it has S_NDE_A"),
+]
+
+
+@pytest.mark.parametrize(("given", "rules", "said"), REFUSED, ids=[said for *_, said in REFUSED])
+def test_channels_that_do_not_fit_the_sensors_are_named(given, rules, said, machine):
     with pytest.raises(RecordError, match=said):
-        record_of(recording(*names), machine.sensors, profile=Profile(channels=rules))
+        record_of(given, machine.sensors, profile=Profile(**rules))
 
 
-def test_sensors_need_channels_of_their_own(machine):
-    twice = Recording(channels=tuple(channel(n, label=f"{g}/{n}") for g in "ab" for n in SENSORS))
-    with pytest.raises(RecordError, match=r"sensor S_NDE_A fits the channels 'a/S_NDE_A', 'b/S_NDE_A'"):
-        record_of(twice, machine.sensors)
-    with pytest.raises(RecordError, match="the machine has no sensors"):
-        record_of(recording(*SENSORS), ())
-
-
-def test_a_unit_that_is_missing_is_asked_for(machine):
-    with pytest.raises(RecordError, match=r"channel 'S_NDE_A' has no unit; name it in the profile"):
-        record_of(recording(*SENSORS, unit=""), machine.sensors)
+def test_a_unit_that_is_missing_is_taken_from_the_profile_and_sensors_must_be_there(machine):
     record = record_of(recording(*SENSORS, unit=""), machine.sensors, profile=Profile(unit="mil"))
     np.testing.assert_allclose(record.signals[1], 25.4e-6)
     blind = tuple(sensor.model_copy(update={"sensitivity": None}) for sensor in machine.sensors)
-    with pytest.raises(
-        RecordError, match=r"'S_NDE_A' is in volts and neither the recording nor the machine file"
-    ):
-        record_of(recording(*SENSORS, unit="V"), blind)
     record = record_of(recording(*SENSORS, unit="mV"), blind, profile=Profile(sensitivity="4 mV/um"))
     np.testing.assert_allclose(record.signals[1], 0.25e-6)
-    with pytest.raises(RecordError, match=r"the speed channel 'Speed' has no unit"):
-        record_of(recording(*SENSORS, extra=(channel("Speed", ""),)), machine.sensors)
-    with pytest.raises(
-        RecordError, match=r"the speed channel 'Speed' is in 'km/h'; expected Hz, rpm or rad/s"
-    ):
-        record_of(recording(*SENSORS, extra=(channel("Speed", "km/h"),)), machine.sensors)
+    with pytest.raises(RecordError, match=r"'S_NDE_A' is in volts and neither the recording nor the machine"):
+        record_of(recording(*SENSORS, unit="V"), blind)
+    with pytest.raises(RecordError, match="the machine has no sensors"):
+        record_of(recording(*SENSORS), ())
 
 
 def test_a_speed_channel_is_found_or_chosen(machine):
     for extra in (channel("N", "rpm", np.full(10, 3600.0)), channel("Drehzahl", "Hz", np.full(10, 60.0))):
         record = record_of(recording(*SENSORS, extra=(extra,)), machine.sensors)
         np.testing.assert_allclose(record.speed, 120 * np.pi)
-    both = recording(
-        *SENSORS, extra=(channel("N1", "rpm", np.full(10, 3600.0)), channel("N2", "Hz", np.full(10, 50.0)))
-    )
-    with pytest.raises(RecordError, match=r"'N1', 'N2' could all be the shaft speed"):
-        record_of(both, machine.sensors)
-    record = record_of(both, machine.sensors, profile=Profile(speed=SpeedSource(channel="N2")))
+    record = record_of(SPEEDS, machine.sensors, profile=Profile(speed=SpeedSource(channel="N2")))
     np.testing.assert_allclose(record.speed, 100 * np.pi)
-    with pytest.raises(RecordError, match=r"no speed channel 'N3'; it has S_NDE_A"):
-        record_of(both, machine.sensors, profile=Profile(speed=SpeedSource(channel="N3")))
 
 
 def test_a_profile_is_read_back_and_given_by_path(tmp_path, machine):
@@ -170,10 +160,7 @@ API = ("Ch1 VE-101X", "Ch2 VE-101Y", "Ch3 VE-102X", "Ch4 VE-102Y")
     ],
 )
 def test_a_map_names_planes_or_sensors(mapping, read, machine):
-    rules = rules_of(None, mapping)
-    readings = [np.full(10, float(k)) for k in range(4)]
-    channels = tuple(channel(name, values=values) for name, values in zip(API, readings, strict=True))
-    record = record_of(Recording(channels=channels), machine.sensors, profile=rules)
+    record = record_of(numbered(*API), machine.sensors, profile=rules_of(None, mapping))
     np.testing.assert_allclose(record.signals[0], 1e-6 * np.array(read))
 
 
@@ -203,7 +190,10 @@ def test_a_channel_that_is_named_twice_is_refused(planes):
 
 
 def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answer(machine):
-    """Y stands a quarter turn behind X: the sensors at 135 and 45° were to be X and Y, in this order."""
+    """Y stands a quarter turn behind X: the sensors at 135 and 45° were to be X and Y, in this order.
+
+    The same map without its angles seats the channels as the suggestion does, in either order.
+    """
     with pytest.raises(RecordError, match="likeliest") as asked:
         record_of(recording(*API), machine.sensors)
     given = literal_eval(str(asked.value).split("mapping=")[1].split(" (planes")[0])
@@ -211,26 +201,11 @@ def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answ
         "NDE: Ch1 VE-101X 45 deg, Ch2 VE-101Y 135 deg",
         "DE: Ch3 VE-102X 45 deg, Ch4 VE-102Y 135 deg",
     ]
-    channels = tuple(channel(name, values=np.full(10, float(k))) for k, name in enumerate(API))
-    record = record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given))
-    np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
-
-
-@pytest.mark.parametrize("swapped", [False, True])
-def test_a_map_without_angles_seats_the_channels_as_the_suggestion_does(machine, swapped):
-    """The suggestion had X a quarter turn before Y; without its angles the same map exchanged the two."""
-    with pytest.raises(RecordError, match="likeliest") as asked:
-        record_of(recording(*API), machine.sensors)
-    angled = literal_eval(str(asked.value).split("mapping=")[1].split(" (planes")[0])
-    bare = [re.sub(r" \d+ deg", "", text) for text in angled]
-    if swapped:
-        bare = [re.sub(r": (.+), (.+)", r": \2, \1", text) for text in bare]
-    channels = tuple(channel(name, values=np.full(10, float(k))) for k, name in enumerate(API))
-    first, second = (
-        record_of(Recording(channels=channels), machine.sensors, profile=rules_of(None, given)).signals[0]
-        for given in (angled, bare)
-    )
-    np.testing.assert_array_equal(first, second)
+    bare = [re.sub(r" \d+ deg", "", text) for text in given]
+    swapped = [re.sub(r": (.+), (.+)", r": \2, \1", text) for text in bare]
+    for planes in (given, bare, swapped):
+        record = record_of(numbered(*API), machine.sensors, profile=rules_of(None, planes))
+        np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
 
 
 @pytest.mark.parametrize(
