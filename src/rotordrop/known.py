@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 NINETY = 1.6448536269514722
@@ -64,6 +64,10 @@ class Known:
 
     def __float__(self) -> float:
         return self.value
+
+    def __repr__(self) -> str:
+        known = ((one.name, getattr(self, one.name)) for one in fields(self))
+        return f"Known({', '.join(f'{name}={value!r}' for name, value in known if value not in (None, ''))})"
 
     @property
     def low(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 LATEST = 8
 """Drops on the first screen; chosen, not measured."""
+LARGEST = (("force, 90 %", "peak_force_N", 1.0, "N"), ("stress, 90 %", "peak_stress_Pa", 1e-6, "MPa"))
 WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
 WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
 
@@ -157,20 +159,21 @@ def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, w
     shown, rows = [*found.items()][0 if whole else -LATEST :], []
     several = len({(drop.machine, drop.bearing_set) for drop in found.values()}) > 1
     for number, drop in shown:
-        forces = [one for one in drop.severity if one.quantity == "peak_force_N"]
-        worst = max(forces, key=lambda one: one.upper, default=None)
+        marks = ["simulated"] * drop.simulated + ["not consistent with it"] * (not drop.consistent)
         day = format_minute(drop.recorded or drop.added)
         lasted = "" if drop.duration is None else f", {drop.duration:.4g} s"
         told = {
             "drop": str(number),
             **({"machine, bearings": f"{drop.machine}, {drop.bearing_set}"} if several else {}),
             "date": day if drop.recorded else f"logged {day}",
-            "record": f"{drop.record} (simulated)" if drop.simulated else drop.record,
-            "speed": f"{format_quantity(drop.speed, 'speed')}{lasted}",
-            "largest force (90 %)": ""
-            if worst is None
-            else f"{worst.bearing} {worst.lower:.0f} to {worst.upper:.0f} N",
+            "record": drop.record + (f" ({', '.join(marks)})" if marks else ""),
+            "speed": f"{format_quantity(drop.speed / (2.0 * math.pi), 'frequency')}{lasted}",
         }
+        for head, field, scale, unit in LARGEST:
+            rated = [one for one in drop.severity if one.quantity == field]
+            worst = max(rated, key=lambda one: one.upper, default=None)
+            ends = "" if worst is None else f"{scale * worst.lower:.0f} to {scale * worst.upper:.0f} {unit}"
+            told[head] = "" if worst is None else f"{worst.bearing} {ends}"
         rows.append(told)
     table = Table(tuple(rows[0]) if rows else ("drop",), tuple(tuple(row.values()) for row in rows))
     left = [f"{len(found) - len(shown)} earlier drops: --all"] if len(shown) < len(found) else []

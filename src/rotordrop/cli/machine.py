@@ -90,7 +90,7 @@ def init(
         deliver_text(_simple_text(numbers or ()), made, overwrite=force)
         if made != STANDARD_OUTPUT:
             console(sys.stderr).print(
-                f"next: rotordrop look RECORD {made}. An estimate with it takes minutes: it seeks the "
+                f"next: rotordrop look {made} RECORD. An estimate with it takes minutes: it seeks the "
                 "form of the rotor too.",
                 soft_wrap=True,
             )

@@ -329,7 +329,7 @@ class BallNumbers(BearingNumbers):
         note = f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind"
         yield _figure(
             "force_on_springs",
-            "peak force if preloaded by springs, ×",
+            "peak force if preloaded by springs, ≈ ×",
             "dimensionless",
             left,
             note=note,

@@ -297,14 +297,12 @@ class ActiveMagneticBearing(Placed):
             }
         if "stiffness" not in self.model_fields_set:
             value = carried_mass * (2.0 * math.pi * RIGID_FREQUENCY) ** 2
-            why = (
-                f"gives the {carried_mass:.3g} kg it carries a rigid-body frequency of {RIGID_FREQUENCY:g} Hz"
-            )
+            why = f"{RIGID_FREQUENCY:g} Hz as a rigid body, equal shares of the mass, {carried_mass:.3g} kg"
             stiffness = Known(value=value, status="default", source=why, unit="N/m")
             values["stiffness"] = stiffness
         if "damping" not in self.model_fields_set:
             value = 2.0 * DAMPING_RATIO * math.sqrt(stiffness.value * carried_mass)
-            why = f"{percent(DAMPING_RATIO)} of critical for the {carried_mass:.3g} kg it carries"
+            why = f"{percent(DAMPING_RATIO)} of critical for an equal share, {carried_mass:.3g} kg"
             values["damping"] = Known(value=value, status="default", source=why, unit="N s/m")
         return values
 

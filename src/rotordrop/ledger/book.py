@@ -93,6 +93,8 @@ class LoggedDrop:
     """Why levitation was lost."""
     method: Text
     verdict: Text
+    consistent: Annotated[bool, Field(strict=True)] = True
+    """Whether the model is consistent with the record; else its numbers are ranges."""
     simulated: Annotated[bool, Field(strict=True)] = False
     """Whether the recording is simulated."""
     version: Text = ""
@@ -336,6 +338,7 @@ def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:
         speed=2.0 * math.pi * drop.speed_Hz,
         method=drop.method,
         verdict=drop.verdict,
+        consistent=drop.consistent,
         simulated=drop.simulated_record,
         version=drop.rotordrop_version,
         fingerprint=drop.fingerprint,

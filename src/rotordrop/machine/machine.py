@@ -524,7 +524,7 @@ class Mention:
     status: Status
 
 
-_ENTRY = re.compile(r"(rotor\.sections|rotor\.discs|sensors|ambs)\..+\.(\w+)$")
+_ENTRY = re.compile(r"(rotor\.sections|rotor\.discs|sensors|ambs)\..+\.(?!bearing$)(\w+)$")
 _SILENT = {"position", "notes", "unbalances", "node_positions", "sections", "elements", "part", "materials"}
 _PLAIN_INFERRED = {"ball_count", "ball_count_range", "ball_material"}
 

@@ -134,12 +134,13 @@ def _verdict(
     texts: dict[str, list[str]] = {}
     # the surest first
     places = [(number, bearing) for number in FIRST for bearing in bearings]
+    if len(drops) - len(excluded) < 2:
+        places = []
+        said.append(Statement("Nothing is ranked: fewer than two drops are left."))
     chance = {key: max(one.worst_drop) for key, one in ranked.items()}
     for number, bearing in sorted(places, key=lambda place: -chance.get((place[1], place[0].field), 1.0)):
         if (bearing, number.field) in ranked:
             text = f"{ranked[bearing, number.field].statement}."
-        elif len(drops) - len(excluded) < 2:
-            text = "fewer than two drops are left to rank."
         else:
             text = (
                 "not every drop states an interval, so the order of the numbers says nothing about which "
@@ -405,17 +406,22 @@ def limit_statement(drops: Sequence[ComparedDrop], limits: Mapping[str, float]) 
 def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tuple[str, bool | None]:
     """What to say of one limit, and whether it is kept; None while that is open."""
     words = f"{number.label} {shown(limit, number.kind)}"
-    beyond = [
-        (probability, f"{one.name} at {bearing}")
-        for one in drops
-        for bearing in one.drop.bearings
-        if (probability := _beyond(one.number(bearing, number), limit, number)) is not None
-    ]
-    if not beyond:
+    beyond, ranges = [], []
+    for one in drops:
+        for bearing in one.drop.bearings:
+            found, who = one.number(bearing, number), f"{one.name} at {bearing}"
+            if one.drop.consistent or not found.ends[0] < limit < found.ends[1]:
+                if (probability := _beyond(found, limit, number)) is not None:
+                    beyond.append((probability, who))
+            else:  # of a range no share is known
+                ranges.append(f"{who}, {found.text}")
+    if not beyond and not ranges:
         return f"{words}: no drop states it with an interval", None
     over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
     if over:
         return f"{words}: passed by {', '.join(over)}", False
+    if ranges:
+        return f"{words}: open, known as a range only: {'; '.join(ranges)}", None
     worst, who = max(beyond)
     if worst > 1.0 - SURE:
         return f"{words}: open, passed by {who} with a probability of {format_chance(worst)}", None

@@ -166,7 +166,8 @@ def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> Report
     certain = estimate.consistent
     machine, date = estimate.machine, format_minute(estimate.record.event_date)
     serial = f"serial number {machine.serial_number}" if machine.serial_number else ""
-    parts = (machine.name, serial, estimate.name, date, f"from {shown(estimate.speed, 'speed')}")
+    made = [" ".join(one) for one in (origin or Origin()).facts() if one[0] in ("report made", "by")]
+    parts = (machine.name, serial, estimate.name, date, f"from {shown(estimate.speed, 'speed')}", *made)
     return ReportContent(
         title=f"Touchdown-bearing force and stress {'by replay of' if replayed else 'from'} a recorded drop",
         subtitle=", ".join(filter(None, parts)),

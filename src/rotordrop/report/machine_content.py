@@ -156,7 +156,8 @@ def _rotor(values: Iterable[tuple[str, object]], modes: Iterable[tuple[str, Iter
 def _card(machine: Machine, rest: BearingSummary, brief: bool) -> Card:
     def stated(figure: BearingFigure) -> KeyFigure:
         known = figure.value if figure.described is None else figure.described
-        return fact(figure.label, known, figure.kind, note=figure.note)
+        digits = 2 if figure.field == ON_SPRINGS else 4  # of one push, no estimate
+        return fact(figure.label, known, figure.kind, digits, note=figure.note)
 
     return Card(
         rest.name,

@@ -121,7 +121,7 @@ def _what_is_missing(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Statement]:
-    """What qualifies every number first, then limits, loads, and whether the rotor whirled."""
+    """What qualifies every number first, then limits, and whether the rotor whirled."""
     said = []
     failed = sum(results.failed.values())
     if failed:
@@ -134,7 +134,6 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
             shown = format_quantity(limit, _quantity(results, name, quantity).kind)
             text = f"{name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
             said.append(Statement(text, "notice" if over.high < 0.5 else "warning"))
-    said += [Statement(_loads(results, name)) for name in names]
     if len(results) < results.study.drops:
         said.append(Statement(_what_is_missing(results)))
     if results.study.design == "sensitivity":
@@ -168,22 +167,6 @@ def _is_symmetric(results: StudyResults, names: Sequence[str]) -> bool:
     """Whether every drop did the same to all bearings."""
     peaks = [results.numbers[f"{name}.peak_force"] for name in names]
     return len(peaks) > 1 and all(np.allclose(one, peaks[0], EQUAL, equal_nan=True) for one in peaks)
-
-
-def _loads(results: StudyResults, name: str) -> str:
-    """Force and stress of a bearing that all but one in a hundred drops stay below, or those of the worst."""
-    rare = SHARES[-1]
-    kinds = {f"{name}.{quantity}": _quantity(results, name, quantity).kind for quantity in HEADLINES}
-    known = [Shown.of(results.quantile(key, rare), kind, 3) for key, kind in kinds.items()]
-    if any(math.isnan(one.value) for one in known):
-        most = {key: float(np.nanmax(results.numbers[key], initial=-math.inf)) for key in kinds}
-        force, stress = (Shown.of(most[key], kind, 3).text for key, kind in kinds.items())
-        share = max(results.exceedance(key, most[key]).high for key in kinds)
-        said = f"none of {len(results)} drops exceeded {force} and {stress}"
-        return f"{name}: {said}; 90 %: at most {100 * share:.2g} % do."
-    force, stress = (f"{one.text} (90 %: {one.interval_text})" for one in known)
-    said = f"{100 * rare:g} % of the drops stay below a peak force of {force} and a stress of {stress}."
-    return f"{name}: {said}"
 
 
 def _distribution_section(results: StudyResults) -> Section:

@@ -47,7 +47,6 @@ from rotordrop.report.style import (
     single,
     square,
 )
-from rotordrop.simulate.coast_down_result import first_window_sentence
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
 from rotordrop.spectrum.indentation import DisplacementHistory, held_clearly, held_maximum
 from rotordrop.spectrum.lines import Line
@@ -207,8 +206,6 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     count = f"{len(analysis.lines)} lines, {len(named)} named"
     more = f"{count}; the strongest: {largest}." if named else f"{count}."
     said.append(Statement(more if analysis.lines else NO_LINE))
-    if found := analysis.signal.force_and_stress:
-        said.append(Statement(first_window_sentence(found)))
     if analysis.signal.profile is None:
         said.append(Statement(NO_SPEED, "warning"))
     else:

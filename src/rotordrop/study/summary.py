@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -113,7 +113,10 @@ class StudyResults:
         groups = [place == k for k in range(int(place.max(initial=-1)) + 1)]
 
         def known(group: NDArray[np.bool_]) -> Known:
-            return quantile(y[group], share) if above is None else exceedance(y[group & done], above)
+            if above is None:
+                unit = next((one.unit for one in self.columns if one.name == name), "")
+                return replace(quantile(y[group], share), unit=unit)
+            return exceedance(y[group & done], above)
 
         return [
             {"from": float(x[g].min()), "to": float(x[g].max()), "known": known(g)} for g in groups if g.any()

@@ -43,8 +43,8 @@ def read_excel(path: Path, profile: Profile) -> Recording:
         again = {one.label for one in part.channels} & {one.label for one in first.channels}
         if parts and (not _together(part, first) or (again and len(first.channels) >= _ENOUGH)):
             left.append(repr(name))
-        else:
-            parts[name] = part
+        else:  # tabs and decimal signs are those of the unpacked lines, not of the workbook
+            parts[name] = replace(part, notes=(f"sheet {name!r}", *part.notes[1:]))
     labels = [one.label for part in parts.values() for one in part.channels]
     channels = tuple(
         one
