@@ -82,11 +82,6 @@ class Change:
         return not self.named and (not self.determined or self.smallest > asked)
 
     @property
-    def found_from(self) -> str:
-        """The same for a table; a dash where no size would have been found."""
-        return "–" if math.isinf(self.smallest) else self.smallest_text
-
-    @property
     def smallest_text(self) -> str:
         """Smallest change that would have been found, in words."""
         if math.isinf(self.smallest):

@@ -18,7 +18,7 @@ def told_changes(found: Changes) -> tuple[Statement, Table]:
         Column("before", lambda one: Quantity.of(one.before, row_of(one.path).display_kind)),
         Column("change (90 %)", _change),
         Column("that much", lambda one: format_chance(one.probability)),
-        Column("found from", "found_from"),
+        Column("found from", lambda one: one.smallest_text.replace("of any size", "–")),
     )
     statement = Statement(found.sentence(spoken_path), "warning" if found.named else "good")
     told = [one for one in found.found if one.determined]  # the sentence names the others

@@ -86,7 +86,6 @@ LINES = "Lines"
 NO_LINE = "No line stands out: a short record is too short for one."
 SAID = 5
 """Lines that are named in the verdict (chosen)."""
-BY_DISPLACEMENT, AFTER_POWER_OFF = "by the displacement alone", "from power-off"
 _IN_WHOLE_SECONDS = 10.0
 """Time from which on whole seconds say when a line was seen [s] (chosen)."""
 _COMPONENTS = {
@@ -126,8 +125,8 @@ def waterfall_page(
         if analysis.signal.recorded:  # a simulation knows its contacts, and need not guess them
             between = (settled.count_interval_90, settled.contact_from_interval_90)
             told += [
-                ("Impacts", len(settled.touched), "count", between[0], BY_DISPLACEMENT),
-                (CONTACT_FROM.capitalize(), last, "duration", between[1], AFTER_POWER_OFF),
+                ("Impacts", len(settled.touched), "count", between[0], "by the displacement alone"),
+                (CONTACT_FROM.capitalize(), last, "duration", between[1], "from power-off"),
             ]
         figures = (
             KeyFigure(label, Quantity(value=value, kind=kind, interval_90=ends, digits=3), note)

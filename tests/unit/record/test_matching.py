@@ -52,6 +52,14 @@ def test_a_sensor_takes_the_channel_of_its_name_or_place(machine):
         assert record_of(recording(*names), plain).channel_names == ("NDE_A", "NDE_B", "DE_A", "DE_B")
 
 
+def test_likely_channels_of_an_end_with_two_planes(machine):
+    first, second, *others = machine.sensors
+    near = [one.model_copy(update={"name": f"{one.name}2", "node": 9}) for one in (first, second)]
+    said = numbered("V-1X", "V-1Y", "V-2X", "V-2Y", "V-3X", "V-3Y")
+    found = record_of(said, (first, second, *near, *others), profile=Profile(likely=True))
+    assert sorted(1e6 * found.signals[0]) == pytest.approx(range(6))
+
+
 WHOLE, OTHER = recording(*SENSORS), recording(*SENSORS[:3], "S_DE_C")
 TWICE = Recording(channels=tuple(channel(n, label=f"{g}/{n}") for g in "ab" for n in SENSORS))
 BARE, ROAD = (recording(*SENSORS, extra=(channel("Speed", unit),)) for unit in ("", "km/h"))

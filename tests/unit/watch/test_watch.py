@@ -293,6 +293,7 @@ def test_an_estimate_is_logged_once_and_judged_by_the_limits(
     (news,) = reported()
     assert (news["peak_force_N"], news["peak_force_lower_N"]) == (3300.0, 3200.0)
     assert news["machine"] == "4711" and "passed" in news["needs_person"]
+    assert one.kept.job(estimated).read()["judged"]["text"] == news["needs_person"]
 
 
 @on_posix
