@@ -95,9 +95,7 @@ def _page(
 ) -> ReportContent:
     said = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count) or "none yet"
     grave = sum(row["outcome"] != "looked" for row in rows)
-    first = Statement(
-        f"{_counted(len(rows), 'record needs', 'records need')} a person.", "warning" if grave else "notice"
-    )
+    first = Statement(f"Records that need a person: {len(rows)}.", "warning" if grave else "notice")
     if not rows:
         first = Statement("No record needs a person.", "good")
     force, stress = (
@@ -129,20 +127,15 @@ def _page(
         ),
         f"Records that need a person{f', {MOST_ROWS} of {len(rows)}' if len(rows) > MOST_ROWS else ''}",
     )
-    of = _counted(len(machines), "machine", "machines")
     return ReportContent(
         title="Drops of the fleet",
-        subtitle=f"{of}; as of {format_minute(datetime.now().isoformat())}",
+        subtitle=f"Machines: {len(machines)}; as of {format_minute(datetime.now().isoformat())}",
         verdict=(first, Statement(f"Records: {said}.")),
         sections=(Section("Machines", tables=(fleet,)), Section("Needs a person", tables=(records,))),
     )
 
 
 LABELS = ("peak force", "peak Hertz stress")
-
-
-def _counted(count: int, one: str, many: str) -> str:
-    return f"{count} {one if count == 1 else many}"
 
 
 def _peak(row: Mapping[str, Any], name: str, unit: str, kind: str) -> Quantity:
