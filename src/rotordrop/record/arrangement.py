@@ -191,6 +191,8 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
     mapped: dict[str, str] = {}
     for name, entries in given_planes(recording, profile):
         members = [sensor for sensor in sensors if (sensor.bearing or "").lower() == name.lower()]
+        if len(members) != len(entries):  # of several planes at a bearing one is told by its sensors
+            members = [one for one in sensors if one.name.lower().startswith(name.lower())] or members
         stand = ", ".join(f"{s.name} at {math.degrees(float(s.angle)):.4g} deg" for s in members)
         if len(members) != len(entries):
             known = listed(dict.fromkeys(sensor.bearing or "" for sensor in sensors))

@@ -174,13 +174,14 @@ def units_missing(used: Sequence[Channel], profile: Profile, *, sensitive: bool)
     """What has to be said of the units of displacements, each with the option of 'rotordrop profile'."""
     bare, volts = [], False
     for channel in used:
-        unit = profile.units.get(channel.label) or profile.unit or channel.unit
+        unit = channel.unit or ("V" if profile.sensitivity else "")
+        unit = profile.units.get(channel.label) or profile.unit or unit
         if channel.unit not in (*SPEED_UNITS, FULL_SCALE):
             try:
                 volts |= worth_of(unit)[1] == "voltage"
             except UsageError:
                 bare.append(f"{channel.label} ({unit!r} is none)" if unit else channel.label)
-    missing = [f"the unit of {listed(bare)}: --unit um"] if bare else []
+    missing = [f'the unit of {listed(bare)}: --unit um, or of volts --sensitivity "8 mV/um"'] if bare else []
     if any(channel.unit == FULL_SCALE for channel in used):
         missing.append('what full scale is: --full-scale "500 um"')
     if volts and not (profile.sensitivity or sensitive):
@@ -208,6 +209,7 @@ def displacement(
     # a sensor may be called "S_V": the ending of its channel's name is then no unit
     suffixed = channel.label == sensor.name != channel.name and channel.label.startswith(channel.name)
     unit = profile.units.get(channel.label) or profile.unit or ("" if suffixed else channel.unit)
+    unit = unit or ("V" if profile.sensitivity else "")
     if not unit:
         ask = "name it in the profile: unit = \"um\", as 'rotordrop profile --unit um' writes it"
         raise RecordError(f"{place}: channel {channel.label!r} has no unit; {ask}")

@@ -118,13 +118,15 @@ class Profile(_Section):
     ) -> Channel:
         """A channel as a file names it, with unit and clock of the profile where it has them.
 
-        The clock is even where a step was given by hand, unless the reader has made it so (`clocked`).
+        The clock has the step and the start given by hand, unless the reader has made it so (`clocked`).
         """
         label, readings = name if label is None else label, np.asarray(values, dtype=np.float64)
+        begun = float(time[0]) if time is not None and len(time) else 0.0
+        start = begun if self.time.start is None else parse_quantity(self.time.start, "time")
         if self.time.step is not None and not clocked:
-            begun = 0.0 if time is None else float(time[0])
-            start = begun if self.time.start is None else parse_quantity(self.time.start, "time")
             time = np.asarray(start + parse_quantity(self.time.step, "time") * np.arange(len(readings)))
+        elif time is not None and start != begun and not clocked:
+            time = time + (start - begun)
         if time is None:
             raise RecordError(f'{label!r} has no clock; give its step in a profile: [time] step = "50 us"')
         return Channel(

@@ -280,30 +280,24 @@ def _verdict(seen: Look) -> list[Statement]:
 def _card(seen: Look, number: int) -> Card:
     plane = seen.planes[number]
     note = f"at the sensors, at {format_moment(plane.largest_time)}"
-    settling = plane.settling
-    hits = Quantity(
-        value=len(settling.touched), kind="count", interval_90=settling.count_interval_90, digits=3
-    )
-    largest = _found(plane.largest, plane.largest_interval_90)
+    hits = _found(len(plane.settling.touched), plane.settling.count_interval_90, "count")
     figures = [
-        KeyFigure("largest distance from the centre", largest, note),
+        KeyFigure("largest distance from the centre", _found(plane.largest, plane.largest_interval_90), note),
         KeyFigure("impacts", hits, "by the displacement alone"),
         _gap_figure(plane),
-        _index(
-            "position index (mean distance over gap)", plane.position_index, plane.position_index_interval_90
+        KeyFigure(
+            "position index (mean distance over gap)",
+            _found(plane.position_index, plane.position_index_interval_90, "dimensionless"),
         ),
     ]
     if plane.velocity_index is not None:
         label = "velocity index (r.m.s. over speed × gap)"
-        figures.append(_index(label, plane.velocity_index, plane.velocity_index_interval_90))
+        velocity = _found(plane.velocity_index, plane.velocity_index_interval_90, "dimensionless")
+        figures.append(KeyFigure(label, velocity))
     for found in seen.synchronous:
         if found.plane == plane.plane:
             figures += _synchronous(found)
     return Card(plane.plane, tuple(figures))
-
-
-def _index(label: str, value: float, interval: tuple[float, float] | None) -> KeyFigure:
-    return KeyFigure(label, Quantity(value=value, kind="dimensionless", interval_90=interval, digits=3))
 
 
 def _gap_figure(plane: PlaneLook) -> KeyFigure:
@@ -313,16 +307,14 @@ def _gap_figure(plane: PlaneLook) -> KeyFigure:
     return KeyFigure("air gap", _found(plane.gap, plane.gap_interval_90), note)
 
 
-def _found(value: float, interval: tuple[float, float]) -> Quantity:
-    return Quantity(value=value, kind="length", interval_90=interval, digits=3)
+def _found(value: float, interval: tuple[float, float] | None, kind: str = "length") -> Quantity:
+    return Quantity(value=value, kind=kind, interval_90=interval, digits=3)
 
 
 def _synchronous(found: Synchronous) -> list[KeyFigure]:
     note = f"of {found.turns} turns before the release, runout of the sensors included"
-    amplitude = Quantity(
-        value=found.amplitude, kind="length", interval_90=found.amplitude_interval_90, digits=3
-    )
-    phase = Quantity(value=found.phase, kind="angle", interval_90=found.phase_interval_90, digits=3)
+    amplitude = _found(found.amplitude, found.amplitude_interval_90)
+    phase = _found(found.phase, found.phase_interval_90, "angle")
     return [
         KeyFigure("1X amplitude", amplitude, note),
         KeyFigure("1X high spot at the mark, from +y with the spin", phase, note),

@@ -255,18 +255,18 @@ def _departure_check(name: str, departures: list[Departure], noted: bool, *, wid
 
 
 def direction_check(problem: DropProblem) -> Check:
-    """Whether both directions are seen at every node with sensors; the rest follows from the model alone."""
+    """Whether both directions are seen at two nodes with sensors; the rest follows from the model alone."""
     live = np.flatnonzero(np.isfinite(problem.readings).any(axis=0))
     sensors = [problem.model.machine.sensors[c] for c in live]
-    blind = []
-    for node in sorted({sensor.node for sensor in problem.model.machine.sensors}):
+    blind, nodes = [], sorted({sensor.node for sensor in problem.model.machine.sensors})
+    for node in nodes:
         angles = np.array([float(sensor.angle) for sensor in sensors if sensor.node == node])
         rows = np.column_stack([np.cos(angles), np.sin(angles)])
         if len(angles) < 2 or np.linalg.svd(rows, compute_uv=False)[1] < LEAST_SECOND_DIRECTION:
             blind.append(str(node))
-    seen = "both directions are seen at every node with sensors"
+    seen, enough = "both directions are seen at two nodes with sensors", len(nodes) - len(blind) > 1
     missing = f"only one direction or none is seen at node {', '.join(blind)}: a force across it is a guess"
-    return Check(name=DIRECTIONS, passed=not blind, message=missing if blind else seen)
+    return Check(name=DIRECTIONS, passed=enough, message=seen if enough else missing)
 
 
 def nuisance_check(problem: DropProblem, smoothed: Smoothed, white: bool) -> Check:
