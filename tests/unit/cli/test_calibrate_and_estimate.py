@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import re
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -19,7 +21,7 @@ from rotordrop.estimate.record_facts import COUNTED_TWICE, INCONSISTENT_CALIBRAT
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import NINETY, Known
-from rotordrop.machine import example_path, load_machine
+from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.machine.saving import machine_text
 from rotordrop.spectrum.indentation import find_settling
@@ -296,6 +298,46 @@ def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_pat
     assert run([verb, LP400, *call, *place]) == (3 if "cannot be used" in message else USAGE)
     assert message in words(capsys.readouterr().err)
     assert not output.exists()
+
+
+def not_a_number(record):
+    signals = record.signals.copy()
+    signals[2200:2300, 2] = np.nan
+    return replace(record, signals=signals)
+
+
+FAULTS = {
+    "NaN": (
+        not_a_number,
+        r"cannot be used: missing samples S_DE_A at 0\.01 s: 100 of 3001 samples are NaN.*export the",
+    ),
+    "unit": (
+        lambda record: replace(record, signals=1e3 * record.signals),
+        r"cannot be used: wrong unit factor S_NDE_A.*span .* × the air gap of 250 µm in lp400\.toml, a drop "
+        r"1 to 2\.5 ×; a unit factor of 1.* or its air_gap",
+    ),
+    "no speed": (
+        lambda record: replace(record, speed=None),
+        r'speed missing: the record has no shaft speed beside S_NDE_A.*\[speed\] constant = "60 Hz"',
+    ),
+}
+
+
+@pytest.mark.parametrize(("change", "message"), FAULTS.values(), ids=FAULTS)
+def test_a_faulty_record_is_refused_by_name_and_leaves_no_file(change, message, tmp_path, capsys):
+    """What else the gate finds: ``evidence/test_gate``; what readers refuse: ``record``."""
+    whole = read_record(example_record_path("lp400_drop_060"), example_machine("lp400"))
+    record, file = change(whole.window(-0.1, 0.05)), tmp_path / "record.csv"
+    names = ["time [s]", *(f"{name} [um]" for name in record.channel_names)]
+    columns = [record.time, *(record.signals.T * 1e6)]
+    if record.speed is not None:
+        names, columns = [*names, "speed [Hz]"], [*columns, record.speed / (2.0 * np.pi)]
+    np.savetxt(file, np.column_stack(columns), "%.6f", ",", header=",".join(names), comments="")
+    outputs = ["--json", str(tmp_path / "out.json"), "--report", str(tmp_path / "out.html")]
+    assert run(["estimate", LP400, str(file), *outputs]) == 3
+    told = capsys.readouterr()
+    assert told.out == "" and list(tmp_path.iterdir()) == [file]
+    assert re.search(message, " ".join(told.err.split()).removeprefix("rotordrop: record ")), told.err
 
 
 @pytest.mark.parametrize("verb", ["estimate", "calibrate"])

@@ -70,6 +70,9 @@ def test_a_profile_for_looks_needs_no_speed(strange, tmp_path):
         ('[time]\nstep = "5"', r"\[time\] step = '5' does not fit: '5' has no unit; a time needs one"),
         ('[text]\nseparator = ";;"', r"\[text\] separator = ';;' does not fit: expected one sign"),
         ('channels = "X1"', r"channels = 'X1' does not fit: expected a table, \[channels\] S_NDE_A"),
+        ("[speed]\nconstant = '60 m'", r"\[speed\] constant = '60 m'.*is not a speed"),
+        ("[text]\ndecimal = ';'", r"\[text\] decimal = ';'"),
+        ("a =", "is not a TOML file"),
         ("a = 1\nb = 2", r"a = 1 is not known.*\n  also: b = 2 is not known"),
     ],
 )

@@ -58,9 +58,7 @@ def test_numbers_come_back_exactly_zero_where_it_makes_sense():
     ("written", "told"),
     [
         (1e8, r"100000000\.0 has no unit; a stiffness needs one, for example '1e8 N/m'"),
-        ("1e8", "'1e8' has no unit"),
         ("1e8 N", "'1e8 N' is not a stiffness"),
-        ("1,5e8 N/m", r"decimal comma; use 1\.5"),
         ("0 N/m", "0 N/m is not allowed here; a stiffness must be positive"),
         ({"guess": "1e8 N/m", "value": "1e8 N/m"}, "either 'guess' or 'value', and only one"),
         ({"range": ["1 N/m", "2 N/m"]}, "either 'guess' or 'value', and only one"),

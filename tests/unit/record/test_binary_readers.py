@@ -38,7 +38,6 @@ def test_matlab_files_need_a_clock_and_equal_lengths(short, machine, tmp_path):
     scipy.io.savemat(path, {"S_NDE_A": short.signals[:, 0]})
     with pytest.raises(RecordError, match=r"no samples with a clock among S_NDE_A"):
         read_record(path, machine)
-    path = tmp_path / "drop.mat"
     as_matlab(short, path, packed=False, time=True)
     path.write_bytes(path.read_bytes() + b"\x0e\x00\x00\x00\xff\x00\x00\x00")
     with pytest.raises(RecordError, match=r"declares 255 bytes and 0 are present"):

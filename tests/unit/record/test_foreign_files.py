@@ -53,14 +53,12 @@ def test_damage_to_segments_of_labview_is_told(tmp_path):
     path.write_text("\n".join(lines[:-12]) + "\n")
     (told,) = read(path).warnings
     assert f"declares {COUNT} samples and {COUNT - 10} are present" in told
-    path = tmp_path / "drop.lvm"
     text = labview("No", segments=(range(25), range(25, COUNT))).decode()
     wrong = f"{VOLTS[30, 1]:.6f}"
     path.write_text(text.replace(wrong, "4.5x"))
     line = text.replace("\r\n", "\n").split(wrong)[0].count("\n") + 1
     with pytest.raises(RecordError, match=rf"line {line}, column 'NDE Y.*': '4\.5x' is not a number"):
         read(path)
-    path = tmp_path / "drop.lvm"
     text = labview("No", segments=(range(25), range(25, COUNT))).decode()
     path.write_text(text.replace("***End_of_Header***", "**+End_of_Header***", 1), newline="")
     assert len(read(path).channels[0].values) == COUNT
@@ -160,7 +158,6 @@ def test_channels_of_their_own_rates_and_lengths_keep_them(tmp_path):
         read(path)
     rows = [f"{START + i * STEP:.6f},{MICRONS[i, 0]}," for i in range(COUNT)]
     rows = [row + (f"{2 * i * STEP:.6f},{MICRONS[i, 1]}" if i < 30 else ",") for i, row in enumerate(rows)]
-    path = tmp_path / "drop.csv"
     path.write_text("\n".join(["Time [s],A [um],Time [s],B [um]", *rows]) + "\n")
     first, second = read(path).channels
     np.testing.assert_allclose(first.time, TIME, atol=1e-9)

@@ -120,22 +120,6 @@ def test_a_profile_is_read_back_and_given_by_path(tmp_path, machine):
     assert record.speed[0] == pytest.approx(122 * np.pi)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[time]\nstep = '50'", r"\[time\] step = '50'.*has no unit"),
-        ("[speed]\nconstant = '60 m'", r"\[speed\] constant = '60 m'.*is not a speed"),
-        ("[text]\ndecimal = ';'", r"\[text\] decimal = ';'"),
-        ("a =", r"is not a TOML file"),
-    ],
-)
-def test_a_wrong_profile_names_the_entry(text, words, tmp_path):
-    path = tmp_path / "recorder.toml"
-    path.write_text(text)
-    with pytest.raises(RecordError, match=words):
-        load_profile(path)
-
-
 def test_a_record_is_read_back_and_refuses_what_it_does_not_hold(drop, machine, tmp_path):
     save_record(drop, tmp_path / "copy.h5")
     copy = read_record(tmp_path / "copy.h5", machine)

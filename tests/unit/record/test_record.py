@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.sensor import Sensor
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 from rotordrop.machine import example_machine
 from rotordrop.record.axes import along_sensors, planar_of, sensor_directions, sensor_planes
 from rotordrop.record.event_date import event_of
@@ -163,32 +163,6 @@ def test_a_table_is_read_as_the_file_of_the_same_columns_would_be():
     np.testing.assert_allclose(
         Record.from_dataframe(MACHINE, stamped, unit="um").time, record.time, atol=1e-12
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"speed": 60}, r"speed is 60; expected a text such as '60 Hz', or readings with their unit"),
-        ({"speed": "60"}, "'60' has no unit; a speed needs one"),
-        ({"unit": ""}, r"the unit of \w+ is ''; say it, for example unit='um'"),
-        ({"time": np.arange(10.0)}, r"time has the shape \(10,\) and the signals have 200 samples"),
-        (
-            {"signals": MICRONS[:, :3]},
-            r"signals have the shape \(200, 3\); expected \(samples, 4\), one column",
-        ),
-        ({"signals": {NAMES[0]: MICRONS[:, 0]}}, f"no channel for .*{NAMES[1]}|{NAMES[1]}"),
-    ],
-)
-def test_what_does_not_fit_is_named(arguments, message):
-    given = {"time": np.arange(COUNT) * 5e-5, "signals": MICRONS, "unit": "um"} | arguments
-    with pytest.raises((RecordError, UsageError), match=message):
-        Record.from_arrays(MACHINE, **given)
-
-
-def test_a_table_whose_index_only_counts_has_no_time():
-    pandas = pytest.importorskip("pandas")
-    with pytest.raises(RecordError, match="no column 'time' and its index only counts rows"):
-        Record.from_dataframe(MACHINE, pandas.DataFrame(MICRONS, columns=NAMES), unit="um")
 
 
 TIME = np.arange(50) / 1e4

@@ -7,34 +7,26 @@ import tracemalloc
 import numpy as np
 import pytest
 from tests.unit.record.every_format import as_comtrade
+from tests.unit.record.test_ninety_recorders import COUNT, NAMES, READINGS, STEP, lined, rows
 
 from rotordrop import check_record, read_record
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile, SpeedSource, TextLayout
 from rotordrop.record.readers import read_recording
 
-NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
-COUNT = 40
-STEP = 5e-5
-READINGS = np.round(
-    np.array([8.18, -6.98, -16.85, -16.31]) + np.outer(np.arange(COUNT), [-0.73, 0.2, 1.5, -3.25]), 2
-)
-
 
 def table(first, *, separator=";", decimal=".", names=None, extra=()):
     """Lines of a recording: what stands in front of the readings is given for every row."""
     head = names or ["Time [s]", *(f"{name} [um]" for name in NAMES), "Speed [Hz]"]
-    lines = [separator.join([*head, *(name for name, _ in extra)])]
-    for i in range(COUNT):
-        fields = [f"{value:.2f}".replace(".", decimal) for value in (*READINGS[i], 60.0)]
-        lines.append(separator.join([*first(i), *fields, *(word for _, word in extra)]))
-    return "\n".join(lines) + "\n"
+    body = [[*row, *(word for _, word in extra)] for row in rows(separator, decimal, first)]
+    return lined(separator, [[*head, *(name for name, _ in extra)]], body)
 
 
 def seconds(i):
     return [f"{i * STEP:.5f}"]
 
 
+LAST = f"{READINGS[-1, -1]:.2f}"
 WAYS = {
     "status column": table(seconds, extra=[("Status", "OK")]),
     "text columns with commas": table(seconds, separator=",", extra=[("Note", '"a, b"')]),
@@ -46,7 +38,7 @@ WAYS = {
     "time of day": table(
         lambda i: [f"13:59:59.{999_000 + 50 * i:06d}" if i < 20 else f"14:00:00.{50 * (i - 20):06d}"]
     ),
-    "quoted thousands": table(seconds, separator=",").replace("-126.75", '"-126.75"'),
+    "quoted thousands": table(seconds, separator=",").replace(LAST, f'"{LAST}"'),
     "no last line end": table(seconds).rstrip("\n"),
     "rate without a time column": "fs = 20000 Hz\n"
     + table(lambda i: [], names=[*(f"{n} [um]" for n in NAMES), "Speed [Hz]"]),
@@ -95,7 +87,6 @@ def test_missing_rows_and_endless_lines_are_told(machine, tmp_path):
     found = check_record(record, machine)
     assert next(finding.kind for finding in found if finding.severity == "stop") == "dropped block"
     assert "3 samples are missing" in found[0].message
-    path = tmp_path / "drop.csv"
     path.write_text("a;b\n" + "1;" * 1_000_000)
     with pytest.raises(RecordError, match=r"line 2 has 2000000 characters"):
         read_recording(path, Profile())
@@ -124,7 +115,7 @@ def test_arrays_that_are_damaged_or_dangerous_are_refused(tmp_path):
     # Brackets that do not close ended in a traceback of the tokenizer.
     np.save(tmp_path / "drop.npy", READINGS)
     content = (tmp_path / "drop.npy").read_bytes()
-    (tmp_path / "drop.npy").write_bytes(content.replace(b"(40, 4), }", b"((40, 4,  "))
+    (tmp_path / "drop.npy").write_bytes(content.replace(b"(60, 4), }", b"((60, 4,  "))
     with pytest.raises(RecordError, match=r"is no intact NPY array"):
         read_recording(tmp_path / "drop.npy", BY_PROFILE)
 
@@ -186,9 +177,9 @@ def test_rows_missing_at_the_end_show_by_the_length_the_header_declares(key, mac
 def test_a_configuration_with_a_damaged_rate(machine, tmp_path):
     as_comtrade(tmp_path / "drop.cfg", "ASCII", WITH_SPEED, 20_000, 5e-4, -1.5)
     text = (tmp_path / "drop.cfg").read_text()
-    (tmp_path / "drop.cfg").write_text(text.replace("20000,40", "20000,4°", 1), encoding="latin-1")
+    (tmp_path / "drop.cfg").write_text(text.replace("20000,60", "20000,6°", 1), encoding="latin-1")
     with pytest.raises(RecordError, match=r"line \d+: .*the configuration is damaged"):
         read_record(tmp_path / "drop.cfg", machine)
-    (tmp_path / "drop.cfg").write_text(text.replace("20000,40", "26000,40", 1))
+    (tmp_path / "drop.cfg").write_text(text.replace("20000,60", "26000,60", 1))
     (told,) = read_record(tmp_path / "drop.cfg", machine).warnings
-    assert "0.0015 s by the sampling rates and 0.00195 s by their time stamps" in told
+    assert "0.00226923 s by the sampling rates and 0.00295 s by their time stamps" in told

@@ -232,6 +232,38 @@ def test_the_verb(tmp_path):
     assert first["column"] == "NDE.peak_force" and 0.0 <= first["place"]["value"] <= 1.0
 
 
+@pytest.fixture(scope="module")
+def study_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    save_machine(MACHINE, folder / "machine.toml")
+    file = folder / "speeds.toml"
+    file.write_text(
+        'machine = "machine.toml"\ndrops = 12\nshard = 5\nduration = "10 ms"\nreduction = "quick"\n'
+        'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
+    )
+    return file
+
+
+def test_a_study_runs_shows_and_helps(study_file, tmp_path, capsys):
+    numbers, page, drops, again = (tmp_path / name for name in ("s.json", "s.html", "s.h5", "again.json"))
+    call = ["study", "run", str(study_file), "--by", "speed", "--threads", "1"]
+    assert run([*call, "--json", str(numbers), "--report", str(page), "--output", str(drops)]) == 0
+    content = json.loads(numbers.read_text())
+    assert content["drops"] == 12
+    assert content["maps"]["speed"]["NDE.peak_force"][0]["from"] >= 60 * 6.283
+    median = content["quantiles"]["NDE.peak_force"]["0.5"]
+    low, high = median["interval_90"]
+    assert 1000.0 < low < median["value"] < high < 6000.0
+    folder = study_file.with_suffix("")
+    before = (folder / "shards" / "000000.npy").read_bytes()
+    assert run(["study", "run", str(folder), "--by", "speed", "--json", str(again)]) == 0
+    assert json.loads(again.read_text()) == content
+    assert (folder / "shards" / "000000.npy").read_bytes() == before
+    assert run(["study", "show", str(folder)]) == 0
+    assert run([*call[:3], "--by", "spead"]) == 64
+    assert "did you mean 'speed'" in capsys.readouterr().err
+
+
 ISHIGAMI = {"a": (0.3139, 0.5576), "b": (0.4424, 0.4424), "c": (0.0, 0.2437)}
 """First-order and total indices of sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1, Ishigami and Homma 1990."""
 PLACES = dict(zip("abc", ("*.friction.dynamic", "NDE.air_gap", "speed"), strict=True))

@@ -1,14 +1,20 @@
-"""The verbs init and schema: files that are right, and none that overwrite another."""
+"""The verbs init, check and doctor: right files, none that overwrite another, numbers, what is here."""
 
 import json
+import tomllib
 from pathlib import Path
 
 import jsonschema
 import pytest
 
+from rotordrop.cli import computer
 from rotordrop.cli.app import run
-from rotordrop.machine import example_machine, load_machine
+from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.machine.schema import machine_schema
+
+PAPER = str(example_path("paper"))
+ROOT = Path(__file__).parents[3]
+MAKING = ("docs", "dev")
 
 
 @pytest.fixture(autouse=True)
@@ -59,3 +65,40 @@ def test_the_schema_of_an_estimate_knows_its_fields(capsys):
             jsonschema.validate(broken, bearing)
     for part in ("Drop", "Bearing"):
         assert schema["$defs"][part]["additionalProperties"] is False
+
+
+def test_the_summary_names_the_numbers(tmp_path, capsys):
+    files = [tmp_path / "m.json", tmp_path / "m.html"]
+    assert run(["check", PAPER, "--all", "--json", str(files[0]), "--report", str(files[1])]) == 0
+    text = capsys.readouterr().out
+    for expected in ("59.50 kg", "621.3 mm", "0.08752 kg m²", "187.3", "134.0", "mode 1 [Hz]", "174.6 N"):
+        assert expected in text
+    assert json.loads(files[0].read_text())["machine"] == example_machine("paper").name
+    assert "touchdown bearing" in files[1].read_text() and "59.50" in files[1].read_text()
+
+
+def test_json_on_standard_output_is_json_and_nothing_else(capsys):
+    assert run(["check", PAPER, "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["mass_kg"] == pytest.approx(59.49996, rel=1e-6)
+    assert found["bearings"]["DE"]["load_N"] == pytest.approx(409.08, rel=1e-4)
+    assert len(found["levitated_sag_m"]) == 36
+    assert found["defaults"]
+
+
+def test_it_names_what_is_installed(capsys):
+    assert run(["doctor", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["packages"]["numpy"]
+    assert all(found["packages"].values())
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = {name: needs for name, needs in stated["optional-dependencies"].items() if name not in MAKING}
+    told = {name: sorted(one["packages"]) for name, one in found["extras"].items()}
+    assert told == {
+        name: sorted(computer.bare(text).lower() for text in needs) for name, needs in extras.items()
+    }
+
+
+def test_requirements_lose_their_versions():
+    texts = ("npTDMS>=1.9", "tree-sitter-toml>=0.7", "psycopg[binary]>=3.1")
+    assert [*map(computer.bare, texts)] == ["npTDMS", "tree-sitter-toml", "psycopg"]
