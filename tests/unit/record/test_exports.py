@@ -1,9 +1,13 @@
-"""Exports of makers and files that users reported are read without an option, or asked about."""
+"""Exports of makers and files that users reported are read without an option, or asked about.
+
+The same samples through every format are the same record, to the last bit the format carries.
+"""
 
 import re
 
 import numpy as np
 import pytest
+from tests.unit.record import every_format as every
 from tests.unit.record import reported
 from tests.unit.record.exports import EXPORTS, SPEED, TIME
 from tests.unit.record.reported import REPORTED
@@ -12,7 +16,7 @@ from rotordrop.errors import RecordError
 from rotordrop.record.arrangement import arrangement_of
 from rotordrop.record.profile import Profile
 from rotordrop.record.readers import read_recording
-from rotordrop.record.record import open_record
+from rotordrop.record.record import open_record, read_record
 
 READ = [export for export in EXPORTS if not export.question]
 REPORTED_READ = [one for one in REPORTED if not one.question]
@@ -79,3 +83,41 @@ def test_a_reported_file_is_read(one, tmp_path):
         apart = record.speed[read] / (2 * np.pi) - reported.turns(record.time[read])
         np.testing.assert_array_less(np.abs(apart), 0.02)
     assert any(re.search(one.said, words) for words in said), said
+
+
+def read_by_name(path, name):
+    return read_record(path, every.MACHINE, profile=every.BY_PROFILE if name in every.BY_HAND else None)
+
+
+@pytest.fixture(params=every.WRITERS)
+def name(request):
+    if request.param in every.NEEDS:
+        pytest.importorskip(every.NEEDS[request.param])
+    return request.param
+
+
+def test_readings_are_those_written_to_the_last_bit(name, tmp_path):
+    """A reading in micrometres times 1e-6 is rounded once; a format with steps is off by half of one."""
+    record = read_by_name(every.written(name, tmp_path), name)
+    off = np.abs(record.signals - every.READINGS * 1e-6)
+    assert np.all(off <= 0.5 * every.CARRIES.get(name, 0.0) + np.spacing(np.abs(every.READINGS * 1e-6)))
+    np.testing.assert_allclose(record.time - record.time[0], every.TIME - every.TIME[0], rtol=0, atol=2e-9)
+    if name in every.WITHOUT_SPEED:
+        assert record.speed_readings is None
+    elif name not in every.BY_HAND:
+        assert len(record.speed_readings) == every.COUNT
+        step = 2 * np.pi * 0.005 if name in every.CARRIES else 1e-12 * 400
+        np.testing.assert_allclose(record.speed_readings, 2 * np.pi * every.SPEED, rtol=0, atol=1.01 * step)
+
+
+@pytest.mark.parametrize("kept", [0.03, 0.2, 0.5, 0.8, 0.97])
+def test_a_file_that_was_cut_says_so(name, kept, tmp_path):
+    path = every.written(name, tmp_path)
+    content = path.read_bytes()
+    path.write_bytes(content[: int(kept * len(content))])
+    try:
+        record = read_by_name(path, name)
+    except RecordError as error:
+        assert str(path.parent) in str(error) or path.stem in str(error)
+    else:
+        assert record.warnings, "fewer samples than were written, without a word"

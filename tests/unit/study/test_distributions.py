@@ -232,19 +232,13 @@ def test_the_verb(tmp_path):
     assert first["column"] == "NDE.peak_force" and 0.0 <= first["place"]["value"] <= 1.0
 
 
-@pytest.fixture(scope="module")
-def study_file(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    save_machine(MACHINE, folder / "machine.toml")
-    file = folder / "speeds.toml"
-    file.write_text(
+def test_a_study_runs_shows_and_helps(tmp_path, capsys):
+    save_machine(MACHINE, tmp_path / "machine.toml")
+    study_file = tmp_path / "speeds.toml"
+    study_file.write_text(
         'machine = "machine.toml"\ndrops = 12\nshard = 5\nduration = "10 ms"\nreduction = "quick"\n'
         'vary.speed = {uniform = ["60 Hz", "200 Hz"]}\n'
     )
-    return file
-
-
-def test_a_study_runs_shows_and_helps(study_file, tmp_path, capsys):
     numbers, page, drops, again = (tmp_path / name for name in ("s.json", "s.html", "s.h5", "again.json"))
     call = ["study", "run", str(study_file), "--by", "speed", "--threads", "1"]
     assert run([*call, "--json", str(numbers), "--report", str(page), "--output", str(drops)]) == 0
