@@ -38,7 +38,12 @@ from rotordrop.evidence.quality import Finding, gate, not_seen, stops
 from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import found, ranked
-from rotordrop.evidence.quality.motion import check_fall, check_given_gap, check_slow_fall
+from rotordrop.evidence.quality.motion import (
+    check_fall,
+    check_given_gap,
+    check_rotation_line,
+    check_slow_fall,
+)
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock
 from rotordrop.evidence.rest import STANDSTILL, standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
@@ -295,7 +300,9 @@ def look(
                 "the rotor does not fall from where it floated", "correct channels or gap"
             )
         if evidence is None:
-            findings = ranked([*findings, *check_fall(motion)])
+            turning, before = _speed_at(read, drops[0].release), drops[0].release - BEFORE_RELEASE
+            line = [] if turning is None else check_rotation_line(fell, before, turning)
+            findings = ranked([*findings, *check_fall(motion), *line])
         if _unit_doubted(findings):
             raise NothingFallsError("no length is known", "give the right unit")
     except NothingFallsError as error:

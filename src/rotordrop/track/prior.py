@@ -124,7 +124,8 @@ def _rotor_prior(
     weight = np.sqrt(model.fe.total_mass)
     frequency = np.sqrt(np.maximum(basis.eigenvalues, 0.0))
     softer = np.where(frequency > 0.0, frequency[2] / np.maximum(frequency, 1.0), 1.0)
-    orbit = START_ORBIT_SIGMA * gap * weight * (omega / np.maximum(frequency, omega)) ** 2
+    turning = max(abs(omega), 1e-9)  # 0 at standstill, where no mode bends on an orbit
+    orbit = START_ORBIT_SIGMA * gap * weight * (omega / np.maximum(frequency, turning)) ** 2
     sag = np.zeros(basis.shapes.shape[0])
     if len(model.machine.ambs) >= 2:
         sag = np.asarray(levitated_sag(model.fe, model.machine), dtype=np.float64)

@@ -121,7 +121,7 @@ def test_twelve_numbers_fit_the_recorder_and_the_next_command_is_printed(tmp_pat
     assert run(["init", "--simple", *given, "twelve.toml"]) == 0
     said = capsys.readouterr().err
     (following,) = re.findall(r"next: rotordrop (.*?)\. ", said)
-    assert following == "look RECORD twelve.toml"
+    assert following == "look twelve.toml RECORD"
     assert run(following.replace("RECORD", RECORD).split()) == 0
     assert run(["profile", RECORD, "--machine", "twelve.toml", "-o", "recorder.toml"]) == 0
     profile = load_profile("recorder.toml")

@@ -83,10 +83,11 @@ def _described(record: Record, model: DropModel, speed: float, count: int) -> Ar
 
 
 def _powers(readings: Array, rate: float, count: int, edges: Array) -> Array:
-    """Mean power density in bands, shape (bands, S), by Welch's method with ``count`` samples a segment."""
-    from scipy.signal import welch
-
-    frequency, power = welch(readings, rate, nperseg=count, axis=0)
+    """Mean power of segments of ``count`` samples in bands [m²], shape (bands, S)."""
+    whole = readings[: len(readings) // count * count].reshape(-1, count, readings.shape[1])
+    segments = (whole - whole.mean(axis=1, keepdims=True)) * np.hanning(count)[:, None]
+    power = np.mean(np.abs(np.fft.rfft(segments, axis=1)) ** 2, axis=0)
+    frequency = np.fft.rfftfreq(count, 1.0 / rate)
     inside = [(frequency >= low) & (frequency < high) for low, high in pairwise(edges)]
     return np.array(
         [power[one].mean(axis=0) if one.any() else np.full(power.shape[1], np.nan) for one in inside]
