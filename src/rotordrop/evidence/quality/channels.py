@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.evidence.quality.finding import Finding, found
+from rotordrop.evidence.quality.finding import Finding, Severity, found
+from rotordrop.record.axes import sees_both_directions
 from rotordrop.series import SIGMA_OF_MEDIAN, runs_of, stride_of
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ def damaged_samples(signals: Array) -> NDArray[np.bool_]:
         for start, count in zip(*_held(values), strict=True):
             bad[start + 1 : start + count, c] = True
         bad[_standing_out(values)[0] + 1, c] = True
+        bad[np.isin(values, list(_limits(values))), c] = True
     return bad
 
 
@@ -138,18 +140,27 @@ def _zeroed(record: Record, channel: str, values: Array) -> list[Finding]:
     ]
 
 
-def _clipped(record: Record, channel: str, values: Array) -> list[Finding]:
+def _limits(values: Array) -> dict[float, int]:
+    """The ends of its range at which a channel is clipped [m], with its longest run there [samples]."""
     low, high = float(np.min(values)), float(np.max(values))
     inside = (values > low) & (values < high)
     # coarse steps make runs everywhere
     usual = int(np.max(runs_of((np.diff(values) == 0) & inside[1:])[1], initial=0)) + 1
-    for extreme, side in ((high, "upper"), (low, "lower")):
-        starts, lengths = runs_of(values == extreme)
-        longest = int(np.max(lengths, initial=0))
-        if longest >= max(CLIPPED_RUN, 3 * usual):
-            at, count = float(record.time[starts[np.argmax(lengths >= CLIPPED_RUN)]]), int(np.sum(lengths))
-            limit = {"side": side, "extreme": extreme, "longest": longest, "count": count}
-            return [found("clipped", limit, channel=channel, time=at)]
+    runs = {end: int(np.max(runs_of(values == end)[1], initial=0)) for end in (high, low)}
+    return {end: longest for end, longest in runs.items() if longest >= max(CLIPPED_RUN, 3 * usual)}
+
+
+def _clipped(record: Record, channel: str, values: Array) -> list[Finding]:
+    """Clipping; a warning where two planes of the record are whole without the channel."""
+    pairs = zip(record.sensors, record.signals.T, strict=True)
+    sound = [one for one, read in pairs if one.name != channel and not _limits(read)]
+    nodes = {one.node for one in sound}
+    whole = [n for n in nodes if sees_both_directions([one for one in sound if one.node == n])]
+    for extreme, longest in list(_limits(values).items())[:1]:
+        side, at = "lower" if extreme < np.median(values) else "upper", values == extreme
+        said = {"side": side, "extreme": extreme, "longest": longest, "count": np.sum(at)}
+        severe: Severity | None = "warning" if len(whole) > 1 else None
+        return [found("clipped", said, channel=channel, time=record.time[np.argmax(at)], severity=severe)]
     return []
 
 
