@@ -130,8 +130,7 @@ def drawn_from_prior(known: Machine, random: np.random.Generator) -> tuple[Machi
         What no machine file has, by path [SI]: remanent forces and their time constant.
     """
     model = build_drop_model(known)
-    # the frozen cases were drawn before the damping of the rotor was an unknown
-    unknowns = [one for one in all_unknowns(model) if one.path != "rotor.modal_damping"]
+    unknowns = [one for one in all_unknowns(model) if one.owner or one.scope == "drop"]  # the rotor as it is
     block = np.diag([one.sigma**2 for one in unknowns])
     inferred_together(model, unknowns, block)
     theta = np.array([one.mean for one in unknowns]) + np.linalg.cholesky(block) @ random.standard_normal(
