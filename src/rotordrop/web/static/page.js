@@ -202,7 +202,7 @@ async function openDrop(told) {
     state.job = await server.job(told.drop);
     shown = "";
     const { id, files, states, damaged } = state.job; // one that `watch` kept was estimated without a look
-    if (files?.record && !states.look && !damaged) { state.job = await server.begin(id, "look").catch(() => state.job); }
+    if (files?.record && states.estimate && !states.look && !damaged) { state.job = await server.begin(id, "look").catch(() => state.job); }
   }
   by("actions").hidden = by("views").hidden = false;
   by("dropname").textContent = by("dropname").title = state.job.name;
