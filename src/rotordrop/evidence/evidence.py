@@ -25,7 +25,6 @@ from rotordrop.evidence.events import (
     find_fall,
     instant_of,
     nominal_gaps,
-    of_part,
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
@@ -144,11 +143,6 @@ class Evidence:
     def falling(self) -> Record:
         """The whole planes of the record whose end fell."""
         return falling(self.record, self.machine)
-
-    @cached_property
-    def falling_floats(self) -> LevitatedModel:
-        """The levitated motion in those planes."""
-        return of_part(known(self.beginning).levitated, self.record, self.falling)
 
     @cached_property
     def flights(self) -> Weighed | None:

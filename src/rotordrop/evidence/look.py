@@ -299,8 +299,9 @@ def look(
             raise NothingFallsError(
                 "the rotor does not fall from where it floated", "correct channels or gap"
             )
+        turning = _speed_at(read, drops[0].release)
         if evidence is None:
-            turning, before = _speed_at(read, drops[0].release), drops[0].release - BEFORE_RELEASE
+            before = drops[0].release - BEFORE_RELEASE
             line = [] if turning is None else check_rotation_line(fell, before, turning)
             findings = ranked([*findings, *check_fall(motion), *line])
         if _unit_doubted(findings):
@@ -313,7 +314,6 @@ def look(
         if held.contacts or evidence is not None or error.moved is None:
             return held
         return replace(held, findings=ranked([*rest, *check_slow_fall(*error.moved)]))
-    turning = _speed_at(read, drops[0].release)
     return Look(
         record=read,
         motion=motion,

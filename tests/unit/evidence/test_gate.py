@@ -8,6 +8,7 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfilt
 
+from rotordrop import build_drop_model
 from rotordrop.errors import RecordError
 from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.evidence import Evidence
@@ -24,6 +25,7 @@ from rotordrop.evidence.quality.arrangement import check_ends_named, check_plane
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.continuity import check_continuity
 from rotordrop.evidence.quality.fall import fell_as_described
+from rotordrop.evidence.quality.low_pass import check_low_pass
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_coupling, check_speed
 from rotordrop.evidence.quality.tail import check_rest_in_record
@@ -695,6 +697,21 @@ def test_a_low_pass_is_found_that_takes_what_impacts_make(corner, order, seen, n
         one.kind for one in check_record(replace(whole_drop, signals=smooth + whole_drop.signals[0]), machine)
     ]
     assert ("recorder low-pass" in kinds) == seen
+
+
+def test_missing_readings_and_a_stated_gain_are_no_low_pass(whole_drop, machine):
+    few = whole_drop.signals.copy()
+    few[[5100, 5200, 5300, 5400], [0, 1, 2, 3]] = np.nan
+    sensors = tuple(one.changed(gain=4.0) for one in whole_drop.sensors)
+    scaled = replace(whole_drop, signals=0.25 * whole_drop.signals, sensors=sensors)
+    for record in (replace(whole_drop, signals=few), scaled):
+        assert check_low_pass(record, build_drop_model(machine), 2.0 * np.pi * 60.0, 0.0) == []
+    smooth = filtered(whole_drop.signals, 20e3, 200.0, "low")
+    smooth[5100, 0] = np.nan
+    found = check_low_pass(
+        replace(whole_drop, signals=smooth), build_drop_model(machine), 2.0 * np.pi * 60.0, 0.0
+    )
+    assert [one.kind for one in found] == ["recorder low-pass"]
 
 
 def test_a_second_drop(whole_drop, machine):

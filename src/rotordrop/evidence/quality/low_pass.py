@@ -44,12 +44,13 @@ def check_low_pass(record: Record, model: DropModel, speed: float, drop: float) 
     edges = _LOWEST * 2.0 ** np.arange(
         0.0, np.log2(max(0.4 * record.sampling_rate / _LOWEST, 1.0)), 1.0 / _BANDS
     )
-    described = _described(record, model, speed, int(after.sum()))
-    if described is None or count < 2:
+    live = np.isfinite(record.along).all(axis=0)  # a channel that lacks readings tells nothing here
+    described = _described(record, model, speed, int(after.sum())) if count > 1 and live.any() else None
+    if described is None:
         return []
     shown, floor, expected = (
-        _powers(readings, record.sampling_rate, count, edges)
-        for readings in (record.signals[after], record.signals[before], described)
+        _powers(along[:, live], record.sampling_rate, count, edges)
+        for along in (record.along[after], record.along[before], described)
     )
     velocity = np.nan_to_num(np.median(expected, axis=1)) * np.diff(edges**3)
     below = np.cumsum(velocity) - velocity < _IMPACTS * velocity.sum()
@@ -67,7 +68,7 @@ def check_low_pass(record: Record, model: DropModel, speed: float, drop: float) 
 
 
 def _described(record: Record, model: DropModel, speed: float, count: int) -> Array | None:
-    """Readings [m] of the described machine after a drop, shape (count, S); None where it cannot drop."""
+    """The described machine along the sensors after a drop [m], shape (count, S); None if it cannot drop."""
     from rotordrop.simulate.case import DropCase
     from rotordrop.simulate.drop import simulate_drop
 
@@ -77,14 +78,13 @@ def _described(record: Record, model: DropModel, speed: float, count: int) -> Ar
         moved = simulate_drop(model, case).at_nodes([sensor.node for sensor in record.sensors])
     except RotordropError:
         return None
-    angles = np.array([float(sensor.angle) for sensor in record.sensors])
-    readings: Array = moved[:count, :, 0] * np.cos(angles) + moved[:count, :, 1] * np.sin(angles)
-    return readings if len(readings) == count else None
+    along: Array = np.sum(moved[:count] * record.directions, axis=-1)
+    return along if len(along) == count else None
 
 
-def _powers(readings: Array, rate: float, count: int, edges: Array) -> Array:
+def _powers(along: Array, rate: float, count: int, edges: Array) -> Array:
     """Mean power of segments of ``count`` samples in bands [m²], shape (bands, S)."""
-    whole = readings[: len(readings) // count * count].reshape(-1, count, readings.shape[1])
+    whole = along[: len(along) // count * count].reshape(-1, count, along.shape[1])
     segments = (whole - whole.mean(axis=1, keepdims=True)) * np.hanning(count)[:, None]
     power = np.mean(np.abs(np.fft.rfft(segments, axis=1)) ** 2, axis=0)
     frequency = np.fft.rfftfreq(count, 1.0 / rate)

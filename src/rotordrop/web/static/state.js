@@ -7,7 +7,7 @@ export const state = { job: null, look: null, estimate: null, view: null, cursor
   panels: [], orbits: [], overview: null, playing: null, serial: 0, speed: null };
 export const zero = () => (state.estimate || state.look).zero;
 // What times count from: an estimate knows power-off, a look only the release.
-export const origin = () => (state.estimate ? "power-off" : state.look.counted_from || "the release (± 2 ms)");
+export const origin = () => (state.estimate ? "power-off" : state.look.counted_from || "the release");
 export const simulated = () => (state.estimate || state.look)?.simulated || "";
 export const shift = (verb) => state[verb].zero - zero();
 export const span = () => { const { start, end } = state.look.traces; return [start - state.look.zero + shift("look"), end - state.look.zero + shift("look")]; };
