@@ -1,7 +1,5 @@
 """Closed forms only tests compare with: whirl, line contact, pendulum, lift-off, equilibrium of a bearing."""
 
-import math
-
 import numpy as np
 
 from rotordrop.physics.ball_bearing import row_axial_force
@@ -72,24 +70,6 @@ def period(length, amplitude=0.0, g=9.81, inertia_ratio=1.0):
     Source: Beléndez et al., cited in Neisi 2020, section 5.4.
     """
     return period_ratio(amplitude) / small_frequency(length, g, inertia_ratio)
-
-
-def amplitude_of_frequency(frequency, length, g=9.81, inertia_ratio=1.0):
-    """Amplitude [rad] at which the swing has a given frequency [Hz]; zero where even a small swing is slower.
-
-    Other arguments as in `small_frequency`. Bisection in the exact period.
-    Source: inverse of Beléndez et al., cited in Neisi 2020, section 5.4.
-    """
-    wanted = float(small_frequency(length, g, inertia_ratio)) / frequency
-    low, high = 0.0, math.pi
-    if wanted <= 1.0:
-        return 0.0
-    while high - low > 4e-16 * math.pi:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            break
-        low, high = (middle, high) if period_ratio(middle) < wanted else (low, middle)
-    return 0.5 * (low + high)
 
 
 def lift_off_force(constants):

@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from tests.reference import impact
 
 from rotordrop.physics.contact import (
     contact_energy,
@@ -20,16 +19,6 @@ from rotordrop.physics.whirl import race_spin_up_time
 
 K, N, LAM = 8.3e8, 10.0 / 9.0, 0.08
 LAW = contact_law(K, N, LAM)
-
-
-def test_force_of_a_line_contact():
-    """10 µm at 8.3e8 N/m^(10/9): K δ^(10/9), and 1.5 λ δ̇ more while it closes."""
-    still, elastic = contact_force(LAW, 1e-5, 0.0)
-    assert elastic == still
-    assert still == pytest.approx(8.3e8 * 1e-5 * 1e-5 ** (1.0 / 9.0), rel=1e-12)
-    assert still == pytest.approx(2309.6, rel=1e-3)
-    assert contact_force(LAW, 1e-5, 0.5) == pytest.approx((1.06 * still, still), rel=1e-12)
-    assert contact_force(LAW, 1e-5, -0.5) == pytest.approx((0.94 * still, still), rel=1e-12)
 
 
 @pytest.mark.parametrize("rate", [-8.4, -20.0])
@@ -66,25 +55,6 @@ def test_depth_carries_the_load_and_the_tangent_is_its_slope(load):
     assert contact_tangent(LAW, load) == pytest.approx(contact_gradient(LAW, depth, 0.0)[1], rel=1e-12)
 
 
-@pytest.mark.parametrize("n", [1.0, 10 / 9, 1.5])
-@pytest.mark.parametrize(("m", "K"), [(1.0, 1e8), (20.0, 8.3e8)])
-def test_restitution_depends_on_lambda_times_speed_only(n, m, K):
-    _, rebound, _ = impact.strike(m, K, n, 0.8, 0.5)
-    assert rebound / 0.5 == pytest.approx(impact.restitution(0.8, 0.5), abs=1e-8)
-    assert impact.restitution(0.8, 0.5) == impact.restitution(0.4, 1.0)
-
-
-@pytest.mark.parametrize("n", [1.0, 10 / 9, 1.5, 2.0])
-def test_elastic_impact_agrees_with_the_kernel(n):
-    m, K, v_0 = 3.0, 2e8, 0.2
-    duration, rebound, peak = impact.strike(m, K, n, 0.0, v_0)
-    assert duration == pytest.approx(impact.elastic_contact_time(m, K, n, v_0), rel=1e-7)
-    assert rebound == pytest.approx(v_0, rel=1e-9)
-    assert peak == pytest.approx(impact.elastic_peak_force(m, K, n, v_0), rel=0.01)
-    stored = contact_energy(contact_law(K, n, 0.0), impact.elastic_indentation(m, K, n, v_0))
-    assert stored == pytest.approx(0.5 * m * v_0**2, rel=1e-12)
-
-
 STATIC, DYNAMIC, DECAY, SMOOTH = 0.13, 0.10, 0.5, 0.02
 FRICTION = (STATIC, DYNAMIC, DECAY, SMOOTH)
 
@@ -104,12 +74,6 @@ def test_corners_of_the_curve():
         stribeck_gradient(above, *FRICTION)[1], rel=1e-5
     )
     assert stribeck_gradient(above, *FRICTION)[1] == pytest.approx(-0.03 / DECAY, rel=1e-6)
-
-
-@pytest.mark.parametrize("speed", [0.003, 0.0199, 0.02, 0.4, 13.0])
-def test_the_coefficient_is_odd_and_the_gradient_even(speed):
-    assert stribeck_coefficient(-speed, *FRICTION) == -stribeck_coefficient(speed, *FRICTION) < 0.0
-    assert stribeck_gradient(-speed, *FRICTION)[1] == stribeck_gradient(speed, *FRICTION)[1]
 
 
 @pytest.mark.parametrize("speed", [-0.7, -0.015, -0.001, 0.004, 0.012, 0.019, 0.05, 0.5, 2.0])

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.special import ellipe, ellipk
 
 from rotordrop.physics import hertz
 
@@ -17,41 +15,10 @@ KAPPAS = np.array([1.0 + 1e-9, 1.001, 1.5, 4.0, 12.0, 80.0])
 
 def test_the_ellipse_of_any_curvature_difference():
     """F = 3/4 (κ − 1) to first order, where the textbook form has lost all its digits."""
-    kappa = np.array([1.2, 3.0, 12.0, 50.0])
-    m = 1.0 - kappa**-2.0
-    textbook = ((kappa**2 + 1) * ellipe(m) - 2 * ellipk(m)) / ((kappa**2 - 1) * ellipe(m))
-    np.testing.assert_allclose(hertz.curvature_difference_of_ellipticity(kappa), textbook, rtol=1e-12)
-    kappa = 1.0 + 1e-9
-    assert hertz.curvature_difference_of_ellipticity(kappa) == pytest.approx(0.75e-9, rel=1e-6)
+    assert hertz.curvature_difference_of_ellipticity(1.0 + 1e-9) == pytest.approx(0.75e-9, rel=1e-6)
     F_rho = hertz.curvature_difference_of_ellipticity(KAPPAS)
     np.testing.assert_allclose(hertz.ellipticity(F_rho), KAPPAS, rtol=1e-11)
     np.testing.assert_allclose(hertz.contact_parameters(0.0), (1.0, 1.0, 1.0), rtol=1e-15)
-
-
-def potential(b_over_a, weight):
-    """Integral of the ellipsoid's potential over w = tan²t, in units of a; weighted with 1/(weight + w)."""
-
-    def integrand(t):
-        w = math.tan(t) ** 2
-        value = 2.0 / math.cos(t) ** 2 / math.sqrt((1.0 + w) * (b_over_a**2 + w))
-        return value if weight is None else value / (weight + w)
-
-    return quad(integrand, 0.0, math.pi / 2 - 1e-9, epsabs=0, epsrel=1e-11, limit=200)[0]
-
-
-@pytest.mark.parametrize("F_rho", [0.0, 0.3, 0.9, 0.99])
-def test_pressure_ellipsoid_carries_the_load_and_flattens_the_gap(F_rho):
-    """Load, both gap curvatures and the approach from Hertz's integrals, done numerically."""
-    total, Q = 150.0, 700.0
-    contact = hertz.point_contact(total, F_rho, ETA)
-    a, b = contact.semi_axes(Q)
-    assert 2.0 / 3.0 * math.pi * a * b * contact.maximum_pressure(Q) == pytest.approx(Q, rel=1e-13)
-    factor = 3.0 * ETA * Q / (4.0 * math.pi * a)
-    along = 2.0 * factor * potential(b / a, 1.0) / a**2
-    across = 2.0 * factor * potential(b / a, (b / a) ** 2) / a**2
-    assert along + across == pytest.approx(total, rel=1e-7)
-    assert across - along == pytest.approx(F_rho * total, rel=1e-7, abs=1e-5)
-    assert contact.approach(Q) == pytest.approx(factor * potential(b / a, None), rel=1e-7)
 
 
 @pytest.mark.parametrize("factor", [0.1, 8.0, 1000.0])

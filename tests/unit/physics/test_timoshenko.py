@@ -7,7 +7,6 @@ import pytest
 from tests.reference.closed_forms import rectangle_shear_coefficient
 
 from rotordrop.physics.timoshenko import (
-    Section,
     element_mass,
     element_polar,
     element_stiffness,
@@ -36,7 +35,6 @@ def test_matrices_are_symmetric_of_the_right_rank_and_rigid_motion_is_free_with_
     values = np.linalg.eigvalsh(scale @ stiffness @ scale)
     assert np.sum(np.abs(values) < 1e-9 * values[-1]) == 2
     assert np.linalg.eigvalsh(element_mass(STUBBY, LENGTH))[0] > 0.0
-    stiffness = element_stiffness(STUBBY, LENGTH)
     for motion in rigid_motions(LENGTH):
         np.testing.assert_allclose(stiffness @ motion, 0.0, atol=1e-6 * np.max(stiffness))
     shift, turn = rigid_motions(LENGTH)
@@ -74,15 +72,6 @@ def test_shape_functions_are_one_at_their_node_and_reproduce_the_stiffness():
     force = element_stiffness(STUBBY, LENGTH)
     along = -force[1][None, :] + xi[:, None] * LENGTH * force[0][None, :]
     np.testing.assert_allclose(moment, along, rtol=1e-6, atol=1e-6 * np.max(np.abs(along)))
-
-
-def test_without_shear_it_is_the_beam_of_bernoulli():
-    slender = Section(
-        bending_stiffness=2.0, shear_stiffness=math.inf, mass=420.0, diametral_inertia=0.0, polar_inertia=0.0
-    )
-    np.testing.assert_allclose(element_stiffness(slender, 1.0)[0], [24.0, 12.0, -24.0, 12.0])
-    np.testing.assert_allclose(element_mass(slender, 1.0)[0], [156.0, 22.0, 54.0, -13.0], rtol=1e-13)
-    np.testing.assert_allclose(element_polar(slender, 1.0), 0.0)
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
