@@ -99,9 +99,6 @@ def test_equivalent_stiffness_is_a_series_and_supports_hold_with_its_parts(paper
         rest = 1 / parts.equivalent(contact=True) - 1 / parts.equivalent()
         assert rest == pytest.approx(1 / parts.contact, rel=1e-9)
         assert parts.simple < parts.tangent
-    assert [p.tangent / 1e6 for p in equivalent_stiffness(paper)] == pytest.approx(
-        [509.925, 507.524], abs=1e-3
-    )
     support = touchdown_supports(paper)[0]
     parts = equivalent_stiffness(paper)[0]
     series = 1 / sum(1 / part.stiffness[1, 1] for part in support.links)
