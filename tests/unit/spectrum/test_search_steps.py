@@ -8,7 +8,6 @@ import pytest
 from scipy.stats import norm
 from tests.unit.spectrum.synthetic import TURN, CoastDown, found_line
 
-from rotordrop.spectrum import lines
 from rotordrop.spectrum._search import BRIEF, LineSearch
 from rotordrop.spectrum._views import View
 from rotordrop.spectrum.candidates import bearing_defect_candidates, mode_candidate, pendulum_candidate
@@ -19,7 +18,7 @@ from rotordrop.spectrum.detection import (
     clearest_peak,
     half_power_width,
 )
-from rotordrop.spectrum.lines import SWING_ERROR, find_lines, harmonics_of, name_lines
+from rotordrop.spectrum.lines import SWING_ERROR, harmonics_of, name_lines
 from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
@@ -94,23 +93,6 @@ def test_a_sum_or_difference_of_a_steady_line_and_an_order_is_found_on_its_path(
     assert line.amplitude == pytest.approx(0.5e-6, rel=0.2)
     partner = max((one for one in found if one.kind == "steady"), key=lambda one: one.amplitude)
     assert partner.frequency == pytest.approx(steady, abs=0.02)
-
-
-def test_a_signal_keeps_its_times_when_its_beginning_is_skipped(monkeypatch):
-    """A slow ramp is its own clock: what is searched begins at the time it is said to begin."""
-    seen = []
-
-    def looked_at(signal, rate, profile, *, start_time, **_):
-        seen.append((float(signal[0, 0]), start_time))
-        assert (signal[200, 0] - signal[0, 0]) * rate == pytest.approx(200.0, rel=1e-3)
-        return SimpleNamespace(run=list)
-
-    monkeypatch.setattr(lines, "LineSearch", looked_at)
-    time = 3.0 + np.arange(40000) / 5000.0
-    find_lines({"DE": np.column_stack([time, time])}, 5000.0, None, start_time=3.0, skip=2.0)
-    ((first, start),) = seen
-    assert start == pytest.approx(5.0, abs=1e-3)
-    assert first == pytest.approx(start, abs=5e-5)  # a sample lasts 0.2 ms
 
 
 def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch():
