@@ -248,9 +248,9 @@ def coast_down(
     from rotordrop.estimate.waterfall import waterfall
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
-    from rotordrop.report.coast_down_page import coast_down_page
     from rotordrop.report.page import write_page
     from rotordrop.report.terminal import summary_console
+    from rotordrop.report.waterfall_page import coast_down_page
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate.case import CentredStart, CoastDownCase, LevitatedStart
     from rotordrop.simulate.coast_down import MOST_STEPS_PER_WINDOW, simulate_coast_down

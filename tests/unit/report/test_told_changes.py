@@ -5,7 +5,7 @@ import copy
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.published import drop_of
-from rotordrop.report.told_changes import told_changes
+from rotordrop.report.compare_page import told_changes
 
 
 def test_a_wider_gap_before_is_named_in_words(estimate):
