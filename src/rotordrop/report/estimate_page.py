@@ -61,20 +61,13 @@ from rotordrop.report.machine_content import drawing_section, not_given, weight_
 from rotordrop.report.origin import Origin
 from rotordrop.report.quantity import NO_INTERVAL, THIN_SPACE, Quantity, shown, with_interval, written
 from rotordrop.report.style import (
-    BAND_FILL,
-    COLOURS,
     LIMIT,
     MICRO,
-    SERIES,
     add_history,
     axis_title,
-    bars,
-    curve,
     fit_legend,
     label_time,
     panels,
-    plain,
-    upright,
 )
 from rotordrop.severity.numbers import NOTE, NUMBERS, Number
 from rotordrop.twin.allowances import MODEL_STRESS_SIGMA
@@ -93,8 +86,6 @@ BALLS = (
     "their number, diameter and conformity, from the maker",
 )
 """Why the stress of a bearing is known no better than its force, and what would narrow it."""
-ROW_HEIGHT = 24
-TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.85, 1, 1.2, 1.5, 2, 3, 5, 10, 20, 50, 100)
 EXPECTED = "90 % expected by the filter"
 LIMIT_LINE = {"color": LIMIT, "width": 1.2, "dash": "dash"}
 SHOWN_SHARE = 0.995
@@ -108,10 +99,6 @@ MEANS = (
 PRIOR_NOTE = (
     "Priors are ranges (90 %), below an estimate stands its 90 % interval. What the record does not "
     "determine enters the intervals of force and stress by its prior."
-)
-PARAMETERS = (
-    "Estimates with 90 % intervals over their priors, both relative to the prior's centre. Where the blue "
-    "bar is as wide as the grey one, the record says nothing about the parameter."
 )
 SENSORS_NOTE = "Gains and offsets are estimated with the motion; the settled tail ties them to the air gap."
 PHASE_NOTE = "Phase: direction of the heavy spot when the mark of the shaft passes, from +y with the spin."
@@ -360,7 +347,6 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
     )
     agreement = () if estimate.agreement is None else (agreement_section(estimate.agreement),)
     speed = () if steps is None else (speed_section(estimate, steps),)
-    friction = () if steps is None or steps.friction is None else (friction_section(steps.friction),)
     unseen = unseen_in(estimate.notes)
     elsewhere = {*summary.grave, *map(Statement, unseen), *_next(estimate).statements}
     notes = Section("", statements=tuple(one for one in summary.verdict[1:] if one not in elsewhere))
@@ -369,7 +355,7 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         orbit,
         impacts,
         folded("Motion at the sensors", motion, *agreement, *speed),
-        folded("Parameters", _parameters(estimate), *friction),
+        folded("Parameters", _parameters(estimate)),
         folded("Checks", notes, _checks(estimate)),
         folded("Severity", stress, _severity(estimate), printed=True),
         folded(
@@ -497,37 +483,6 @@ def parameter_table(
     return table(lines.values(), columns, caption, note)
 
 
-def parameter_figure(rows: Sequence[ParameterRow]) -> go.Figure:
-    """Draw every estimate with its interval relative to its prior, over the prior's own range.
-
-    A parameter without a positive prior or estimate cannot be set in relation and is left out.
-    """
-    drawn = [row for row in rows if row.prior.value > 0.0 and row.estimate.value > 0.0]
-    figure = panels(("estimate relative to prior",), height=70 + ROW_HEIGHT * len(drawn))
-    for label, colour, size, width in (("prior", "#b9c3cd", 6, 9), ("estimate", COLOURS["estimated"], 9, 3)):
-        ratios = [_ratios(getattr(row, label), row.prior.value) for row in drawn]
-        curve(
-            figure,
-            [value for value, _, _ in ratios],
-            [plain(f"{row.bearing}: {row.name}" if row.bearing else row.name) for row in drawn],
-            f"{label} with 90 % interval",
-            mode="markers",
-            marker={"color": colour, "size": size},
-            error_x=bars(ratios, 1.0, thickness=width, width=0, color=colour),
-            hover="%{x:.3f} × prior, %{y}",
-        )
-    upright(figure, 1.0, "#5b6875", "dot")
-    figure.update_xaxes(title_text=axis_title("value divided by prior", "1"), type="log", tickvals=TICKS)
-    figure.update_yaxes(autorange="reversed", type="category", showgrid=False)
-    return fit_legend(figure)
-
-
-def _ratios(quantity: Quantity, reference: float) -> tuple[float, float, float]:
-    """Value, lower and upper limit divided by the reference; limits equal the value where none are known."""
-    value, low, high = (max(x, 1e-3 * reference) / reference for x in (quantity.value, *quantity.ends))
-    return value, min(low, value), max(high, value)
-
-
 def _of_bearings(estimate: Estimate) -> Table:
     """Parameters of the touchdown bearings side by side."""
     rows = [one for one in _rows(estimate, "machine") if one.bearing]
@@ -563,9 +518,20 @@ def _parameters(estimate: Estimate) -> Section:
     if steps is not None and steps.correlations:
         tables.append(correlation_table(steps.correlations))
     fixed = "" if steps is None else steps.fixed
-    text = (f"The supports were taken from {fixed}; this drop did not change them.",) if fixed else ()
-    figure = Figure(parameter_figure(machine), PARAMETERS)
-    return Section("Parameters", text, figures=(figure,), tables=tuple(tables))
+    text = [f"The supports were taken from {fixed}; this drop did not change them."] if fixed else []
+    if steps is not None and steps.friction is not None:
+        text.append(_of_sweep(steps.friction))
+    return Section("Parameters", tuple(text), tables=tuple(tables))
+
+
+def _of_sweep(sweep: FrictionSweep) -> str:
+    """Over which part of the orbit which dynamic friction coefficient follows it best."""
+    value = Quantity.of(sweep.value, "dimensionless", 2)
+    start, end = (shown(t, "time", 3) for t in sweep.window)
+    return (
+        f"Distance of simulated and measured orbit from {start} to {end}; best {value.text} "
+        f"(90 %: {value.interval_text}). A number in place of the paper's eye."
+    )
 
 
 def _checks(estimate: Estimate) -> Section:
@@ -843,8 +809,7 @@ def agreement_section(agreement: Agreement) -> Section:
     if agreement.expected_horizon_s is not None:
         expected = 1e3 * agreement.expected_horizon_s
         text += f" With everything that is uncertain here, {expected:.0f} ms are to be expected."
-    tables = (window_table(agreement), contact_time_table(agreement))
-    return Section("Agreement with the record", (text,), tables=tables)
+    return Section("Agreement with the record", (text,), tables=(window_table(agreement),))
 
 
 def window_table(agreement: Agreement) -> Table:
@@ -867,61 +832,6 @@ def window_table(agreement: Agreement) -> Table:
 
     columns = (Column("agreement", lambda row: row[0]), *(at(*one) for one in enumerate(agreement.bearings)))
     return table(rows, columns, "Agreement in windows", DISTANCES)
-
-
-def contact_time_table(agreement: Agreement) -> Table:
-    """Set begin and end of the first contacts side by side, measured and simulated."""
-    rows = [
-        (f"{name}, contact {k + 1}", k, bearing)
-        for name, bearing in agreement.bearings.items()
-        for k in range(max(len(bearing.measured_contacts_s), len(bearing.simulated_contacts_s)))
-    ]
-
-    def at(whose: str, end: str) -> Column:
-        def time(row: tuple[str, int, object]) -> float | None:
-            times = getattr(row[2], f"{whose}_contacts_s")
-            return float(times[row[1]][int(end == "end")]) if row[1] < len(times) else None
-
-        return Column(f"{whose} {end}", time, "time")
-
-    ends = (at(whose, end) for whose in ("measured", "simulated") for end in ("begin", "end"))
-    return table(rows, (Column("contact", lambda row: row[0]), *ends), "Contact times")
-
-
-def friction_section(sweep: FrictionSweep) -> Section:
-    """The sweep of the friction coefficient."""
-    value = Quantity.of(sweep.value, "dimensionless", 2)
-    start, end = (shown(t, "time", 3) for t in sweep.window)
-    caption = (
-        f"Distance of simulated and measured orbit from {start} to {end}; best {value.text} "
-        f"(90 %: {value.interval_text}). A number in place of the paper's eye."
-    )
-    return Section("Friction", figures=(Figure(friction_sweep_figure(sweep), caption),))
-
-
-def friction_sweep_figure(sweep: FrictionSweep) -> go.Figure:
-    """Draw how far the simulated orbit lies from the measured one over the dynamic friction coefficient.
-
-    The best value is marked with its 90 % interval.
-    """
-    figure = panels(("orbit agreement over friction",), height=250)
-    curve(
-        figure,
-        sweep.coefficients,
-        MICRO * sweep.disagreement,
-        "distance of the orbits",
-        mode="lines+markers",
-        marker={"size": 6},
-        hover="μ %{x:.3f}: %{y:.2f} µm",
-    )
-    line, named = {"color": SERIES[4], "width": 1.3}, {"showlegend": True}
-    figure.add_vline(x=sweep.value.value, line=line, name="best", **named)
-    if sweep.value.interval_90 is not None:
-        low, high = sweep.value.interval_90
-        figure.add_vrect(x0=low, x1=high, fillcolor=BAND_FILL, line_width=0, name="90 % interval", **named)
-    figure.update_xaxes(title_text=axis_title("dynamic friction coefficient", "1"))
-    figure.update_yaxes(title_text=axis_title("orbit distance, weighted rms", "µm"), rangemode="tozero")
-    return fit_legend(figure)
 
 
 def speed_section(estimate: Estimate, steps: ReplaySteps) -> Section:

@@ -8,15 +8,12 @@ from numpy.testing import assert_allclose
 from tests.unit.report.conftest import section
 
 from rotordrop.estimate.agreement import compare_orbits
-from rotordrop.estimate.estimate import FrictionSweep
 from rotordrop.evidence.contacts import TimedContact
 from rotordrop.known import Correlation, Known
 from rotordrop.report.estimate_page import (
-    contact_time_table,
     correlation_table,
     estimate_page,
     first_contact_table,
-    friction_sweep_figure,
     window_table,
 )
 from rotordrop.report.quantity import Quantity
@@ -32,13 +29,6 @@ CONTACT = TimedContact(
     corrected_stiffness=3.1e7,
     standard_error=2e6,
     indentation=15.2e-6,
-)
-SWEEP = FrictionSweep(
-    coefficients=np.array([0.05, 0.1, 0.15]),
-    disagreement=np.array([9e-6, 3e-6, 7e-6]),
-    best=np.array([0.11, 0.112]),
-    value=Known(value=0.11, status="determined", interval_90=(0.107, 0.114), standard_error=0.002, unit="1"),
-    window=(0.0075, 0.0405),
 )
 
 
@@ -86,15 +76,6 @@ def test_agreement_states_the_distances_of_the_windows(agreement):
         assert_allclose([*window.rms.values()], 3e-6 * np.sqrt(2.0), rtol=1e-9)
 
 
-def test_contact_times_stand_side_by_side_and_missing_ones_are_dashes(agreement):
-    bearing = agreement.bearings["NDE"]
-    fewer = bearing.model_copy(update={"simulated_contacts_s": []})
-    both = {"NDE": fewer, "DE": fewer}
-    first = contact_time_table(agreement.model_copy(update={"bearings": both})).rows[0]
-    assert [cell.text for cell in first[1:] if isinstance(cell, Quantity)][2:] == ["–", "–"]
-    assert first[1].value == bearing.measured_contacts_s[0][0]
-
-
 def test_a_bounce_has_its_height_above_the_rest():
     time = np.linspace(0.0, 0.1, 2001)
     place = np.zeros((len(time), 1, 2))
@@ -124,16 +105,10 @@ def test_confounded_parameters_are_called_so():
 def test_supports_of_an_earlier_estimate_have_no_friction_sweep(drop):
     steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations=())
     content = estimate_page(replace(drop, replay=steps))
-    drawn = [len(section(page, "Parameters").figures) for page in (content, estimate_page(drop))]
-    assert drawn == [1, 2]  # without the friction sweep, and with it
-
-
-def test_the_friction_sweep_marks_best_and_interval():
-    chart = friction_sweep_figure(SWEEP)
-    assert_allclose(chart.data[0].y, (9.0, 3.0, 7.0), rtol=1e-6)
-    shapes = {shape.name: (shape.x0, shape.x1) for shape in chart.layout.shapes}
-    assert shapes["best"] == (0.11, 0.11)
-    assert shapes["90 % interval"] == (0.107, 0.114)
+    without, with_it = (section(page, "Parameters").text for page in (content, estimate_page(drop)))
+    found = Quantity.of(drop.replay.friction.value, "dimensionless", 2)
+    assert not any("best" in text for text in without)
+    assert any(f"best {found.text} (90 %: {found.interval_text})" in text for text in with_it)
 
 
 def test_values_of_an_earlier_estimate_are_called_so(drop):

@@ -24,7 +24,6 @@ from rotordrop.report.estimate_page import (
     ParameterRow,
     cross_check_statements,
     cross_check_table,
-    parameter_figure,
     parameter_table,
 )
 from rotordrop.report.quantity import Quantity, round_steps
@@ -128,16 +127,6 @@ def test_parameters_show_prior_estimate_interval_and_verdict():
     assert texts(both.rows[0])[:3] == ["K", "100.0 N/µm", "140.0 N/µm"]
     assert both.rows[0][2].interval_text == "138.0 to 142.0 N/µm"
     assert [line[both.columns.index("verdict")] for line in both.rows] == ["", open_.verdict]
-
-
-def test_parameters_are_drawn_relative_to_their_prior():
-    rows = [row("K", 1e8, 1.4e8, (1.38e8, 1.42e8)), row("M", 4e7, 4e7, None), row("zero", 0.0, 1.0, None)]
-    drawn = parameter_figure(rows)
-    estimate = next(item for item in drawn.data if item.name.startswith("estimate"))
-    assert list(estimate.y) == ["K", "M"]
-    assert_allclose(estimate.x, [1.4, 1.0])
-    assert_allclose(estimate.error_x.array, [0.02, 0.0], atol=1e-12)
-    assert_allclose(estimate.error_x.arrayminus, [0.02, 0.0], atol=1e-12)
 
 
 def check(estimate, other):
