@@ -18,7 +18,7 @@ from rotordrop.known import NINETY
 from rotordrop.report.content import Column, Figure, Level, ReportContent, Section, Statement, Table, table
 from rotordrop.report.quantity import Quantity, display_unit, one_line, shown, written
 from rotordrop.report.stress_box import StressBox, stress_box_figure
-from rotordrop.report.style import axis_title, bars, curve, fit_legend, panels, plain
+from rotordrop.report.style import axis_title, bars, curve, finished, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
 from rotordrop.twin.allowances import MODEL_STRESS_SIGMA
@@ -271,9 +271,8 @@ def comparison_figure(drops: Sequence[str], values: Mapping[str, Sequence[Quanti
             hover="%{x}: %{customdata}",
         )
     figure.update_xaxes(type="category", range=[-0.6, len(drops) - 0.4])
-    figure.update_yaxes(title_text=axis_title(name, unit), col=1)
     figure.update_yaxes(rangemode="tozero")
-    return fit_legend(figure)
+    return finished(figure, y=axis_title(name, unit))
 
 
 @dataclass(frozen=True)

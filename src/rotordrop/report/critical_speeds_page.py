@@ -38,9 +38,8 @@ from rotordrop.report.style import (
     MUTED,
     SERIES,
     TURN,
-    axis_title,
     curve,
-    fit_legend,
+    finished,
     panels,
     plain,
     upright,
@@ -386,13 +385,10 @@ def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
                     legend=column == 1,
                     hover=f"{stiffness:.3g} N/m",
                 )
-    figure.update_xaxes(
-        title_text=axis_title("equivalent stiffness", "N/m"), type="log", exponentformat="power", dtick=1
-    )
+    figure.update_xaxes(type="log", exponentformat="power", dtick=1)
     figure.update_yaxes(type="log", range=[1.0, math.log10(1000.0)], **LOG_LABELS)
     what = "natural frequency" if found.whirl == "standstill" else "critical speed"
-    figure.update_yaxes(title_text=axis_title(what, "Hz"), col=1)
-    return fit_legend(figure)
+    return finished(figure, "equivalent stiffness [N/m]", f"{what} [Hz]")
 
 
 def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | None = None) -> go.Figure:
@@ -428,10 +424,9 @@ def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | N
     if nominal is not None:
         for column in (1, 2):
             upright(figure, nominal / TURN, row=1, col=column)
-    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"))
-    figure.update_yaxes(title_text=axis_title("frequency", "Hz"), range=[0.0, highest], col=1)
-    figure.update_yaxes(title_text=axis_title("damping ratio", "%"), rangemode="tozero", col=2)
-    return fit_legend(figure)
+    figure.update_yaxes(range=[0.0, highest], col=1)
+    figure.update_yaxes(title_text="damping ratio [%]", rangemode="tozero", col=2)
+    return finished(figure, "rotor speed [Hz]", "frequency [Hz]")
 
 
 def mode_shape_figure(
@@ -463,9 +458,7 @@ def mode_shape_figure(
         figure.add_annotation(
             x=MILLI * position, y=1.0, yref="paper", text=plain(name), showarrow=False, yanchor="bottom"
         )
-    figure.update_xaxes(title_text=axis_title("position from node 1", "mm"))
-    figure.update_yaxes(title_text=axis_title("deflection, largest 1", "1"))
-    return fit_legend(figure)
+    return finished(figure, "position from node 1 [mm]", "deflection, largest 1 [1]")
 
 
 def _distinct(frequency: Array) -> list[int]:

@@ -56,7 +56,7 @@ from rotordrop.report.style import (
     colour_of_time,
     compared_style,
     curve,
-    fit_legend,
+    finished,
     panels,
     single,
     square,
@@ -583,9 +583,7 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
         radii = [float(np.nanmax(np.abs(motion.displacement))) for motion in bearing.motions]
         reach = 1.08 * MICRO * max([*radii, bearing.air_gap.upper if bearing.air_gap else 0.0])
         square(figure, column, reach)
-    figure.update_xaxes(title_text=axis_title("displacement x", "µm"))
-    figure.update_yaxes(title_text=axis_title("displacement y", "µm"), col=1)
-    return fit_legend(figure)
+    return finished(figure, "displacement x [µm]", "displacement y [µm]")
 
 
 def _add_circles(figure: go.Figure, bearing: BearingMotions | BearingDrop, column: int) -> None:
@@ -653,9 +651,8 @@ def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOW
             add_gap_limits(figure, bearing.air_gap, sign=-1.0, column=column, legend=column == 1)
         if bearing.first_contact is not None:
             _mark_first(figure, bearing.first_contact, bearing, column)
-    figure.update_xaxes(title_text=TIME_TITLE, range=[0.0, MILLI * until])
-    figure.update_yaxes(title_text=axis_title("vertical displacement y", "µm"), col=1)
-    return fit_legend(figure)
+    figure.update_xaxes(range=[0.0, MILLI * until])
+    return finished(figure, TIME_TITLE, "vertical displacement y [µm]")
 
 
 def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, column: int) -> None:

@@ -64,8 +64,7 @@ from rotordrop.report.style import (
     LIMIT,
     MICRO,
     add_history,
-    axis_title,
-    fit_legend,
+    finished,
     label_time,
     panels,
 )
@@ -573,8 +572,7 @@ def innovations_figure(
         reach = 1.1 * MICRO * float(np.nanquantile(np.abs(innovations[:, index]), SHOWN_SHARE)) or 1.0
         figure.update_yaxes(range=[-reach, reach], row=row, col=column)
     label_time(figure, row=rows)
-    figure.update_yaxes(title_text=axis_title("innovation", "µm"), col=1)
-    return fit_legend(figure)
+    return finished(figure, y="innovation [µm]")
 
 
 def cross_check_statements(checks: Sequence[CrossCheck]) -> tuple[Statement, ...]:

@@ -29,7 +29,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, fit_legend, panels, plain
+from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, finished, panels, plain
 from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rotor_fe
 from rotordrop.rotor.suspension import Support, link
 from rotordrop.rotor.whirl import matrices_of
@@ -343,9 +343,7 @@ def friction_curve_figure(machine: Machine) -> go.Figure:
                 legend=column == 1,
                 hover="%{x:.4~g} m/s: %{y:.3f}",
             )
-    figure.update_xaxes(title_text=axis_title("relative surface speed", "m/s"))
-    figure.update_yaxes(title_text=axis_title("friction coefficient", "1"), col=1)
-    return fit_legend(figure)
+    return finished(figure, "relative surface speed [m/s]", "friction coefficient [1]")
 
 
 def drawing_section(machine: Machine) -> Section:

@@ -22,7 +22,7 @@ from rotordrop.report.content import (
     Table,
     table,
 )
-from rotordrop.report.style import SERIES, axis_title, fit_legend, panels
+from rotordrop.report.style import SERIES, finished, panels
 from rotordrop.restart.card import POSITIVE, RestartCard
 from rotordrop.restart.damages import CHECKS, DAMAGES, Check
 from rotordrop.restart.evidence import Indicator
@@ -268,9 +268,8 @@ def _by_speed(drops: Sequence[NextDrop], names: Sequence[str]) -> go.Figure:
                 row=1,
                 col=column,
             )
-        figure.update_xaxes(title_text=axis_title("speed at power-off", "Hz"), col=column)
-    figure.update_yaxes(title_text=axis_title("peak force", "kN"), rangemode="tozero", col=1)
-    return fit_legend(figure)
+    figure.update_yaxes(rangemode="tozero", col=1)
+    return finished(figure, "speed at power-off [Hz]", "peak force [kN]")
 
 
 def restart_numbers(card: RestartCard) -> dict[str, Any]:

@@ -38,7 +38,7 @@ from rotordrop.report.style import (
     Panel,
     axis_title,
     curve,
-    fit_legend,
+    finished,
     panels,
     time_panels,
 )
@@ -517,5 +517,5 @@ def heat_figure(heat: Heat, names: tuple[str, ...]) -> go.Figure:
     figure.update_yaxes(title_text=axis_title("above the start", "K"), row=1, col=1)
     figure.update_yaxes(title_text=axis_title("axial force", "N"), row=2, col=1)
     figure.update_yaxes(rangemode="tozero")
-    figure.update_xaxes(title_text=FROM_POWER_OFF, range=[0.0, float(np.max(heat.time))], row=2)
-    return fit_legend(figure)
+    figure.update_xaxes(range=[0.0, float(np.max(heat.time))], row=2)
+    return finished(figure, FROM_POWER_OFF, row=2)

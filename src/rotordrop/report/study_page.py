@@ -36,7 +36,7 @@ from rotordrop.report.style import (
     axis_title,
     bars,
     curve,
-    fit_legend,
+    finished,
     panels,
     plain,
     upright,
@@ -221,8 +221,8 @@ def _distribution_figure(results: StudyResults, quantity: str) -> go.Figure:
         figure.update_xaxes(title_text=axis_title(words, unit), row=2, col=column)
     figure.update_yaxes(title_text=axis_title("drops", "%"), rangemode="tozero", row=1, col=1)
     figure.update_yaxes(range=[0.0, BELOW], row=2)
-    figure.update_yaxes(title_text=axis_title("drops below", "%"), row=2, col=1)
-    return fit_legend(figure)
+    figure.update_yaxes(title_text="drops below [%]", row=2, col=1)
+    return finished(figure)
 
 
 def _table(results: StudyResults, shares: Sequence[float], only: Sequence[str] = ()) -> Table:
@@ -373,8 +373,7 @@ def _map_figure(
         words, size_unit = "P(lift)", "1"
     elif limit is not None:
         words = f"P({words} > {format_quantity(limit, shown.kind)})" if limit else f"P({words})"
-    figure.update_yaxes(title_text=axis_title(words, size_unit), col=1)
-    return fit_legend(figure)
+    return finished(figure, y=axis_title(words, size_unit))
 
 
 def study_numbers(
@@ -531,8 +530,7 @@ def _figure(results: StudyResults, found: Sequence[Repeat], name: str) -> go.Fig
         if one.recorded is not None:
             upright(figure, one.recorded.value / size, SERIES[1], row=1, col=column)
         figure.update_xaxes(title_text=axis_title(name.replace("_", " "), unit), col=column)
-    figure.update_yaxes(title_text=axis_title("drops below", "%"), col=1)
-    return fit_legend(figure)
+    return finished(figure, y="drops below [%]")
 
 
 def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, Any]:

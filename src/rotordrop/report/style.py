@@ -329,6 +329,18 @@ def fit_legend(figure: go.Figure) -> go.Figure:
     return figure
 
 
+def finished(figure: go.Figure, x: str = "", y: str = "", row: int | None = None) -> go.Figure:
+    """Title the horizontal axes, of one row or all, and those of the first column; fit the legend.
+
+    Titles have their units, as in ``"speed [Hz]"``.
+    """
+    if x:
+        figure.update_xaxes(title_text=x, row=row)
+    if y:
+        figure.update_yaxes(title_text=y, col=1)
+    return fit_legend(figure)
+
+
 def single(values: Array) -> NDArray[np.float32]:
     """Values in single precision: seven digits are plenty for a figure and halve the page."""
     return np.asarray(values, dtype=np.float32)

@@ -47,7 +47,7 @@ from rotordrop.report.style import (
     add_gap_limits,
     axis_title,
     curve,
-    fit_legend,
+    finished,
     panels,
     plain,
     single,
@@ -558,12 +558,9 @@ def order_figure(track: OrderTrack, plane: str) -> go.Figure:
         amplitude = np.where(track.separable[:, index], MICRO * track.major_axis[:, index], np.nan)
         colour, hover = SERIES[index % len(SERIES)], "%{x:.2f} Hz: %{y:.3~g} µm"
         curve(figure, track.speed / TURN, amplitude, f"{order:g}X", colour=colour, hover=hover)
-    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"))
     # Without the powers the axis would show "100µ" beside its unit µm.
-    figure.update_yaxes(
-        title_text=axis_title("amplitude, zero-to-peak", "µm"), type="log", exponentformat="power", dtick=1
-    )
-    return fit_legend(figure)
+    figure.update_yaxes(type="log", exponentformat="power", dtick=1)
+    return finished(figure, "rotor speed [Hz]", "amplitude, zero-to-peak [µm]")
 
 
 def vectors_of(track: OrderTrack) -> dict[float, tuple[ComplexArray, Array]]:
@@ -607,13 +604,10 @@ def bode_figure(track: OrderTrack, plane: str) -> go.Figure:
             curve(
                 figure, at, phase, hover="%{x:.2f} Hz: %{y:.0f}°", row=2, **name | {"legend": False}, **place
             )
-    figure.update_yaxes(
-        title_text=axis_title("amplitude, zero-to-peak", "µm"), rangemode="tozero", row=1, col=1
-    )
+    figure.update_yaxes(title_text="amplitude, zero-to-peak [µm]", rangemode="tozero", row=1, col=1)
     figure.update_yaxes(range=[-180, 180], dtick=90, row=2)
-    figure.update_yaxes(title_text=axis_title("phase", "°"), row=2, col=1)
-    figure.update_xaxes(title_text=axis_title("rotor speed", "Hz"), row=2)
-    return fit_legend(figure)
+    figure.update_yaxes(title_text="phase [°]", row=2, col=1)
+    return finished(figure, "rotor speed [Hz]", row=2)
 
 
 def polar_figure(track: OrderTrack, plane: str) -> go.Figure:
@@ -646,9 +640,7 @@ def polar_figure(track: OrderTrack, plane: str) -> go.Figure:
                 legend=column == 1,
             )
         square(figure, column, 1.15 * MICRO * float(np.nanmax(np.abs(vector), initial=1e-9)))
-    figure.update_xaxes(title_text=axis_title("real part", "µm"))
-    figure.update_yaxes(title_text=axis_title("imaginary part", "µm"), col=1)
-    return fit_legend(figure)
+    return finished(figure, "real part [µm]", "imaginary part [µm]")
 
 
 def displacement_history_figure(histories: Mapping[str, DisplacementHistory], role: str) -> go.Figure:
@@ -681,9 +673,8 @@ def displacement_history_figure(histories: Mapping[str, DisplacementHistory], ro
             )
         near = MICRO * np.array([NEAR * history.air_gap, history.largest + (1.0 - NEAR) * history.air_gap])
         figure.update_yaxes(range=near.tolist(), row=row, col=2)
-    figure.update_yaxes(title_text=axis_title("displacement", "µm"), rangemode="tozero", col=1)
-    figure.update_xaxes(title_text=FROM_POWER_OFF, row=len(histories))
-    return fit_legend(figure)
+    figure.update_yaxes(rangemode="tozero", col=1)
+    return finished(figure, FROM_POWER_OFF, "displacement [µm]", row=len(histories))
 
 
 def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.Figure:
@@ -699,10 +690,9 @@ def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.
     ):
         curve(figure, t, fitted / TURN, name, colour=colour, width=1.4)
         curve(figure, t, (fitted_to - fitted) / TURN, name, row=2, colour=colour, width=1.4, legend=False)
-    figure.update_yaxes(title_text=axis_title("speed", "Hz"), row=1)
-    figure.update_yaxes(title_text=axis_title("residual", "Hz"), row=2)
-    figure.update_xaxes(title_text=FROM_POWER_OFF, row=2)
-    return fit_legend(figure)
+    figure.update_yaxes(title_text="speed [Hz]", row=1)
+    figure.update_yaxes(title_text="residual [Hz]", row=2)
+    return finished(figure, FROM_POWER_OFF, row=2)
 
 
 LARGEST_NOTE = (
@@ -855,8 +845,7 @@ def statistics_figure(result: CoastDownResult) -> go.Figure:
         else:
             figure.update_yaxes(type="log", row=row, **LOG_LABELS)
         figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
-    figure.update_xaxes(title_text=FROM_POWER_OFF, row=len(_DRAWN))
-    return fit_legend(figure)
+    return finished(figure, FROM_POWER_OFF, row=len(_DRAWN))
 
 
 def coast_down_speed_figure(result: CoastDownResult) -> go.Figure:
@@ -875,6 +864,5 @@ def coast_down_speed_figure(result: CoastDownResult) -> go.Figure:
         curve(figure, time, turning, label, colour=colour)
     if result.standstill_time is not None:
         upright(figure, result.standstill_time, SERIES[4])
-    figure.update_yaxes(title_text=axis_title("speed", "Hz"), type="log", **LOG_LABELS)
-    figure.update_xaxes(title_text=FROM_POWER_OFF)
-    return fit_legend(figure)
+    figure.update_yaxes(type="log", **LOG_LABELS)
+    return finished(figure, FROM_POWER_OFF, "speed [Hz]")
