@@ -199,12 +199,7 @@ def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
 
 def _boxes(drops: Sequence[ComparedDrop]) -> tuple[StressBox, ...]:
     return tuple(
-        StressBox(
-            label=one.name,
-            bearing=bearing,
-            statistics=entry.stress_statistics_Pa,
-            outliers=np.zeros(0),
-        )
+        StressBox(one.name, bearing, entry.stress_statistics_Pa, np.zeros(0))
         for one in drops
         if one.drop.consistent  # of others no single number holds
         for bearing, entry in one.drop.bearings.items()
@@ -286,14 +281,8 @@ class ComparedDrop:
     @property
     def label(self) -> str:
         """Record, date and speed, for a table."""
-        return ", ".join(
-            part for part in (self.name, self.minute, shown(self.drop.speed_Hz, "frequency", 3)) if part
-        )
-
-    @property
-    def minute(self) -> str:
-        """When the recorder says the drop was, without seconds."""
-        return format_minute(self.drop.recorded)
+        minute, speed = format_minute(self.drop.recorded), shown(self.drop.speed_Hz, "frequency", 3)
+        return ", ".join(part for part in (self.name, minute, speed) if part)
 
     def number(self, bearing: str, number: Number) -> Quantity:
         """A number at a bearing with its interval; a dash where the estimate does not state it.

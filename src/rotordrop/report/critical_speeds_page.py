@@ -139,6 +139,11 @@ def machine_page(
     diagrams = {name: campbell_diagram(machine, grid, name) for name in held}
     speeds = critical_speeds_page(machine, {"standstill": critical_speed_map(machine)}, diagrams)
     told = machine_content(machine, summary, warnings)
+
+    def lowest(diagram: CampbellDiagram) -> Iterator[KeyFigure]:
+        for one in sorted(diagram.crossings, key=lambda one: one.speed)[:4]:
+            yield fact(f"critical speed, {one.direction}", one.speed / TURN, "frequency")
+
     rotor = (
         fact("mass", summary.fe.total_mass, "mass"),
         fact("centre of gravity from node 1", summary.fe.centre_of_gravity, "dimension"),
@@ -148,7 +153,7 @@ def machine_page(
         verdict=(told.verdict[0], *speeds.verdict),
         cards=(
             Card("Rotor", rotor),
-            *(Card(_held(machine, name), tuple(_lowest(one))) for name, one in diagrams.items()),
+            *(Card(_held(machine, name), tuple(lowest(one))) for name, one in diagrams.items()),
         ),
         summary=(),
         sections=(
@@ -163,11 +168,6 @@ def machine_page(
         ),
         lead=2,
     )
-
-
-def _lowest(diagram: CampbellDiagram) -> Iterator[KeyFigure]:
-    for one in sorted(diagram.crossings, key=lambda one: one.speed)[:4]:
-        yield fact(f"critical speed, {one.direction}", one.speed / TURN, "frequency")
 
 
 def _margins(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Margins:
@@ -475,11 +475,8 @@ def critical_speeds_json(
     maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
 ) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units; null where there is no line."""
-    found: dict[str, Any] = {
-        "maps": {name: _map_json(found) for name, found in maps.items()},
-        "campbell": {name: _campbell_json(diagram) for name, diagram in diagrams.items()},
-    }
-    return dict(finite(found))
+    told = {name: _map_json(found) for name, found in maps.items()}
+    return dict(finite({"maps": told, "campbell": {name: _campbell_json(d) for name, d in diagrams.items()}}))
 
 
 def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:

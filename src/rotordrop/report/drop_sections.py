@@ -25,7 +25,6 @@ from rotordrop.estimate.estimate import SensorMotion
 from rotordrop.evidence.impacts import HOP, shortest_flight
 from rotordrop.evidence.quality import NO_CHECK_SEES
 from rotordrop.evidence.quality.finding import Finding
-from rotordrop.known import Known
 from rotordrop.report.content import (
     Card,
     Column,
@@ -90,12 +89,8 @@ def headline_card(bearing: BearingDrop, *, certain: bool = True) -> Card:
 
     Single numbers are shown where they are certain, else ranges.
     """
-    known: dict[str, Known] = {
-        **bearing.values,
-        "peak_force_N": bearing.peak_force.known,
-        "peak_stress_Pa": bearing.peak_stress.known,
-    }
     peaks = {"peak_force_N": bearing.peak_force, "peak_stress_Pa": bearing.peak_stress}
+    known = {**bearing.values, **{field: peak.known for field, peak in peaks.items()}}
     figures = []
     for load in LOADS:
         field, label = load.field, f"{load.label[0].upper()}{load.label[1:]}"

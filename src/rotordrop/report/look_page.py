@@ -36,7 +36,7 @@ from rotordrop.report.style import TURN, axis_title, curve, panels
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.look import HeldContact, Impact, Level, Look, PlaneLook, Synchronous
+    from rotordrop.evidence.look import HeldContact, Impact, Level, Look, PlaneLook
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
@@ -296,7 +296,13 @@ def _card(seen: Look, number: int) -> Card:
         figures.append(KeyFigure(label, velocity))
     for found in seen.synchronous:
         if found.plane == plane.plane:
-            figures += _synchronous(found)
+            note = f"of {found.turns} turns before the release, runout of the sensors included"
+            amplitude = _found(found.amplitude, found.amplitude_interval_90)
+            phase = _found(found.phase, found.phase_interval_90, "angle")
+            figures += [
+                KeyFigure("1X amplitude", amplitude, note),
+                KeyFigure("1X high spot at the mark, from +y with the spin", phase, note),
+            ]
     return Card(plane.plane, tuple(figures))
 
 
@@ -309,16 +315,6 @@ def _gap_figure(plane: PlaneLook) -> KeyFigure:
 
 def _found(value: float, interval: tuple[float, float] | None, kind: str = "length") -> Quantity:
     return Quantity(value=value, kind=kind, interval_90=interval, digits=3)
-
-
-def _synchronous(found: Synchronous) -> list[KeyFigure]:
-    note = f"of {found.turns} turns before the release, runout of the sensors included"
-    amplitude = _found(found.amplitude, found.amplitude_interval_90)
-    phase = _found(found.phase, found.phase_interval_90, "angle")
-    return [
-        KeyFigure("1X amplitude", amplitude, note),
-        KeyFigure("1X high spot at the mark, from +y with the spin", phase, note),
-    ]
 
 
 def _figures(seen: Look) -> tuple[Section, ...]:
@@ -348,20 +344,18 @@ def _figures(seen: Look) -> tuple[Section, ...]:
     return sections
 
 
-def _touch_of(impact: Impact) -> str:
-    return f"{format_moment(impact.time)} ± {1e3 * (impact.time_interval_90[1] - impact.time):.2g} ms"
-
-
-def _azimuth_of(impact: Impact) -> str:
-    half = impact.azimuth_interval_90[1] - impact.azimuth
-    return f"{written(degrees(impact.azimuth), 0)}° ± {degrees(half):.0f}°"
-
-
 def _impacts(seen: Look) -> Table:
+    def touch(one: Impact) -> str:
+        return f"{format_moment(one.time)} ± {1e3 * (one.time_interval_90[1] - one.time):.2g} ms"
+
+    def azimuth(one: Impact) -> str:
+        half = one.azimuth_interval_90[1] - one.azimuth
+        return f"{written(degrees(one.azimuth), 0)}° ± {degrees(half):.0f}°"
+
     columns = (
         Column("plane", "plane"),
-        Column("touches at (record time, 90 %)", _touch_of),
-        Column("azimuth (90 %)", _azimuth_of),
+        Column("touches at (record time, 90 %)", touch),
+        Column("azimuth (90 %)", azimuth),
         Column("beyond the air gap", "depth", "length"),
         Column("radial velocity before", "approach", "velocity"),
         Column("and after", "rebound", "velocity"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -35,16 +35,12 @@ from rotordrop.rotor.suspension import Support, link
 from rotordrop.rotor.whirl import matrices_of
 
 if TYPE_CHECKING:
-    from rotordrop.elements.magnet import ActiveMagneticBearing
     from rotordrop.elements.race_bearing import BearingFigure
-    from rotordrop.elements.sensor import Sensor
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE
     from rotordrop.rotor.machine_summary import BearingSummary, MachineSummary, MachineWarning
     from rotordrop.rotor.magnet_loop import LoopStability, MagnetSummary
-
-    Mounted: TypeAlias = ActiveMagneticBearing | Sensor | TouchdownBearing
 
 ALL_RIGHT = "Machine file OK; the drop model leaves out nothing known of it."
 ON_SPRINGS = "force_on_springs"
@@ -233,7 +229,15 @@ def machine_json(
     machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
 ) -> dict[str, object]:
     """Give what ``rotordrop check`` found, ready for JSON, in SI units."""
-    sag = summary.levitated_sag
+    sag, controlled = summary.levitated_sag, {}
+    if (loop := summary.loop) is not None:
+        controlled["control_loop"] = {
+            "stable": loop.stable,
+            "growth_per_s": loop.growth,
+            "frequency_Hz": loop.frequency,
+            "delay_s": loop.delay,
+            "longest_delay_s": loop.longest_delay,
+        }
     return {
         "machine": machine.name,
         **inertias_json(summary.fe),
@@ -252,7 +256,7 @@ def machine_json(
             for rest in summary.bearings
         },
         **({"magnets": {one.name: _magnet_json(one) for one in summary.magnets}} if summary.magnets else {}),
-        **({} if summary.loop is None else {"control_loop": _loop_json(summary.loop)}),
+        **controlled,
         "warnings": [warning.message for warning in warnings],
         "defaults": [list(entry) for entry in machine.defaults_in_use],
         "inferred": [list(entry) for entry in machine.inferred],
@@ -278,16 +282,6 @@ def _magnet_json(one: MagnetSummary) -> dict[str, object]:
             "delay_margin_s": one.margins.delay,
         }
     return known
-
-
-def _loop_json(loop: LoopStability) -> dict[str, object]:
-    return {
-        "stable": loop.stable,
-        "growth_per_s": loop.growth,
-        "frequency_Hz": loop.frequency,
-        "delay_s": loop.delay,
-        "longest_delay_s": loop.longest_delay,
-    }
 
 
 def inertias_json(fe: RotorFE) -> dict[str, object]:
@@ -421,9 +415,12 @@ MARKS = {
 def rotor_figure(machine: Machine) -> go.Figure:
     """Draw the rotor to scale in mm from the side, NDE at the left, with everything that sits on it."""
     figure = panels([""], height=240)
-    nodes, top = machine.rotor.node_positions, _top(machine)
-    _add_pieces(figure, _layers(machine), "layer without stiffness", LAYER_COLOUR)
-    _add_pieces(figure, _shaft(machine), "shaft", SHAFT_COLOUR)
+    nodes = machine.rotor.node_positions
+    radii = [0.5 * max(e.outer_diameter, e.layer_diameter or 0.0) for e in machine.rotor.elements]
+    top = 1.5 * max(*radii, DRAWN_AT_LEAST)
+    layers, shaft = ("outer_diameter", "layer_diameter"), ("inner_diameter", "outer_diameter")
+    _add_pieces(figure, _pieces(machine, *layers), "layer without stiffness", LAYER_COLOUR)
+    _add_pieces(figure, _pieces(machine, *shaft), "shaft", SHAFT_COLOUR)
     for index, disc in enumerate(machine.rotor.discs):
         z, reach = MILLI * nodes[disc.node - 1], 0.85 * MILLI * top
         label = plain(disc.name or f"disc {index + 1}")
@@ -437,7 +434,12 @@ def rotor_figure(machine: Machine) -> go.Figure:
             legend=index == 0,
             hover=f"{label}: {float(disc.mass):.3g} kg at node {disc.node}",
         )
-    for kind, parts, height in _mounted(machine):
+    mounted = (
+        ("touchdown bearing", machine.touchdown_bearings, -top),
+        ("AMB", machine.ambs, -1.25 * top),
+        ("sensor", machine.sensors, top),
+    )
+    for kind, parts, height in mounted:
         if parts:
             symbol, colour = MARKS[kind]
             curve(
@@ -455,39 +457,15 @@ def rotor_figure(machine: Machine) -> go.Figure:
     return figure
 
 
-def _mounted(machine: Machine) -> tuple[tuple[str, Sequence[Mounted], float], ...]:
-    """What is mounted on the rotor by kind, with the height of its marks [m]."""
-    top = _top(machine)
-    return (
-        ("touchdown bearing", machine.touchdown_bearings, -top),
-        ("AMB", machine.ambs, -1.25 * top),
-        ("sensor", machine.sensors, top),
-    )
-
-
-def _top(machine: Machine) -> float:
-    radii = [0.5 * max(e.outer_diameter, e.layer_diameter or 0.0) for e in machine.rotor.elements]
-    return 1.5 * max(*radii, DRAWN_AT_LEAST)
-
-
-Piece: TypeAlias = tuple[float, float, float, float]
-"""Left and right end, inner and outer radius [m]."""
-
-
-def _shaft(machine: Machine) -> Iterator[Piece]:
+def _pieces(machine: Machine, inner: str, outer: str) -> Iterator[tuple[float, float, float, float]]:
+    """Left and right end, inner and outer radius [m] of the elements that have such an outer diameter."""
     spans = pairwise(machine.rotor.node_positions)
     for (left, right), element in zip(spans, machine.rotor.elements, strict=True):
-        yield left, right, 0.5 * element.inner_diameter, 0.5 * element.outer_diameter
+        if getattr(element, outer) is not None:
+            yield left, right, 0.5 * getattr(element, inner), 0.5 * getattr(element, outer)
 
 
-def _layers(machine: Machine) -> Iterator[Piece]:
-    spans = pairwise(machine.rotor.node_positions)
-    for (left, right), element in zip(spans, machine.rotor.elements, strict=True):
-        if element.layer_diameter is not None:
-            yield left, right, 0.5 * element.outer_diameter, 0.5 * element.layer_diameter
-
-
-def _add_pieces(figure: go.Figure, pieces: Iterator[Piece], name: str, colour: str) -> None:
+def _add_pieces(figure: go.Figure, pieces: Iterable[Any], name: str, colour: str) -> None:
     """Draw rectangles above and below the axis, all in one trace."""
     x: list[float | None] = []
     y: list[float | None] = []

@@ -32,7 +32,7 @@ STATED = (
 """Lines of the table: label, field of the statistics, kind."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class StressBox:
     """Distribution of the stress at one bearing in one drop."""
 
@@ -49,7 +49,7 @@ class StressBox:
 def stress_box(label: str, bearing: str, stress: Array, statistics: Statistics) -> StressBox:
     """Take the statistics of a stress history (T,) [Pa] as they are stated, with its outliers to draw."""
     beyond = (stress < statistics.lower_whisker) | (stress > statistics.upper_whisker)
-    return StressBox(label=label, bearing=bearing, statistics=statistics, outliers=np.asarray(stress)[beyond])
+    return StressBox(label, bearing, statistics, np.asarray(stress)[beyond])
 
 
 def stress_box_figure(boxes: Sequence[StressBox]) -> go.Figure:

@@ -46,7 +46,7 @@ from rotordrop.simulate.used import share_column, stopped
 from rotordrop.study.plan import Study, case_kind
 from rotordrop.study.quantities import LIFT, Quantity
 from rotordrop.study.repeat import Repeat
-from rotordrop.study.sensitivity import influences
+from rotordrop.study.sensitivity import Influence, influences
 from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
 
@@ -158,15 +158,10 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         lifted = results.exceedance(LIFT, 0.5)
         text = f"The magnets lift the rotor again in {percent(lifted)} of the drops."
         said.append(Statement(text, "good" if lifted.value == 1.0 else "warning"))
-    if _is_symmetric(results, names):
+    peaks = [results.numbers[f"{name}.peak_force"] for name in names]
+    if len(peaks) > 1 and all(np.allclose(one, peaks[0], EQUAL, equal_nan=True) for one in peaks):
         said.append(Statement(SYMMETRIC))
     return [*said, Statement(SCOPE)]
-
-
-def _is_symmetric(results: StudyResults, names: Sequence[str]) -> bool:
-    """Whether every drop did the same to all bearings."""
-    peaks = [results.numbers[f"{name}.peak_force"] for name in names]
-    return len(peaks) > 1 and all(np.allclose(one, peaks[0], EQUAL, equal_nan=True) for one in peaks)
 
 
 def _distribution_section(results: StudyResults) -> Section:
@@ -258,16 +253,9 @@ def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
 
 def _influence_section(results: StudyResults) -> tuple[Section, ...]:
     """Which varied values matter, or nothing where there are too few drops to say it."""
-    names = [bearing.name for bearing in results.study.machine.touchdown_bearings]
-    try:
-        found = {
-            f"{name} {quantity.replace('_', ' ')}": {
-                one.name: one for one in influences(results, f"{name}.{quantity}")
-            }
-            for name in names
-            for quantity in MATTERS
-        }
-    except UsageError:
+    every = _influences(results).items()
+    found = {_in_words(column): {one.name: one for one in of} for column, of in every}
+    if not found:
         return ()
 
     def part(what: str, field: str) -> Column:
@@ -417,7 +405,13 @@ def study_numbers(
             for q in results.columns
         },
         "maps": {name: mapped(name) for name in by},
-        "influences": _influences(results),
+        "influences": {
+            column: [
+                {"name": one.name, "alone": _bounded(one.alone), "total": _bounded(one.total)}
+                for one in every
+            ]
+            for column, every in _influences(results).items()
+        },
     }
 
 
@@ -425,20 +419,14 @@ def _bounded(known: Known | None) -> dict[str, float] | None:
     return None if known is None else {"value": known.value, "lower": known.low, "upper": known.high}
 
 
-def _influences(results: StudyResults) -> dict[str, Any]:
-    columns = [
-        f"{b.name}.{quantity}" for b in results.study.machine.touchdown_bearings for quantity in MATTERS
-    ]
+def _influences(results: StudyResults) -> dict[str, tuple[Influence, ...]]:
+    """How much every varied value matters to every quantity; nothing where there are too few drops."""
+    names = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    columns = [f"{name}.{quantity}" for name in names for quantity in MATTERS]
     try:
-        return {
-            column: [
-                {"name": one.name, "alone": _bounded(one.alone), "total": _bounded(one.total)}
-                for one in influences(results, column)
-            ]
-            for column in columns
-        }
+        return {column: influences(results, column) for column in columns}
     except UsageError:
-        return {}  # too few drops
+        return {}
 
 
 FEW = 0.05
@@ -464,7 +452,12 @@ def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent
         subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
         verdict=_repeat_verdict(results, found),
         summary=(_repeat_table(results, found),),
-        facts=study_facts(study),
+        facts=(
+            ("machine", study.machine.name),
+            ("seed", str(study.seed)),
+            ("digest", study.digest),
+            ("rotordrop", __version__),
+        ),
         sections=(Section("Distribution", figures=tuple(Figure(figure, SHARE_BELOW) for figure in figures)),),
     )
 
@@ -583,16 +576,6 @@ def ends(known: Known) -> dict[str, Any]:
     found = {"value": known.value, "interval_90": [known.low, known.high], "drops": known.drops}
     made: dict[str, Any] = finite(found)
     return made
-
-
-def study_facts(study: Study) -> tuple[tuple[str, str], ...]:
-    """Lines for a report on simulated drops: what makes the same ones again."""
-    return (
-        ("machine", study.machine.name),
-        ("seed", str(study.seed)),
-        ("digest", study.digest),
-        ("rotordrop", __version__),
-    )
 
 
 def study_numbers_of(study: Study) -> dict[str, Any]:

@@ -244,49 +244,24 @@ def square(figure: go.Figure, column: int, reach: float) -> None:
     figure.update_xaxes(constrain="domain", range=[-reach, reach], col=column)
 
 
-def add_history(
-    figure: go.Figure,
-    history: History,
-    scale: float,
-    unit: str,
-    *,
-    row: int = 1,
-    column: int = 1,
-    legend: bool = True,
-    line: dict[str, Any] | None = None,
-) -> None:
-    """Draw a history over time in milliseconds, with as few points as show all its peaks."""
+def add_history(figure: go.Figure, history: History, scale: float, unit: str, **more: Any) -> None:
+    """Draw a history over time in milliseconds, with as few points as show all its peaks.
+
+    ``more`` goes to `curve`: row, column, legend, and a line in place of that of its role.
+    """
     chosen = peak_indices(history.values)
-    curve(
-        figure,
-        MILLI * history.time[chosen],
-        scale * history.values[chosen],
-        history.label,
-        row=row,
-        column=column,
-        legend=legend,
-        line=line or line_style(history.role),
-        hover=f"%{{x:.2f}} ms: %{{y:.4~g}} {unit}",
-    )
+    time, values = MILLI * history.time[chosen], scale * history.values[chosen]
+    look = {"line": line_style(history.role), "hover": f"%{{x:.2f}} ms: %{{y:.4~g}} {unit}"} | more
+    curve(figure, time, values, history.label, **look)
 
 
-def add_band(
-    figure: go.Figure,
-    band: Band,
-    scale: float,
-    unit: str,
-    *,
-    row: int = 1,
-    column: int = 1,
-    legend: bool = True,
-) -> None:
+def add_band(figure: go.Figure, band: Band, scale: float, unit: str, *, legend: bool, **place: Any) -> None:
     """Draw a band between two limits; thinned out, the drawn band still contains the whole one."""
     index, lower, upper = block_envelope(band.lower, band.upper)
-    time = MILLI * band.time[index]
-    place: dict[str, Any] = {"row": row, "column": column}
-    curve(figure, time, scale * lower, band.label, **place, legend=False, hover=None, line=BAND_EDGE)
+    time, edge = MILLI * band.time[index], dict[str, Any](line=BAND_EDGE)
+    curve(figure, time, scale * lower, band.label, **place, legend=False, hover=None, **edge)
     hover = f"%{{x:.2f}} ms: up to %{{y:.4~g}} {unit}"
-    filled: dict[str, Any] = {"fill": "tonexty", "fillcolor": BAND_FILL, "line": BAND_EDGE}
+    filled: dict[str, Any] = {"fill": "tonexty", "fillcolor": BAND_FILL, **edge}
     curve(figure, time, scale * upper, band.label, **place, legend=legend, hover=hover, **filled)
 
 
@@ -458,10 +433,10 @@ def _draw(
     compared = len({history.role for history in panel.histories}) > 1
     ordered = sorted(enumerate(panel.histories), key=lambda entry: compared and entry[1].role == "measured")
     for index, history in ordered:
-        line = line_style(history.role, index + 4 * (column - 1)) if panel.series else None
-        if compared and not panel.series:
-            line = compared_style(history.role)
-        add_history(figure, history, scale, unit, **place, legend=first(history.label), line=line)
+        look = compared_style(history.role) if compared else line_style(history.role)
+        if panel.series:
+            look = line_style(history.role, index + 4 * (column - 1))
+        add_history(figure, history, scale, unit, **place, legend=first(history.label), line=look)
     if panel.air_gap is not None:
         for sign in panel.gap_signs:
             add_gap_limits(figure, panel.air_gap, sign=sign, **place, legend=first("air gap"))
