@@ -134,28 +134,17 @@ def profile(
     from rotordrop.record.profile import profile_of, rules_of, save_profile
     from rotordrop.record.readers import read_recording
 
-    entries: dict[str, Any] = {
-        "format": file_format,
-        "unit": unit,
-        "sensitivity": sensitivity,
-        "full_scale": full_scale,
-        "text": {"names": None if names is None else [name.strip() for name in names.split(",")]},
-        "time": {"step": time_step, "start": time_start},
-        "speed": {
-            "constant": speed,
-            "channel": speed_channel,
-            "unit": speed_unit,
-            "pulses": pulses,
-            "pulses_per_turn": pulses_per_turn,
-            "edge": edge,
-        },
+    def stated(**entries: object) -> dict[str, Any]:
+        return {name: value for name, value in entries.items() if value is not None}
+
+    turning = stated(constant=speed, channel=speed_channel, unit=speed_unit, pulses=pulses, edge=edge)
+    parts = {
+        "text": stated(names=None if names is None else [name.strip() for name in names.split(",")]),
+        "time": stated(step=time_step, start=time_start),
+        "speed": turning | stated(pulses_per_turn=pulses_per_turn),
     }
-    stated = {
-        key: {k: v for k, v in entry.items() if v is not None} if isinstance(entry, dict) else entry
-        for key, entry in entries.items()
-        if entry is not None
-    }
-    given = rules_of(profile_of(stated, "the options"), mapping or [])
+    whole = stated(format=file_format, unit=unit, sensitivity=sensitivity, full_scale=full_scale)
+    given = rules_of(profile_of(whole | parts, "the options"), mapping or [])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors

@@ -135,10 +135,9 @@ class Quantity:
             return self._with_unit(f"< {written(10.0**-self.places, self.places)}")
         if self.range_only:
             return self._range() if self.interval_90 is not None else "–"
-        if self.kind == "probability" and self.interval_90 is None and math.isfinite(self.value):
-            chance = format_chance(self.value)
-            if chance[0] in "<>":
-                return self._with_unit(chance.removesuffix(" %"))
+        sure = self.kind == "probability" and self.interval_90 is None and math.isfinite(self.value)
+        if sure and (chance := format_chance(self.value))[0] in "<>":
+            return self._with_unit(chance.removesuffix(" %"))
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
             turns = self.value / (2 * math.pi)
             places = self._places()
@@ -162,11 +161,7 @@ class Quantity:
         if self.lower is not None and self.upper is not None:
             return "limits " + self._with_unit(f"{self._at(self.lower)} to {self._at(self.upper)}")
         if self.standard_error is not None:
-            return (
-                "± "
-                + self._with_unit(written(self._in_unit(self.standard_error), self._places()))
-                + " (standard error)"
-            )
+            return f"± {self._with_unit(self._at(self.standard_error))} (standard error)"
         return ""
 
     @property
@@ -265,11 +260,8 @@ def written(value: float, places: int | None) -> str:
         power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
         return f"{mantissa} × 10{power}"
     text = f"{value:,.{places}f}".replace(",", THIN_SPACE)
-    return (
-        "0" + text[2:]
-        if text.startswith("-0") and not text.strip(f"-0.{THIN_SPACE}")
-        else text.replace("-", "−")
-    )
+    nothing = text.startswith("-0") and not text.strip(f"-0.{THIN_SPACE}")
+    return f"0{text[2:]}" if nothing else text.replace("-", "−")
 
 
 _UNITS = {unit for scales in (DISPLAY, IN_OTHER_UNITS) for _, unit in scales.values()} | {

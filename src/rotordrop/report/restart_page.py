@@ -22,7 +22,7 @@ from rotordrop.report.content import (
     Table,
     table,
 )
-from rotordrop.report.style import SERIES, finished, panels
+from rotordrop.report.style import SERIES, curve, finished, panels
 from rotordrop.restart.card import POSITIVE, RestartCard
 from rotordrop.restart.damages import CHECKS, DAMAGES, Check
 from rotordrop.restart.evidence import Indicator
@@ -257,17 +257,10 @@ def _by_speed(drops: Sequence[NextDrop], names: Sequence[str]) -> go.Figure:
     figure = panels(names)
     for column, name in enumerate(names, start=1):
         for k, label in enumerate(("half of the drops below", "95 % of the drops below")):
-            figure.add_scatter(
-                x=[one.speed / (2.0 * math.pi) for one in drops],
-                y=[one.peak_force[name][k].value / 1e3 for one in drops],
-                mode="lines+markers",
-                name=label,
-                legendgroup=label,
-                showlegend=column == 1,
-                line={"color": SERIES[k]},
-                row=1,
-                col=column,
-            )
+            speeds = [one.speed / (2.0 * math.pi) for one in drops]
+            peaks = [one.peak_force[name][k].value / 1e3 for one in drops]
+            look: dict[str, Any] = {"mode": "lines+markers", "line": {"color": SERIES[k]}}
+            curve(figure, speeds, peaks, label, column=column, legend=column == 1, **look)
     figure.update_yaxes(rangemode="tozero", col=1)
     return finished(figure, "speed at power-off [Hz]", "peak force [kN]")
 

@@ -381,9 +381,8 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
         "energy_scale_J": certificate.energy_scale,
     }
     for name in ("peak_change_tolerance", "peak_change_truncation"):
-        change = getattr(certificate, name)
-        if change is not None:
-            parts[name] = [float(value) for value in change]
+        if (change := getattr(certificate, name)) is not None:
+            parts[name] = change.tolist()
     for index, one in enumerate(simulated_bearings(result)):
         pressure, half_width, moment = result.peak_contact_pressure(index)
         bearings[one.name] = {
@@ -438,19 +437,15 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
 
 def _magnets_json(result: DropResult, magnets: MagnetHistory) -> dict[str, Any]:
     events = zip(magnets.events, magnets.event_time.tolist(), strict=True)
+    pulls = np.hypot(*np.moveaxis(magnets.force, 2, 0))
     known: dict[str, Any] = {
         "events": [{"what": what, "time_s": time if math.isfinite(time) else None} for what, time in events],
-        "largest_current_A": dict(
-            zip(magnets.names, np.max(magnets.current, axis=(0, 2, 3)).tolist(), strict=True)
-        ),
-        "largest_force_N": dict(
-            zip(
-                magnets.names,
-                np.max(np.hypot(*np.moveaxis(magnets.force, 2, 0)), axis=0).tolist(),
-                strict=True,
-            )
-        ),
     }
+    for name, largest in (
+        ("largest_current_A", np.max(magnets.current, axis=(0, 2, 3))),
+        ("largest_force_N", np.max(pulls, axis=0)),
+    ):
+        known[name] = dict(zip(magnets.names, largest.tolist(), strict=True))
     if (lift := result.lift) is not None:
         known["lift"] = {
             "begun_s": lift.begun,
@@ -495,12 +490,12 @@ def heat_sections(heat: Heat | None, names: tuple[str, ...]) -> tuple[Section, .
     """Temperatures, preload and where the heat went, of a machine whose bearings warm."""
     if heat is None:
         return ()
-    caption = (
+    figure = Figure(
+        heat_figure(heat, names),
         "Temperatures above the start, and the axial force of a row of balls with the race in the middle. "
-        "Capacities and conductances are values by size unless the machine file gives them."
+        "Capacities and conductances are values by size unless the machine file gives them.",
     )
     rows = [{"name": name} | one for name, one in heat.as_json(names).items()]
-    figure = Figure(heat_figure(heat, names), caption)
     return (Section("Heat", figures=(figure,), tables=(table(rows, WARMTHS),)),)
 
 
