@@ -1,4 +1,6 @@
-"""The comparison of several drops: all numbers, the ranking of the severity package, and its limits."""
+"""The comparison of several drops: all numbers, the ranking of the severity package, limits kept or not."""
+
+import json
 
 import numpy as np
 import pytest
@@ -6,9 +8,18 @@ from numpy.testing import assert_allclose
 from scipy.special import ndtr
 from tests.published import bearing, published, value
 
+from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Impact
-from rotordrop.report.compare_page import ComparedDrop, compare_page, comparison_figure, left_out, rankings
+from rotordrop.report.compare_page import (
+    ComparedDrop,
+    compare_page,
+    comparison_figure,
+    left_out,
+    limit_statement,
+    rankings,
+    read_limits,
+)
 from rotordrop.report.quantity import Quantity
 from rotordrop.severity.numbers import LOADS
 from rotordrop.severity.ranking import DropSeverity, rank_drops
@@ -195,3 +206,83 @@ def test_stresses_of_one_bearing_are_ranked_by_what_their_records_say():
     other = another(other, machine="of other balls, for all that is known")
     worst = rankings([one, other], ("NDE",), {})["NDE", "peak_stress_Pa"].worst_drop
     assert 0.6 < worst[0] < 0.8
+
+
+def stressed(name, stress, half, safety=8.0):
+    numbers = {
+        "peak_stress_Pa": value(stress, stress - half, stress + half),
+        "severity.static_safety": value(safety, safety - 0.1, safety + 0.1),
+    }
+    return ComparedDrop(name, published(bearings={"NDE": bearing(numbers)}))
+
+
+STRESSED = (stressed("a", 1.9e9, 2e7), stressed("b", 2.0e9, 2e7, safety=2.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "level", "text"),
+    [
+        ([], "notice", "No limit given"),
+        (["peak_stress=2.2 GPa"], "good", "kept by all drops (passed by b at NDE with 0.0 % at most)"),
+        (["peak_stress=1.95 GPa"], "bad", "passed by b at NDE (> 99 %)"),
+        (["peak_stress=2 GPa"], "warning", "open, passed by b at NDE with a probability of 50 %"),
+        (["static_safety = 3"], "bad", "passed by b at NDE (> 99 %)"),  # from above
+    ],
+)
+def test_limits_are_kept_passed_open_or_not_given(limits, level, text):
+    said = limit_statement(STRESSED, read_limits(limits))
+    assert said.level == level and text in said.text and "passed by a" not in said.text
+
+
+@pytest.mark.parametrize(
+    ("limit", "message"),
+    [
+        ("peak_strss=2 GPa", r"did you mean 'peak_stress'"),
+        ("peak_stress", r"expected a number and its limit"),
+        ("peak_stress=2 kN", r"2 kN"),
+    ],
+)
+def test_what_is_no_limit_is_refused(limit, message):
+    with pytest.raises(UsageError, match=message):
+        read_limits([limit])
+
+
+def written(name, speed, peaks):
+    bearings = {
+        end: bearing(
+            {
+                "peak_force_N": value(peak, 0.95 * peak, 1.05 * peak),
+                "mean_force_0p15_0p2_N": value(0.1 * peak, 0.09 * peak, 0.11 * peak),
+                "peak_stress_Pa": value(1e9 + 2e5 * peak, 1e9, 1e9 + 4e5 * peak),
+                "mean_stress_Pa": value(1e9 + peak, 1e9, 1e9 + 2.0 * peak),
+            }
+        )
+        for end, peak in zip(("NDE", "DE"), peaks, strict=True)
+    }
+    return published(speed_Hz=speed, record_sha256=name, bearings=bearings).as_json()
+
+
+def test_the_comparison_ranks_every_number_of_every_bearing(tmp_path):
+    drops = (("a", 60.0, (3300.0, 3900.0)), ("b", 100.0, (3500.0, 3600.0)), ("c", 210.0, (2500.0, 3700.0)))
+    documents = {one[0]: written(*one) for one in drops}
+    files = [tmp_path / f"{name}.json" for name in documents]
+    for file in files:
+        file.write_text(json.dumps(documents[file.stem]))
+    out = tmp_path / "compared.json"
+    assert run(["compare", *map(str, files), "--json", str(out)]) == 0
+    told = json.loads(out.read_text())
+    assert told["left_out"] == {}
+    for end in ("NDE", "DE"):
+        for key, entry in told["bearings"][end].items():
+            numbers = {name: document["bearings"][end][key] for name, document in documents.items()}
+            order = sorted(numbers, key=lambda name: -numbers[name]["value"])
+            assert entry["worst_first"] == order, (end, key)
+            assert entry["values"] == [numbers[name]["value"] for name in order]
+            drops = [
+                DropSeverity.from_interval(name, one["value"], tuple(one["interval_90"]))
+                for name, one in numbers.items()
+            ]
+            assert entry["probability_worst_drop"] == pytest.approx(rank_drops(drops).worst_drop)
+            assert sum(entry["probability_worst_drop"]) == pytest.approx(1.0)
+            assert entry["probability_worst_condition"] is None
+    assert {"peak_force_N", "peak_stress_Pa"} <= set(told["bearings"]["DE"])

@@ -1,5 +1,6 @@
 """The page on critical speeds tells where one of them lies nearer to the nominal speed than allowed."""
 
+import json
 import math
 from dataclasses import replace
 from functools import lru_cache
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import example_machine
-from rotordrop.report.critical_speeds_page import critical_speeds_page, crossing_table
+from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page, crossing_table
 from rotordrop.rotor.campbell import Crossing, campbell_diagram, separations
 from rotordrop.rotor.critical_speeds import critical_speed_map
 
@@ -74,3 +75,43 @@ def test_a_margin_stands_beside_forward_critical_speeds_in_given_ambs():
     table = crossing_table(MACHINE, {"AMBs": diagram}, separations(diagram, NOMINAL, NOMINAL))
     margins = [row[table.columns.index("margin")] for row in table.rows]
     assert margins[0] == "–" and all(one.endswith(" %") for one in margins[1:])
+
+
+def same(written, values):
+    """Equal to the last digit, with what is unknown in the same places."""
+    np.testing.assert_array_equal(np.array(written, dtype=np.float64), values)
+
+
+def test_every_number_of_the_map_is_that_of_the_rotor_on_springs():
+    machine = example_machine("lp400")
+    stiffness, speeds = np.geomspace(1e6, 1e9, 4), np.linspace(10.0, 150.0, 4)
+    found = critical_speed_map(machine, stiffness, count=3)
+    diagram = campbell_diagram(machine, 2.0 * math.pi * speeds, "touchdown bearings")
+    told = critical_speeds_json({"standstill": found}, {"held": diagram})
+    written = json.loads(json.dumps(told, allow_nan=False))
+    table, held = written["maps"]["standstill"], written["campbell"]["held"]
+    assert table["stiffness_N_m"] == pytest.approx(stiffness)
+    same(table["massless_Hz"], found.massless)
+    same(table["with_support_mass_Hz"], found.with_support_mass)
+    assert set(table["at_the_machine_Hz"]) == set(found.at_lines)
+    for name, values in found.at_lines.items():
+        same(table["at_the_machine_Hz"][name], values)
+    for bearing, part in zip(machine.touchdown_bearings, found.lines, strict=True):
+        entry = table["bearings"][bearing.name]
+        assert entry["support_N_m"] == pytest.approx(float(bearing.support.stiffness))
+        for way in ("tangent", "simple"):
+            series = 1.0 / (1.0 / entry[f"{way}_N_m"] + 1.0 / entry["support_N_m"])
+            assert entry[f"equivalent_{way}_N_m"] == pytest.approx(series, rel=1e-9)
+        assert entry["tangent_N_m"] == part.tangent and entry["contact_N_m"] == part.contact
+    assert held["speed_Hz"] == pytest.approx(speeds)
+    same(held["frequency_Hz"], diagram.frequency)
+    same(held["damping_ratio"], diagram.damping_ratio)
+    same(held["whirl"], diagram.whirl)
+    assert held["node_positions_m"] == pytest.approx(diagram.node_positions)
+    same(held["shapes_at_lowest_speed"]["real"], diagram.shapes[0].real)
+    same(held["shapes_at_lowest_speed"]["imaginary"], diagram.shapes[0].imag)
+    for entry, crossing in zip(held["critical_speeds"], diagram.crossings, strict=True):
+        frequency = np.array(held["frequency_Hz"], dtype=np.float64)[:, entry["line"]]
+        meets = np.interp(entry["speed_Hz"], held["speed_Hz"], frequency)
+        assert meets == pytest.approx(entry["speed_Hz"], rel=0.02)
+        assert (entry["direction"], entry["damping_ratio"]) == (crossing.direction, crossing.damping_ratio)

@@ -1,11 +1,14 @@
-"""Figures contain the numbers they were given, in the unit their axes name."""
+"""Figures contain the numbers they were given, in the unit their axes name; thinned, all peaks and bands."""
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from rotordrop.elements.friction import Friction
@@ -31,7 +34,8 @@ from rotordrop.report.drop_sections import (
 )
 from rotordrop.report.estimate_page import innovations_figure
 from rotordrop.report.machine_content import friction_curve_figure
-from rotordrop.report.style import Panel, time_panels
+from rotordrop.report.style import Panel, block_envelope, time_panels
+from rotordrop.series import peak_indices
 
 TIME = np.linspace(0.0, 0.1, 1001)
 SINGLE = 2e-7
@@ -299,3 +303,51 @@ def test_where_single_numbers_do_not_hold_peaks_are_ranges_and_no_distribution_i
             assert peak == "peak, 90 %: 1\u202f500 to 2\u202f300 N"
             assert not stress.tables and len(stress.figures) == 1
             assert stress.statements[0].text.startswith("No distribution of the stress is stated")
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(2, 5000),
+    blocks=st.integers(1, 60),
+    signals=st.integers(1, 3),
+)
+@settings(max_examples=60, deadline=None)
+def test_every_block_keeps_its_extremes(seed, count, blocks, signals):
+    values = np.random.default_rng(seed).normal(size=(signals, count))
+    chosen = peak_indices(*values, blocks=blocks)
+    assert chosen[0] == 0
+    assert chosen[-1] == count - 1
+    assert np.all(np.diff(chosen) > 0)
+    assert len(chosen) <= 2 * signals * blocks + 2
+    for block in np.split(np.arange(count), np.linspace(0, count, blocks + 1).astype(int)[1:-1]):
+        if len(block):
+            kept = values[:, np.intersect1d(block, chosen)]
+            assert np.array_equal(kept.max(axis=1), values[:, block].max(axis=1))
+            assert np.array_equal(kept.min(axis=1), values[:, block].min(axis=1))
+
+
+def test_short_histories_are_drawn_as_they_are():
+    assert np.array_equal(peak_indices(np.arange(100.0), blocks=50), np.arange(100))
+
+
+def test_a_gap_in_a_history_does_not_hide_the_peak_beside_it():
+    values = np.ones(10_000)
+    values[4000:4500] = np.nan
+    values[4501] = 7.0
+    chosen = peak_indices(values, blocks=40)
+    assert np.nanmax(values[chosen]) == 7.0
+    assert np.isnan(values[chosen]).any()
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(max_examples=25, deadline=None)
+def test_a_thinned_band_contains_the_whole_one(seed):
+    rng = np.random.default_rng(seed)
+    middle = rng.normal(size=3000).cumsum()
+    lower, upper = middle - rng.random(3000), middle + rng.random(3000)
+    index, lowest, highest = block_envelope(lower, upper, blocks=30)
+    edges = np.linspace(0, 3000, 31).astype(int)
+    for block, (start, end) in enumerate(pairwise(edges)):
+        assert start <= index[block] < end
+        assert lowest[block] <= lower[start:end].min()
+        assert highest[block] >= upper[start:end].max()

@@ -1,5 +1,6 @@
 """The report on a tracked drop: what the estimate says is what the page says."""
 
+import copy
 import json
 import re
 from dataclasses import replace
@@ -10,9 +11,11 @@ from tests.unit.report.conftest import section
 from tests.unit.report.test_tables import check
 
 from rotordrop.estimate.bearing_drop import Origin
-from rotordrop.estimate.document import estimate_document
+from rotordrop.estimate.changed import changes
+from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
-from rotordrop.estimate.published import LaterMotion
+from rotordrop.estimate.published import LaterMotion, drop_of
+from rotordrop.report.compare_page import told_changes
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page
 from rotordrop.report.page import render_page
@@ -155,3 +158,13 @@ def test_what_is_estimated_has_its_interval_or_is_not_shown(estimate, page):
     assert not {"azimuth", "duration"} & {*section(page, "Impacts").tables[0].columns}
     bare = [replace(b, impacts=tuple(without(one) for one in b.impacts)) for b in estimate.bearings]
     assert {"azimuth", "duration"} <= {*impact_table(bare, force="bearing force").columns}
+
+
+def test_a_wider_gap_before_is_named_in_words(estimate):
+    document = copy.deepcopy(estimate_document(estimate))
+    known = next(one["estimate"] for one in document["parameters"] if one["path"] == "NDE.air_gap")
+    known["value"] -= 60e-6
+    known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
+    document["joint"] = None
+    first, _ = told_changes(changes(drop_of(document, "before.json"), published_drop(estimate)))
+    assert first.level == "warning" and "NDE: air gap (" in first.text
