@@ -1,6 +1,7 @@
 """Checks that decide whether intervals hold: what they see, and that they do not see what is not there."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -80,12 +81,14 @@ def test_what_the_sensors_or_impulses_do_wrong_is_named(lp400, prepared, impacts
         assert checks_of(impacts, impacts_smoothed, factor)["process noise"].passed is passes
 
 
-def test_red_noise_is_seen(impacts, random):
+@pytest.mark.parametrize("channel", [0, 3])
+def test_red_noise_is_seen_and_its_channel_named(impacts, random, channel):
     """Noise of the same size whose neighbours are alike, as a low-pass before the sampling makes it."""
     white = random.standard_normal(impacts.readings.shape)
     red = np.zeros_like(white)
     for i in range(1, len(white)):
         red[i] = 0.8 * red[i - 1] + 0.6 * white[i]
+    red[:, np.arange(4) != channel] = white[:, np.arange(4) != channel]
     noisy, usual = (
         checked(
             replace(impacts, readings=impacts.readings + 1.5e-6 * e, variances=impacts.variances + 1.5e-6**2)
@@ -93,7 +96,8 @@ def test_red_noise_is_seen(impacts, random):
         for e in (red, white)
     )
     assert usual.passed and not noisy.passed
-    assert f"(limit {CORRELATION_LIMIT:g})" in noisy.message
+    name = impacts.model.machine.sensors[channel].name
+    assert re.search(rf"channel {name} correlate by .*limit {CORRELATION_LIMIT:g}", noisy.message)
 
 
 def test_noise_of_another_size_than_stated_is_seen_and_named(impacts, random):
@@ -132,6 +136,17 @@ def test_departures_that_are_no_note_fail_and_are_named(impacts, impacts_smoothe
     assert not check.passed and check.note == ""
     assert check.widening == pytest.approx(1.0 + 2.0 * (min(by, NOTED_DEPARTURE) - DEPARTURE_LIMIT))
     assert check.said().startswith(f"{paths[0]} departs by")
+
+
+@pytest.mark.parametrize(("louder", "passes"), [(1.0, True), (2.0, False)])
+def test_what_is_unusual_in_one_drop_is_a_note_while_its_innovations_are_white(
+    impacts, impacts_smoothed, louder, passes
+):
+    one = departed(impacts, impacts_smoothed, ["unbalance.1.sine"], 9.0)
+    loud = replace(one.filtered, innovations=louder * one.filtered.innovations)
+    check = checks_of(impacts, replace(one, filtered=loud))["unknowns of the drop"]
+    assert (check.passed, bool(check.note), check.path) == (passes, passes, "unbalance.1.sine")
+    assert check.message.startswith("departs by 9.0 prior standard deviations") and check.widening == 1.0
 
 
 @pytest.mark.parametrize(("up", "passes"), [(0.25, True), (1.1, False)])

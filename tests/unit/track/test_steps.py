@@ -3,7 +3,6 @@
 import math
 import os
 import pickle
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,8 +13,7 @@ import numpy as np
 import pytest
 from tests.scaled_machines import scaled_machine
 
-from rotordrop import build_drop_model, example_machine
-from rotordrop.rotor.unknowns import all_unknowns
+from rotordrop import build_drop_model
 from rotordrop.track import calibration, noise_size
 from rotordrop.track._filter import is_plausible
 from rotordrop.track.calibration import (
@@ -28,12 +26,11 @@ from rotordrop.track.calibration import (
     track,
     window_end,
 )
-from rotordrop.track.consistency import CORRELATION_LIMIT, innovation_checks, nuisance_check
 from rotordrop.track.forces import displacements_of, force_history
 from rotordrop.track.noise_size import LARGEST, SMALLEST, forward_passes, likeliest_noise, likelihood_of
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import WATCHED, first_level
-from rotordrop.track.smoother import Forward, PassSettings, forward, smooth, smooth_means
+from rotordrop.track.smoother import PassSettings, forward, smooth, smooth_means
 from rotordrop.twin.problems import COARSE_BASIS
 
 
@@ -66,65 +63,6 @@ def test_a_displacement_is_as_uncertain_as_its_covariance_says():
             assert sigma[:, b, axis] ** 2 == pytest.approx(watched[:, place, place])
     smoothed.watched = -watched
     assert np.all(displacements_of(problem, smoothed)[1] == 0.0)  # below zero by rounding only
-
-
-@pytest.mark.parametrize("red", [0, 1, 2])
-def test_the_channel_whose_innovations_follow_each_other_is_named(red):
-    dice = np.random.default_rng(4)
-    noise = dice.standard_normal((4000, 4))
-    for k in range(1, 4000):
-        noise[k, red] = 0.6 * noise[k - 1, red] + 0.8 * noise[k, red]
-    smoothed: Any = SimpleNamespace(
-        filtered=SimpleNamespace(
-            done=4000, innovations=2e-7 * noise, innovation_variances=np.full((4000, 4), 4e-14)
-        )
-    )
-    names = ("A", "B", "C")
-    sensors = tuple(SimpleNamespace(name=name) for name in names)
-    problem: Any = SimpleNamespace(model=SimpleNamespace(machine=SimpleNamespace(sensors=sensors)))
-    size, whiteness = innovation_checks(problem, smoothed)
-    assert size.passed
-    assert not whiteness.passed and CORRELATION_LIMIT < 0.5
-    assert re.search(rf"channel {names[red]} correlate by 0\.(5|6)", whiteness.message)
-
-
-def test_a_filter_that_lost_the_drop_is_judged_by_what_it_followed():
-    dice = np.random.default_rng(5)
-    innovations, variances = dice.normal(size=(100, 3)), dice.uniform(0.5, 2.0, (100, 3))
-    innovations[10, 1] = np.nan
-    nothing = np.zeros(0)
-    unused: Any = dict.fromkeys(("problem", "settings", "prior", "reference", "length", "covariance_at_end"))
-    made = Forward(
-        **unused,
-        done=60,
-        impulse=1e-3,
-        means=nothing,
-        innovations=innovations,
-        innovation_variances=variances,
-    )
-    terms = [
-        (e**2 / s, np.log(s))
-        for e, s in zip(innovations[:60].ravel(), variances[:60].ravel(), strict=True)
-        if np.isfinite(e)
-    ]
-    squares, logs = np.array(terms).T
-    assert made.nis == pytest.approx(squares.mean())
-    assert made.negative_log_likelihood == pytest.approx(0.5 * (squares.sum() + logs.sum()))
-
-
-@pytest.mark.parametrize("path", ["unbalance.1.sine", "remanence.time_constant", "speed.aero_time_constant"])
-@pytest.mark.parametrize(("sigmas", "white"), [(1.0, True), (9.0, True), (9.0, False)])
-def test_what_is_unusual_in_one_drop_is_a_note_while_its_innovations_are_white(path, sigmas, white):
-    unknowns = all_unknowns(build_drop_model(example_machine("lp400"), "quick"))
-    theta = np.array([u.mean + (sigmas * u.sigma if u.path == path else 0.0) for u in unknowns])
-    problem: Any = SimpleNamespace(unknowns=unknowns, parameter_slice=slice(0, len(unknowns)))
-    smoothed: Any = SimpleNamespace(means=theta[None], filtered=SimpleNamespace(parameter_sample=0))
-    found = nuisance_check(problem, smoothed, white)
-    assert found.passed is (white or sigmas < 5.0)
-    assert found.path == path
-    assert found.message.startswith(f"departs by {sigmas:.1f} prior standard deviations")
-    assert bool(found.note) is (white and sigmas > 5.0)
-    assert not found.note or found.note == f"{found.message}; the readings are followed all the same"
 
 
 def test_damping_holds_the_parameters_to_the_pass_before(impacts):

@@ -14,7 +14,6 @@ from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
-from rotordrop.physics.ball_bearing import bearing_constants, preload_of_offset
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior, smallest_gap
 from rotordrop.simulate.levitation import levitated_orbit
@@ -59,33 +58,6 @@ def unknown_of(machine, path):
 )
 def test_the_prior_comes_from_interval_range_error_or_status(quantity, expected):
     assert prior(parameter("support.stiffness"), quantity).sigma == pytest.approx(expected)
-
-
-def test_the_machine_file_sets_the_priors(lp400):
-    stiffness = unknown_of(lp400, "NDE.support.stiffness")
-    assert stiffness.value_of(stiffness.mean) == pytest.approx(1e8)
-    assert stiffness.sigma == pytest.approx(math.log(4.0) / (2 * NINETY))
-    gap = unknown_of(lp400, "DE.air_gap")
-    assert (gap.mean, gap.begin, gap.logarithmic) == (pytest.approx(275e-6), 250e-6, False)
-    assert gap.sigma == pytest.approx(150e-6 / (2 * NINETY))
-    damping = unknown_of(lp400, "NDE.contact.damping")  # a plain value
-    assert damping.sigma == parameter("contact.damping").given_sigma
-    given = unknown_of(lp400.with_values({"NDE.air_gap": 260e-6}), "NDE.air_gap")  # may still be wrong
-    assert given.sigma == pytest.approx(parameter("air_gap").given_sigma * 260e-6)
-
-
-def test_preload_and_ratios_are_estimated_as_they_are_stated(lp400):
-    unknown = unknown_of(lp400, "NDE.preload")
-    bearing = lp400.bearing("NDE").bearing
-    constants = bearing_constants(bearing)
-    assert preload_of_offset(constants, unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
-    assert unknown.value_of(unknown.begin) == pytest.approx(float(bearing.preload), rel=1e-6)
-    ends = [unknown.value_of(unknown.mean + s * NINETY * unknown.sigma) for s in (-1.0, 1.0)]
-    assert ends == pytest.approx([370.0, 760.0], rel=1e-6)
-    anisotropy = unknown_of(lp400, "NDE.support.anisotropy")
-    assert [anisotropy.value_of(math.log(one)) for one in (1.0, 1.1)] == pytest.approx([1.0, 1.1])
-    inertia = unknown_of(lp400, "DE.race.inertia")
-    assert inertia.value_of(inertia.mean + 3.0) == pytest.approx(4.0 * math.exp(inertia.mean))
 
 
 def race_errors(machine):
@@ -391,15 +363,6 @@ def test_a_trajectory_carried_over_is_the_same_but_for_other_priors(flight, rand
     np.testing.assert_allclose(moved[:, at], problem.start[at])
     others = np.arange(len(flight.mean)) != at
     np.testing.assert_allclose(moved[:, others], means[:, others], rtol=1e-9, atol=1e-16)
-
-
-def test_an_exponent_calibrated_at_its_bound_is_not_taken_for_exact(lp400):
-    bound = Known(value=1.0, status="estimated", interval_90=(1.0, 1.0))
-    unknowns = all_unknowns(
-        build_drop_model(lp400.with_values({"NDE.contact.exponent": bound}), Reduction(modes=4))
-    )
-    sigma = next(u.sigma for u in unknowns if u.path == "NDE.contact.exponent")
-    assert sigma == parameter("contact.exponent").least_sigma
 
 
 def test_a_rotor_that_does_not_rest_on_a_bearing_is_refused_with_its_numbers():
