@@ -247,7 +247,6 @@ def test_a_record_that_begins_with_the_fall_gives_power_off_to_its_stated_error(
 def test_levitation_is_enough_or_refused_where_contact_is_near(started):
     machine, made = started
     assert isinstance(power_off(made.record, machine), DropInstant)
-    machine, made = started
     late = from_time(made.record, made.truth["t_off_in_record_s"] + 6e-3)
     with pytest.raises(RecordError, match=r"pre-trigger|no drop in the record"):
         power_off(late, machine)

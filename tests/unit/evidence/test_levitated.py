@@ -140,7 +140,6 @@ def test_the_angle_is_the_integral_of_the_speed_whatever_a_tacho_adds(drop):
     np.testing.assert_allclose(at, true, atol=0.02)
     assert np.all(spread == 0.0)
     assert abs(HZ * 500.0 * 0.2 - true[-1]) > 7.0  # what a constant speed would say
-    record, true = slowing(drop)
     high = replace(record, speed_readings=record.speed_readings + 10.0)
     at, _ = rotor_angle(high, 0.0, HZ * 500.0).at(record.time)
     np.testing.assert_allclose(at, true, atol=0.02)

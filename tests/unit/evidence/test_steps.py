@@ -67,10 +67,7 @@ def single():
 @pytest.fixture(scope="module")
 def twice(single):
     """A drop, the rotor lifted within 0.3 s, floating, and such a drop again."""
-    level, rest = (
-        single.signals[0],
-        single.signals[-1],
-    )  # no step where the parts meet: samples would be missing
+    level, rest = single.signals[0], single.signals[-1]  # no step between: samples would be missing
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 6000))
     lift = rest + np.outer(share, level - rest) + np.random.default_rng(4).normal(0.0, 0.5e-6, (6000, 4))
     # equal samples would be a block that was written twice
@@ -93,12 +90,9 @@ def test_drops_of_one_file_come_apart_and_one_stays_whole(single, twice):
     assert second.time[-1] == twice.time[-1]
     before = second.time[-count] - second.time[0]  # half of the lift
     assert 0.0 <= before < 0.16
-    assert (first.metadata["split_from"], second.metadata["split_from"]) == (
-        "record, drop 1 of 2",
-        "record, drop 2 of 2",
-    )
-    assert len(split_drops(first)) == 1
-    assert len(split_drops(second)) == 1
+    split = [part.metadata["split_from"] for part in (first, second)]
+    assert split == ["record, drop 1 of 2", "record, drop 2 of 2"]
+    assert len(split_drops(first)) == len(split_drops(second)) == 1
     assert all(part.speed_time[0] >= part.time[0] for part in (first, second))
     (same,) = split_drops(single)
     assert same is single
@@ -113,9 +107,7 @@ def test_the_verb_writes_one_record_each_and_estimate_says_so(twice, tmp_path, c
     assert sorted(path.name for path in (tmp_path / "parts").iterdir()) == ["both_drop1.h5", "both_drop2.h5"]
     again = read_record(tmp_path / "parts" / "both_drop2.h5", example_machine("lp400"))
     assert np.array_equal(again.signals, split_drops(twice)[1].signals)
-    assert (
-        run(["look", str(tmp_path / "parts" / "both_drop1.h5"), machine, "--split", str(tmp_path / "no")])
-        == 0
-    )
+    one = str(tmp_path / "parts" / "both_drop1.h5")
+    assert run(["look", one, machine, "--split", str(tmp_path / "no")]) == 0
     assert "holds one drop; nothing to split" in capsys.readouterr().out
     assert not (tmp_path / "no").exists()

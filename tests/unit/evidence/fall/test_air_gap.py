@@ -61,7 +61,6 @@ def test_rest_is_standstill_of_tail_or_record(drop, truth, sensing):
     floating = replace(drop.tail, signals=-drop.tail.signals)
     with pytest.raises(IdentificationError, match=r"not at rest on its bearings: mean height 2\d\d"):
         rest_of(floating, sensing)
-    assert drop.tail is not None
     time = drop.tail.time
     whole = replace(
         drop.tail, speed_time=time, speed_readings=np.where(np.arange(len(time)) < 1000, 5.0, 0.0)
@@ -75,7 +74,6 @@ def test_a_short_tail_says_how_little_it_knows_or_is_refused(drop, sensing):
     with pytest.raises(IdentificationError, match=r"0.1 s of settled rotor; at least 0.2 s"):
         rest_of(short, sensing)
     # A tail of one block had no scatter and so no error; of two, nine in ten means lie within 6.3 errors.
-    assert drop.tail is not None
     begin = float(drop.tail.time[0])
     rest = rest_of(drop.tail.window(begin, begin + 0.4), sensing)
     halves = rest.radius_upper - rest.radius_lower
@@ -90,7 +88,6 @@ def test_a_rotor_that_swings_in_one_bearing_alone_is_not_at_rest(drop, sensing, 
     place[..., 1] = -rest.radius
 
     def tail():
-        assert drop.tail is not None
         along = np.einsum("sbc,tbc->ts", sensing.from_bearings, place) + sensing.settled_bend
         return replace(drop.tail, time=time, signals=along)
 

@@ -198,13 +198,10 @@ def test_intervals_list_every_contact_and_no_contact_is_refused():
     radius = GAP + np.where(time < 5e-3, -50e-6, 10e-6)
     intervals = contact_intervals(time, radius, GAP)
     assert intervals == pytest.approx(np.array([[5e-3, time[-1]]]), abs=6e-5)
-    time = np.arange(0.0, 0.01, 5e-5)
     place = np.zeros((len(time), 1, 2))
     place[:, 0, 1] = -100e-6
     with pytest.raises(IdentificationError, match=r"comes to 100 µm .* never reaches the air gap of 250 µm"):
         identify_first_contacts(time, place, np.array([GAP]), np.array([400.0]), GRAVITY, 1e-6)
-    time = np.arange(0.0, 0.01, 5e-5)
-    place = np.zeros((len(time), 1, 2))
     place[:, 0, 1] = np.where(time < 5e-3, -200e-6, -300e-6)
     with pytest.raises(IdentificationError, match=r"stays beyond the air gap of 250 µm from 5.*ms"):
         identify_first_contacts(time, place, np.array([GAP]), np.array([400.0]), GRAVITY, 1e-6)

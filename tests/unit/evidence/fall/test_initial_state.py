@@ -40,8 +40,6 @@ def test_state_power_off_and_remanent_lift_are_found_and_leave_noise(initial, dr
     assert 0.7 < initial.misfit < 1.3
     true = np.array([[f["x_N"], f["vertical_N"]] for f in drop.truth["remanent_force"]])
     assert initial.remanent_force == pytest.approx(true, abs=15.0)
-    late = float(round((contacts.min() - 3e-4) / 1e-5) * 1e-5)
-    error = (bearing_state(initial, late) - true_state(drop, late))[0]
     turn = initial.fall.transition(initial.decay, late)
     states = initial.unknowns.states
     shape = initial.fall.model.parameters.bearing_shape
@@ -50,7 +48,7 @@ def test_state_power_off_and_remanent_lift_are_found_and_leave_noise(initial, dr
     for axis in range(2):
         part = slice(axis * m, (axis + 1) * m)
         sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
-        assert np.all(np.abs(error[:, axis]) < 4.0 * sigma + 0.05e-6)
+        assert np.all(np.abs(place[:, axis]) < 4.0 * sigma + 0.05e-6)
 
 
 def test_zeros_of_the_sensors_make_the_rest_as_unsure_as_they_are(evidence, sensing):
