@@ -208,7 +208,6 @@ def test_files_are_there_in_utf_8_with_a_mark_or_without(tmp_path, small_text):
         load_machine(file)
     with pytest.raises(MachineFileError, match=r"more than 16777216 bytes are no machine file"):
         load_machine("/dev/zero")
-    file = tmp_path / "machine.toml"
     file.write_bytes(b"\xef\xbb\xbf" + small_text.encode())
     assert load_machine(file) == loads_machine(small_text)
 

@@ -89,7 +89,6 @@ def test_a_force_takes_the_place_of_a_preload_class_and_a_position_keeps_its_nod
     assert machine.touchdown_bearings[1].bearing.preload.value == 1026.0
     bearing = machine.with_values({"DE.preload": 500.0}).touchdown_bearings[1].bearing
     assert (bearing.preload.value, bearing.preload_class) == (500.0, None)
-    machine = loads_machine(small_text)
     assert machine.touchdown_bearings[1].node == 8
     assert machine.with_values({"DE.air_gap": 3e-4}).touchdown_bearings[1].node == 8
 

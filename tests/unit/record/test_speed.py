@@ -119,7 +119,6 @@ def test_missing_and_spare_pulses_are_said():
     assert f"1 pulses missing after {whole.marks[19]:.4g} s" in found.warnings[0]
     assert np.min(found.speed) > 0.9 * speed[-1]
     assert len(found.marks) == len(whole.marks) - 1
-    time, angle, speed = shaft()
     values = pulses(angle)
     k = np.searchsorted(time, passages(time, values).marks[20]) + 150
     values[k : k + 8] = 4.8

@@ -75,7 +75,6 @@ def test_neither_tolerance_nor_output_moves_a_drop(quick):
     assert peaks[1e-6] == pytest.approx(peaks[1e-7], rel=5e-3)
     assert peaks[1e-7] == pytest.approx(peaks[1e-8], rel=5e-4)
     assert np.max(np.abs(peaks[1e-5] / peaks[1e-8] - 1.0)) > np.max(np.abs(peaks[1e-7] / peaks[1e-8] - 1.0))
-    case = DropCase(speed=SPEED, duration=0.02)
     fine, coarse = simulate_drop(quick, case), simulate_drop(quick, replace(case, output_step=1e-4))
     assert coarse.steps == fine.steps
     assert coarse.state == pytest.approx(fine.state[::10], rel=1e-12, abs=1e-15)

@@ -116,7 +116,6 @@ def test_the_probe_touches_and_slides_and_its_hash_is_that_of_every_bit(tmp_path
     assert set(drop.contacts.bearing.tolist()) == {0, 1}
     assert abs(drop.friction_force).max() > 1.0
     assert abs(drop.race_speed).max() > 1.0
-    drop = probe_drop()
     assert history_hash(drop) == fingerprint()
     drop.contact_force.view("uint64")[-1, 0] ^= 1
     assert history_hash(drop) != fingerprint()
