@@ -34,8 +34,6 @@ from rotordrop.estimate.published import Drop, estimate_schema
 from rotordrop.estimate.record_facts import RecordFacts, facts_of
 from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
-from rotordrop.physics import columns
-from rotordrop.rotor.unknowns import bearing_unknowns
 from rotordrop.track.calibration import TrackedDrops, is_inconsistent
 from rotordrop.track.consistency import Check
 from rotordrop.track.input_state import corrections_by_record, input_state_estimate
@@ -61,7 +59,6 @@ from rotordrop.twin.tracked_parameters import (
     fitted_values,
     gap_of_record,
     is_impossible_gap,
-    parameters,
 )
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.score import score_estimate
@@ -574,18 +571,6 @@ def test_an_inertia_that_a_bounded_drag_stands_in_for_is_not_determined(workshop
     prior, stated = problem.unknowns[inertia], found[inertia]
     assert stated.low < math.exp(prior.mean - prior.sigma)
     assert stated.high > math.exp(prior.mean + prior.sigma)
-
-
-def test_a_race_whose_mass_nobody_states_is_an_unknown(workshop):
-    machine = example_machine("lp400").with_values(
-        {"NDE.race.mass": Known(value=0.31, status="inferred", range=(0.155, 0.62))}
-    )
-    unknowns = bearing_unknowns(build_drop_model(machine, "quick"), 0)
-    unknown = next(one for one in unknowns if one.path == "NDE.race.mass")
-    assert unknown.value_of(unknown.mean + NINETY * unknown.sigma) == pytest.approx(0.62)
-    assert unknown.sets("bearing", columns.RACE_MASS)
-    found = parameters(workshop.problem, workshop.smoothed, fits=True, widening=1.0)
-    assert "race.mass_kg" in {one.row.field for one in found}
 
 
 def test_what_is_noted_widens_every_interval(workshop, tracked, calibrated, synthetic):
