@@ -18,7 +18,7 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.parameter import Role
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import published, row_of
-from rotordrop.estimate.advice import WORTH_SAYING, is_wide
+from rotordrop.estimate.advice import is_wide
 from rotordrop.estimate.bearing_drop import BearingDrop, History
 from rotordrop.estimate.estimate import (
     CrossCheck,
@@ -79,7 +79,7 @@ FRONT = 2
 MAIN = 2
 """Headline numbers of the page to send: peak force and stress."""
 WORTH = 0.7
-"""Share of an interval of stress that is left from which it is not said what would narrow it [1] (chosen)."""
+"""Share of an interval that is left from which it is not said what would narrow it [1] (chosen)."""
 BALLS = (
     "balls inferred from the designation",
     "their number, diameter and conformity, from the maker",
@@ -224,7 +224,7 @@ def width_advice(estimate: Estimate) -> Iterator[str]:
             lefts = [one.narrowed[bearing.name] / one.half_widths[bearing.name] for one in estimate.advice]
             left = min(lefts, default=1.0)
             cause = remedy = ""
-            if left < WORTH_SAYING:
+            if left < WORTH:
                 best = estimate.advice[lefts.index(left)]
                 cause, remedy = ", ".join(dict.fromkeys(map(_cause, best.paths))), best.measurement
             found.setdefault(("Force", cause, remedy), []).append((bearing.name, half, half * left))
@@ -235,11 +235,11 @@ def width_advice(estimate: Estimate) -> Iterator[str]:
     for (load, cause, remedy), every in found.items():
         if narrowed := [one for one in every if load == "Force" or one[2] < WORTH * one[1]]:
             names, now, then = zip(*narrowed, strict=True)
-            known = f"{load} ({', '.join(names)}) ± {_per_cent(now)} % because of "
+            known = f"{load} ({', '.join(names)}) ± {_per_cent(now)} %"
             if not remedy:
-                yield f"{known}the readings themselves; no measurement of the machine would narrow it."
+                yield f"{known}; no one measurement of the machine would narrow it much."
             else:
-                yield f"{known}{cause}; would become ± {_per_cent(then)} % with {remedy}."
+                yield f"{known} because of {cause}; would become ± {_per_cent(then)} % with {remedy}."
 
 
 def _cause(path: str) -> str:
