@@ -109,7 +109,8 @@ def check_units(
     if motion is not None:
         gaps = check_gaps(motion, record, machine)
         whirls = [whirl for drop in drops_of(motion) for whirl in whirls_of(motion, drop)]
-        if whirls and not gaps and all(wall.determined for wall in motion.walls.values()):
+        falls = float(np.median(motion.falls)) / GRAVITY  # which tells the unit, however far it whirls
+        if whirls and not gaps and 1.0 / _NO_FALL < falls < _NO_FALL:
             longest = max(whirls, key=lambda whirl: abs(whirl.turns))
             return [found("beyond", ratio=max(ratios), how=longest.words)]
         if gaps and estimated is None:
