@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal
+
+from rotordrop.errors import UsageError
+from rotordrop.require import numbers, require
 
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
@@ -61,6 +65,19 @@ class Known:
     """Where the value comes from."""
     unit: str = ""
     """SI unit, for display."""
+
+    def __post_init__(self) -> None:
+        require(self.status, "status", str)
+        for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):
+            if (one := getattr(self, name)) is not None or name == "value":
+                numbers(one, name, ())
+        if math.isnan(self.value) and self.status != "default":  # there it follows from other values
+            require(self.value, "value", float)
+        for name in ("interval_90", "range", "bounds"):
+            if (ends := getattr(self, name)) is not None:
+                low, high = numbers(ends, name, (2,))
+                if not low <= high:
+                    raise UsageError(f"{name} is {ends}; expected the lower end first.")
 
     def __float__(self) -> float:
         return self.value

@@ -63,7 +63,7 @@ def each(
     """Give a list of one of some kinds each, as many as there are records."""
     if not isinstance(values, Iterable) or isinstance(values, str | bytes | Mapping):
         raise UsageError(f"{name} is {_shown(values)}; expected a list, also of one: {name}=[...].")
-    found = tuple(values)
+    found = tuple(np.atleast_1d(values)) if isinstance(values, np.ndarray) else tuple(values)
     if records is not None and len(found) != records:
         wanted = "one, or None, for each" if none else "one for each"
         raise UsageError(f"{len(found)} {name} for {records} records; expected {wanted}.")

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sized
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, SupportsFloat, overload
+
+import numpy as np
 
 from rotordrop.errors import UsageError
 from rotordrop.require import numbers, require
@@ -246,7 +249,8 @@ def in_si(value: object, kind: str, name: str) -> float:
     if isinstance(value, str):
         return parse_quantity(value, kind)
     wanted = _kind(kind)
-    if isinstance(value, bool) or not isinstance(value, SupportsFloat):
+    array = isinstance(value, Sized | np.ndarray)
+    if array or isinstance(value, bool | complex) or not isinstance(value, SupportsFloat):
         raise UsageError(
             f"{name} is {value!r}; expected a text such as {wanted.example!r}, or a number [{wanted.unit}]"
         )
@@ -318,10 +322,10 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
     """
     value = float(numbers(value, "value", ()))
     require(digits, "digits", int, least=1)
+    scales = _kind(kind).scales
     if kind == "speed":
         turns = value / (2 * math.pi)
         return f"{_rounded(turns, digits)} Hz ({_rounded(60 * turns, max(digits, 4))} rpm)"
-    scales = _kind(kind).scales
     size = abs(value) * (1 + 0.5 * 10.0**-digits)
     factor, unit = next(
         (scale for scale in scales if size >= scale[0]), scales[-1] if size > 0 else scales[0]
@@ -371,10 +375,7 @@ def percent(share: float, places: int = 0) -> str:
 
 
 def _kind(kind: str) -> Kind:
-    try:
-        return KINDS[kind]
-    except KeyError:
-        raise UsageError(f"{kind!r} is not a kind of quantity; known are {', '.join(KINDS)}") from None
+    return KINDS[require(kind, "kind of quantity", str, among=KINDS)]
 
 
 def _split(text: object, kind: str, wanted: Kind) -> tuple[float, str]:

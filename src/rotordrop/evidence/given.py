@@ -51,10 +51,11 @@ def given_drops(
     for record, rest in zip(drops, rests, strict=True):
         require_drop(record, machine)
         require_tail(rest, record, machine)
+    names = None if names is None else each(names, "names", str, records=len(drops))
     if names is not None and len(set(names)) < len(drops):
-        raise UsageError(f"names are {', '.join(map(str, names))}; expected one of its own for each record.")
+        raise UsageError(f"names are {', '.join(names)}; expected one of its own for each record.")
     stems = [r.path.stem if r.path else f"drop_{i + 1}" for i, r in enumerate(drops)]
-    names = each(stems if names is None else names, "names", str, records=len(drops))
+    names = tuple(stems) if names is None else names
     seen: dict[str, str] = {}
     for name, record in zip(names, drops, strict=True):
         if names.count(name) > 1:

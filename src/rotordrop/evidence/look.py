@@ -69,7 +69,7 @@ from rotordrop.record.axes import sees_both_directions
 from rotordrop.record.profile import Profile, SpeedSource, rules_of
 from rotordrop.record.readers import read_recording
 from rotordrop.record.record import Record, open_record
-from rotordrop.require import require
+from rotordrop.require import each, require
 from rotordrop.sketch import sketch
 from rotordrop.units import format_quantity, in_si
 
@@ -267,7 +267,7 @@ def look(
     Where nothing falls, the look has no drop but the contacts of a rotor that its magnets hold; where no two
     channels make a plane, it has the levels of the channels.
     """
-    gap, speed = _given(record, machine, gap, speed, read_by=(mapping, profile))
+    gap, speed = _given(record, machine, gap, speed, mapping, profile)
     try:
         read, arrangement = _read(record, machine, speed, mapping, profile)
     except UnpairedError as error:
@@ -330,13 +330,14 @@ def look(
 
 
 def _given(
-    record: object, machine: Machine | None, gap: object, speed: object, read_by: Sequence[object]
+    record: object, machine: Machine | None, gap: object, speed: object, mapping: object, profile: object
 ) -> tuple[float | None, float | None]:
     """Refuse what cannot be looked at, or by what nothing is read; the gap [m] and the speed [rad/s]."""
     require(record, "record", str, PathLike, Record)
     if require(machine, "machine", Machine, none=True) is not None and isinstance(record, Record):
         require_drop(record, machine)
-    if isinstance(record, Record) and (speed is not None or any(read_by)):
+    told = each(mapping, "mapping", str) or profile is not None or speed is not None
+    if isinstance(record, Record) and told:
         raise UsageError("speed, mapping and profile tell how a file is read; expected none with a Record.")
     gap = None if gap is None else in_si(gap, "length", "gap")
     speed = None if speed is None else in_si(speed, "speed", "speed")

@@ -86,8 +86,14 @@ class Record:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", each(self.sensors, "sensors", Sensor))
-        numbers(self.sampling_rate, "sampling_rate", ())
-        shape = (numbers(self.time, "time").size, len(self.sensors))
+        require(self.sampling_rate, "sampling_rate [Hz]", float, above=0.0)
+        require(self.speed_by_hand, "speed_by_hand", bool)
+        require(self.path, "path", Path, none=True)
+        require(self.sha256, "sha256", str)
+        require(self.metadata, "metadata", Mapping, hint="Give the header as {name: text}")
+        each(self.notes, "notes", str)
+        each(self.warnings, "warnings", str)
+        shape = (numbers(self.time, "time", finite=True).size, len(self.sensors))
         if np.shape(self.signals) != shape:
             words = f"{shape[0]} times and {shape[1]} sensors need {shape}"
             raise RecordError(f"signals have the shape {np.shape(self.signals)}; {words}")
@@ -145,15 +151,21 @@ class Record:
         require(unit, "unit", str, Mapping, hint="Say it, for example unit='um'")
         columns = _columns(signals, names)
         count = len(next(iter(columns.values())))
+        first = parse_quantity(start, "time")
         if isinstance(time, str):
             rate = require(parse_quantity(time, "frequency"), "the sampling rate in time", float, above=0.0)
-            clock = np.asarray(parse_quantity(start, "time") + np.arange(count) / rate)
+            clock = np.asarray(first + np.arange(count) / rate)
         else:
             unit_of_time = require(time_unit, "time_unit", str, among=_TIME_UNITS)
-            (clock,) = in_seconds([np.atleast_1d(numbers(time, "time", finite=True))], [unit_of_time])
-        if clock.shape != (count,):
-            words = f"time has the shape {clock.shape} and the signals have {count} samples"
-            raise RecordError(f"{words}; give one time for each sample, or a sampling rate such as '20 kHz'")
+            stamps = np.atleast_1d(numbers(time, "time", finite=True))
+            if first or stamps.shape != (count,):
+                words = (
+                    f"time has the shape {stamps.shape} and the signals have {count} samples, from {start}"
+                )
+                raise RecordError(
+                    f"{words}; give one time for each sample, or a sampling rate such as '20 kHz'"
+                )
+            (clock,) = in_seconds([stamps], [unit_of_time])
         channels = []
         for name, values in columns.items():
             given = unit.get(name, "") if isinstance(unit, Mapping) else unit
@@ -188,7 +200,12 @@ class Record:
             Which column is which sensor, where the names differ.
         """
         require(machine, "machine", Machine)
-        if not hasattr(frame, "columns") or not len(frame) or hasattr(frame.index, "levels"):
+        if (
+            not hasattr(frame, "columns")
+            or not hasattr(frame, "index")
+            or not len(frame)
+            or hasattr(frame.index, "levels")
+        ):
             words = "Record.from_arrays takes arrays, frame.reset_index() makes columns of levels."
             expected = "expected a data frame with rows and one level of index"
             raise UsageError(f"frame is a {type(frame).__name__}; {expected}. {words}")

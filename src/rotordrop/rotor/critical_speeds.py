@@ -116,8 +116,7 @@ def critical_speeds(
     ``"forward"`` or ``"backward"``: the whirl keeps step with the spin; ``"standstill"``: natural frequencies
     without spin. Point masses on a shaft without mass are allowed.
     """
-    if whirl not in WHIRLS:
-        raise UsageError(f"unknown whirl {whirl!r}; choose one of {', '.join(map(repr, WHIRLS))}")
+    require(whirl, "whirl", str, among=WHIRLS)
     rows = [rotor.node_row(support.node) for support in supports]
     zero = np.zeros_like(rotor.mass)
     system = planar_matrices(rotor.mass, rotor.stiffness, zero, rotor.polar, rows, supports)

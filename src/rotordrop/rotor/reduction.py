@@ -19,6 +19,7 @@ from rotordrop.errors import SimulationError, UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.physics.linear_algebra import orthonormal, product, symmetric_eigen
+from rotordrop.require import require
 from rotordrop.rotor.assembly import (
     N_RIGID,
     PlanarModes,
@@ -128,11 +129,7 @@ def reduction_of(choice: str | Reduction) -> Reduction:
     """The reduction of a preset name, or the reduction itself."""
     if isinstance(choice, Reduction):
         return choice
-    if choice not in PRESETS:
-        raise UsageError(
-            f"unknown reduction {choice!r}; choose one of {', '.join(map(repr, PRESETS))} or give "
-            "Reduction(modes=…, attachment=…)"
-        )
+    require(choice, "reduction", str, among=PRESETS, hint="Or give Reduction(modes=…, attachment=…)")
     return PRESETS[choice]
 
 

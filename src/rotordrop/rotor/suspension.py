@@ -17,6 +17,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_tangent
+from rotordrop.require import require
 from rotordrop.rotor.statics import bearing_load_shares
 
 SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
@@ -135,13 +136,12 @@ def _held_by(bearing: TouchdownBearing, load: float) -> tuple[float, float]:
 
 def suspension_of(machine: Machine, name: str) -> tuple[Support, ...]:
     """Supports of a machine's rotor by the name of what holds it, one of `SUSPENSIONS`."""
+    require(name, "suspension", str, among=SUSPENSIONS)
     if name == "free-free":
         return ()
     if name == "AMBs":
         return amb_supports(machine)
-    if name == "touchdown bearings":
-        return touchdown_supports(machine)
-    raise UsageError(f"unknown suspension {name!r}; choose one of {', '.join(map(repr, SUSPENSIONS))}")
+    return touchdown_supports(machine)
 
 
 def amb_supports(machine: Machine) -> tuple[Support, ...]:

@@ -12,7 +12,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
 from rotordrop.errors import SimulationError
 from rotordrop.require import each, numbers, require
-from rotordrop.rotor.reduction import Reduction
+from rotordrop.rotor.reduction import Reduction, reduction_of
 from rotordrop.units import InSI
 
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
@@ -69,9 +69,12 @@ class LevitatedStart:
     follows the runout of its sensors makes it; by default the response to the unbalance alone, shape (A,)."""
 
     def __post_init__(self) -> None:
-        for name in ("remanent_force", "offset"):
-            if getattr(self, name) is not None:
-                numbers(getattr(self, name), name, finite=True)
+        orbit = None if self.orbit is None else np.asarray(self.orbit)
+        read = {"remanent_force": self.remanent_force, "offset": self.offset}
+        read["orbit"] = None if orbit is None else np.stack([orbit.real, orbit.imag])
+        for name, values in read.items():
+            if values is not None:
+                numbers(values, name, finite=True)
         require(self.rotor_angle, "rotor_angle", float)
         require(self.delay, "delay", float, least=0.0)
         require(self.remanence_time_constant, "remanence_time_constant", float, above=0.0)
@@ -190,7 +193,7 @@ class DropCase(Case):
         require(self.spin, "spin", str, among=get_args(SpinMode))
         require(self.most_steps, "most_steps", int, least=1)
         require(self.jump, "jump", UnbalanceJump, none=True)
-        require(self.reduction, "reduction", str, Reduction)
+        reduction_of(self.reduction)
         if self.magnets is not None:
             each(self.magnets, "magnets", MagnetEvent)
         count = self.duration / self.output_step
@@ -254,8 +257,9 @@ class CoastDownCase(Case):
     def __post_init__(self) -> None:
         given = () if self.duration is None else ("duration",)
         self._check("longest", "output_step", "stop_speed", "settled_error", *given)
-        if not np.isfinite(self.rest) or self.rest < 0.0:
-            raise SimulationError(f"rest is {self.rest!r} s; expected a finite time of zero or more.")
+        reduction_of(self.reduction)
+        require(self.rest, "rest", float, least=0.0, error=SimulationError)
+        require(self.settled_scheme, "settled_scheme", bool, error=SimulationError)
         if not np.isfinite(self.speed) or abs(self.speed) <= self.stop_speed:
             raise SimulationError(
                 f"speed is {self.speed!r} rad/s; a coast-down starts above {self.stop_speed:g} rad/s. "

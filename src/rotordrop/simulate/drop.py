@@ -55,6 +55,7 @@ def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool
     """
     require(machine, "machine", Machine, DropModel)
     require(case, "case", DropCase)
+    require(certify, "certify", bool)
     model = machine if isinstance(machine, DropModel) else model_for(machine, case)
     result = _simulate(model, case)
     if certify:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Literal
 
+from rotordrop.errors import UsageError
+
 Kind = Literal["deep groove", "angular contact"]
 
 # Mean and standard deviation of the ball diameter over the height of the cross-section, 2 D_w / (D - d), and
@@ -184,6 +186,12 @@ def infer_balls(
                 stiff = _rigidity_error(rigidity, row, conformity)
                 weights[diameter, count, conformity] = math.exp(-0.5 * (error + unusual + carried + stiff))
     diameter, count, conformity = max(weights, key=lambda key: weights[key])
+    if weights[diameter, count, conformity] == 0.0:
+        given = ", ".join(f"{one:g} N" for one in ratings if one is not None)
+        raise UsageError(
+            f"no balls in {1e3 * bore:g} × {1e3 * outside_diameter:g} mm have the load ratings {given}; "
+            "expected those of the maker in N. Correct them or leave them out."
+        )
     counts = _interval([(float(z), w) for (_, z, _), w in weights.items()])
     diameters = _interval([(d, w) for (d, _, _), w in weights.items()])
     rated = [

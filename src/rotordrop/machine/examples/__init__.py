@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from rotordrop.errors import UsageError
 from rotordrop.machine.loading import load_machine
 from rotordrop.machine.machine import Machine
+from rotordrop.require import require
 
 _EXAMPLES = {
     "paper": "the reference machine, reconstructed from Neisi et al. 2020",
@@ -23,8 +23,7 @@ def example_names() -> tuple[str, ...]:
 
 def example_path(name: str) -> Path:
     """Path of the machine file of an example."""
-    if name not in _EXAMPLES:
-        raise UsageError(f"there is no example machine {name!r}; there are {', '.join(_EXAMPLES)}")
+    require(name, "example machine", str, among=_EXAMPLES)
     return Path(str(files("rotordrop.machine.examples") / f"{name}.toml"))
 
 
