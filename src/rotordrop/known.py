@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -71,12 +70,10 @@ class Known:
         for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):
             if (one := getattr(self, name)) is not None or name == "value":
                 numbers(one, name, ())
-        if math.isnan(self.value) and self.status != "default":  # there it follows from other values
-            require(self.value, "value", float)
         for name in ("interval_90", "range", "bounds"):
             if (ends := getattr(self, name)) is not None:
                 low, high = numbers(ends, name, (2,))
-                if not low <= high:
+                if low > high:
                     raise UsageError(f"{name} is {ends}; expected the lower end first.")
 
     def __float__(self) -> float:

@@ -72,6 +72,7 @@ def test_numbers_come_back_exactly_zero_where_it_makes_sense():
         ({"value": "1e8 N/m", "status": "sure"}, "status = 'sure' is not known; it is one of given, guess"),
         (True, "True is not a stiffness"),
         (Known(value=math.inf), "is not a finite number"),
+        (Known(value=math.nan), "is not a finite number"),
     ],
 )
 def test_refusals_name_the_value_and_the_way_out(written, told):
