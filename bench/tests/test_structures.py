@@ -12,7 +12,6 @@ from rotordrop.elements.load import Load
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
-from rotordrop.physics import departure as D
 from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force
 from rotordrop.physics.contact import contact_force
 from rotordrop.rotor.assembly import free_free_modes
@@ -20,7 +19,9 @@ from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, UnbalanceJump
 from rotordrop.simulate.losses import losses
 from rotordrop_bench import Violations, hidden_machine
+from rotordrop_bench import departure as D
 from rotordrop_bench.ball_tables import fast_pair, held_pair, table_row, thrust_pair
+from rotordrop_bench.departing import STATES_AT, departing
 from rotordrop_bench.recording import true_drop
 from rotordrop_bench.settled import settled_coordinates, without_magnets
 from rotordrop_bench.structure import departures_of, violated
@@ -58,7 +59,7 @@ def departed(model, **parts):
     machine = violated(model.machine, v)
     values = build_drop_model(machine, "quick") if machine is not model.machine else model
     rows = departures_of(machine, v)
-    return values.departing(rows if len(rows) else nothing(machine))
+    return departing(values, rows if len(rows) else nothing(machine))
 
 
 def nothing(machine):
@@ -110,7 +111,7 @@ def test_what_is_late_or_has_no_compliance_leaves_every_bit(known, case, plain, 
     compliances = [D.FOUNDATION_MODE + D.COMPLIANCE, D.TILT_MODE + D.COMPLIANCE]
     assert np.all(rows[:, compliances] > 0.0)
     rows[:, compliances] = 0.0
-    same_bits(simulate_drop(model.departing(rows), case), plain)
+    same_bits(simulate_drop(departing(model, rows), case), plain)
 
 
 PRESENT = {
@@ -228,7 +229,7 @@ def test_a_ring_of_balls_under_a_thrust_has_the_forces_of_the_pair_at_rest(known
 
 def axial(model, result):
     """Force of the face [N], axial way of race and rotor [m] at DE."""
-    row, first = model.parameters.departure[1], model.parameters.bearing_at[1, L.DEPARTURE]
+    row, first = model.parameters.departure[1], model.parameters.bearing_at[1, STATES_AT]
     states = result.state[:, first : first + D.N_STATES]
     push = np.array([D.landed(row, own, 0.0, 0.0, 1.0)[0] for own in states])
     return push, states[:, D.AXIAL + 1], states[:, D.AXIAL]
@@ -326,8 +327,8 @@ def test_a_loose_bearing_lies_in_its_seat_and_is_not_damped_there(known):
     state[model.layout.n_coordinates + x] = pushed
     for way, damped in ((0.5 * play, False), (2.0 * play, True)):
         state[down] = state[support + 1] - way
-        rates = model.layout.zeros()
-        drop_derivative(0.0, state, model.parameters, rates, scratch_of(model.parameters))
+        rates, p = model.layout.zeros(), model.parameters
+        p.form.of(drop_derivative)(0.0, state, p, rates, scratch_of(p))
         assert bool(rates[model.layout.n_coordinates + x] < -pushed) == damped
 
 
@@ -405,7 +406,7 @@ def test_slip_in_a_support_dissipates_however_slow(model, amplitude):
     """Work over a closed loop is positive and the same at any rate: that is hysteresis, not damping."""
     rows = nothing(model.machine)
     rows[0, [D.SLIP_FORCE, D.SLIP_TRAVEL]] = 100.0, 1e-6
-    changed = model.departing(rows)
+    changed = departing(model, rows)
     p = changed.parameters._replace(bearing=changed.parameters.bearing.copy())
     p.bearing[:, [L.SUPPORT_DAMPING_X, L.SUPPORT_DAMPING_Y]] = 0.0
     lost = [_loop_work(changed, p, amplitude, frequency) for frequency in (1.0, 100.0)]
@@ -417,12 +418,12 @@ def _loop_work(model, p, amplitude, frequency):
     """Work [J] that the support takes in its third turn of a sinusoidal motion along x."""
     y, rates, work, steps = model.layout.zeros(), model.layout.zeros(), scratch_of(p), 4000
     h, w = model.layout.support.start, 2.0 * np.pi * frequency
-    slip = p.bearing_at[0, L.DEPARTURE] + D.SLIP_X
-    done, dt = 0.0, 1.0 / (frequency * steps)
+    slip = p.bearing_at[0, STATES_AT] + D.SLIP_X
+    done, dt, derivative = 0.0, 1.0 / (frequency * steps), p.form.of(drop_derivative)
     for i in range(3 * steps):
         phase = w * (i + 0.5) * dt
         y[h], y[h + model.layout.n_coordinates] = amplitude * np.sin(phase), amplitude * w * np.cos(phase)
-        drop_derivative(0.0, y, p, rates, work)
+        derivative(0.0, y, p, rates, work)
         y[slip] += dt * rates[slip]
         force = p.bearing[0, L.SUPPORT_STIFFNESS_X] * y[h] + 100.0 * y[slip]
         done += force * y[h + model.layout.n_coordinates] * dt * (i >= 2 * steps)
@@ -559,7 +560,7 @@ def test_the_rotor_rests_lower_on_a_foundation_and_higher_in_a_gap_that_closed(k
     tilt = {"tilt_stiffness": "600 N/um", "tilt_frequency": "11 kHz"}
     hidden = hidden_machine(known, 3, violations(foundation=FOUNDATION, gap=drift, race=tilt))
     model = hidden.model
-    plain = model.departing(model.parameters.departure[:0])
+    plain = departing(model, model.parameters.departure[:0])
     moved = (settled_coordinates(model) - settled_coordinates(plain))[model.layout.modal_y]
     weight = model.load_shares
     sag = weight / (400.0 * (2.0 * math.pi * 85.0) ** 2) + weight / 6e8
@@ -572,10 +573,10 @@ def test_a_machine_at_rest_has_no_acceleration(known):
     model = hidden.model
     p, y, rates = without_magnets(model), model.layout.zeros(), model.layout.zeros()
     y[: model.layout.n_coordinates] = settled_coordinates(model)
-    for b, first in enumerate(p.bearing_at[:, L.DEPARTURE]):
+    for b, first in enumerate(p.bearing_at[:, STATES_AT]):
         mode = p.departure[b, D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH]
         # what the foundation yields to the weight it carries
         y[first + 1] = -mode[D.COMPLIANCE] * model.load_shares[b] / mode[D.SQUARE_Y]
-    drop_derivative(1e9, y, p, rates, scratch_of(p))
+    p.form.of(drop_derivative)(1e9, y, p, rates, scratch_of(p))
     left = rates[model.layout.velocity_of(model.layout.modal_y)]
     assert np.max(np.abs(left)) < 1e-6 * np.max(np.abs(p.gravity))

@@ -9,6 +9,7 @@ from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine import example_machine
 from rotordrop.physics.columns import POSITION
 from rotordrop_bench import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
+from rotordrop_bench.departing import departures_in
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import PERFECT, lagging
 from rotordrop_bench.true_values import KINDS, violated_kinds
@@ -316,7 +317,7 @@ def test_what_a_machine_file_says_is_not_lost_beside_violations():
     with pytest.raises(UsageError, match=r"states NDE\.mount .* leave the mount or the violations out"):
         hidden_machine(mounted, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
     coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})
-    assert not len(hidden_machine(coupled, 1, "none").model.parameters.departure)
+    assert not len(departures_in(hidden_machine(coupled, 1, "none").model))
     with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
         hidden_machine(coupled, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
 

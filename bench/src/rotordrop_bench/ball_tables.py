@@ -16,8 +16,8 @@ from rotordrop.elements.ball_numbers import BallNumbers
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
-from rotordrop.physics import departure as D
 from rotordrop.rotor.parameters import FASTEST
+from rotordrop_bench import departure as D
 from rotordrop_bench.violations import BallsViolation, FaceViolation
 
 LARGEST_LOADS = 60.0

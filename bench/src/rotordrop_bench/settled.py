@@ -14,7 +14,6 @@ from rotordrop.elements.ball_numbers import BallNumbers
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
-from rotordrop.physics import departure as D
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.load import load_now
 from rotordrop.physics.pendulum import small_frequency
@@ -23,7 +22,9 @@ from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.levitation import rigid_amplitudes
+from rotordrop_bench import departure as D
 from rotordrop_bench.ball_tables import thrust_pair
+from rotordrop_bench.departing import STATES_AT, DepartingParameters, departing, departures_in
 
 MOST_ITERATIONS = 100
 SMALLEST_CHANGE = 1e-15
@@ -53,7 +54,7 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
     machine that departs from its model the one nearest to that: slip in a support has crept to nothing, the
     cage stands where it stood. The rotor stands at an angle [rad].
     """
-    if model.layout.departing:
+    if len(departures_in(model)):
         return _departing_rest(model, angle)
     parameters = without_magnets(model)
     mass = coordinate_masses(model)
@@ -149,13 +150,14 @@ def coordinate_masses(model: DropModel) -> Array:
 
 
 def _energy(state: Array, parameters: KernelParameters) -> float:
-    return float(stored_energy(LONG_AFTER, state, parameters, False))
+    return float(parameters.form.of(stored_energy)(LONG_AFTER, state, parameters, False))
 
 
 def _departing_rest(model: DropModel, angle: float) -> Array:
-    plain = model.departing(model.parameters.departure[:0])
+    plain = departing(model, departures_in(model)[:0])
     parameters, n_q = without_magnets(model), model.layout.n_coordinates
-    parameters = parameters._replace(departure=parameters.departure.copy())
+    parameters = parameters._replace(bearing=parameters.bearing.copy())
+    assert isinstance(parameters, DepartingParameters)
     for row in parameters.departure:
         if row[D.SLEEVE_OVAL] != 0.0:  # it rests on one place of its sleeve, as an eccentric one would
             off_x, off_y, _, _ = D.sleeve(row, angle, 0.0, -1.0)
@@ -165,7 +167,7 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
     places, mass = list(range(n_q)), list(coordinate_masses(model))
     start, thrust = list(found), [0.0] * n_q
     for b, row in enumerate(parameters.departure):
-        first = parameters.bearing_at[b, L.DEPARTURE]
+        first = parameters.bearing_at[b, STATES_AT]
         for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
             if row[mode + D.COMPLIANCE] > 0.0:
                 places += [first + place, first + place + 1]
@@ -179,7 +181,7 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
             thrust += [push, 0.0]
     at, masses = np.array(places), np.array(mass)
     velocities = np.where(at < n_q, at + n_q, at + 2)
-    work = scratch_of(parameters)
+    work, derivative = scratch_of(parameters), parameters.form.of(drop_derivative)
 
     def completed(coordinates: Array) -> Array:
         state = model.layout.zeros()
@@ -189,7 +191,7 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
 
     def force(coordinates: Array) -> Array:
         rates = model.layout.zeros()
-        drop_derivative(LONG_AFTER, completed(coordinates), parameters, rates, work)
+        derivative(LONG_AFTER, completed(coordinates), parameters, rates, work)
         return np.asarray(masses * rates[velocities])
 
     def force_and_stiffness(coordinates: Array) -> tuple[Array, Array]:
@@ -212,7 +214,7 @@ def _way_along(model: DropModel, b: int) -> float:
     """Axial way [m] of a race that carries its static load and the thrust on its face."""
     numbers = numbers_of(model.machine.touchdown_bearings[b])
     assert isinstance(numbers, BallNumbers)
-    thrust = float(model.parameters.departure[b, D.THRUST])
+    thrust = float(departures_in(model)[b, D.THRUST])
     return thrust_pair(numbers.constants, numbers.deflection(float(model.load_shares[b]))[0], thrust)[2]
 
 
@@ -221,7 +223,7 @@ def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
 
     Within the play of a seat nothing holds a race: no step would lead out of it.
     """
-    layout, rows = model.layout, model.parameters.departure
+    layout, rows = model.layout, departures_in(model)
     down = np.zeros(len(model.machine.touchdown_bearings))
     ways = (coordinates[layout.support] - coordinates[layout.race])[1::2]
     for b, load in enumerate(model.load_shares):

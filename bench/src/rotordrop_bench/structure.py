@@ -18,11 +18,12 @@ from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
-from rotordrop.physics import departure as D
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop_bench import departure as D
 from rotordrop_bench.ball_tables import face_row, table_row
+from rotordrop_bench.departing import departures_in
 from rotordrop_bench.violations import BearingViolations, Violations
 
 PULL_LASTS, PULL_POINTS = 6.0, 61
@@ -181,7 +182,7 @@ def _further(
 def loosened(model: DropModel) -> DropModel:
     """The model whose races, where they are loose in their seats, lie in them by their weight."""
     bearing = model.parameters.bearing.copy()
-    for row, own in zip(bearing, model.parameters.departure, strict=False):
+    for row, own in zip(bearing, departures_in(model), strict=False):
         if own[D.LOOSE_WAY] > 0.0:
             row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(model.machine.gravity)
     return replace(model, parameters=model.parameters._replace(bearing=bearing))

@@ -13,16 +13,17 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from dis import get_instructions
-from functools import cached_property, lru_cache, update_wrapper
+from functools import lru_cache, update_wrapper
 from pathlib import Path
 from threading import RLock
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
 OPTIONAL_PARTS = True
-"""Stands in kernels before what few machines have; false in their plain forms, see `plain_form`."""
+"""Stands in kernels before what few machines have; false in their plain forms, see `PLAIN`."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Named = TypeVar("Named", bound=type)
@@ -99,14 +100,29 @@ def by_reference(named: Named) -> Named:
     return named
 
 
-def plain_form(function: Function) -> Function:
-    """The form of a kernel for machines without optional parts, compiled without them."""
-    return cast(Function, function.plain) if isinstance(function, _Kernel) else function
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """Another form of kernels: what stands there under some names, in them and in all behind them.
+
+    A part is changed in the same way, so that what it calls under another name is what it takes the place of.
+    """
+
+    name: str
+    parts: Mapping[str, Any]
+    beside: Path | None = None
+    """Folder of the package whose parts these are, where it is not this one."""
+
+    def of(self, function: Function) -> Function:
+        """A kernel in this form; what is no kernel stays."""
+        return cast(Function, function.form(self)) if isinstance(function, _Kernel) else function
+
+
+FULL, PLAIN = Form(name="full", parts={}), Form(name="plain", parts={"OPTIONAL_PARTS": False})
+"""Kernels as they stand, and for machines without optional parts, compiled without them."""
 
 
 def _lazy(function: Function, **options: Any) -> Function:
-    interpreted = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
-    return function if interpreted else cast(Function, _Kernel(function, options))
+    return cast(Function, _Kernel(function, options))
 
 
 class _Kernel:
@@ -116,28 +132,29 @@ class _Kernel:
     kernels behind it, as a whole.
     """
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(
+        self, function: Callable[..., Any], options: dict[str, Any], beside: Path | None = None
+    ) -> None:
         self.py_func = function
         self._options = options
+        self._beside = beside
+        self._forms: dict[str, _Kernel] = {}
         self._inner: Any = None
-        self._outer: Any = None
+        self._outer: Any = function if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0" else None
         update_wrapper(self, function)
 
-    @cached_property
-    def plain(self) -> _Kernel:
-        """The kernel and all behind it with `OPTIONAL_PARTS` false; itself where that changes nothing."""
-        known, code = self.py_func.__globals__, self.py_func.__code__
-        names = {one.argval for one in get_instructions(code) if one.opname == "LOAD_GLOBAL"} & set(known)
-        other = {name: known[name].plain for name in names if isinstance(known[name], _Kernel)}
-        changed: dict[str, Any] = {name: one for name, one in other.items() if one is not known[name]}
-        if "OPTIONAL_PARTS" in names and known["OPTIONAL_PARTS"]:
-            changed["OPTIONAL_PARTS"] = False
-        if not changed:
-            return self
-        function = FunctionType(code, known | changed, argdefs=self.py_func.__defaults__)
-        update_wrapper(function, self.py_func)
-        function.__qualname__ = f"plain_{self.py_func.__qualname__}"
-        return _Kernel(function, self._options)
+    def form(self, form: Form) -> _Kernel:
+        """The kernel in another form; itself where that changes nothing."""
+        if form.name not in self._forms:
+            known, code = self.py_func.__globals__, self.py_func.__code__
+            names = {one.argval for one in get_instructions(code) if one.opname == "LOAD_GLOBAL"} & set(known)
+            parts = {name: form.of(form.parts.get(name, known[name])) for name in names}
+            changed = {name: one for name, one in parts.items() if one is not known[name]}
+            function = FunctionType(code, known | changed, argdefs=self.py_func.__defaults__)
+            update_wrapper(function, self.py_func)
+            function.__qualname__ = f"{form.name}_{self.py_func.__qualname__}"
+            self._forms[form.name] = _Kernel(function, self._options, form.beside) if changed else self
+        return self._forms[form.name]
 
     @property
     def inner(self) -> Any:
@@ -155,7 +172,7 @@ class _Kernel:
             with _MAKING:
                 if self._outer is None:
                     home = Path(self.py_func.__code__.co_filename).resolve().parent
-                    beside = None if home in _FOLDERS else home
+                    beside = self._beside or (None if home in _FOLDERS else home)
                     shipped = _SHIPPED / kernel_digest(beside)
                     self._outer = _compiler().entry(
                         self.py_func, cache_folder(beside), shipped, **self._options

@@ -142,7 +142,7 @@ def ball_set_force(
 
 @inner_kernel
 def bearing_reaction(
-    numbers: Array, F_x: float, F_y: float, vx: float, vy: float, spin: float, held: float = 1.0
+    numbers: Array, F_x: float, F_y: float, vx: float, vy: float, spin: float
 ) -> tuple[float, float, float, float, float]:
     """Force on the support, torque on the race and power lost of a bearing whose balls push back.
 
@@ -156,8 +156,6 @@ def bearing_reaction(
         Velocity of the race against the support [m/s].
     spin : float
         Spin of the race [rad/s].
-    held : float
-        Share of the damping that acts [1]: none while the bearing is loose in its seat.
 
     Returns
     -------
@@ -177,7 +175,7 @@ def bearing_reaction(
         numbers[PITCH_DIAMETER],
         numbers[DRAG_SPEED],
     )
-    C_b = held * numbers[DAMPING]
+    C_b = numbers[DAMPING]
     return F_x + C_b * vx, F_y + C_b * vy, drag, C_b * (vx * vx + vy * vy), drag * spin
 
 

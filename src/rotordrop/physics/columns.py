@@ -18,7 +18,7 @@ from rotordrop.physics import (
     thermal,
     touch,
 )
-from rotordrop.physics._compile import by_reference
+from rotordrop.physics._compile import FULL, PLAIN, Form, by_reference
 
 # Columns of `KernelParameters.bearing`, one row per touchdown bearing; SI units. The contact law and the ball
 # set are blocks of columns that only their own modules read.
@@ -157,19 +157,18 @@ N_ROTOR_PLACES = 11
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
-# Then its first contact and the one behind its last, and the first state of its departure, of its mount, of
-# its sprung rings and of the axial motion of its race; -1 without one.
+# Then its first contact and the one behind its last, and the first state of its mount, of its sprung rings
+# and of the axial motion of its race; -1 without one.
 RACE = 0
 SUPPORT = 1
 RACE_SPIN = 2
 BEARING_OWN = 3
 CONTACTS = 4
 CONTACTS_END = 5
-DEPARTURE = 6
-MOUNT_STATES = 7
-RING_STATES = 8
-FACE_STATES = 9
-N_BEARING_PLACES = 10
+MOUNT_STATES = 6
+RING_STATES = 7
+FACE_STATES = 8
+N_BEARING_PLACES = 9
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that
@@ -197,14 +196,15 @@ class KernelParameters(NamedTuple):
     where a race moves axially (2 B, 3, Z8), first the rows that motion towards +z loads, then the others,
     ``ball_table`` (B, ·, ·, ·, ·) or (0, ·, ·, ·, ·) what `physics.ball_table` reads of balls at speed;
     ``rotor_at``, ``bearing_at`` (B, ·), ``contact_at`` (C, ·) and ``magnet_at`` (A, ·) say where the states
-    of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``departure``
-    (B, ·) or (0, ·) holds what `physics.departure` reads. ``load`` (K, ·), ``load_shape`` (K, m) and
-    ``load_points`` (R, 3) are what pushes the rotor (`physics.load`). ``rub`` (N, · + m) are the contacts of
-    the rotor with its housing, numbers of `physics.touch` and then shape, ``stops`` (S,) the bearings whose
-    mount has a stop, ``faces`` (F,) those with an axial face; the log has all three behind the contacts with
-    races. ``memory`` is what is remembered beside the state: a right-hand side reads it. Bearings that warm
-    have their temperatures first in it, which `simulate.heat` writes between stretches of time; then come the
-    clock and the controllers of magnets, which `simulate._sampled` writes where a step has ended on a sample.
+    of each owner stand, so that no kernel computes a place from numbers of modes and bearings. ``load``
+    (K, ·), ``load_shape`` (K, m) and ``load_points`` (R, 3) are what pushes the rotor (`physics.load`).
+    ``rub`` (N, · + m) are the contacts of the rotor with its housing, numbers of `physics.touch` and then
+    shape, ``stops`` (S,) the bearings whose mount has a stop, ``faces`` (F,) those with an axial face; the
+    log has all three behind the contacts with races. ``memory`` is what is remembered beside the state: a
+    right-hand side reads it. Bearings that warm have their temperatures first in it, which `simulate.heat`
+    writes between stretches of time; then come the clock and the controllers of magnets, which
+    `simulate._sampled` writes where a step has ended on a sample. A package whose machines have more derives
+    from this class, with rows of ``bearing`` and ``bearing_at`` that are longer.
     """
 
     eigenvalue: Array
@@ -225,7 +225,6 @@ class KernelParameters(NamedTuple):
     bearing_at: Integers
     contact_at: Integers
     magnet_at: Integers
-    departure: Array
     load: Array
     load_shape: Array
     load_points: Array
@@ -233,3 +232,16 @@ class KernelParameters(NamedTuple):
     stops: Integers
     faces: Integers
     memory: Array
+
+    @property
+    def form(self) -> Form:
+        """The form of the kernels for this machine: plain where it has no optional part."""
+        at, row = self.bearing_at, self.bearing
+        optional = (
+            max(len(self.rub), len(self.stops), len(self.faces), *self.flags[[LOOPS_ACT, LOADS_ACT]]) > 0
+            or self.rotor_at[AXIAL] >= 0
+            or bool((at[:, RACE] < 0).any())
+            or bool((at[:, [FACE_STATES, RING_STATES, MOUNT_STATES]] >= 0).any())
+            or bool((row[:, [FAST_SPEED_STEP, MOUNT]] != 0.0).any())
+        )
+        return FULL if optional else PLAIN

@@ -28,8 +28,6 @@ class StateLayout:
     sensor_own: int = 0
     """Number of sensors that lag behind, each with the reading that it has got to [m]; only the filter moves
     these."""
-    departing: tuple[int, ...] = ()
-    """Kinds of the states of what departs at each bearing, behind the books; empty where nothing does."""
     raceless: tuple[bool, ...] = ()
     """Whether each bearing has no race, where one has none; the states of what is not there stay zero."""
     moves_axially: bool = False
@@ -87,8 +85,6 @@ class StateLayout:
             if not name.startswith("further") and name != "axial_velocity":
                 object.__setattr__(self, name, stop - 1 if size is None else slice(stop - size, stop))
         kinds = np.repeat([kind for _, kind in blocks.values()], sizes).astype(np.int64)
-        # behind the books, where what the filter estimates ends: no estimator's model holds a departure
-        kinds = np.concatenate([kinds, np.tile(np.array(self.departing, dtype=np.int64), b)])
         object.__setattr__(self, "kinds", kinds)
 
     @classmethod
@@ -157,7 +153,7 @@ class StateLayout:
         return places
 
     def bearing_at(self) -> Integers:
-        """Places of the states of each bearing, shape (B, 10), see ``RACE`` and the names beside it."""
+        """Places of the states of each bearing, shape (B, 9), see ``RACE`` and the names beside it."""
         places = np.full((self.n_bearings, L.N_BEARING_PLACES), -1, dtype=np.int64)
         count = np.arange(self.n_bearings)
         places[:, L.RACE] = self.race.start + 2 * count
@@ -168,9 +164,6 @@ class StateLayout:
             places[:, place] = _first_of(counts, self.further_at(place).start, self.n_bearings)
         places[np.array(self.raceless, dtype=bool).nonzero(), L.RACE] = -1
         places[:, L.CONTACTS], places[:, L.CONTACTS_END] = count, count + 1
-        of_one = len(self.departing)
-        if of_one:
-            places[:, L.DEPARTURE] = self.work_in + 1 + of_one * count
         return places
 
     def contact_at(self) -> Integers:
@@ -205,7 +198,6 @@ class StateLayout:
             *self._names_of_further(bearings),
             *((ROTOR_AXIAL, f"{ROTOR_AXIAL} velocity") if self.moves_axially else ()),
             *("rotor speed", "rotor angle", "dissipated energy", "work put in"),
-            *(f"departure {name} {k + 1}" for name in bearing_names for k in range(len(self.departing))),
         )
 
     def _names_of_further(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:

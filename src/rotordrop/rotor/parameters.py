@@ -15,7 +15,7 @@ from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
-from rotordrop.physics import aerodynamics, departure, magnet, touch
+from rotordrop.physics import aerodynamics, magnet, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
@@ -58,14 +58,6 @@ class DropModel:
                 amb.fill(row)
         return replace(self, machine=machine, parameters=self.parameters._replace(**values))
 
-    def departing(self, rows: Array) -> DropModel:
-        """The same model whose bearings depart from it by rows (B, C) of `physics.departure`, if any."""
-        layout = replace(self.layout, departing=departure.KINDS if len(rows) else ())
-        p = self.parameters._replace(
-            departure=rows, rotor_at=layout.rotor_at(), bearing_at=layout.bearing_at()
-        )
-        return replace(self, layout=layout, parameters=p)
-
     def at_rest(self) -> Array:
         """State, shape (n,), of a centred rotor with all at rest; loose races lie where they fall."""
         state = self.layout.zeros()
@@ -75,8 +67,7 @@ class DropModel:
             if weight > 0.0:
                 seat = numbers_of(bearing).seat(weight)
                 sag = weight / p[b, L.SUPPORT_STIFFNESS_Y]
-                loose = self.parameters.departure[b, departure.LOOSE_WAY] if self.layout.departing else 0.0
-                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - loose - sag
+                state[self.layout.race][2 * b : 2 * b + 2] = seat[0], seat[1] - sag
                 state[self.layout.support][2 * b + 1] = -sag
         return state
 
@@ -153,7 +144,6 @@ def _kernel_parameters(
         bearing_at=layout.bearing_at(),
         contact_at=layout.contact_at(),
         magnet_at=layout.magnet_at(by_magnets, kept),
-        departure=np.zeros((0, departure.N_COLUMNS)),
         memory=np.zeros(kept + sum(by_magnets)),
         **_of_values(machine, fe, basis, shares),
     )

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.physics import ball_table, departure, face, magnet, mount, ring, support, touch
+from rotordrop.physics import ball_table, face, magnet, mount, ring, support, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import OPTIONAL_PARTS, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_energy
@@ -19,14 +18,12 @@ from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate._loop import borne, contact_at
 from rotordrop.simulate._rhs import (
     Scratch,
-    departing,
     depth_now,
     face_values,
     modal_parts,
     mount_states,
     plane_motion,
     project,
-    pushed_along,
     race_deflection,
     ring_travel,
     rows_of,
@@ -142,13 +139,6 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     row = p.bearing[b]
     balls, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
     dx, dy = race_deflection(b, y, p)
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
-        spin = y[p.bearing_at[b, L.RACE_SPIN]]
-        return departure.table_energy(p.departure[b], math.sqrt(dx * dx + dy * dy), spin)
-    if OPTIONAL_PARTS and pushed_along(b, p):
-        s, own = departing(b, y, p)
-        pressed: float = departure.ring_of_balls(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])[2]
-        return pressed + departure.axial_energy(s, own, p.spin[L.ROTOR_MASS], row[L.RACE_MASS])
     if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
         grid, spin = row[L.FAST : L.FAST_END], y[p.bearing_at[b, L.RACE_SPIN]]
         return ball_table.fast_energy(grid, p.ball_table[b], p.balls[b], dx, dy, spin)
@@ -166,11 +156,19 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
 
 
 @lean_kernel
-def touch_energy(b: int, law: Array, delta: float, p: KernelParameters) -> float:
-    """Energy [J] in a contact of one bearing."""
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        return departure.energy_in_contact(p.departure[b], law, delta)
-    return contact_energy(law, delta)
+def touch_energy(b: int, delta: float, p: KernelParameters) -> float:
+    """Energy [J] in a contact of one bearing at an indentation [m]."""
+    return contact_energy(p.bearing[b, L.CONTACT : L.CONTACT_END], delta) if delta > 0.0 else 0.0
+
+
+@lean_kernel
+def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
+    """Energy [J] in the springs of one support."""
+    h, row = p.bearing_at[b, L.SUPPORT], p.bearing[b]
+    energy: float = (
+        0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2 + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
+    )
+    return energy
 
 
 @lean_kernel
@@ -239,9 +237,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         row = p.bearing[b]
         r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
         for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-            delta = depth_now(t, c, b, y, p)
-            law = row[L.CONTACT : L.CONTACT_END]
-            energy += touch_energy(b, law, delta, p) if delta > 0.0 else 0.0
+            energy += touch_energy(b, depth_now(t, c, b, y, p), p)
         if r >= 0:
             energy += ball_energy(b, y, p)
             energy += row[L.RACE_WEIGHT] * y[r + 1]
@@ -249,15 +245,7 @@ def stored_energy(t: float, y: Array, p: KernelParameters, with_rotor_spin: bool
         energy += (
             0.5 * row[L.SUPPORT_MASS_X] * y[n_q + h] ** 2 + 0.5 * row[L.SUPPORT_MASS_Y] * y[n_q + h + 1] ** 2
         )
-        if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-            s, own = departing(b, y, p)
-            springs = row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1]
-            energy += departure.stored_energy(s, own, springs, y[h], y[h + 1])
-        else:
-            energy += (
-                0.5 * row[L.SUPPORT_STIFFNESS_X] * y[h] ** 2
-                + 0.5 * row[L.SUPPORT_STIFFNESS_Y] * y[h + 1] ** 2
-            )
+        energy += spring_energy(b, y, p)
         if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
             energy += support_form_energy(b, y, p)
         energy += 0.5 * row[L.RACE_INERTIA] * y[p.bearing_at[b, L.RACE_SPIN]] ** 2

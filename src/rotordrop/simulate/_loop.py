@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.physics import ball_set, ball_table, departure, mount
+from rotordrop.physics import ball_set, ball_table, mount
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import OPTIONAL_PARTS, by_reference, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.ball_set import ball_set_load
@@ -24,11 +24,9 @@ from rotordrop.simulate._rhs import (
     Scratch,
     ball_force,
     contact_values,
-    departing,
     depth_now,
     drop_derivative,
     face_values,
-    pushed_along,
     race_deflection,
     race_travel,
     ring_travel,
@@ -181,6 +179,15 @@ def scaled_error(
     for i in range(n):
         total += scratch[i]
     return math.sqrt(total / n) / tolerance
+
+
+@inner_kernel
+def step_error(
+    h: float, y: Array, y_new: Array, k: Array, e: Array, rule: Control, p: KernelParameters, scratch: Array
+) -> float:
+    """`scaled_error` of a step over the states that the control looks at; up to 1 it is accepted."""
+    scale = rule.scale[: p.rotor_at[L.N_CONTROLLED]]
+    return scaled_error(h, y, y_new, k, e, scale, rule.tolerance, scratch)
 
 
 @lean_kernel
@@ -397,14 +404,6 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     """
     dx, dy = race_deflection(b, y, p)
     spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
-        way = math.sqrt(dx * dx + dy * dy)
-        load = max(departure.from_table(p.departure[b], departure.TABLE_LOAD, way, spin), 0.0)
-        return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
-    if OPTIONAL_PARTS and pushed_along(b, p):
-        s, own = departing(b, y, p)
-        load = departure.hardest_ball(s, math.sqrt(dx * dx + dy * dy), own[departure.AXIAL + 1])
-        return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
     return deflected_loads(b, dx, dy, ring_travel(b, y, p), along, spin, p)
 
 
@@ -532,8 +531,6 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     """
     n = y.shape[0]
     i_w = p.rotor_at[L.ROTOR_SPEED]
-    # What departs stands behind the books and has a norm of its own: at rest it must not loosen the control.
-    apart, watched = p.rotor_at[L.WORK_IN] + 1, control.scale[: p.rotor_at[L.N_CONTROLLED]]
     y_new = np.empty(n)
     k = np.empty((7, n))
     work = scratch_of(p)
@@ -557,13 +554,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
         tried += 1
         step = min(h, t_end - t, landing)
         runge_kutta_stages(t, step, y, p, tab, k, y_new, work, powers)
-        error = scaled_error(step, y, y_new, k, tab.e, watched, control.tolerance, scratch)
-        if OPTIONAL_PARTS and n > apart:
-            scale = control.scale[apart:]
-            by_others = scaled_error(
-                step, y[apart:], y_new[apart:], k[:, apart:], tab.e, scale, control.tolerance, scratch
-            )
-            error = max(error, by_others)
+        error = step_error(step, y, y_new, k, tab.e, control, p, scratch)
         if not error <= 1.0:
             progress[REJECTED] += 1.0
             h = 0.1 * step if not math.isfinite(error) else step * max(SHRINK, SAFETY * power(error, -0.2))

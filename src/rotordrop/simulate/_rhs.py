@@ -15,7 +15,6 @@ from rotordrop.arrays import Array
 from rotordrop.physics import (
     aerodynamics,
     ball_table,
-    departure,
     face,
     landing_sleeve,
     magnet,
@@ -25,7 +24,7 @@ from rotordrop.physics import (
     touch,
 )
 from rotordrop.physics import columns as L
-from rotordrop.physics._compile import OPTIONAL_PARTS, Function, inner_kernel, kernel, lean_kernel, plain_form
+from rotordrop.physics._compile import OPTIONAL_PARTS, inner_kernel, kernel, lean_kernel
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.ball_set import (
     ball_set_axial_force,
@@ -69,21 +68,6 @@ def scratch_of(p: KernelParameters) -> Scratch:
     return Scratch(np.empty((2, p.balls.shape[2])), power, blend)
 
 
-def suited(function: Function, p: KernelParameters) -> Function:
-    """The kernel for a machine: its plain form where the machine has no optional part."""
-    at, row = p.bearing_at, p.bearing
-    states = (L.DEPARTURE, L.FACE_STATES, L.RING_STATES, L.MOUNT_STATES)
-    numbers = (L.FAST_SPEED_STEP, L.MOUNT)
-    optional = (
-        max(len(p.rub), len(p.stops), len(p.faces), p.flags[L.LOOPS_ACT], p.flags[L.LOADS_ACT]) > 0
-        or p.rotor_at[L.AXIAL] >= 0
-        or bool((at[:, L.RACE] < 0).any())
-        or bool((at[:, states] >= 0).any())
-        or bool((row[:, numbers] != 0.0).any())
-    )
-    return function if optional else plain_form(function)
-
-
 @lean_kernel
 def project(shape: Array, amplitudes: Array) -> float:
     """Physical displacement or velocity of a node from modal amplitudes: one row of mode shapes times
@@ -107,13 +91,6 @@ def modal_parts(y: Array, p: KernelParameters) -> tuple[Array, Array, Array, Arr
 
 
 @inner_kernel
-def departing(b: int, y: Array, p: KernelParameters) -> tuple[Array, Array]:
-    """Numbers and states of what departs at one bearing that has a departure."""
-    first = p.bearing_at[b, L.DEPARTURE]
-    return p.departure[b], y[first : first + departure.N_STATES]
-
-
-@inner_kernel
 def true_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, float, float, float]:
     """Displacement [m] and velocity [m/s] of the rotor against the bore of contact ``c`` of bearing ``b``.
 
@@ -128,12 +105,7 @@ def true_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, f
         uy += shape[k] * qy[k]
         vx += shape[k] * sx[k]
         vy += shape[k] * sy[k]
-    ux, uy, vx, vy = ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        s, own = departing(b, y, p)
-        angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
-        return departure.against_bore(s, own, angle, spin, ux, uy, vx, vy)
-    return ux, uy, vx, vy
+    return ux - y[r], uy - y[r + 1], vx - y[n_q + r], vy - y[n_q + r + 1]
 
 
 @inner_kernel
@@ -151,9 +123,6 @@ def relative_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[floa
 def gap_at(t: float, b: int, y: Array, p: KernelParameters) -> float:
     """Air gap [m] of one bearing now."""
     gap: float = p.bearing[b, L.AIR_GAP]
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        s, own = departing(b, y, p)
-        gap = departure.gap_now(s, own, t, gap)
     return gap
 
 
@@ -175,15 +144,6 @@ def contact_values(
     row, gap = p.bearing[b], gap_at(t, b, y, p)
     numbers, law = row[L.TOUCH : L.TOUCH_END], row[L.CONTACT : L.CONTACT_END]
     omega = y[p.rotor_at[L.ROTOR_SPEED]]
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        s, own = departing(b, y, p)
-        at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
-        law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
-        left = departure.friction_left(s, own)
-        delta, F_r, F_mu, nx, ny, sliding, lost = touch.touch(
-            numbers, gap, law, ux, uy, vx, vy, omega, omega_i
-        )
-        return delta, F_r, left * F_mu, nx, ny, left * sliding, lost
     return touch.touch(numbers, gap, law, ux, uy, vx, vy, omega, omega_i)
 
 
@@ -191,11 +151,15 @@ def contact_values(
 def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
     """Displacement [m] of the race of one bearing relative to its support, in the axes of its balls."""
     r, h = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
-    x, z = y[r] - y[h], y[r + 1] - y[h + 1]
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        _, own = departing(b, y, p)
-        return departure.turned(own[departure.CAGE_ANGLE], x, z)
-    return x, z
+    return y[r] - y[h], y[r + 1] - y[h + 1]
+
+
+@inner_kernel
+def race_velocity(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
+    """Velocity [m/s] of the race of one bearing against its support, which its balls damp."""
+    n_q = p.rotor_at[L.N_COORDINATES]
+    r, h = n_q + p.bearing_at[b, L.RACE], n_q + p.bearing_at[b, L.SUPPORT]
+    return y[r] - y[h], y[r + 1] - y[h + 1]
 
 
 @inner_kernel
@@ -212,20 +176,12 @@ def rows_of(b: int, p: KernelParameters) -> tuple[Array, Array]:
 
 
 @inner_kernel
-def pushed_along(b: int, p: KernelParameters) -> bool:
-    """Whether a departure has the rotor land on the face of the race of one bearing."""
-    pushed: bool = p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.THRUST] > 0.0
-    return pushed
-
-
-@inner_kernel
 def rises_with_travel(b: int, p: KernelParameters) -> bool:
     """Whether the force of a bearing grows with the travel of its race, whatever else stands in the state.
 
     What gives way axially and balls that press outwards leave no order between the two.
     """
     carried: bool = p.bearing_at[b, L.RACE] >= 0 and p.bearing_at[b, L.RING_STATES] < 0
-    carried = carried and not pushed_along(b, p)
     slow: bool = p.bearing[b, L.FAST_SPEED_STEP] == 0.0 and p.bearing_at[b, L.FACE_STATES] < 0
     return carried and slow
 
@@ -263,25 +219,7 @@ def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[fl
     """
     x, z = race_deflection(b, y, p)
     spin, along = y[p.bearing_at[b, L.RACE_SPIN]], race_travel(b, y, p)
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0 and p.departure[b, departure.TABLE_SPEEDS] > 0.0:
-        way = math.sqrt(x * x + z * z)
-        rise = departure.from_table(p.departure[b], departure.TABLE_FORCE, way, spin) / max(way, 1e-15)
-        _, own = departing(b, y, p)
-        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
-        return F_x, F_y, 0.0
-    if OPTIONAL_PARTS and pushed_along(b, p):
-        s, own = departing(b, y, p)
-        way = math.sqrt(x * x + z * z)
-        rise = departure.ring_of_balls(s, way, own[departure.AXIAL + 1])[0] / max(way, 1e-15)
-        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], rise * x, rise * z)
-        return F_x, F_y, 0.0
-    F_x, F_y, by_spin = deflected_force(b, x, z, ring_travel(b, y, p), along, spin, p, work)
-    if OPTIONAL_PARTS and p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
-        return F_x, F_y, by_spin
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        _, own = departing(b, y, p)
-        F_x, F_y = departure.turned(-own[departure.CAGE_ANGLE], F_x, F_y)
-    return F_x, F_y, 0.0
+    return deflected_force(b, x, z, ring_travel(b, y, p), along, spin, p, work)
 
 
 @inner_kernel
@@ -573,16 +511,12 @@ def add_race(
     and the drag take [W].
     """
     n_q = p.rotor_at[L.N_COORDINATES]
-    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
+    r, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
     row = p.bearing[b]
     F_x, F_y, exchanged = ball_force(b, y, p, work)
-    wx = y[n_q + r] - y[n_q + h]
-    wy = y[n_q + r + 1] - y[n_q + h + 1]
+    wx, wy = race_velocity(b, y, p)
     numbers = row[L.ROLLING : L.ROLLING_END]
-    held = 1.0
-    if OPTIONAL_PARTS and p.bearing_at[b, L.DEPARTURE] >= 0:
-        held = departure.held_share(p.departure[b], y[r] - y[h], y[r + 1] - y[h + 1])
-    F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin], held)
+    F_x, F_y, drag, by_balls, by_drag = bearing_reaction(numbers, F_x, F_y, wx, wy, y[spin])
     dy[n_q + r] = (dy[n_q + r] - F_x) / row[L.RACE_MASS]
     dy[n_q + r + 1] = (dy[n_q + r + 1] - F_y - row[L.RACE_WEIGHT]) / row[L.RACE_MASS]
     dy[spin] = (friction * row[L.BORE_RADIUS] - drag) / row[L.RACE_INERTIA]
@@ -678,62 +612,6 @@ def add_axial_motion(
 
 
 @lean_kernel
-def add_departing_thrust(
-    t: float, b: int, y: Array, p: KernelParameters, dy: Array
-) -> tuple[float, float, float, float, float]:
-    """Add the axial motion of rotor and race that a departing thrust makes, and the friction of the face.
-
-    Returns the torque on the race [N m] and the power that sliding, the face, the balls and drag take [W].
-    """
-    n_q, r, spin = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
-    s, own = departing(b, y, p)
-    _, rates = departing(b, dy, p)
-    row, shape, at = p.bearing[b], p.bearing_shape[b], departure.AXIAL
-    if s[departure.THRUST] == 0.0:
-        rates[at : at + 4] = 0.0
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    _, _, sx, sy = modal_parts(y, p)
-    _, _, ax, ay = modal_parts(dy, p)
-    vx, vy = project(shape, sx) - y[n_q + r], project(shape, sy) - y[n_q + r + 1]
-    slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[spin]
-    push, F_x, F_y, torque, sliding, lost = departure.landed(s, own, vx, vy, slip)
-    for k in range(shape.shape[0]):
-        ax[k] -= shape[k] * F_x
-        ay[k] -= shape[k] * F_y
-    dy[n_q + r] += F_x / row[L.RACE_MASS]
-    dy[n_q + r + 1] += F_y / row[L.RACE_MASS]
-    x, z = race_deflection(b, y, p)
-    held = departure.ring_of_balls(s, math.sqrt(x * x + z * z), own[at + 1])[1]
-    drag = race_drag_torque(
-        abs(held), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
-    )
-    dy[spin] += (torque - drag) / row[L.RACE_INERTIA]
-    thrust = 0.0 if t < p.spin[L.POWER_OFF_DELAY] else s[departure.THRUST]
-    damped = s[departure.ALONG] * row[L.BEARING_DAMPING] * own[at + 3]
-    rates[at], rates[at + 1] = own[at + 2], own[at + 3]
-    rates[at + 2] = (thrust - push) / p.spin[L.ROTOR_MASS]
-    rates[at + 3] = (push - held - damped) / row[L.RACE_MASS]
-    dy[p.rotor_at[L.WORK_IN]] += thrust * own[at + 2]
-    return torque, sliding, lost, damped * own[at + 3], drag * y[spin]
-
-
-@lean_kernel
-def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
-    """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
-    race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
-    s, own = departing(b, y, p)
-    _, rates = departing(b, dy, p)
-    lost: float = departure.mode_rates(
-        s[departure.TILT_MODE : departure.TILT_MODE + departure.MODE_WIDTH],
-        dy[race],
-        dy[race + 1],
-        own[departure.TILT : departure.TILT + 4],
-        rates[departure.TILT : departure.TILT + 4],
-    )
-    return lost
-
-
-@lean_kernel
 def landing_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Torque on the rotor [N m] of the normal force that ``dy`` holds so far: it misses the rotor's axis."""
     c = p.bearing_at[b, L.CONTACTS]
@@ -743,61 +621,6 @@ def landing_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     at = p.rotor_at[L.N_COORDINATES] + p.contact_at[c, L.CONTACT_BODY]
     torque: float = arm * (nx * dy[at] + ny * dy[at + 1])
     return torque
-
-
-@lean_kernel
-def sleeve_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
-    """Torque on the rotor [N m] of the contact force that ``dy`` holds so far, beside that of friction.
-
-    Source: virtual work of `departure.sleeve`.
-    """
-    s, own = departing(b, y, p)
-    if s[departure.SLEEVE_OFF] == 0.0 and s[departure.SLEEVE_OVAL] == 0.0:
-        return 0.0
-    body = p.contact_at[p.bearing_at[b, L.CONTACTS], L.CONTACT_BODY]
-    qx, qy, _sx, _sy = modal_parts(y, p)
-    x = project(p.bearing_shape[b], qx) - y[body] - own[departure.TILT] - s[departure.CENTRE_X]
-    z = project(p.bearing_shape[b], qy) - y[body + 1] - own[departure.TILT + 1] - s[departure.CENTRE_Y]
-    _x, _z, by_x, by_z = departure.sleeve(s, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
-    at = p.rotor_at[L.N_COORDINATES] + body
-    torque: float = -by_x * dy[at] - by_z * dy[at + 1]
-    return torque
-
-
-@lean_kernel
-def add_departing_support(
-    b: int, F_x: float, F_y: float, sliding: float, y: Array, p: KernelParameters, dy: Array
-) -> float:
-    """Rates of a support that departs, its foundation, the heat of sliding and the cage; power lost [W].
-
-    ``F_x, F_y`` is the force on the support [N], ``sliding`` the heat of friction [W].
-    """
-    n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
-    row = p.bearing[b]
-    s, own = departing(b, y, p)
-    _, rates = departing(b, dy, p)
-    k_x, k_y, c_x, c_y, lost = departure.support_force(
-        s,
-        own,
-        rates,
-        row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1],
-        row[L.SUPPORT_DAMPING_X : L.SUPPORT_DAMPING_Y + 1],
-        y[h],
-        y[h + 1],
-        y[n_q + h],
-        y[n_q + h + 1],
-    )
-    dy[n_q + h] = (F_x - c_x - k_x) / row[L.SUPPORT_MASS_X]
-    dy[n_q + h + 1] = (F_y - c_y - k_y) / row[L.SUPPORT_MASS_Y]
-    rates[departure.HEAT] = sliding
-    rates[departure.CAGE_ANGLE] = s[departure.CAGE_RATIO] * y[p.bearing_at[b, L.RACE_SPIN]]
-    return lost + departure.mode_rates(
-        s[departure.FOUNDATION_MODE : departure.FOUNDATION_MODE + departure.MODE_WIDTH],
-        k_x + c_x,
-        k_y + c_y,
-        own[departure.FOUNDATION : departure.FOUNDATION + 4],
-        rates[departure.FOUNDATION : departure.FOUNDATION + 4],
-    )
 
 
 @lean_kernel
@@ -820,22 +643,13 @@ def bearing_accelerations(
         sliding += by_sliding
         lost += by_law
     F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
-    departs = p.bearing_at[b, L.DEPARTURE] >= 0
-    by_tilt, by_sleeve = 0.0, 0.0
-    if OPTIONAL_PARTS and departs:
-        by_tilt, by_sleeve = add_tilt(b, y, p, dy), sleeve_torque(b, y, p, dy)
+    by_sleeve = 0.0
     if row[L.NOT_ROUND] != 0.0:
-        by_sleeve += landing_torque(b, y, p, dy)
+        by_sleeve = landing_torque(b, y, p, dy)
     if not OPTIONAL_PARTS or p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
         dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
-    by_face, rubbed = 0.0, 0.0
-    if OPTIONAL_PARTS and departs:
-        by_face, rubbed, by_landing, by_moving, by_rolling = add_departing_thrust(t, b, y, p, dy)
-        lost += by_landing
-        by_balls += by_moving
-        by_drag += by_rolling
     sprung = p.bearing_at[b, L.RING_STATES] >= 0
     by_fit = 0.0
     if OPTIONAL_PARTS and sprung:
@@ -853,16 +667,13 @@ def bearing_accelerations(
     ]
     if row[L.SUPPORT_FORM + support.PRESENT] != 0.0:
         by_support = add_support_form(b, y, p, dy)
-    if OPTIONAL_PARTS and departs:
-        by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy)
     if OPTIONAL_PARTS and sprung:
         by_support += by_fit
     # Written together and last: each write makes the compiler read the arrays of the bearing again.
     power = work.power[b]
-    sliding += rubbed
     power[SLIDING], power[IN_CONTACT] = sliding, lost
     power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
-    torque = by_sleeve - by_face - friction * row[L.ROTOR_RADIUS]
+    torque = by_sleeve - friction * row[L.ROTOR_RADIUS]
     return torque, by_balls + by_drag + by_support + (sliding + lost)
 
 

@@ -27,7 +27,7 @@ from rotordrop.simulate import _coast_loop as C
 from rotordrop.simulate import _histories as H
 from rotordrop.simulate import _loop
 from rotordrop.simulate import _settled_loop as S
-from rotordrop.simulate._rhs import N_PLACES, suited
+from rotordrop.simulate._rhs import N_PLACES
 from rotordrop.simulate._tableau import Tableau, dp5, tsit5
 from rotordrop.simulate.case import CoastDownCase, Simulated
 from rotordrop.simulate.heat import Warming, warmed, warms
@@ -150,7 +150,7 @@ class Run:
         progress[[_loop.TIME, _loop.STEP]] = time, min(FIRST_STEP, setup.control.largest_step)
         progress[_loop.PREVIOUS_ERROR] = float(not setup.control.logarithmic)
         running, log = np.zeros((watched, _loop.N_RUN_COLUMNS)), np.zeros((watched, _loop.N_LOG_COLUMNS))
-        progress[_loop.LOGGED] = suited(_loop.start_running, p)(y, time, p, running, log)
+        progress[_loop.LOGGED] = p.form.of(_loop.start_running)(y, time, p, running, log)
         status = np.zeros(7)
         status[[STOPPED_AT, LAST_SAMPLE]] = np.nan, last_sample
         run = cls(
@@ -248,7 +248,7 @@ def follow(
 
     def fill(part: slice, now: KernelParameters) -> None:
         if with_histories:
-            suited(H.bearing_histories, now)(times[part], states[part], now, histories[part])
+            now.form.of(H.bearing_histories)(times[part], states[part], now, histories[part])
 
     states[0], parts, filled = run.state, [(slice(0, 1), present(setup, run))], 1
     fill(*parts[0])
@@ -290,7 +290,7 @@ def step(
     stop_speed = setup.control.stop_speed if run.spinning else -1.0
     control = setup.control._replace(end=float(end), stop_speed=stop_speed)
     arrays = (states, log, run.running, run.books, run.peaks, run.progress)
-    return int(suited(setup.stepped, now)(run.state, times, now, setup.tableau, control, *arrays))
+    return int(now.form.of(setup.stepped)(run.state, times, now, setup.tableau, control, *arrays))
 
 
 def _end(setup: Setup, run: Run, times: Array, filled: int) -> float:
@@ -346,7 +346,7 @@ def _after(setup: Setup, run: Run, outcome: int, sample: int) -> None:
 def energies(p: KernelParameters, times: Array, states: Array) -> tuple[Array, Array]:
     """Energy [J] of states (T, n), and with it what was dissipated less what was put in: constant."""
     stored = np.empty(len(times))
-    suited(H.stored_energies, p)(times, states, p, True, stored)
+    p.form.of(H.stored_energies)(times, states, p, True, stored)
     return stored, stored + states[:, p.rotor_at[L.DISSIPATED]] - states[:, p.rotor_at[L.WORK_IN]]
 
 
@@ -383,11 +383,11 @@ def _settled_piece(
     start, begun = run.state.copy(), run.time
     exact = _reference(setup, run, now, times[: max(1, round(CHECKED / case.output_step))])
     stop_speed = case.stop_speed if run.spinning else -1.0
-    got = suited(S.integrate_settled, now)(
+    got = now.form.of(S.integrate_settled)(
         run.state, begun, case.output_step, setup.settled_parts, now, stop_speed, states, run.books
     )
     done = histories[:got]
-    suited(H.bearing_histories, now)(times[:got], states[:got], now, done)
+    now.form.of(H.bearing_histories)(times[:got], states[:got], now, done)
     error = _difference(now, times, states[:got], done, exact)
     lost = not np.all(np.isfinite(states[:got])) or bool(np.any(done[..., H.H_DELTA] <= 0.0))
     if got == 0 or lost or not error[0] <= case.settled_error:
@@ -416,7 +416,7 @@ def _difference(
         return math.inf, math.inf
     moved, exactly = (H.node_displacements(one[:count], p.bearing_shape) for one in (states, reference))
     exact = np.empty((count, *histories.shape[1:]))
-    suited(H.bearing_histories, p)(times[:count], reference[:count], p, exact)
+    p.form.of(H.bearing_histories)(times[:count], reference[:count], p, exact)
     force = slice(H.H_BEARING_FORCE_X, H.H_BEARING_FORCE_Y + 1)
     return float(np.max(np.abs(moved - exactly))), float(
         np.max(np.abs(histories[:count, :, force] - exact[..., force]))

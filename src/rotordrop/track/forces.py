@@ -19,7 +19,6 @@ from rotordrop.simulate._rhs import (
     race_travel,
     ring_travel,
     scratch_of,
-    suited,
 )
 from rotordrop.track import _propagation as P
 from rotordrop.track._arrays import copy_into
@@ -164,7 +163,7 @@ def _values_at(problem: DropProblem, times: Array, means: Array) -> tuple[Array,
     values, contacts = np.empty((len(means), n_b, N_VALUES)), np.empty((len(means), n_b, 6))
     gradients, s = np.empty((len(means), n_b, N_VALUES, 3)), problem.n_dynamic
     count = len(problem.unknowns)
-    suited(force_values, p)(times, means, s, problem.targets, p, count, values, gradients, contacts)
+    p.form.of(force_values)(times, means, s, problem.targets, p, count, values, gradients, contacts)
     return values, gradients, contacts
 
 
@@ -178,7 +177,7 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     steps = np.arange(1 + (samples - 1) * substeps)
     time = np.interp(steps / substeps, np.arange(samples), problem.time[:samples])
     means, p = np.empty((len(steps), smoothed.means.shape[1])), private_copy(problem.model.parameters)
-    suited(states_between, p)(problem.time, smoothed.means, problem.targets, p, substeps, means)
+    p.form.of(states_between)(problem.time, smoothed.means, problem.targets, p, substeps, means)
     smoothed = replace(smoothed, means=means, watched=smoothed.watched[steps // substeps])
     values, gradients, contacts = _values_at(problem, time, means)
     sigma = _standard_deviations(smoothed, gradients)
@@ -223,7 +222,7 @@ def stress_at_force(problem: DropProblem, theta: Array, b: int, force: Array) ->
     along = np.asarray(force) / max(size, 1e-300)
     work, out = scratch_of(p), np.empty(N_VALUES)
 
-    fill_values = suited(bearing_values, p)
+    fill_values = p.form.of(bearing_values)
 
     def lacking(deflection: float) -> float:
         fill_values(

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics import ring
-from rotordrop.simulate._rhs import suited
 from rotordrop.track import _filter
 from rotordrop.track import _propagation as P
 from rotordrop.track._arrays import unpack
@@ -151,7 +150,7 @@ class Forward:
             speed_R=problem.speed_variance,
         )
         x_0, p = self.means[start] if start else self.prior, private_copy(problem.model.parameters)
-        done = suited(forward_pass, p)(
+        done = p.form.of(forward_pass)(
             x_0, P, measured, problem.targets, p, self.settings, problem.sensor_form, segment
         )
         return start + int(done), segment

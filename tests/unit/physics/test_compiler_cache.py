@@ -124,8 +124,8 @@ def test_the_plain_form_leaves_optional_parts_out_of_all_kernels_behind_it(kerne
     source = tmp_path / "other" / "doubled_kernel.py"
     source.write_text(PARTED)
     doubled = kernel_of()
-    plain = _compile.plain_form(doubled)
+    plain = _compile.PLAIN.of(doubled)
     assert (doubled(2.0), plain(2.0)) == (5.0, 4.0)
     assert doubled(2.0, 3.0) == 13.0  # what stands for an argument that is left out is kept in both
     assert plain(2.0, 3.0) == 12.0
-    assert plain.plain is plain
+    assert _compile.PLAIN.of(plain) is plain
