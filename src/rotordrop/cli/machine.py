@@ -107,16 +107,29 @@ def init(
 
 def _simple_text(numbers: Sequence[str]) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
-    from rotordrop.machine.simple import simple_text
+    from rotordrop.machine.simple import EXAMPLES, read_number, simple_text
 
     given = pairs(numbers, 'a number, "mass=60 kg"')
+    for name in EXAMPLES:
+        if given.get(name):
+            read_number(name, given)
     missing = [name for name in _QUESTIONS if not given.get(name)]
     if missing and not (sys.stdin and sys.stdin.isatty()):
         raise UsageError(
             f"--simple needs {', '.join(missing)}; nobody can be asked, because the input is no terminal: "
             f'give them, as in --set "{missing[0]}=..."'
         )
-    return simple_text(given | {name: typer.prompt(_QUESTIONS[name], err=True).strip() for name in missing})
+    for name in missing:
+
+        def readable(said: str, name: str = name) -> str:
+            try:
+                read_number(name, given | {name: said})
+            except UsageError as error:
+                raise typer.BadParameter(str(error)) from None  # makes it ask again
+            return said
+
+        given[name] = typer.prompt(_QUESTIONS[name], err=True, value_proc=readable)
+    return simple_text(given)
 
 
 def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -12,6 +13,7 @@ from pydantic import ValidationError
 from rotordrop.elements.catalog.lookup import find_bearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.support import REFERENCE_MASS
+from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine
 from rotordrop.machine.saving import machine_text
@@ -154,15 +156,11 @@ def simple_text(given: Mapping[str, str]) -> str:
     said: dict[str, Any] = {name: " ".join(value.split()) for name, value in given.items() if value.strip()}
     if missing := [name for name in known if name not in said]:
         raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
-    for name in ("bearings", "sensors"):
-        planes = said[name] = tuple(place.strip() for place in said[name].replace(";", ",").split(","))
-        if len(planes) != 2:
-            raise UsageError(f'{name} needs two planes, such as "110 mm, 980 mm"')
+    said |= {name: read_number(name, said) for name in said}
     try:
         made = simple_machine(SimpleMachine(**said))
     except ValidationError as error:
-        reasons = "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
-        raise UsageError(f"these numbers make no machine: {reasons}") from None
+        raise UsageError(f"these numbers make no machine: {_reasons(error)}") from None
     weight = f"both halves together: {said['mass']}, centre at {said['centre']}"
     remarks = {
         "speed.nominal": said["speed"],
@@ -177,6 +175,54 @@ def simple_text(given: Mapping[str, str]) -> str:
         "touchdown_bearings.support.mass": "not given: a share of the rotor's mass",
     }
     return machine_text(made, remarks)
+
+
+def read_number(name: str, said: Mapping[str, str]) -> str | tuple[str, str]:
+    """One of the numbers said as `SimpleMachine` takes it; a place has to lie on the rotor.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read.
+    """
+    length = math.inf
+    if name in ("centre", "bearings", "sensors") and "length" in said:
+        length = in_si(read_number("length", said), "length", "length")
+    try:
+        return _read(name, said[name], length)
+    except (UsageError, LookupError, ValidationError) as error:
+        reason = _reasons(error) if isinstance(error, ValidationError) else str(error)
+        reason = reason.removeprefix(f"{name}: ")
+        raise UsageError(f"{name}, such as {EXAMPLES[name]!r}: {reason}") from None
+
+
+def _read(name: str, text: str, length: float) -> str | tuple[str, str]:
+    kind = getattr(vars(SimpleMachine).get(name), "kind", None)
+    if name in ("bearings", "sensors"):
+        first, *others = (place.strip() for place in text.replace(";", ",").split(","))
+        if len(others) != 1:
+            raise UsageError(f"{text!r} are not two planes")
+        _planes((first, others[0]), length, name)
+        return first, others[0]
+    if name == "designation":
+        find_bearing(text)
+    elif name == "grade":
+        BalanceGrade.model_validate({"grade": text, "at_speed": "1 Hz"})
+    elif name == "support":
+        _supports(text, REFERENCE_MASS, 2)
+    elif kind:
+        if re.search(r"[,;]\s", text):
+            raise UsageError(f"{text!r} are several values; give one")
+        value = in_si(text, kind, name)
+        if value <= 0.0 and kind != "angle":
+            raise UsageError(f"{text!r} is not allowed here; it must be positive")
+        if name == "centre" and math.isfinite(length):
+            _share_at_de(value, length)
+    return text
+
+
+def _reasons(error: ValidationError) -> str:
+    return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
 
 
 def drafted_machine(
@@ -245,15 +291,20 @@ def _planes(given: tuple[float | str, float | str], length: float, name: str) ->
     return first, second
 
 
-def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
-    """Two halves of one diameter; their densities carry mass and centre of mass."""
-    share = 2.0 * known.centre / known.length - 0.5  # of the mass in the half at the DE
+def _share_at_de(centre: float, length: float) -> float:
+    """Share of the mass in the half at the DE [1]."""
+    share = 2.0 * centre / length - 0.5
     if not 0.02 < share < 0.98:
         raise UsageError(
-            f"the centre of mass at {_mm(known.centre)} is too far from the middle of a rotor of "
-            f"{_mm(known.length)} for a beam; expected {_mm(0.26 * known.length)} to "
-            f"{_mm(0.74 * known.length)}: describe the rotor by sections"
+            f"the centre of mass at {_mm(centre)} is too far from the middle of a rotor of {_mm(length)} for "
+            f"a beam; expected {_mm(0.26 * length)} to {_mm(0.74 * length)}: describe the rotor by sections"
         )
+    return share
+
+
+def _beam(known: SimpleMachine, positions: list[float]) -> dict[str, Any]:
+    """Two halves of one diameter; their densities carry mass and centre of mass."""
+    share = _share_at_de(known.centre, known.length)
     area = known.mass / (STEEL_DENSITY * known.length)
     diameter = f"{1e3 * math.sqrt(4.0 * area / math.pi):.6g} mm"
     middle = positions.index(0.5 * known.length) + 1

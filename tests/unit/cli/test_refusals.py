@@ -45,6 +45,11 @@ REFUSED = [
     ("convert rotor.pdf", 2, "'.pdf' is no format of a rotor"),
     ("init m.toml --set 'mass=60 kg'", 64, "numbers of a machine belong to --simple"),
     ("init --simple --set 'mass=60 kg' --set 'length=1.1 m'", 64, SIMPLE),
+    (
+        "init --simple --set 'sensor_angle=0 deg, 90 deg'",
+        64,
+        "sensor_angle, such as '135 deg': '0 deg, 90 deg' are several values",
+    ),
     ("init --example lp500", 64, "there is no example machine 'lp500'; there are paper, lp400"),
     ("init --example lp400", 6, r"drop_060\.h5 exists already; name another folder or add --force"),
     ("waterfall {lp400} nowhere.h5", 3, r"nowhere\.h5"),

@@ -1,6 +1,8 @@
 """A machine of twelve numbers; shaft sections from tables, as other programs call their columns."""
 
+import io
 import math
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -116,6 +118,30 @@ def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
     assert load_machine(target).touchdown_bearings[0].support.stiffness.range == pytest.approx(
         (1e7 / 7.0, 7e7), rel=1e-5
     )
+
+
+class Terminal(io.StringIO):
+    """What somebody types at a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_an_answer_that_cannot_be_read_is_asked_for_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    typed = (
+        "60 kg\n1.1 m\n35 mm, 965 mm\n900 mm\n520 mm\n110 mm\n110 mm, 980 mm\n180 mm, 900 mm\n0 deg, 90 deg\n"
+    )
+    typed += "135 deg\nhello\n7014 ACD/HCP4A\n0.2\n0.25 mm\n9000 rpm\nfine\nG 2.5\nfirm\nstiff\n"
+    monkeypatch.setattr("sys.stdin", Terminal(typed))
+    assert run(["init", "--simple"]) == 0
+    asked = capsys.readouterr().err
+    wrong = re.findall(r"Error: (\w+), such as .*?: (.*)", asked)
+    assert [
+        name for name, _ in wrong
+    ] == "centre centre bearings sensor_angle designation gap grade support".split()
+    assert "'0.2' has no unit" in wrong[5][1]
+    assert load_machine("machine.toml").rotor.centre_of_gravity == pytest.approx(0.52)
 
 
 DYROBES = "Ele,L,OD,ID,Mass OD,Material\n,mm,mm,mm,mm,\n1,100,60,0,60,\n2,300,80,20,100,\n3,100,60,0,60,\n"
