@@ -99,4 +99,4 @@ def test_a_wide_force_says_why_and_what_would_narrow_it_once_for_both_ends(estim
     assert "Force (NDE, DE) ± 16 %" in said and "± 2 % with a tap test" in said
     assert said in text_of(wide)
     (said,) = width_advice(replace(wide, advice=(replace(found, narrowed=halves),)))
-    assert "Force (NDE, DE) ± 16 % because of the readings themselves" in said
+    assert "Force (NDE, DE) ± 16 %; no one measurement" in said
