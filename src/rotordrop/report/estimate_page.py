@@ -643,9 +643,9 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
     grave = [one for one in (static, *limits) if one.level in ("bad", "warning")]
     assumed = ", ".join(dict.fromkeys(estimate.assumed.values()))
-    remedies = dict.fromkeys(_remedies(estimate))
+    remedies = dict.fromkeys("; ".join(_remedies(estimate)).split("; "))
     told = (
-        f"to do next: {'; '.join(remedies)}" if remedies else "",
+        f"to do next: {'; '.join(remedies)}" if any(remedies) else "",
         *advice,
         static.text if estimate.consistent and static not in grave else "",
         f"assumed: {assumed}" if assumed else "",
@@ -654,17 +654,24 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     loads, verdict = _loads(estimate), _short(judgement, LONGEST_VERDICT)
     said: list[Statement] = []
     left = LINES - 4 - len(loads.rows) - _lines(verdict)
-    # of a model that failed the way out comes first
-    ranked = [*calm[:1], *grave, *calm[1:]]
-    if estimate.consistent:  # what limits a number comes first
-        widths = [Statement(text) for text in advice]
-        ranked = [*widths, *grave, *(one for one in calm if one not in widths)]
-    for one in (_short(one, LONGEST) for one in ranked):
-        if _lines(one) + (len(said) + 1 < len(ranked)) <= left:
-            said.append(one)
-            left -= _lines(one)
-    if len(said) < len(ranked):
-        said.append(Statement(f"{len(ranked) - len(said)} more with --all"))
+    # of a model that failed the way out comes first: what the record itself says of it, then what to do
+    seen = [one for one in grave if one in quality_statements(estimate.findings)]
+    ranked = [*seen, *calm[:1], *(one for one in grave if one not in seen), *calm[1:]]
+    if estimate.consistent:
+        ranked = [*grave, *calm]
+    for one in ranked:
+        room = left - (len(said) + 1 < len(ranked))
+        whole = _short(one, LONGEST)
+        fitting = (
+            whole if _lines(whole) <= room or one not in grave else _short(one, WIDTH - len("warning: "))
+        )
+        if _lines(fitting) <= room:
+            said.append(fitting)
+            left -= _lines(fitting)
+    if hidden := len(ranked) - len(said):
+        warnings = sum(one in grave for one in ranked) - sum(one.level in ("bad", "warning") for one in said)
+        some = f" ({warnings} warning{'s' * (warnings > 1)})" if warnings else ""
+        said.append(Statement(f"{hidden} more with --all{some}"))
     return ReportContent(
         title=f"{estimate.machine.name}, {estimate.name}, dropped from {shown(estimate.speed, 'speed')}",
         simulated=SIMULATED_RECORD if estimate.simulated_record else "",
