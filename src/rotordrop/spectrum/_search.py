@@ -443,7 +443,8 @@ class LineSearch:
         """Lines at a steady one plus or minus an order: look along every such path."""
         if self._clock.angle is None:
             return
-        steady = sorted(self._phases, key=lambda entry: -entry[0].strength)
+        kept = [entry for entry in self._phases if entry[0] in self.found]  # not a burst that was refused
+        steady = sorted(kept, key=lambda entry: -entry[0].strength)
         pairs = [(line, phase, k) for line, phase in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
         seen: list[list[Peak | None]] = []
         while pairs and len(self.found) < self.settings.most_lines:

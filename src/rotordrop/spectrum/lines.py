@@ -146,11 +146,11 @@ def name_lines(
     ]
     lines = [named(plane, line, (*candidates, *harmonics_of(line, swings))) for plane, line in single]
     label = {
-        id(line): (result.label if result.named else f"{line.frequency:.1f} Hz")
+        line: (result.label if result.named else f"{line.frequency:.1f} Hz")
         for (_, line), result in zip(single, lines, strict=True)
     }
     return lines + [
-        _line(line, plane, _combination_name(line, label[id(line.parent)]))
+        _line(line, plane, _combination_name(line, label[line.parent]))
         for plane, line in found
         if line.parent
     ]

@@ -95,6 +95,19 @@ def test_a_sum_or_difference_of_a_steady_line_and_an_order_is_found_on_its_path(
     assert partner.frequency == pytest.approx(steady, abs=0.02)
 
 
+def test_the_partner_of_a_sum_is_a_line_that_was_kept():
+    """What swells a hundredfold for a third of the time is refused as a burst and found again as a line."""
+    down = CoastDown(duration=14.0, time_constant=20.0, noise=0.05e-6)
+    phase = TURN * 200.0 * down.time
+    down.xy[:, 0] += 3e-6 * np.cos(phase) + 0.5e-6 * np.cos(phase + down.angle + 0.3)
+    down.add_whirl(200.0, 300e-6, 3.0, 7.0)
+    found = search(down.xy, down.sampling_rate, down.exact()).run()
+    (line,) = (one for one in found if one.kind == "combination")
+    assert line.parent in found
+    names = [one.label for one in name_lines([("DE", one) for one in found], (), 285e-6, (450.0, 20.0))]
+    assert names == ["forward whirl", "forward whirl + 1X"]
+
+
 def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch():
     dice = np.random.default_rng(5)
     power = dice.exponential(1e-16, size=(40, 400, 2))
