@@ -225,8 +225,13 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
 
 def _likeliest_wanted(error: RotordropError) -> bool:
     """Whether somebody at a terminal takes the likeliest channels where no names tell."""
-    known = isinstance(error, UnmatchedError) and "likeliest" in error.remedy
-    return known and sys.stdin.isatty() and typer.confirm("Use the likeliest?", default=True, err=True)
+    if not (isinstance(error, UnmatchedError) and "likeliest" in error.remedy and sys.stdin.isatty()):
+        return False
+    try:
+        return typer.confirm("Use the likeliest?", default=True, err=True)
+    except typer.Abort:  # nobody answers
+        typer.echo(err=True)
+        return False
 
 
 def _discard_standard_output() -> None:
