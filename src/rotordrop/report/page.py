@@ -50,6 +50,7 @@ def render_page(content: ReportContent) -> str:
             content=content,
             sections=numbered,
             running_title=css_text(" · ".join(filter(None, (content.title, content.subtitle)))),
+            css_text=css_text,
             style=_text("templates", "page.css"),
             scripts=scripts,
             policy=content_security_policy(scripts),

@@ -152,6 +152,24 @@ def test_the_first_printed_page_is_the_one_to_send_and_the_rest_an_appendix(brow
     assert sheets(browser) == 3 < longer
 
 
+def test_a_full_sheet_is_not_followed_by_one_of_a_single_sentence(browser, tmp_path):
+    write_page(ReportContent(title="Drop"), tmp_path / "page.html")
+    browser.open(f"file://{tmp_path / 'page.html'}")
+    browser.evaluate("document.querySelector('header').style.height = '985px'")
+    assert sheets(browser) == 1
+    browser.evaluate("document.querySelector('header').style.height = '1025px'")
+    assert sheets(browser) == 2
+
+
+def test_without_scripts_no_room_is_left_for_figures(browser, tmp_path):
+    write_page(content(), tmp_path / "page.html")
+    browser.call("Emulation.setScriptExecutionDisabled", value=True)
+    browser.open(f"file://{tmp_path / 'page.html'}")
+    drawn = edges(browser, "figure")
+    browser.call("Emulation.setScriptExecutionDisabled", value=False)
+    assert drawn[3] - drawn[1] < 60
+
+
 def test_a_table_of_many_numbers_fits_a_narrow_screen(browser, tmp_path):
     kinds = ("force", "pressure", "length", "impulse", "speed", "time", "energy")
     number = {"force": 3333.0, "pressure": 2009e6, "length": 312e-6, "speed": 377.0}
