@@ -433,7 +433,7 @@ KKS = ("10MKA11CY011", "10MKA11CY012", "10MKA21CY011", "10MKA21CY012")
 SPOKEN = ("Lager 1 horizontal", "Lager 1 vertikal", "Lager 2 horizontal", "Lager 2 vertikal")
 TAGGED = [f"Ch{k} {tag}" for k, tag in enumerate(API, start=1)]
 POINT = r"holds 1 channel that can be displacements .*it has VE-101X in um; export the"
-SCALE = r"does not tell it: say what it is with 'rotordrop profile a\.wav --full-scale"
+SCALE = r"does not tell it: say what it is with 'rotordrop profile .*a\.wav --full-scale"
 WAVE = partial(every_format.as_wav, readings=MICRONS, rate=20_000)
 BENTLY, API_PLANES, KKS_PLANES = "Bently Nevada", ("VE-101", "VE-102"), ("10MKA11CY01", "10MKA21CY01")
 ROOMS = {"names": SPOKEN, "planes": ("Lager 1", "Lager 2")}
