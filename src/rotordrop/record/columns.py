@@ -9,7 +9,6 @@ import math
 import re
 from collections.abc import Sequence
 from difflib import get_close_matches
-from pathlib import Path
 
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
@@ -198,12 +197,22 @@ def worth_of(unit: str) -> tuple[float, str]:
     return parse_quantity(amount, kind), kind
 
 
+NO_FILE = "the recording"
+"""What a recording is called that was not read from a file."""
+
+
+def _profile_with(option: str, place: str) -> str:
+    """The command that writes a profile with an option for a file, to be copied."""
+    file = "FILE" if place == NO_FILE else f'"{place}"' if " " in place else place
+    return f"'rotordrop profile {file} {option} -o recorder.toml'"
+
+
 def displacement(
     channel: Channel, sensor: Sensor, recording: Recording, profile: Profile, place: str
 ) -> tuple[Array, list[str]]:
     """Give the reading of a sensor [m], shape (N,), with a word where two sensitivities disagree."""
     if channel.unit == FULL_SCALE:
-        ask = f"'rotordrop profile {Path(place).name} --full-scale \"500 um\" -o recorder.toml'"
+        ask = _profile_with('--full-scale "500 um"', place)
         what = "shares of a full scale, from -1 to 1, and does not tell it"
         raise RecordError(f"{place} holds {what}: say what it is with {ask}")
     # a sensor may be called "S_V": the ending of its channel's name is then no unit
@@ -211,7 +220,7 @@ def displacement(
     unit = profile.units.get(channel.label) or profile.unit or ("" if suffixed else channel.unit)
     unit = unit or ("V" if profile.sensitivity else "")
     if not unit:
-        ask = "name it in the profile: unit = \"um\", as 'rotordrop profile --unit um' writes it"
+        ask = f'name it in the profile: unit = "um", as {_profile_with("--unit um", place)} writes it'
         raise RecordError(f"{place}: channel {channel.label!r} has no unit; {ask}")
     try:
         factor, kind = worth_of(unit)

@@ -150,6 +150,20 @@ def test_a_wav_file_asks_for_its_full_scale_whatever_unit_is_given(tmp_path):
     np.testing.assert_allclose(record.signals, MICRONS * 1e-6, atol=1e-8)
 
 
+@pytest.mark.parametrize(("file", "option"), [("WAV", '--full-scale "500 um"'), ("no unit", "--unit um")])
+def test_the_command_that_is_proposed_names_the_file_with_its_folder(file, option, machine, tmp_path):
+    path = tmp_path / "drop.csv"
+    if file == "WAV":
+        path = export("WAV").written(tmp_path)
+        machine = None
+    else:
+        columns = ",".join(sensor.name for sensor in machine.sensors)
+        rows = [f"{TIME[i]:.6f},{','.join(f'{v:.2f}' for v in MICRONS[i])}" for i in range(COUNT)]
+        path.write_text("\n".join([f"Time [s],{columns}", *rows]))
+    with pytest.raises(RecordError, match=re.escape(f"'rotordrop profile {path} {option} -o recorder.toml'")):
+        open_record(path, machine, profile=Profile())
+
+
 def test_channels_of_their_own_rates_and_lengths_keep_them(tmp_path):
     text = export("SampleRate").content.decode().replace("20000.000,20000.000", "20000.000,10000.000", 1)
     path = tmp_path / "drop.csv"

@@ -174,6 +174,27 @@ def test_rows_missing_at_the_end_show_by_the_length_the_header_declares(key, mac
     assert f"declares {COUNT} samples and {COUNT - 8} are present" in told
 
 
+@pytest.mark.parametrize(
+    ("revision", "stamp", "day"),
+    [
+        (",1999", "01/03/2026", "2026-03-01"),
+        (",2013", "01/03/2026", "2026-03-01"),
+        (",1991", "03/01/2026", "2026-03-01"),
+        ("", "03/01/26", "2026-03-01"),
+        ("", "03/14/98", "1998-03-14"),
+        (",1999", "03/14/2026", "2026-03-14"),
+    ],
+)
+def test_the_revision_of_a_configuration_says_which_day_a_date_is(revision, stamp, day, machine, tmp_path):
+    """IEEE C37.111: the month first in 1991, which need not be named, and the day first since 1999."""
+    as_comtrade(tmp_path / "drop.cfg", "ASCII", WITH_SPEED, 20_000, 5e-4)
+    text = (tmp_path / "drop.cfg").read_text().replace(",1999", revision).replace("16/10/2019", stamp)
+    (tmp_path / "drop.cfg").write_text(text)
+    record = read_record(tmp_path / "drop.cfg", machine)
+    assert record.event_date == f"{day}T13:42:07.000500"
+    assert not any("leaves open" in note for note in record.notes)
+
+
 def test_a_configuration_with_a_damaged_rate(machine, tmp_path):
     as_comtrade(tmp_path / "drop.cfg", "ASCII", WITH_SPEED, 20_000, 5e-4, -1.5)
     text = (tmp_path / "drop.cfg").read_text()

@@ -147,27 +147,34 @@ def _configuration(text: bytes, path: Path) -> _Configuration:
         row(1)
         declared = [row(2) for _ in range(max(int(row(1)[0]), 1))]
         rates = [(float(rate), int(last)) for rate, last, *_ in declared]
-        start, when = _instant(row(2)), row(2)
-        trigger = _instant(when)
+        start, when = _instant(row(2), station)[1:], row(2)
+        day, *trigger = _instant(when, station)
         kind = row(1)[0].upper()
         time_factor = float(rows[number][0]) if number < len(rows) and rows[number][0].strip() else 1.0
     except (ValueError, IndexError) as error:
         raise damaged(path, f", line {number}: {error}, the configuration is damaged") from error
     if kind != "ASCII" and kind not in _FORMATS:
         raise RecordError(f"{path}, line {number}: the format {kind!r} is not ASCII, {', '.join(_FORMATS)}")
-    entries = {"station": station[0], "recorder": station[1], "trigger time": " ".join(when)}
+    entries = {"station": station[0], "recorder": station[1], "trigger time": " ".join([day, *when[1:]])}
     before = (start[0] - trigger[0]) + (start[1] - trigger[1])
     return _Configuration(analogue, digital_count, rates, before, kind, 1e-6 * time_factor, entries)
 
 
-def _instant(entries: list[str]) -> tuple[int, float]:
-    """Whole seconds and the rest of a date and a time of day; only differences of them are used."""
+def _instant(entries: list[str], station: list[str]) -> tuple[str, int, float]:
+    """The day (ISO 8601), and whole seconds and the rest, of which only differences are used.
+
+    The month comes first in the revision of 1991, which need not be named, and the day in those of
+    1999 and 2013 (IEEE C37.111).
+    """
     parts = re.split(r"[/:.]", f"{entries[0]}:{entries[1]}")
     first, second, year, hour, minute, whole = (int(part) for part in parts[:6])
-    day, month = (first, second) if second <= 12 else (second, first)
-    days = datetime(year if year > 99 else 1900 + year, month, day).toordinal()
+    early = station[2:3] in ([], [""], ["1991"])
+    day, month = (second, first) if second > 12 or (early and first <= 12) else (first, second)
+    year += 0 if year > 99 else 1900 if year > 68 else 2000  # two digits as POSIX has them
+    date = datetime(year, month, day)
     rest = float(f"0.{parts[6]}") if len(parts) > 6 else 0.0
-    return days * 86_400 + 3600 * hour + 60 * minute + whole, rest
+    seconds = date.toordinal() * 86_400 + 3600 * hour + 60 * minute + whole
+    return date.date().isoformat(), seconds, rest
 
 
 def _ascii(content: bytes, rules: _Configuration, path: Path) -> tuple[Array, Array, Array]:
