@@ -28,7 +28,14 @@ from rotordrop.record.axes import (
     sensor_planes,
 )
 from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock
-from rotordrop.record.columns import displacement, find_named, find_speed, match_sensors, speed_factor
+from rotordrop.record.columns import (
+    NO_FILE,
+    displacement,
+    find_named,
+    find_speed,
+    match_sensors,
+    speed_factor,
+)
 from rotordrop.record.event_date import event_of
 from rotordrop.record.keys import speed_told
 from rotordrop.record.missing import gone_on, mended, no_values, without_pairs
@@ -157,7 +164,9 @@ class Record:
             clock = np.asarray(first + np.arange(count) / rate)
         else:
             unit_of_time = require(time_unit, "time_unit", str, among=_TIME_UNITS)
-            stamps = np.atleast_1d(numbers(time, "time", finite=True))
+            stamps = numbers(time, "time", finite=True)
+            if stamps.ndim == 0:
+                raise RecordError(f"time is one number; write the sampling rate as text: '{stamps:g} Hz'")
             if first or stamps.shape != (count,):
                 words = (
                     f"time has the shape {stamps.shape} and the signals have {count} samples, from {start}"
@@ -435,7 +444,7 @@ def record_of(
 ) -> Record:
     """Match the channels of a recording to sensors and bring them to SI units on one clock."""
     profile = profile or Profile()
-    place = str(path or "the recording")
+    place = str(path or NO_FILE)
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
     recording = from_first_stamp(recording)

@@ -192,6 +192,7 @@ WRONG = {
     ),
     "speed without unit": (lambda: made(speed="60"), "'60' has no unit; a speed needs one"),
     "few times": (lambda: made(TIME[:10]), r"time has the shape \(10,\) and the signals have 200 samples"),
+    "a number for the rate": (lambda: made(16000), "write the sampling rate as text: '16000 Hz'"),
     "few columns": (lambda: made(signals=SIGNALS[:, :3]), r"shape \(200, 3\); expected \(samples, 4\), one"),
     "one channel": (lambda: made(signals={NAMES[0]: TIME}), f"no channel for .*{NAMES[1]}|{NAMES[1]}"),
     "a counted table": (lambda: framed(None), "no column 'time' and its index only counts rows"),
