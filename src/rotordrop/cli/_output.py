@@ -60,12 +60,13 @@ def deliver(
     *,
     report: Path | None = None,
     data: Path | None = None,
+    output: Path | None = None,
 ) -> None:
     """Write page, tables and JSON where they were asked for, and print the summary.
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
     in place of the summary, which is a page or a function that prints on the console it is given. Pages and
-    tables need a page.
+    tables need a page. The output was written before and is named.
     """
     if not callable(summary) and report is not None:
         from rotordrop.report.page import write_page
@@ -93,6 +94,8 @@ def deliver(
             out.print(f"Report: {report}")
     if json_file is not None:
         out.print(f"JSON: {json_file}")
+    if output is not None:
+        out.print(f"Written: {output}")
 
 
 def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:

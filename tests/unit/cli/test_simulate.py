@@ -36,6 +36,11 @@ def test_a_drop_from_the_centre_reaches_every_output(tmp_path):
         assert "mean_force_0p15_0p2_N" not in found
 
 
+def test_the_summary_names_the_file_it_wrote(tmp_path, capsys):
+    assert run([*SHORT, "-o", str(tmp_path / "drop.h5")]) == 0
+    assert f"Written: {tmp_path}/drop.h5".replace(" ", "") in "".join(capsys.readouterr().out.split())
+
+
 def first_touch(capsys, *arguments):
     """When each bearing is touched first [s]."""
     assert run([*SHORT, *arguments, "--json", "-"]) == 0
