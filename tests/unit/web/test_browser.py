@@ -170,7 +170,10 @@ def test_a_record_of_rest_is_offered_as_the_tail(browser, server, tmp_path, file
     browser.key("Escape")
     browser.until("!document.getElementById('sending').open")
     send(browser, [files[role] for role in ("machine", "beside", "record")] + made[-1:])
+    browser.until("document.getElementById('usetail')")
+    assert words(browser, "#usetail") == "Use measured_17 as its settled tail"  # the drop is open
     press(browser, "usetail")
+    browser.until("!document.getElementById('usetail')")
     browser.until("document.getElementById('status').innerText.includes('Released at')")
     assert browser.evaluate("dropname.innerText === 'drop_060' && !document.getElementById('usetail')")
     (job,) = server.ask("GET", "/api/jobs").told["jobs"]

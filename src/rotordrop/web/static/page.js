@@ -178,6 +178,8 @@ async function refresh() {
       state.overview = { time: found.time, curves: columns.map((name) => ({ values: found[name] })) };
       state.pair = await tailPair(job);
       if (state.job?.id !== id) { return; }
+      const [rest, drop] = state.pair || []; // of those sent together the drop is opened
+      if (justSent === id && rest?.id === id && state.together.includes(drop.id)) { sent(drop.id); return; }
       await asSeen();
     }
   }

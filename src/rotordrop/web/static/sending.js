@@ -64,10 +64,11 @@ async function sendFiles(pairs) {
     return state.job.id;
   }
   let last = null;
+  state.together = [];
   for (const pair of records) {
     const job = await server.newJob(pair[1].name.replace(/\.[^.]+$/, ""), options);
     try { await sendTo(job.id, [...others, pair], numbers); } catch (error) { await server.remove(job.id); throw error; }
-    last = job.id;
+    state.together.push(last = job.id);
   }
   return last;
 }

@@ -3,7 +3,7 @@ import * as server from "./server.js";
 import { make, sentence } from "./tables.js";
 
 export const by = (id) => document.getElementById(id);
-export const state = { job: null, look: null, estimate: null, view: null, cursor: null, mark: null, impact: -1, tab: "Impacts", report: "",
+export const state = { job: null, look: null, estimate: null, view: null, cursor: null, mark: null, impact: -1, tab: "Impacts", report: "", together: [],
   panels: [], orbits: [], overview: null, playing: null, serial: 0, speed: null };
 export const zero = () => (state.estimate || state.look).zero;
 // What times count from: an estimate knows power-off, a look only the release.
