@@ -56,8 +56,9 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     notes = tuple(Statement(note) for note in seen.notes)
     facts = _facts(seen)
     given = any(plane.gap_interval_90 is None for plane in seen.planes)
-    # what a gap that was given makes false stands before the numbers
-    doubted = [one for one in seen.findings if given and one.kind == "wrong air gap"]
+    # what a gap that was given makes false, or the speed of the headline, stands before the numbers
+    false = {"wrong speed", "wrong speed unit", *(("wrong air gap",) if given else ())}
+    doubted = [one for one in seen.findings if one.kind in false]
     others = [one for one in seen.findings if one not in doubted]
     read = f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}."
     return ReportContent(

@@ -4,7 +4,10 @@ import io
 
 from rich.console import Console
 
+from rotordrop.evidence.look import look
+from rotordrop.examples import example_record_path
 from rotordrop.report.content import Card, KeyFigure, ReportContent, Statement, Table
+from rotordrop.report.look_page import look_page
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.terminal import print_summary, summary_console
 
@@ -61,3 +64,10 @@ def test_a_name_cannot_repaint_the_terminal_or_bring_markup():
     assert ESCAPE not in text
     assert "\x07" not in text
     assert "[bold]x[/bold]" in text
+
+
+def test_a_speed_that_the_record_contradicts_stands_before_the_numbers():
+    seen = look(example_record_path("lp400_drop_060"), speed="3600 Hz")
+    first, second, *_ = look_page(seen, drawn=False).verdict
+    assert "(rpm taken for Hz)" in first.text
+    assert second.text.startswith("Released at")
