@@ -321,11 +321,17 @@ def _thrown(result: DropResult, machine: Machine) -> Iterator[Statement]:
                 text = f"{name}: the largest stress is {one} on the inner and {other} on the outer race."
                 yield Statement(text)
     share = machine.rotor.mass * float(machine.gravity) / len(machine.touchdown_bearings)
-    for b, bearing in enumerate(machine.touchdown_bearings):
-        fastest = float(np.max(np.abs(result.race_speed[:, b])))
-        for excess in numbers_of(bearing).excesses(fastest, share):
-            if excess.kind == THROWN:
-                yield Statement(f"{bearing.name}: {excess.text}.", "warning")
+    fastest = np.max(np.abs(result.race_speed), axis=0)
+    found = {
+        bearing.name: excess
+        for bearing, speed in zip(machine.touchdown_bearings, fastest, strict=True)
+        for excess in numbers_of(bearing).excesses(float(speed), share)
+        if excess.kind == THROWN
+    }
+    if found:
+        worst = max(found, key=lambda name: found[name].value / found[name].limit)
+        others = f" ({', '.join(name for name in found if name != worst)} likewise, less)"
+        yield Statement(f"{worst}{others * (len(found) > 1)}: {found[worst].text}.", "warning")
 
 
 def landing_count(one: Landing) -> int:

@@ -68,3 +68,13 @@ def test_equal_friction_laws_share_a_curve():
     assert len(machine_sections(machine)[0].figures[0].chart.data) == 2
     changed = machine.with_values({"NDE.friction.dynamic": 0.05})
     assert len(machine_sections(changed)[0].figures[0].chart.data) == 4
+
+
+def test_balls_thrown_outwards_at_both_ends_are_one_warning(drop_result):
+    fast = replace(drop_result, race_speed=40.0 * drop_result.race_speed)
+    warned = [
+        one.text
+        for one in simulate_page(fast, example_machine("paper")).verdict
+        if "thrown outwards" in one.text
+    ]
+    assert [text.split(":")[0] for text in warned] == ["DE (NDE likewise, less)"]
