@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
-from rotordrop.errors import UsageError
-from rotordrop.require import numbers, require
-
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
 
@@ -64,17 +61,6 @@ class Known:
     """Where the value comes from."""
     unit: str = ""
     """SI unit, for display."""
-
-    def __post_init__(self) -> None:
-        require(self.status, "status", str)
-        for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):
-            if (one := getattr(self, name)) is not None or name == "value":
-                numbers(one, name, ())
-        for name in ("interval_90", "range", "bounds"):
-            if (ends := getattr(self, name)) is not None:
-                low, high = numbers(ends, name, (2,))
-                if low > high:
-                    raise UsageError(f"{name} is {ends}; expected the lower end first.")
 
     def __float__(self) -> float:
         return self.value

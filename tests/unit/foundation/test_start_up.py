@@ -224,8 +224,6 @@ WRONG = {
     "several speeds": (lambda: case(speed=np.array([1.0, 2.0])), "speed is array.* expected a text such as"),
     "reduction": (lambda: case(reduction="fine"), "reduction is 'fine'; expected one of accurate, quick"),
     "certify as text": (lambda: rd.simulate_drop(MACHINE, case(), certify="no"), "certify is 'no'.* True"),
-    "value of letters": (lambda: rd.Known(value="1 N"), "value is .* no array of real numbers"),
-    "interval": (lambda: rd.Known(value=1.0, interval_90=(2.0, 0.0)), "interval_90 is .* lower end first"),
     "start of stamps": (lambda: made(start="1 s"), r"shape \(200,\) and .* from 1 s; give"),
     "rating in tonnes": (lambda: rd.find_bearing("7203", static_load_rating=5.0), "no balls .* rating"),
     "quick as text": (lambda: rd.Tracked(quick="no"), "quick is 'no'; expected True or False"),
