@@ -50,7 +50,7 @@ REFUSED = [
         64,
         "sensor_angle, such as '135 deg': '0 deg, 90 deg' are several values",
     ),
-    ("init --example lp500", 64, "there is no example machine 'lp500'; there are paper, lp400"),
+    ("init --example lp500", 64, "example machine is 'lp500'; expected one of paper, lp400"),
     ("init --example lp400", 6, r"drop_060\.h5 exists already; name another folder or add --force"),
     ("waterfall {lp400} nowhere.h5", 3, r"nowhere\.h5"),
     ("waterfall {lp400} {lp400}", 3, r"lp400\.toml"),

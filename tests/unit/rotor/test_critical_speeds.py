@@ -160,10 +160,13 @@ def test_lines_that_cross_are_followed_through():
         ),
         (
             lambda _, fe: critical_speeds(fe, [spring(2, 1e6)], whirl="sideways"),
-            "'sideways'; choose one of 'stand",
+            "'sideways'; expected one of stand",
         ),
         (lambda _, fe: critical_speeds(fe, []), "springs at two nodes at least"),
-        (lambda paper, _: suspension_of(paper, "air"), "suspension 'air'; choose one of 'free-free', 'AMBs'"),
+        (
+            lambda paper, _: suspension_of(paper, "air"),
+            "suspension is 'air'; expected one of free-free, AMBs",
+        ),
         (lambda paper, _: campbell_diagram(paper, [10.0, 5.0]), "must increase"),
         (lambda paper, _: campbell_diagram(paper, [0.0]), "needs a speed above standstill"),
         (lambda paper, _: touchdown_supports(paper, "exact"), "unknown bearing stiffness 'exact'"),
