@@ -100,8 +100,8 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.estimate.published import read_drop
     from rotordrop.files import finite
-    from rotordrop.report.compare_page import told_changes
     from rotordrop.report.content import ReportContent, Statement
+    from rotordrop.report.told_changes import told_changes
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")

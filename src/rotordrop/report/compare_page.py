@@ -10,13 +10,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.elements.table import row_of
 from rotordrop.errors import UsageError, unknown_key
-from rotordrop.estimate.changed import Change, Changes, asked_for
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.report.content import Column, Figure, Level, ReportContent, Section, Statement, Table, table
-from rotordrop.report.quantity import Quantity, display_unit, one_line, shown, written
+from rotordrop.report.quantity import Quantity, display_unit, one_line, shown
 from rotordrop.report.stress_box import StressBox, stress_box_figure
 from rotordrop.report.style import axis_title, bars, curve, finished, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
@@ -426,34 +424,3 @@ def _beyond(quantity: Quantity, limit: float, number: Number) -> float | None:
     sigma = max((high - low) / (2.0 * NINETY), 1e-12 * max(abs(quantity.value), 1e-300))
     above = 0.5 * math.erfc((limit - quantity.value) / (math.sqrt(2.0) * sigma))  # scipy takes longer to load
     return above if number.more_is_worse else 1.0 - above
-
-
-CHANGES_NOTE = (
-    f"{asked_for()}, with the probability of at least that; found from: what shows in 19 of 20 cases."
-)
-
-
-def told_changes(found: Changes) -> tuple[Statement, Table]:
-    """What changed in a sentence, and every parameter as it was, with its change by both records."""
-    columns = (
-        Column("parameter", lambda one: spoken_path(one.path)),
-        Column("before", lambda one: Quantity.of(one.before, row_of(one.path).display_kind)),
-        Column("change (90 %)", _change),
-        Column("that much", lambda one: format_chance(one.probability)),
-        Column("found from", lambda one: one.smallest_text.replace("of any size", "–")),
-    )
-    statement = Statement(found.sentence(spoken_path), "warning" if found.named else "good")
-    told = [one for one in found.found if one.determined]  # the sentence names the others
-    return statement, table(told, columns, note=CHANGES_NOTE)
-
-
-def spoken_path(path: str) -> str:
-    """Name of a parameter for people: what it belongs to, and what it is."""
-    return f"{path.partition('.')[0]}: {row_of(path).label}"
-
-
-def _change(one: Change) -> str:
-    low, high = one.interval_90
-    if one.factor:
-        return f"× {one.change:.3g} ({low:.3g} to {high:.3g})"
-    return "{} µm ({} to {} µm)".format(*(written(1e6 * end, 1) for end in (one.change, low, high)))

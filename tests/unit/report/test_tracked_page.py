@@ -15,10 +15,10 @@ from rotordrop.estimate.changed import changes
 from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import LaterMotion, drop_of
-from rotordrop.report.compare_page import told_changes
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page
 from rotordrop.report.page import render_page
+from rotordrop.report.told_changes import told_changes
 from rotordrop.track.consistency import Check
 
 
