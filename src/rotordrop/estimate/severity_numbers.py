@@ -89,6 +89,8 @@ def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kn
         return
     during = (motion.time >= 0.0) & (motion.time <= INDEX_WINDOW)
     time, path = motion.time[during], motion.displacement[during]
+    if not np.isfinite(path).all():  # of a model that lost the record
+        return
     velocity = np.gradient(path, time, axis=0)
     yield "severity.position_index", _over_gap(float(np.mean(np.hypot(*path.T))), gap)
     if estimate.speed > 0.0:
