@@ -130,7 +130,7 @@ ENDLESS = (
         ("1e9 N/m^3", "contact_stiffness", r"'1e9 N/m\^3' is not .*; write N/m\^n with n from 1 to 2"),
         (True, "length", r"True is not a length; write a number with a unit, '280 um'"),
         (None, "mass", r"None is not a mass"),
-        ("3 red", "colour", r"'colour' is not a kind of quantity; known are length, mass"),
+        ("3 red", "colour", r"kind of quantity is 'colour'; expected one of length, mass"),
         *((f"1 {unit}", "length", "write for example '280 um'") for unit in ENDLESS),
         ("٣ m", "length", "does not begin with a number"),
     ],

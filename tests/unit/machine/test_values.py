@@ -130,7 +130,7 @@ def test_the_recorded_machine_is_that_of_its_owner():
     assert {float(s.sensitivity) for s in sensors} == {8000.0}
     assert example_machine("paper").source_path == example_path("paper")
     assert load_machine(example_path("paper")) == example_machine("paper")
-    with pytest.raises(UsageError, match="no example machine 'paber'; there are paper, lp400"):
+    with pytest.raises(UsageError, match="example machine is 'paber'; expected one of paper, lp400"):
         example_machine("paber")
 
 
