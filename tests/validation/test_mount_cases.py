@@ -57,14 +57,18 @@ def branches(inputs):
         {"stiffness": f"{k!r} N/m", "time": f"{tau!r} s"}
         for k, tau in zip(inputs["stiffness"], inputs["time"], strict=True)
     ]
-    numbers = numbers_of(maxwell=elements)
+    numbers, none = numbers_of(maxwell=elements), np.zeros(2 * len(elements))
+
+    def answer(velocity, stretch):
+        rate = np.zeros_like(stretch)
+        return mount.mount_force(numbers, 0.0, 0.0, velocity, 0.0, stretch, rate)[0], rate
 
     def dynamic(frequency):
         total, omega = complex(inputs["k_0"]), 2.0 * np.pi * frequency
         for state in range(0, 2 * len(elements), 2):
-            by_stretch, by_rate = mount.stretch_gradient(numbers, state, 0.0, 0.0, 0.0, 0.0)
-            stretch = by_rate[0] * 1j * omega / (1j * omega - by_stretch[0])
-            total += mount.stiffness_of_state(numbers, state) * stretch
+            stiffness, relaxing = answer(0.0, np.eye(len(none))[state])
+            stretch = answer(1.0, none)[1][state] * 1j * omega / (1j * omega - relaxing[state])
+            total += stiffness * stretch
         return total
 
     middle = dynamic(100.0)

@@ -247,8 +247,8 @@ def lines_of_contact(constants: BearingConstants) -> float:
 
 
 @inner_kernel
-def row_axial_damping(numbers: Array, share: float, ring: float) -> tuple[float, float]:
-    """Damping [N s/m] of a row against axial motion, and its slope [N s/m²] by the way of its rings.
+def row_axial_damping(numbers: Array, share: float, ring: float) -> float:
+    """Damping [N s/m] of a row against axial motion.
 
     Parameters
     ----------
@@ -267,49 +267,19 @@ def row_axial_damping(numbers: Array, share: float, ring: float) -> tuple[float,
     """
     radial2 = numbers[RADIAL_OFFSET] * numbers[RADIAL_OFFSET]
     axial = numbers[AXIAL_OFFSET] - ring
-    A2 = radial2 + axial * axial
-    lines = share * numbers[LINES] * numbers[DAMPING]
-    return lines * axial * axial / A2, -2.0 * lines * axial * radial2 / (A2 * A2)
+    damping: float = share * numbers[LINES] * numbers[DAMPING] * axial * axial / (radial2 + axial * axial)
+    return damping
 
 
 @inner_kernel
-def two_row_axial_damping(numbers: Array, rows: tuple[Array, Array], dz: float) -> tuple[float, float]:
-    """Damping [N s/m] against axial motion of a race that has moved by dz [m], and its slope [N s/m²].
+def two_row_axial_damping(numbers: Array, rows: tuple[Array, Array], dz: float) -> float:
+    """Damping [N s/m] against axial motion of a race that has moved by dz [m].
 
     ``numbers`` (11,) as of `row_axial_damping`, ``rows`` as of `two_row_force`. Source: `row_axial_damping`.
     """
     loaded, relieved = lane_sum(rows[0][COUNT]), lane_sum(rows[1][COUNT])
-    C, by_ring = row_axial_damping(numbers, loaded / (loaded + relieved), -dz)
-    D, of_other = row_axial_damping(numbers, relieved / (loaded + relieved), dz)
-    return C + D, of_other - by_ring
-
-
-@lean_kernel
-def ball_set_axial_gradient(
-    entries: Array, balls: Array, dx: float, dy: float, ring: float
-) -> tuple[float, float, float, float]:
-    """Axial force [N] of `ball_set_axial_force` and its slopes [N/m] by x, y and the axial offset.
-
-    The slopes by x and y are those of the radial force by the axial offset: both come from one energy.
-    Source: Neisi 2020, eqs. (2)–(6), differentiated.
-    """
-    K, axial_offset = entries[BALL_STIFFNESS], entries[AXIAL_OFFSET] - ring
-    f_a = k_ax = k_ay = k_aa = 0.0
-    for j in range(balls.shape[1]):
-        radial = entries[RADIAL_OFFSET] + dx * balls[COSINE, j] + dy * balls[SINE, j]
-        A = math.sqrt(radial * radial + axial_offset * axial_offset)
-        delta = A - entries[GROOVE_DISTANCE]
-        if delta <= 0.0:
-            continue
-        root = math.sqrt(delta)
-        cosine, sine = radial / A, axial_offset / A
-        across = balls[COUNT, j] * K * delta * root / A
-        along = balls[COUNT, j] * K * 1.5 * root
-        f_a += across * axial_offset
-        k_ax += (along - across) * cosine * sine * balls[COSINE, j]
-        k_ay += (along - across) * cosine * sine * balls[SINE, j]
-        k_aa += along * sine * sine + across * cosine * cosine
-    return f_a, k_ax, k_ay, k_aa
+    C = row_axial_damping(numbers, loaded / (loaded + relieved), -dz)
+    return C + row_axial_damping(numbers, relieved / (loaded + relieved), dz)
 
 
 @lean_kernel

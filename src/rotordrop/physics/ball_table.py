@@ -124,13 +124,6 @@ def _weights(v: float) -> tuple[float, float, float, float]:
 
 
 @inner_kernel
-def _weights_of_slope(v: float) -> tuple[float, float, float, float]:
-    """Slopes of `_weights` [1]."""
-    w = 1.0 - v
-    return -6.0 * v * w, w * (1.0 - 3.0 * v), 6.0 * v * w, -v * (2.0 - 3.0 * v)
-
-
-@inner_kernel
 def _between(weights: tuple[float, float, float, float], a: float, b: float, c: float, d: float) -> float:
     """Sum of value and slope at both ends."""
     return weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d
@@ -175,35 +168,6 @@ def fast_force(
         F_x += force * balls[COSINE, k]
         F_y += force * balls[SINE, k]
     return F_x, F_y, by_spin * (1.0 if spin >= 0.0 else -1.0) / grid[SPEED_STEP]
-
-
-@lean_kernel
-def fast_gradient(
-    grid: Array, table: Array, balls: Array, dx: float, dy: float, spin: float
-) -> tuple[float, float, float, float, float, float, float]:
-    """Force [N] of `fast_force`, stiffness ``k_xx, k_xy, k_yy`` [N/m], slopes by the spin [N s].
-
-    Source: `fast_force`, differentiated.
-    """
-    j, v = _speed_cell(grid, table, spin)
-    at, turned = _weights(v), _weights_of_slope(v)
-    F_x = F_y = k_xx = k_xy = k_yy = w_x = w_y = 0.0
-    for b in range(balls.shape[1]):
-        c, s = balls[COSINE, b], balls[SINE, b]
-        i, u, t = _place_cell(grid, table, dx * c + dy * s)
-        force = balls[COUNT, b] * _looked_up(table, j, i, FORCE, at, _weights(u))
-        slope = balls[COUNT, b] * _looked_up(table, j, i, FORCE, at, _weights_of_slope(u))
-        by_spin = balls[COUNT, b] * _looked_up(table, j, i, FORCE, turned, _weights(u))
-        k = slope / (2.0 * max(t, 1e-9) * grid[STEP])
-        F_x += force * c
-        F_y += force * s
-        k_xx += k * c * c
-        k_xy += k * c * s
-        k_yy += k * s * s
-        w_x += by_spin * c
-        w_y += by_spin * s
-    sense = (1.0 if spin >= 0.0 else -1.0) / grid[SPEED_STEP]
-    return F_x, F_y, k_xx, k_xy, k_yy, w_x * sense, w_y * sense
 
 
 @inner_kernel

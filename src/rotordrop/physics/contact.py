@@ -59,19 +59,6 @@ def contact_force(law: Array, delta: float, delta_dot: float) -> tuple[float, fl
 
 
 @inner_kernel
-def contact_gradient(law: Array, delta: float, delta_dot: float) -> tuple[float, float, float]:
-    """Normal force [N] with its derivatives by indentation [N/m] and by rate of indentation [N s/m].
-
-    Source: Neisi 2020, eq. (8), differentiated.
-    """
-    elastic = law[STIFFNESS] * power(delta, law[EXPONENT])
-    growth = 1.0 + 1.5 * law[DAMPING] * delta_dot
-    if growth <= 0.0:
-        return 0.0, 0.0, 0.0
-    return elastic * growth, law[EXPONENT] * elastic / delta * growth, elastic * 1.5 * law[DAMPING]
-
-
-@inner_kernel
 def contact_energy(law: Array, delta: float) -> float:
     """Energy [J] stored in the contact at a positive indentation [m]: ``K δ^(n+1) / (n+1)``.
 

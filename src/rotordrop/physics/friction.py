@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rotordrop.physics._compile import inner_kernel, kernel
+from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.elementary import exp
 
 SMOOTHING_SPEED = 0.02
@@ -46,23 +46,3 @@ def stribeck_coefficient(v: float, mu_s: float, mu_d: float, v_stribeck: float, 
         slope = -(mu_s - mu_d) * v_smooth / v_stribeck
         mu = s * (1.5 * mu_s - 0.5 * slope + s * s * (0.5 * slope - 0.5 * mu_s))
     return math.copysign(mu, v)
-
-
-@kernel
-def stribeck_gradient(
-    v: float, mu_s: float, mu_d: float, v_stribeck: float, v_smooth: float
-) -> tuple[float, float]:
-    """Signed friction coefficient [1] and its derivative by the relative surface speed [s/m].
-
-    Source: Neisi 2020, eq. (11) and Fig. 2, differentiated.
-    """
-    speed = abs(v)
-    if speed >= v_smooth:
-        excess = (mu_s - mu_d) * exp(-(speed - v_smooth) / v_stribeck)
-        return math.copysign(mu_d + excess, v), -excess / v_stribeck
-    s = speed / v_smooth
-    slope = -(mu_s - mu_d) * v_smooth / v_stribeck
-    first = 1.5 * mu_s - 0.5 * slope
-    third = 0.5 * slope - 0.5 * mu_s
-    mu = s * (first + s * s * third)
-    return math.copysign(mu, v), (first + 3.0 * third * s * s) / v_smooth

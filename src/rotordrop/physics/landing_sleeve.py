@@ -27,15 +27,13 @@ LARGEST_OVAL = 1.0 / 12.0
 to this three steps of Newton find it to 2e-10 of a radian."""
 NEWTON_STEPS = 3
 
-Reach = tuple[float, float, float, float, float]
-
 
 @lean_kernel
-def deepest(s: Array, angle: float, x: float, y: float) -> Reach:
+def deepest(s: Array, angle: float, x: float, y: float) -> tuple[float, float, float, float]:
     """Where a sleeve reaches deepest at a rotor angle [rad] and a displacement against the bore [m].
 
-    Returns how far it reaches beyond ``r_0`` [m], the normal there (x, y) [1], and slope and curvature of its
-    radius there [m]. Source: largest ``u·n(ψ) + h(ψ - θ)`` by Newton's method, from the azimuth of the
+    Returns how far it reaches beyond ``r_0`` [m], the normal there (x, y) [1], and the slope of its radius
+    there [m]. Source: largest ``u·n(ψ) + h(ψ - θ)`` by Newton's method, from the azimuth of the
     displacement of the eccentric circle.
     """
     sine, cosine = sine_cosine(angle)
@@ -60,8 +58,7 @@ def deepest(s: Array, angle: float, x: float, y: float) -> Reach:
         length = math.sqrt(tx * tx + ty * ty)
         nx, ny = tx / length, ty / length
     once, across = s[ONCE_COSINE] * c + s[ONCE_SINE] * z, s[ONCE_SINE] * c - s[ONCE_COSINE] * z
-    reach = x * nx + y * ny + once + even
-    return reach, nx, ny, across + 2.0 * odd, -once - 4.0 * even
+    return x * nx + y * ny + once + even, nx, ny, across + 2.0 * odd
 
 
 @lean_kernel
@@ -72,7 +69,7 @@ def as_round(
 
     ``spin`` [rad/s] is that of the rotor. Source: `deepest`; of a maximum ``d/dt (u·n + h) = v·n - h' ω``.
     """
-    reach, nx, ny, slope, _curved = deepest(s, angle, x, y)
+    reach, nx, ny, slope = deepest(s, angle, x, y)
     rate = -slope * spin
     return reach * nx, reach * ny, vx + rate * nx, vy + rate * ny
 
@@ -84,28 +81,5 @@ def turning_arm(s: Array, angle: float, x: float, y: float) -> tuple[float, floa
     Source: virtual work of a force along ``n`` on ``u·n + h(ψ - θ)``: the line of the force passes the axis
     of the rotor at ``h'`` and meets that of the bore, which it does not turn.
     """
-    _reach, nx, ny, slope, _curved = deepest(s, angle, x, y)
+    _reach, nx, ny, slope = deepest(s, angle, x, y)
     return slope, nx, ny
-
-
-@lean_kernel
-def of_true_motion(s: Array, angle: float, spin: float, x: float, y: float, g: Array) -> None:
-    """Turn the derivatives ``g`` (3, 7) of a contact by the motion of `as_round` into those by the true one.
-
-    Columns as in `touch.touch_gradient` [SI], the last one by the rotor angle [rad]. Source: `as_round`,
-    differentiated.
-    """
-    reach, nx, ny, slope, curved = deepest(s, angle, x, y)
-    tx, ty = -ny, nx
-    stiff = x * nx + y * ny - curved  # how sharp the maximum is
-    tau = -slope
-    for force in range(g.shape[0]):
-        along = g[force, 0] * nx + g[force, 1] * ny
-        aside = g[force, 0] * tx + g[force, 1] * ty
-        rate_along = g[force, 2] * nx + g[force, 3] * ny
-        rate_aside = g[force, 2] * tx + g[force, 3] * ty
-        turned = (reach * aside + spin * (tau * rate_aside - curved * rate_along)) / stiff
-        g[force, 0] = along * nx + turned * tx
-        g[force, 1] = along * ny + turned * ty
-        g[force, 4] += tau * rate_along
-        g[force, 6] = tau * along - curved * turned + spin * curved * rate_along

@@ -14,9 +14,6 @@ from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.elementary import power
 
-Matrix = tuple[float, float, float, float]
-"""Of x and y: xx, xy, yx, yy."""
-
 # Entries of a mount; SI units. All at zero is none: no stop, no ribbon, no branch that relaxes.
 PRESENT = 0
 STATES = 1
@@ -57,31 +54,6 @@ def stop_force(numbers: Array, x: float, y: float, vx: float, vy: float) -> tupl
 
 
 @inner_kernel
-def stop_tangent(numbers: Array, x: float, y: float, vx: float, vy: float) -> tuple[Matrix, Matrix]:
-    """Slopes of the force of a stop by deflection [N/m] and by its rate [N s/m].
-
-    Source: `stop_force`, differentiated.
-    """
-    r = math.sqrt(x * x + y * y)
-    depth = r - numbers[GAP]
-    if numbers[GAP] <= 0.0 or depth <= 0.0:
-        return (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
-    nx, ny = x / r, y / r
-    force, by_depth, by_rate = contact.contact_gradient(numbers[STOP:STOP_END], depth, vx * nx + vy * ny)
-    turning = by_rate * (vy * nx - vx * ny) / r  # the rate of depth changes as the normal turns
-    side = force / r
-    return (
-        (
-            by_depth * nx * nx - turning * nx * ny + side * ny * ny,
-            by_depth * nx * ny + turning * nx * nx - side * nx * ny,
-            by_depth * nx * ny - turning * ny * ny - side * nx * ny,
-            by_depth * ny * ny + turning * nx * ny + side * nx * nx,
-        ),
-        (by_rate * nx * nx, by_rate * nx * ny, by_rate * nx * ny, by_rate * ny * ny),
-    )
-
-
-@inner_kernel
 def stop_energy(numbers: Array, x: float, y: float) -> float:
     """Energy [J] stored in a stop at a deflection [m]. Source: integral of the elastic `stop_force`."""
     depth = math.sqrt(x * x + y * y) - numbers[GAP]
@@ -114,28 +86,6 @@ def _slip_factor(numbers: Array, stretch: float) -> float:
     if stretch <= 0.0:
         return 0.0
     return power(stretch / limit, n) / (stretch * stretch)
-
-
-@inner_kernel
-def ribbon_slip_gradient(numbers: Array, ex: float, ey: float, vx: float, vy: float) -> tuple[Matrix, Matrix]:
-    """Slopes of the speed of slip by stretch [1/s] and by the rate of deflection [1].
-
-    Source: `ribbon_slip`, differentiated.
-    """
-    along, square = ex * vx + ey * vy, ex * ex + ey * ey
-    if along <= 0.0 or square <= 0.0:
-        return (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
-    q = _slip_factor(numbers, math.sqrt(square))
-    grown = (numbers[SHARPNESS] - 2.0) * q / square * along
-    return (
-        (
-            q * along + ex * (grown * ex + q * vx),
-            ex * (grown * ey + q * vy),
-            ey * (grown * ex + q * vx),
-            q * along + ey * (grown * ey + q * vy),
-        ),
-        (q * ex * ex, q * ex * ey, q * ey * ex, q * ey * ey),
-    )
 
 
 @inner_kernel
@@ -200,40 +150,3 @@ def mount_energy(numbers: Array, x: float, y: float, stretch: Array) -> float:
             energy += 0.5 * k * (stretch[at] * stretch[at] + stretch[at + 1] * stretch[at + 1])
             at += 2
     return energy
-
-
-@inner_kernel
-def stiffness_of_state(numbers: Array, state: int) -> float:
-    """Stiffness [N/m] of the spring whose stretch is a state, counted from the first of the mount.
-
-    Source: `mount_force`, the order of its springs.
-    """
-    stiffness: float = numbers[RIBBON]
-    at = 2 if stiffness > 0.0 else 0
-    for j in range(BRANCHES, N_ENTRIES, BRANCH_ENTRIES):
-        if numbers[j] > 0.0:
-            if at <= state < at + 2:
-                stiffness = numbers[j]
-            at += 2
-    return stiffness
-
-
-@inner_kernel
-def stretch_gradient(
-    numbers: Array, state: int, ex: float, ey: float, vx: float, vy: float
-) -> tuple[Matrix, Matrix]:
-    """Slopes of the rate of a stretch by that stretch [1/s] and by the rate of deflection [1].
-
-    Source: `mount_force`, differentiated.
-    """
-    if numbers[RIBBON] > 0.0 and state < 2:
-        a, b = ribbon_slip_gradient(numbers, ex, ey, vx, vy)
-        return (-a[0], -a[1], -a[2], -a[3]), (1.0 - b[0], -b[1], -b[2], 1.0 - b[3])
-    at = 2 if numbers[RIBBON] > 0.0 else 0
-    relaxing = 0.0
-    for j in range(BRANCHES, N_ENTRIES, BRANCH_ENTRIES):
-        if numbers[j] > 0.0:
-            if state == at:
-                relaxing = -1.0 / numbers[j + 1]
-            at += 2
-    return (relaxing, 0.0, 0.0, relaxing), (1.0, 0.0, 0.0, 1.0)

@@ -84,8 +84,8 @@ def spring_force(numbers: Array, entries: Array, q: float) -> tuple[float, float
 
 
 @inner_kernel
-def fit_friction(numbers: Array, F: float, v: float) -> tuple[float, float, float]:
-    """Friction [N] of one ring in its housing, its slope by the radial force [1] and by the speed [N s/m].
+def fit_friction(numbers: Array, F: float, v: float) -> float:
+    """Friction [N] of one ring in its housing.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def fit_friction(numbers: Array, F: float, v: float) -> tuple[float, float, floa
     Coulomb's friction, smoothed: ``µ F / rows · tanh(v / v0)``. A ring that would stick creeps instead.
     Source: definition. Not validated against a measured ring.
     """
-    share, level = numbers[FRICTION] / numbers[ROWS], tanh(v / SMOOTHING_SPEED)
-    return share * F * level, share * level, share * F * (1.0 - level * level) / SMOOTHING_SPEED
+    friction: float = numbers[FRICTION] / numbers[ROWS] * F * tanh(v / SMOOTHING_SPEED)
+    return friction
 
 
 @inner_kernel

@@ -44,16 +44,3 @@ def race_drag_torque(
     spin.
     """
     return drag_coefficient * F_b * 0.5 * D_pw * tanh(omega_i / drag_speed)
-
-
-@inner_kernel
-def race_drag_gradient(
-    F_b: float, omega_i: float, drag_coefficient: float, D_pw: float, drag_speed: float
-) -> tuple[float, float]:
-    """Derivatives of `race_drag_torque` by the ball force [m] and by the race spin [N m s].
-
-    Source: `race_drag_torque`, differentiated.
-    """
-    arm = 0.5 * drag_coefficient * D_pw
-    level = tanh(omega_i / drag_speed)
-    return arm * level, arm * F_b * (1.0 - level * level) / drag_speed

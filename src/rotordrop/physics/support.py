@@ -74,29 +74,6 @@ def cubic_share(cubic: float, u: float) -> float:
 
 
 @inner_kernel
-def support_tangent(
-    form: Array, k_x: float, k_y: float, c_x: float, c_y: float, x: float, y: float, v_x: float, v_y: float
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Slope of the force of a support by deflection [N/m] and by its rate [N s/m]: along x, across, along y.
-
-    Source: `support_force`, differentiated.
-    """
-    k_c = form[COUPLING] * math.sqrt(k_x * k_y)
-    stiffness = k_x * _cubic_slope(form[CUBIC], x), k_c, k_y * _cubic_slope(form[CUBIC], y)
-    square = v_x * v_x + v_y * v_y + SLOW * SLOW
-    rubbing = form[FRICTION] / math.sqrt(square)
-    turned = rubbing / square
-    damping = c_x + rubbing - turned * v_x * v_x, -turned * v_x * v_y, c_y + rubbing - turned * v_y * v_y
-    return stiffness, damping
-
-
-@inner_kernel
-def _cubic_slope(cubic: float, u: float) -> float:
-    share = cubic * u * u
-    return 1.0 + 3.0 * share if share > -LARGEST_SOFTENING else 1.0 - LARGEST_SOFTENING
-
-
-@inner_kernel
 def support_energy(form: Array, k_x: float, k_y: float, x: float, y: float) -> float:
     """Energy [J] stored in the springs of a support at a deflection [m].
 

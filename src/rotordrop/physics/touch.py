@@ -1,4 +1,4 @@
-"""Rotor in a round bore: normal force, friction and their derivatives from the motion against the bore.
+"""Rotor in a round bore: normal force and friction from the motion against the bore.
 
 The numbers of a contact are a short array that only this module reads; its last entries are the law of
 `rotordrop.physics.contact`, the columns of `rotordrop.physics.columns` hold it.
@@ -10,8 +10,8 @@ import math
 
 from rotordrop.arrays import Array
 from rotordrop.physics import contact
-from rotordrop.physics._compile import inner_kernel, lean_kernel
-from rotordrop.physics.friction import stribeck_coefficient, stribeck_gradient
+from rotordrop.physics._compile import inner_kernel
+from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
 
 # Entries of a contact; SI units.
@@ -82,57 +82,3 @@ def touch(
         numbers[SMOOTHING_SPEED],
     )
     return delta, F_r, F_mu, nx, ny, F_mu * v_t, (F_r - elastic) * delta_dot
-
-
-@lean_kernel
-def touch_gradient(
-    numbers: Array, ux: float, uy: float, vx: float, vy: float, omega: float, omega_i: float, g: Array
-) -> bool:
-    """Derivatives of contact and friction force; False and ``g`` untouched when there is no contact.
-
-    ``g`` (3, 6 or more): rows force on the bore in x, in y [N] and friction force [N]; columns by
-    ``ux, uy`` [m], ``vx, vy`` [m/s], rotor spin and bore spin [rad/s]; arguments as in `touch`.
-    Source: `touch`, differentiated.
-    """
-    r = math.sqrt(ux * ux + uy * uy)
-    delta = r - numbers[AIR_GAP]
-    if delta <= 0.0:
-        return False
-    nx = ux / r
-    ny = uy / r
-    tx = -ny
-    ty = nx
-    v_n = vx * nx + vy * ny
-    v_s = vx * tx + vy * ty
-    F, F_d, F_v = contact.contact_gradient(numbers[LAW:N_ENTRIES], delta, v_n)
-    v_t = surface_speed(v_s, omega, numbers[ROTOR_RADIUS], omega_i, numbers[BORE_RADIUS])
-    mu, mu_v = stribeck_gradient(
-        v_t,
-        numbers[FRICTION_STATIC],
-        numbers[FRICTION_DYNAMIC],
-        numbers[STRIBECK_SPEED],
-        numbers[SMOOTHING_SPEED],
-    )
-    for c in range(6):
-        dn = 0.0
-        dt = 0.0
-        d_force = 0.0
-        d_slip = 0.0
-        if c < 2:
-            dn = nx if c == 0 else ny
-            dt = tx if c == 0 else ty
-            d_force = F_d * dn + F_v * v_s / r * dt
-            d_slip = -v_n / r * dt
-        elif c < 4:
-            d_force = F_v * (nx if c == 2 else ny)
-            d_slip = tx if c == 2 else ty
-        elif c == 4:
-            d_slip = numbers[ROTOR_RADIUS]
-        else:
-            d_slip = -numbers[BORE_RADIUS]
-        d_friction = mu * d_force + F * mu_v * d_slip
-        turn = dt / r
-        g[0, c] = nx * d_force + tx * d_friction + F * turn * (tx - mu * nx)
-        g[1, c] = ny * d_force + ty * d_friction + F * turn * (ty - mu * ny)
-        g[2, c] = d_friction
-    return True

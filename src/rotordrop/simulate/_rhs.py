@@ -535,11 +535,11 @@ def add_rings(
     numbers = row[L.RING : L.RING_END]
     pushed = ball_set_axial_force(row[L.ROLLING : L.ROLLING_END], p.balls[b], x, z, balls, y[at])
     held, _rate = ring.spring_force(numbers, row[L.ROLLING : L.ROLLING_END], y[at])
-    friction, _by_force, _by_speed = ring.fit_friction(numbers, F, y[at + 1])
+    friction = ring.fit_friction(numbers, F, y[at + 1])
     rows = numbers[ring.ROWS]
     dy[at] = y[at + 1]
     share = numbers[ring.DAMPING] / rows
-    damped = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, y[at])[0] * y[at + 1]
+    damped = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, y[at]) * y[at + 1]
     dy[at + 1] = (pushed / rows - held - friction - damped) / numbers[ring.MASS]
     return float(rows * damped * y[at + 1]), float(rows * friction * y[at + 1])
 
@@ -592,7 +592,7 @@ def add_axial_motion(
         dx, dz = race_deflection(b, y, p)
         numbers, moved = row[L.ROLLING : L.ROLLING_END], y[own + 1]
         held = two_row_axial_force(numbers, rows_of(b, p), dx, dz, y[own], work.balls)
-        damped = two_row_axial_damping(numbers, rows_of(b, p), y[own])[0] * moved
+        damped = two_row_axial_damping(numbers, rows_of(b, p), y[own]) * moved
         spin = p.bearing_at[b, L.RACE_SPIN]
         # balls roll under the sum of their loads: the drag of the axial force comes on top
         drag = race_drag_torque(
@@ -623,29 +623,17 @@ def landing_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     return torque
 
 
-@lean_kernel
-def bearing_accelerations(
-    t: float, b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
-) -> tuple[float, float]:
-    """Forces at one touchdown bearing, added to rotor, race, support and spin; power lost, in its row.
+@inner_kernel
+def carried_accelerations(
+    b: int, friction: float, y: Array, p: KernelParameters, dy: Array, work: Scratch
+) -> tuple[float, float, float]:
+    """Motion of race, rings and support under the contact forces that ``dy`` holds and their friction [N].
 
-    Returns the friction torque on the rotor [N m] (positive drives it) and all power lost here [W]. A bearing
-    without a race has the rotor touch its support.
+    Returns the power that balls, support and drag take [W].
     """
     n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
     row = p.bearing[b]
-    friction = 0.0
-    sliding = 0.0
-    lost = 0.0
-    for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
-        force, by_sliding, by_law = add_contact(t, c, b, y, p, dy)
-        friction += force
-        sliding += by_sliding
-        lost += by_law
     F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
-    by_sleeve = 0.0
-    if row[L.NOT_ROUND] != 0.0:
-        by_sleeve = landing_torque(b, y, p, dy)
     if not OPTIONAL_PARTS or p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
@@ -669,11 +657,34 @@ def bearing_accelerations(
         by_support = add_support_form(b, y, p, dy)
     if OPTIONAL_PARTS and sprung:
         by_support += by_fit
-    # Written together and last: each write makes the compiler read the arrays of the bearing again.
+    return by_balls, by_support, by_drag
+
+
+@lean_kernel
+def bearing_accelerations(
+    t: float, b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
+) -> tuple[float, float]:
+    """Forces at one touchdown bearing, added to rotor, race, support and spin; power lost, in its row.
+
+    Returns the friction torque on the rotor [N m] (positive drives it) and all power lost here [W]. A bearing
+    without a race has the rotor touch its support.
+    """
+    friction = 0.0
+    sliding = 0.0
+    lost = 0.0
+    for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
+        force, by_sliding, by_law = add_contact(t, c, b, y, p, dy)
+        friction += force
+        sliding += by_sliding
+        lost += by_law
+    by_sleeve = 0.0
+    if p.bearing[b, L.NOT_ROUND] != 0.0:
+        by_sleeve = landing_torque(b, y, p, dy)
+    by_balls, by_support, by_drag = carried_accelerations(b, friction, y, p, dy, work)
     power = work.power[b]
     power[SLIDING], power[IN_CONTACT] = sliding, lost
     power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
-    torque = by_sleeve - friction * row[L.ROTOR_RADIUS]
+    torque = by_sleeve - friction * p.bearing[b, L.ROTOR_RADIUS]
     return torque, by_balls + by_drag + by_support + (sliding + lost)
 
 

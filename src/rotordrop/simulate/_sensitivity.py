@@ -1,46 +1,35 @@
 """Derivative of the right-hand side by the state: what the filter needs beside the value.
 
-Every derivative is analytic and tested against finite differences away from switches. Left out, because they
-are tiny and would make the matrix full: the dependence of the ω̇ terms of eq. (1) on the contact torque. Left
-out too is the torque of a landing sleeve that is not round, some hundredth of that of friction.
+What bearings do is differentiated by one-sided differences of the right-hand side's own parts; the rest is
+analytic. Left out, because they are tiny and would make the matrix full: the dependence of the ω̇ terms of
+eq. (1) on the contact torque. Left out too is the torque of a landing sleeve that is not round, some
+hundredth of that of friction.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rotordrop.arrays import Array, Integers
-from rotordrop.physics import aerodynamics, ball_table, face, landing_sleeve, mount, ring, support
+from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.physics._compile import OPTIONAL_PARTS, inner_kernel, kernel, lean_kernel
-from rotordrop.physics.ball_set import (
-    ball_set_axial_gradient,
-    ball_set_gradient,
-    row_axial_damping,
-    two_row_axial_damping,
-)
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
-from rotordrop.physics.spin import race_drag_gradient
-from rotordrop.physics.touch import touch_gradient
 from rotordrop.simulate._rhs import (
+    Scratch,
+    add_axial_motion,
     aerodynamic_deceleration,
+    carried_accelerations,
+    contact_values,
     mount_states,
-    race_deflection,
-    race_travel,
-    relative_motion,
-    ring_travel,
-    rows_of,
-    support_deflection,
-    true_motion,
+    scratch_of,
 )
 
-FACE_STEP = 1e-9
-"""Step [m], [m/s] of the difference by which the law of a face is differentiated."""
+PLACE_STEP, RATE_STEP, SPIN_STEP = 1e-11, 1e-7, 1e-6
+"""Steps [m], [m/s] and [rad/s] or [rad] of the differences: far below the depth of any contact that counts,
+and far above rounding (chosen)."""
 
-Slopes = tuple[float, float, float]
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED
 OF_SPEED = aerodynamics.FUNCTION_OF_SPEED
 
@@ -114,220 +103,132 @@ def _contact_jacobian(c: int, g: Array, p: KernelParameters, J: Array) -> None:
 
 
 @lean_kernel
-def _couple(J: Array, place: int, weight: float, at: int, rate: int, i: int, k: Slopes, c: Slopes) -> None:
-    """Add to an acceleration along axis ``i`` what springs ``k_xx, k_xy, k_yy`` and dampers make of a body.
-
-    The body's displacement stands at ``at``, its velocity at ``rate``, x before y.
-    """
-    for j in range(2):
-        stiffness, damping = k[1], c[1]
-        if i == j:
-            stiffness, damping = (k[0], c[0]) if i == 0 else (k[2], c[2])
-        J[place, at + j] += weight * stiffness
-        J[place, rate + j] += weight * damping
-
-
-@lean_kernel
-def _race_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
-    """Add balls and drag of a race."""
-    n_q = p.rotor_at[L.N_COORDINATES]
-    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
-    row = p.bearing[b]
-    dx, dy = race_deflection(b, y, p)
-    w_x = w_y = 0.0
-    if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
-        grid = row[L.FAST : L.FAST_END]
-        F_x, F_y, k_xx, k_xy, k_yy, w_x, w_y = ball_table.fast_gradient(
-            grid, p.ball_table[b], p.balls[b], dx, dy, y[spin]
-        )
-    elif OPTIONAL_PARTS and p.bearing_at[b, L.FACE_STATES] >= 0:
-        entries, along = row[L.BALL_SET : L.BALL_SET_END], race_travel(b, y, p)
-        loaded, relieved = rows_of(b, p)
-        F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, loaded, dx, dy, -along)
-        G_x, G_y, g_xx, g_xy, g_yy = ball_set_gradient(entries, relieved, dx, dy, along)
-        F_x, F_y, k_xx, k_xy, k_yy = F_x + G_x, F_y + G_y, k_xx + g_xx, k_xy + g_xy, k_yy + g_yy
-    else:
-        entries, way = row[L.BALL_SET : L.BALL_SET_END], ring_travel(b, y, p)
-        F_x, F_y, k_xx, k_xy, k_yy = ball_set_gradient(entries, p.balls[b], dx, dy, way)
-    k, c = (k_xx, k_xy, k_yy), (row[L.BEARING_DAMPING], 0.0, row[L.BEARING_DAMPING])
-    for i in range(2):
-        m_h = row[L.SUPPORT_MASS_X + i]
-        _couple(J, n_q + r + i, -1.0 / row[L.RACE_MASS], r, n_q + r, i, k, c)
-        _couple(J, n_q + r + i, 1.0 / row[L.RACE_MASS], h, n_q + h, i, k, c)
-        _couple(J, n_q + h + i, 1.0 / m_h, r, n_q + r, i, k, c)
-        _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
-    F = math.sqrt(F_x * F_x + F_y * F_y)
-    by_force, by_spin = race_drag_gradient(
-        F + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
-    )
-    J[spin, spin] -= by_spin / row[L.RACE_INERTIA]
-    if F > 0.0:
-        for j in range(2):
-            along = F_x * k_xx + F_y * k_xy if j == 0 else F_x * k_xy + F_y * k_yy
-            J[spin, r + j] -= by_force / row[L.RACE_INERTIA] * along / F
-            J[spin, h + j] += by_force / row[L.RACE_INERTIA] * along / F
-    if OPTIONAL_PARTS and row[L.FAST_SPEED_STEP] > 0.0:
-        for i in range(2):
-            slope = w_x if i == 0 else w_y
-            J[n_q + r + i, spin] -= slope / row[L.RACE_MASS]
-            J[n_q + h + i, spin] += slope / row[L.SUPPORT_MASS_X + i]
-        if F > 0.0:
-            J[spin, spin] -= by_force / row[L.RACE_INERTIA] * (F_x * w_x + F_y * w_y) / F
-    if OPTIONAL_PARTS and p.bearing_at[b, L.RING_STATES] >= 0:
-        _ring_jacobian(b, y, p, J, (F_x, F_y), k)
-
-
-@lean_kernel
-def _ring_jacobian(
-    b: int, y: Array, p: KernelParameters, J: Array, F: tuple[float, float], k: Slopes
+def _add_column(
+    t: float,
+    owner: int,
+    i: int,
+    step: float,
+    rates: Array,
+    y: Array,
+    p: KernelParameters,
+    J: Array,
+    work: Scratch,
 ) -> None:
-    """Add sprung rings: their own motion, and what their way changes of the force [N] on race and support.
-
-    ``k`` are the slopes of the force of the balls by the deflection of the race.
-    """
-    n_q, at = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RING_STATES]
-    r, h, spin = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.RACE_SPIN]
-    row = p.bearing[b]
-    entries, numbers = row[L.BALL_SET : L.BALL_SET_END], row[L.RING : L.RING_END]
-    dx, dy = race_deflection(b, y, p)
-    _pushed, k_ax, k_ay, k_aa = ball_set_axial_gradient(entries, p.balls[b], dx, dy, y[at])
-    _held, rate = ring.spring_force(numbers, entries, y[at])
-    C = row[L.BEARING_DAMPING]
-    total_x = F[0] + C * (y[n_q + r] - y[n_q + h])
-    total_y = F[1] + C * (y[n_q + r + 1] - y[n_q + h + 1])
-    size = math.sqrt(total_x * total_x + total_y * total_y)
-    _friction, by_force, by_speed = ring.fit_friction(numbers, size, y[at + 1])
-    mass, rows = numbers[ring.MASS], numbers[ring.ROWS]
-    along_x, along_y = (total_x / size, total_y / size) if size > 0.0 else (0.0, 0.0)
-    elastic = math.sqrt(F[0] * F[0] + F[1] * F[1])
-    share = numbers[ring.DAMPING] / numbers[ring.ROWS]
-    damping, by_way = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, y[at])
-    by_drag, _by_spin = race_drag_gradient(
-        elastic + row[L.PRESSED], y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
-    )
-    J[at, at + 1] = 1.0
-    J[at + 1, at] -= (k_aa / rows + rate - by_force * (along_x * k_ax + along_y * k_ay)) / mass
-    J[at + 1, at] -= by_way * y[at + 1] / mass
-    J[at + 1, at + 1] -= (by_speed + damping) / mass
-    for j in range(2):
-        axial, along = (k_ax, along_x) if j == 0 else (k_ay, along_y)
-        # as the rings give way, the force of the balls falls
-        J[n_q + r + j, at] += axial / row[L.RACE_MASS]
-        J[n_q + h + j, at] -= axial / row[L.SUPPORT_MASS_X + j]
-        if elastic > 0.0:
-            J[spin, at] += by_drag / row[L.RACE_INERTIA] * F[j] * axial / elastic
-        radial = along_x * k[0] + along_y * k[1] if j == 0 else along_x * k[1] + along_y * k[2]
-        slope = (axial / rows - by_force * radial) / mass
-        J[at + 1, r + j] += slope
-        J[at + 1, h + j] -= slope
-        J[at + 1, n_q + r + j] -= by_force * along * C / mass
-        J[at + 1, n_q + h + j] += by_force * along * C / mass
+    """Add to column ``i`` what a step of that state changes of the rates of `_rates_of`, ``rates[0]``."""
+    n_b, kept = p.bearing.shape[0], y[i]
+    y[i] = kept + step
+    _rates_of(t, owner, y, p, rates[1], work)
+    step = y[i] - kept
+    y[i] = kept
+    # bearings: races and supports and all behind; axial motion: behind the spins
+    first = 2 * p.rotor_at[L.N_COORDINATES] + (n_b if owner == n_b else -4 * n_b)
+    for r in range(first, J.shape[0]):
+        J[r, i] += (rates[1, r] - rates[0, r]) / step
 
 
 @lean_kernel
-def _axial_jacobian(y: Array, p: KernelParameters, J: Array) -> None:
-    """Add the axial motion of rotor and races: faces, balls, and what the balls make of both motions.
+def _rates_of(t: float, owner: int, y: Array, p: KernelParameters, dy: Array, work: Scratch) -> None:
+    """Rates of what one bearing carries, contacts left out, or of axial motion behind the last bearing."""
+    for i in range(dy.shape[0]):
+        dy[i] = 0.0
+    if owner < p.bearing.shape[0]:
+        carried_accelerations(owner, 0.0, y, p, dy, work)
+    elif OPTIONAL_PARTS:
+        add_axial_motion(t, y, p, dy, work)
+
+
+@lean_kernel
+def _bearing_jacobian(
+    t: float, b: int, y: Array, p: KernelParameters, J: Array, rates: Array, work: Scratch
+) -> None:
+    """Add what one bearing carries: race, rings, support, foundation and mount."""
+    n_q = p.rotor_at[L.N_COORDINATES]
+    r, h, own = p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
+    _rates_of(t, b, y, p, rates[0], work)
+    for j in range(2):
+        _add_column(t, b, h + j, PLACE_STEP, rates, y, p, J, work)
+        _add_column(t, b, n_q + h + j, RATE_STEP, rates, y, p, J, work)
+        if not OPTIONAL_PARTS or r >= 0:
+            _add_column(t, b, r + j, PLACE_STEP, rates, y, p, J, work)
+            _add_column(t, b, n_q + r + j, RATE_STEP, rates, y, p, J, work)
+        if own >= 0:
+            _add_column(t, b, own + j, PLACE_STEP, rates, y, p, J, work)
+            _add_column(t, b, own + 2 + j, RATE_STEP, rates, y, p, J, work)
+    if not OPTIONAL_PARTS or r >= 0:
+        _add_column(t, b, p.bearing_at[b, L.RACE_SPIN], SPIN_STEP, rates, y, p, J, work)
+    if OPTIONAL_PARTS:
+        first, last = mount_states(b, p)
+        for i in range(first, last):
+            _add_column(t, b, i, PLACE_STEP, rates, y, p, J, work)
+        ring, face = p.bearing_at[b, L.RING_STATES], p.bearing_at[b, L.FACE_STATES]
+        if ring >= 0:
+            _add_column(t, b, ring, PLACE_STEP, rates, y, p, J, work)
+            _add_column(t, b, ring + 1, RATE_STEP, rates, y, p, J, work)
+        if face >= 0:
+            _add_column(t, b, face, PLACE_STEP, rates, y, p, J, work)
+
+
+@lean_kernel
+def _axial_jacobian(t: float, y: Array, p: KernelParameters, J: Array, rates: Array, work: Scratch) -> None:
+    """Add the axial motion of rotor and races.
 
     Left out are the friction of a face and the drag that the axial force of the balls puts on the race.
     """
-    n_q, at = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.AXIAL]
-    J[at, at + 1] = 1.0
+    owner, at = p.bearing.shape[0], p.rotor_at[L.AXIAL]
+    _rates_of(t, owner, y, p, rates[0], work)
+    _add_column(t, owner, at, PLACE_STEP, rates, y, p, J, work)
+    _add_column(t, owner, at + 1, RATE_STEP, rates, y, p, J, work)
     for b in p.faces:
         own, r, h = p.bearing_at[b, L.FACE_STATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.SUPPORT]
-        row, (loaded, relieved) = p.bearing[b], rows_of(b, p)
-        numbers, entries = row[L.FACE : L.FACE_END], row[L.BALL_SET : L.BALL_SET_END]
-        dx, dy = race_deflection(b, y, p)
-        z, vz = y[at] - y[own], y[at + 1] - y[own + 1]
-        above = face.face_contact(numbers, z + FACE_STEP, vz, 0.0, 0.0, 0.0)[1]
-        stiff = above - face.face_contact(numbers, z - FACE_STEP, vz, 0.0, 0.0, 0.0)[1]
-        above = face.face_contact(numbers, z, vz + FACE_STEP, 0.0, 0.0, 0.0)[1]
-        loss = above - face.face_contact(numbers, z, vz - FACE_STEP, 0.0, 0.0, 0.0)[1]
-        _one, k_ax, k_ay, k_aa = ball_set_axial_gradient(entries, loaded, dx, dy, -y[own])
-        _other, g_ax, g_ay, g_aa = ball_set_axial_gradient(entries, relieved, dx, dy, y[own])
-        damping, by_way = two_row_axial_damping(row[L.ROLLING : L.ROLLING_END], (loaded, relieved), y[own])
-        J[own, own + 1] = 1.0
-        for part in range(2):
-            slope = (stiff if part == 0 else loss) / (2.0 * FACE_STEP)
-            held = k_aa + g_aa + by_way * y[own + 1] if part == 0 else damping
-            J[at + 1, at + part] -= slope / p.spin[L.ROTOR_MASS]
-            J[at + 1, own + part] += slope / p.spin[L.ROTOR_MASS]
-            J[own + 1, at + part] += slope / row[L.RACE_MASS]
-            J[own + 1, own + part] -= (slope + held) / row[L.RACE_MASS]
+        _add_column(t, owner, own, PLACE_STEP, rates, y, p, J, work)
+        _add_column(t, owner, own + 1, RATE_STEP, rates, y, p, J, work)
         for j in range(2):
-            slope = k_ax - g_ax if j == 0 else k_ay - g_ay
-            J[own + 1, r + j] -= slope / row[L.RACE_MASS]
-            J[own + 1, h + j] += slope / row[L.RACE_MASS]
-            J[n_q + r + j, own] -= slope / row[L.RACE_MASS]
-            J[n_q + h + j, own] += slope / row[L.SUPPORT_MASS_X + j]
+            _add_column(t, owner, r + j, PLACE_STEP, rates, y, p, J, work)
+            _add_column(t, owner, h + j, PLACE_STEP, rates, y, p, J, work)
 
 
 @inner_kernel
-def _entry(matrix: mount.Matrix, i: int, j: int) -> float:
-    """Entry of a matrix of x and y."""
-    if i == 0:
-        return matrix[0] if j == 0 else matrix[1]
-    return matrix[2] if j == 0 else matrix[3]
+def _contact_force(
+    t: float, c: int, b: int, y: Array, p: KernelParameters
+) -> tuple[float, float, float, float]:
+    """Indentation [m], force on the bore along x and y and friction force [N] of a contact."""
+    delta, F_r, F_mu, nx, ny, _sliding, _lost = contact_values(t, c, b, y, p)
+    return delta, F_r * nx - F_mu * ny, F_r * ny + F_mu * nx, F_mu
 
 
 @lean_kernel
-def _mount_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
-    """Add stop, ribbon and branches of a mount: their forces on support and foundation, and their states."""
-    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
-    row = p.bearing[b]
-    numbers = row[L.MOUNT : L.MOUNT_END]
-    x, z, vx, vz = support_deflection(b, y, p)
-    first, last = mount_states(b, p)
-    mobility = max(row[L.SUPPORT_FORM + support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
-    k, c = mount.stop_tangent(numbers, x, z, vx, vz)
-    for i in range(2):
-        for body in range(1 if own < 0 else 2):  # the force acts on the support and back on its foundation
-            place = n_q + h + i if body == 0 else own + 2 + i
-            weight = -1.0 / row[L.SUPPORT_MASS_X + i] if body == 0 else mobility
-            for j in range(2):
-                J[place, h + j] += weight * _entry(k, i, j)
-                J[place, n_q + h + j] += weight * _entry(c, i, j)
-                if own >= 0:
-                    J[place, own + j] -= weight * _entry(k, i, j)
-                    J[place, own + 2 + j] -= weight * _entry(c, i, j)
-            for state in range(first + i, last, 2):
-                J[place, state] += weight * mount.stiffness_of_state(numbers, state - first)
-    for state in range(first, last, 2):
-        by_stretch, by_rate = mount.stretch_gradient(numbers, state - first, y[state], y[state + 1], vx, vz)
-        for i in range(2):
-            for j in range(2):
-                J[state + i, state + j] += _entry(by_stretch, i, j)
-                J[state + i, n_q + h + j] += _entry(by_rate, i, j)
-                if own >= 0:
-                    J[state + i, own + 2 + j] -= _entry(by_rate, i, j)
+def contact_gradient(t: float, c: int, y: Array, p: KernelParameters, g: Array) -> bool:
+    """Derivatives of a contact; False and ``g`` untouched where the rotor flies.
 
-
-@lean_kernel
-def _support_jacobian(b: int, y: Array, p: KernelParameters, J: Array) -> None:
-    """Add a support with what its form changes, and its foundation."""
-    n_q, h, own = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing_at[b, L.BEARING_OWN]
-    row = p.bearing[b]
-    form = row[L.SUPPORT_FORM : L.SUPPORT_FORM_END]
-    k_x, k_y = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
-    c_x, c_y = row[L.SUPPORT_DAMPING_X], row[L.SUPPORT_DAMPING_Y]
-    k, c = (k_x, 0.0, k_y), (c_x, 0.0, c_y)
-    if form[support.PRESENT] != 0.0:
-        x, z, vx, vz = support_deflection(b, y, p)
-        k, c = support.support_tangent(form, k_x, k_y, c_x, c_y, x, z, vx, vz)
-    for i in range(2):
-        m_h = row[L.SUPPORT_MASS_X + i]
-        _couple(J, n_q + h + i, -1.0 / m_h, h, n_q + h, i, k, c)
-        if own < 0:
+    ``g`` (3, 7): rows force on the bore in x, in y [N] and friction force [N]; columns by displacement [m]
+    and velocity [m/s] of the rotor against the bore, spin of rotor and of bore [rad/s], rotor angle [rad].
+    """
+    b, body, spin = (
+        p.contact_at[c, L.CONTACT_BEARING],
+        p.contact_at[c, L.CONTACT_BODY],
+        p.contact_at[c, L.CONTACT_SPIN],
+    )
+    delta, F_x, F_y, F_mu = _contact_force(t, c, b, y, p)
+    if delta <= 0.0:
+        return False
+    for k in range(7):
+        i, step = body + k % 2, PLACE_STEP
+        if k >= 4:
+            i, step = spin, SPIN_STEP
+            if k != 5:
+                i = p.rotor_at[L.ROTOR_SPEED] if k == 4 else p.rotor_at[L.ROTOR_ANGLE]
+        elif k >= 2:
+            i, step = i + p.rotor_at[L.N_COORDINATES], RATE_STEP
+        g[0, k] = g[1, k] = g[2, k] = 0.0
+        if i < 0 or (k == 6 and p.bearing[b, L.NOT_ROUND] == 0.0):
             continue
-        mobility = max(form[support.FOUNDATION_SHARE], 0.0) / row[L.SUPPORT_MASS_Y]
-        speed = form[support.FOUNDATION_SPEED]
-        _couple(J, n_q + h + i, 1.0 / m_h, own, own + 2, i, k, c)
-        _couple(J, own + 2 + i, mobility, h, n_q + h, i, k, c)
-        _couple(J, own + 2 + i, -mobility, own, own + 2, i, k, c)
-        J[own + i, own + 2 + i] = 1.0
-        J[own + 2 + i, own + i] -= speed * speed
-        J[own + 2 + i, own + 2 + i] -= 2.0 * form[support.FOUNDATION_DAMPING] * speed
-    if OPTIONAL_PARTS and row[L.MOUNT] != 0.0:
-        _mount_jacobian(b, y, p, J)
+        kept = y[i]
+        y[i] = kept + step
+        _delta, x, z, friction = _contact_force(t, c, b, y, p)
+        step = y[i] - kept if k >= 4 else kept - y[i]  # the bore moves where the rotor should
+        y[i] = kept
+        g[0, k], g[1, k], g[2, k] = (x - F_x) / step, (z - F_y) / step, (friction - F_mu) / step
+    return True
 
 
 @kernel
@@ -339,7 +240,7 @@ def drop_jacobian(t: float, y: Array, p: KernelParameters, J: Array) -> None:
     n_c = p.contact_at.shape[0]
     g = np.zeros((n_c, 3, 7))
     touching = np.zeros(n_c, dtype=np.int64)
-    drop_jacobian_parts(t, y, p, J, g, touching)
+    drop_jacobian_parts(t, y, p, J, g, touching, np.empty((2, y.shape[0])), scratch_of(p))
     for c in range(n_c):
         if touching[c] != 0:
             _contact_jacobian(c, g[c], p, J)
@@ -359,34 +260,29 @@ def _deceleration_jacobian(t: float, y: Array, p: KernelParameters, J: Array) ->
 
 @lean_kernel
 def drop_jacobian_parts(
-    t: float, y: Array, p: KernelParameters, J: Array, g: Array, touching: Integers
+    t: float,
+    y: Array,
+    p: KernelParameters,
+    J: Array,
+    g: Array,
+    touching: Integers,
+    rates: Array,
+    work: Scratch,
 ) -> None:
     """`drop_jacobian` with the contacts apart, because a contact fills the rows and columns of all modes.
 
     ``J`` (s, s) is filled with everything but the contacts and the ω̇ terms of eq. (1), which are some
     hundred thousand times smaller than gyroscopics; ``g`` (C, 3, 7) with the gradients of each contact (see
-    `touch_gradient`), valid where ``touching`` (C,) is not zero.
+    `contact_gradient`), valid where ``touching`` (C,) is not zero. ``rates`` (2, n) is scratch.
     """
     n_q, i_w = p.rotor_at[L.N_COORDINATES], p.rotor_at[L.ROTOR_SPEED]
     J[:, :] = 0.0
     for i in range(n_q):
         J[i, n_q + i] = 1.0
     for b in range(p.bearing.shape[0]):
-        if not OPTIONAL_PARTS or p.bearing_at[b, L.RACE] >= 0:
-            _race_jacobian(b, y, p, J)
-        _support_jacobian(b, y, p, J)
+        _bearing_jacobian(t, b, y, p, J, rates, work)
     for c in range(p.contact_at.shape[0]):
-        b = p.contact_at[c, L.CONTACT_BEARING]
-        ux, uy, vx, vy = relative_motion(c, b, y, p)
-        spin = p.contact_at[c, L.CONTACT_SPIN]
-        omega_i = y[spin] if spin >= 0 else 0.0
-        numbers = p.bearing[b, L.TOUCH : L.TOUCH_END]
-        touching[c] = 1 if touch_gradient(numbers, ux, uy, vx, vy, y[i_w], omega_i, g[c]) else 0
-        if touching[c] != 0 and p.bearing[b, L.NOT_ROUND] != 0.0:
-            sleeve = p.bearing[b, L.LANDING_SLEEVE : L.LANDING_SLEEVE_END]
-            ux, uy, _vx, _vy = true_motion(c, b, y, p)
-            angle = y[p.rotor_at[L.ROTOR_ANGLE]]
-            landing_sleeve.of_true_motion(sleeve, angle, y[i_w], ux, uy, g[c])
+        touching[c] = 1 if contact_gradient(t, c, y, p, g[c]) else 0
     _rotor_jacobian(y, p, J)
     J[p.rotor_at[L.ROTOR_ANGLE], i_w] = 1.0
     if p.flags[L.SPIN_MODE] == OF_SPEED:
@@ -394,7 +290,7 @@ def drop_jacobian_parts(
             y[i_w], p.spin[L.AERO_LINEAR], p.spin[L.AERO_QUADRATIC]
         )
     if OPTIONAL_PARTS and p.rotor_at[L.AXIAL] >= 0:
-        _axial_jacobian(y, p, J)
+        _axial_jacobian(t, y, p, J, rates, work)
     if p.flags[L.MAGNETS_ACT] != 0:
         _magnet_jacobian(t < p.spin[L.POWER_OFF_DELAY], p, J)
 

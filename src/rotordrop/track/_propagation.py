@@ -400,7 +400,7 @@ def propagate(
                 copy_into(k[4], middle)
             elif 2 * (part + 1) == settings.frozen:
                 copy_into(y, middle)
-        drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching)
+        drop_jacobian_parts(now + 0.5 * h, middle, p, J, g, touching, k[:2], work)
         gather_entries(J, entries, places, starts)
         if columns > s and (block == 0 or not once):
             parameter_jacobian(now + 0.5 * h, middle, theta, targets, p, work, B)

@@ -221,20 +221,11 @@ def test_deep_grooves_are_damped_as_far_as_their_angle_has_opened(clearance):
 
 @pytest.mark.parametrize("way", [0.0, 7e-6, -40e-6, 0.3e-3])
 @pytest.mark.parametrize("deep", [False, True], ids=["pair", "deep grooves"])
-def test_slope_and_mirror_of_the_axial_damping(way, deep):
+def test_axial_damping_is_that_of_its_mirror_image(way, deep):
     p = build_drop_model(deep_grooves() if deep else faced(), "quick").parameters
     numbers, rows = p.bearing[1, L.ROLLING : L.ROLLING_END], (p.balls[1], p.balls[3])
-
-    def damping(z):
-        return two_row_axial_damping(numbers, rows, z)[0]
-
-    h = 2e-6  # three central differences, of the sixth order together
-    once, twice = ((damping(way + step) - damping(way - step)) / (2.0 * step) for step in (h, 2.0 * h))
-    wide = (damping(way + 3.0 * h) - damping(way - 3.0 * h)) / (6.0 * h)
-    value, slope = two_row_axial_damping(numbers, rows, way)
-    differences = 1.5 * once - 0.6 * twice + 0.1 * wide
-    assert slope == pytest.approx(differences, rel=1e-9, abs=1e-14 * (damping(way + h) + value) / h)
-    assert two_row_axial_damping(numbers, rows, -way) == pytest.approx((value, -slope), rel=1e-12)
+    damping = two_row_axial_damping(numbers, rows, way)
+    assert two_row_axial_damping(numbers, rows, -way) == pytest.approx(damping, rel=1e-12)
 
 
 @pytest.mark.parametrize("arrangement", ["", 'arrangement = "O"\n'])

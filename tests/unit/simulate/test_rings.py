@@ -71,7 +71,7 @@ def test_a_ring_is_damped_as_its_balls_are(way):
     rest, now = (np.arctan2(constants.axial_offset - moved, constants.radial_offset) for moved in (0.0, way))
     radial = np.sum(balls[COUNT] * np.cos(rest) ** 2 * balls[COSINE] ** 2)
     axial = np.sum(balls[COUNT]) / constants.row_count * np.sin(now) ** 2
-    found = row_axial_damping(row, 1.0 / constants.row_count, way)[0]
+    found = row_axial_damping(row, 1.0 / constants.row_count, way)
     assert found == pytest.approx(row[DAMPING] * axial / radial, rel=1e-9)
 
 
@@ -85,7 +85,7 @@ def test_rings_swing_out_in_flight_without_friction_of_their_fit(part):
     row = p.bearing[1]
     rings = row[L.RING : L.RING_END]
     share = 1.0 / rings[ring.ROWS]
-    whole = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, state[at])[0] / share
+    whole = row_axial_damping(row[L.ROLLING : L.ROLLING_END], share, state[at]) / share
     lost = part * whole * state[at + 1] ** 2
     assert lost > 0.0
     assert rates[model.layout.dissipated] == pytest.approx(lost, rel=1e-6)

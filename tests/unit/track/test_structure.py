@@ -88,18 +88,14 @@ def test_a_support_turned_by_an_angle_is_stiff_along_its_own_axes():
 
 
 @pytest.mark.parametrize("entries", [{"COUPLING": 0.4}, {"CUBIC": 4e8}, {"CUBIC": -1e8, "COUPLING": -0.3}])
-def test_force_is_the_slope_of_the_energy_and_tangent_that_of_the_force(entries):
+def test_force_is_the_slope_of_the_energy(entries):
     form, k_x, k_y, at = form_of(**entries), 0.7e8, 1e8, np.array([21e-6, -33e-6])
     force = support.support_force(form, k_x, k_y, 0.0, 0.0, at[0], at[1], 0.0, 0.0)
-    (k_xx, k_xy, k_yy), _ = support.support_tangent(form, k_x, k_y, 0.0, 0.0, at[0], at[1], 0.0, 0.0)
     step = 1e-9
-    for axis, slope in enumerate(((k_xx, k_xy), (k_xy, k_yy))):
+    for axis in range(2):
         ends = [at + sign * step * np.eye(2)[axis] for sign in (1.0, -1.0)]
         energy = [support.support_energy(form, k_x, k_y, *end) for end in ends]
         assert (energy[0] - energy[1]) / (2 * step) == pytest.approx(force[axis], rel=1e-6)
-        forces = [support.support_force(form, k_x, k_y, 0.0, 0.0, *end, 0.0, 0.0) for end in ends]
-        found = (np.array(forces[0]) - np.array(forces[1])) / (2 * step)
-        assert found[:2] == pytest.approx(slope, rel=1e-6)
 
 
 def test_a_support_loses_what_its_force_does_beyond_that_of_its_springs():
@@ -113,11 +109,6 @@ def test_a_support_loses_what_its_force_does_beyond_that_of_its_springs():
     rubbing = (np.array(moving) - still) - np.array(dampers) * rate
     assert np.linalg.norm(rubbing) == pytest.approx(600.0, rel=1e-3)  # at a hundred times the slow speed
     assert rubbing / np.linalg.norm(rubbing) == pytest.approx(rate / np.linalg.norm(rate), rel=1e-9)
-    _, (c_xx, c_xy, c_yy) = support.support_tangent(*springs, *dampers, *place, *rate)
-    for axis, slope in enumerate(((c_xx, c_xy), (c_xy, c_yy))):
-        ends = [rate + sign * 1e-7 * np.eye(2)[axis] for sign in (1.0, -1.0)]
-        forces = [support.support_force(*springs, *dampers, *place, *end)[:2] for end in ends]
-        assert (np.array(forces[0]) - forces[1]) / 2e-7 == pytest.approx(slope, rel=1e-6)
 
 
 @pytest.mark.parametrize("x", [1e-6, 1e-5, 1e-4, 5e-4])
