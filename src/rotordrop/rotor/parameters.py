@@ -102,9 +102,8 @@ def build_drop_model(
     """
     fe = build_rotor_fe(require(machine, "machine", Machine))
     nodes = tuple(bearing.node for bearing in machine.touchdown_bearings)
-    if require(
-        loops, "loops", bool
-    ):  # what a few modes leave out of the planes of the loop would shift its fast modes
+    if require(loops, "loops", bool):
+        # what a few modes leave out of the planes of the loop would shift its fast modes
         nodes += tuple(node for amb in machine.looped_ambs for node in (amb.node, machine.measured_node(amb)))
     basis = reduce_rotor(fe, reduction, nodes)
     shares = np.asarray(bearing_load_shares(machine, fe), dtype=np.float64)
