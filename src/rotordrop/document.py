@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from operator import attrgetter
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Self, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
@@ -29,6 +34,17 @@ _LONG_KEY = re.compile(
 """A key of more parts than that, bare or quoted."""
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+_UNIT = re.compile(r"(_(m|m2|s|kg|N|J|A|H|K|Hz|hz|Pa|rad|per))+$")
+"""Unit at the end of a key."""
+
+
+@dataclass(frozen=True)
+class Of:
+    """Where a result has what a field states, if not in the attribute of its name without the unit."""
+
+    source: str | Callable[[Any], Any]
+    """Attributes with dots between them, or what reads it off."""
 
 
 class Schema(GenerateJsonSchema):
@@ -56,6 +72,20 @@ class Document(BaseModel):
         return self.model_dump(exclude_unset=True)
 
     @classmethod
+    def of_result(cls, result: Any, **given: Any) -> Self:
+        """The document of a result: its fields as given, or read off as they say.
+
+        A field with a default is read off only where it has an `Of`, and left out if nothing is there.
+        """
+        for key, field in cls.model_fields.items():
+            said = next((one.source for one in field.metadata if isinstance(one, Of)), None)
+            if key not in given and (said is not None or field.is_required()):
+                found = _read_off(result, said or without_unit(key))
+                if field.is_required() or (found is not None and found != {}):
+                    given[key] = _stated(found, field.annotation)
+        return cls.model_validate(given)
+
+    @classmethod
     def of(cls, content: Any, place: str, made_by: str) -> Self:
         """The document that a mapping holds.
 
@@ -68,6 +98,50 @@ class Document(BaseModel):
             return cls.model_validate(content)
         except ValidationError as error:
             raise UsageError(f"{place}: {first_fault(error)}. Give a file that '{made_by}' wrote.") from None
+
+
+def stated(result: Any, keys: str, **given: Any) -> dict[str, Any]:
+    """Parts of a result ready for JSON, by keys in their order.
+
+    Each is given, or read off: from the attribute of its name without the unit, or from what follows its "=".
+    """
+    split = (key.partition("=") for key in keys.split())
+    return {
+        key: _stated(given[key] if key in given else _read_off(result, source or without_unit(key)))
+        for key, _, source in split
+    }
+
+
+def without_unit(key: str) -> str:
+    """The name in a key, ``impact_speed`` of ``impact_speed_m_per_s``."""
+    return _UNIT.sub("", key)
+
+
+def _read_off(result: Any, source: str | Callable[[Any], Any]) -> Any:
+    found = attrgetter(source)(result) if isinstance(source, str) else source(result)
+    return found() if callable(found) else found
+
+
+def _stated(found: Any, kind: Any = None) -> Any:
+    """A part of a result as JSON has it, what is within it by the document in its type; NaN is None."""
+    if isinstance(found, np.ndarray | np.generic):
+        found = found.tolist()
+    if isinstance(found, Mapping):
+        return {name: _stated(one, kind) for name, one in found.items()}
+    if isinstance(found, list | tuple):
+        return [_stated(one, kind) for one in found]
+    if isinstance(found, float):
+        return float(found) if math.isfinite(found) else None
+    if found is None or isinstance(found, str | int) or (kind and isinstance(found, Document)):
+        return found
+    return _stated(found.as_json()) if hasattr(found, "as_json") else _document_in(kind).of_result(found)
+
+
+def _document_in(kind: Any) -> type[Document]:
+    """The document in a type such as ``dict[str, Parameter]``."""
+    if isinstance(kind, type) and issubclass(kind, Document):
+        return kind
+    return next(_document_in(one) for one in get_args(kind) if one not in (str, type(None)))
 
 
 def read_document(path: str | Path) -> dict[str, Any]:

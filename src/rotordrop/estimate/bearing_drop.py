@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.estimate import published
-from rotordrop.estimate.published import Value
 from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import Known
 from rotordrop.severity.statistics import Statistics, stress_statistics
@@ -139,6 +137,12 @@ class Peak:
         """Interval that holds the true peak with 90 % probability, where one is known."""
         return self.known.interval_90
 
+    def as_json(self) -> dict[str, Any]:
+        """What is known of the number and of its time, ready for JSON."""
+        between = self.time_interval_90
+        when = {"time_s": self.time} | ({} if between is None else {"time_interval_90_s": list(between)})
+        return self.known.as_json() | when
+
 
 @dataclass(frozen=True, kw_only=True)
 class Impact:
@@ -221,6 +225,11 @@ class BearingDrop:
     """Name of the force whose peak the impacts state."""
     first_contact: FirstContact | None = None
     """None where the bearing was not touched."""
+
+    @property
+    def numbers(self) -> dict[str, Known | Peak]:
+        """Every number by the field names of the published document."""
+        return {"peak_force_N": self.peak_force, "peak_stress_Pa": self.peak_stress, **self.values}
 
     @property
     def statistics(self) -> Statistics:
@@ -355,47 +364,3 @@ def mean_late(force: History) -> float | None:
         return None
     late = force.between(*LATE).values
     return float(np.mean(late)) if len(late) else None
-
-
-def published_bearing(bearing: BearingDrop, severity: dict[str, Known] | None = None) -> published.Bearing:
-    """What is published of one bearing, found from a record or simulated."""
-    numbers = {
-        f"peak_{name}": Value.of_known(one.known, one.time, one.time_interval_90)
-        for name, one in (("force_N", bearing.peak_force), ("stress_Pa", bearing.peak_stress))
-    }
-    for path, known in {**bearing.values, **(severity or {})}.items():
-        numbers[path] = Value.of_known(known)
-    return published.Bearing(
-        origin=bearing.peak_force.origin.value,
-        numbers=numbers,
-        stress_statistics_Pa=bearing.statistics,
-        impacts=[
-            published.Impact(
-                start_s=impact.start,
-                end_s=finite(impact.end),
-                peak_time_s=impact.peak_time,
-                azimuth_rad=impact.azimuth,
-                peak_force_N=Value.of_known(impact.peak_force),
-                impulse_N_s=Value.of_known(impact.impulse),
-                dissipated_energy_J=Value.of_known(impact.dissipated_energy),
-                after_flight=after,
-            )
-            for impact, after in zip(bearing.impacts, bearing.after_flight, strict=True)
-        ],
-        **_where_known(
-            impacts_interval_90=bearing.count_interval_90,
-            contact_from_interval_90_s=bearing.contact_from_interval_90,
-            largest_displacement_m=None if bearing.largest is None else Value.of_known(bearing.largest),
-            not_stated=dict(bearing.missing),
-        ),
-    )
-
-
-def _where_known(**parts: object) -> dict[str, Any]:
-    """Parts of the document that are known; pairs are lists there."""
-    return {name: list(part) if isinstance(part, tuple) else part for name, part in parts.items() if part}
-
-
-def finite(value: float | None) -> float | None:
-    """The number, or None where it is not finite: JSON has no NaN."""
-    return None if value is None or not math.isfinite(value) else float(value)

@@ -5,9 +5,10 @@ Times are from power-off, all numbers in SI units, the unit stands in the key.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     ModelWrapValidatorHandler,
@@ -16,10 +17,9 @@ from pydantic import (
     model_validator,
 )
 
-from rotordrop.document import ABSENT, Document, Pair, Schema, read_json
+from rotordrop.document import ABSENT, Document, Of, Pair, Schema, read_json
 from rotordrop.errors import UsageError
 from rotordrop.json_schema import DIALECT, closed
-from rotordrop.known import Known
 from rotordrop.severity.numbers import NUMBERS
 from rotordrop.severity.statistics import Statistics
 from rotordrop.units import format_moment, si_unit
@@ -55,15 +55,6 @@ class Value(Document):
     time_interval_90_s: Pair = ABSENT
     """Interval that holds the time with 90 % probability."""
 
-    @classmethod
-    def of_known(
-        cls, known: Known, time: float | None = None, between: tuple[float, float] | None = None
-    ) -> Value:
-        """As a result states it, with the time [s] of a peak and its interval."""
-        when = {"time_s": time, "time_interval_90_s": between and list(between)}
-        when = {name: one for name, one in when.items() if one is not None}
-        return cls.model_validate({**known.as_json(), **when})
-
     @property
     def interval(self) -> tuple[float, float] | None:
         """The 90 % interval, where there is one."""
@@ -85,6 +76,10 @@ class Impact(Document):
     """Whether it begins an impact; the others follow a hop too short to be told from the displacement."""
 
 
+def _impact(contact: Any, after_flight: bool) -> Impact:
+    return Impact.of_result(contact, after_flight=after_flight)
+
+
 def described() -> dict[str, str]:
     """Every number that a bearing may have, by its path in the document, with label and unit."""
     # the elements name their parameters; reading a document needs no elements
@@ -101,18 +96,18 @@ class Bearing(Document):
     other.
     """
 
-    origin: str
+    origin: Annotated[str, Of("peak_force.origin.value")]
     """Who found force and stress of this bearing."""
     numbers: dict[str, Value]
-    stress_statistics_Pa: Statistics
-    impacts: list[Impact]
-    impacts_interval_90: Pair = ABSENT
+    stress_statistics_Pa: Annotated[Statistics, Of("statistics")]
+    impacts: Annotated[list[Impact], Of(lambda drop: [*map(_impact, drop.impacts, drop.after_flight)])]
+    impacts_interval_90: Annotated[Pair, Of("count_interval_90")] = ABSENT
     """Interval that holds the number of impacts with 90 % probability."""
-    contact_from_interval_90_s: Pair = ABSENT
+    contact_from_interval_90_s: Annotated[Pair, Of("contact_from_interval_90")] = ABSENT
     """The same of when the last of them began, the rotor in contact from there on."""
-    largest_displacement_m: Value = ABSENT
+    largest_displacement_m: Annotated[Value, Of("largest")] = ABSENT
     """Largest distance of the rotor from the centre in the estimated part."""
-    not_stated: dict[str, str] = ABSENT
+    not_stated: Annotated[dict[str, str], Of("missing")] = ABSENT
     """Numbers that are not stated, and why."""
 
     @model_validator(mode="wrap")
@@ -172,9 +167,9 @@ class Check(Document):
 
     name: str
     passed: bool
-    message: str
-    note: str
-    widening: float = ABSENT
+    message: Annotated[str, Of("said")]
+    note: Annotated[str, Of("noted")]
+    widening: Annotated[float, Of(lambda check: None if check.widening == 1.0 else check.widening)] = ABSENT
     """Factor on all intervals that what is noted asks for [1]."""
 
 
@@ -184,7 +179,7 @@ class Consistency(Document):
     consistent: bool
     sentence: str
     nis: float | None
-    process_noise_factor: float | None
+    process_noise_factor: Annotated[float | None, Of("noise_factor")]
     checks: list[Check]
 
 
@@ -216,9 +211,9 @@ class CrossCheck(Document):
     """One number found in two ways."""
 
     name: str
-    estimate: float
-    cross_check: float
-    known_relative_accuracy: float
+    estimate: Annotated[float, Of("estimate.value")]
+    cross_check: Annotated[float, Of("check")]
+    known_relative_accuracy: Annotated[float, Of("accuracy")]
     agrees: bool
     replaced: bool
     """Whether the cross-check stands in place of the estimate."""
@@ -379,9 +374,9 @@ class FirstContact(Document):
     impact_speed_m_per_s: float
     indentation_m: float
     mass_kg: float
-    half_period_stiffness_N_per_m: float
-    half_period_stiffness_error_N_per_m: float
-    gravity_corrected_stiffness_N_per_m: float
+    half_period_stiffness_N_per_m: Annotated[float, Of("equivalent_stiffness")]
+    half_period_stiffness_error_N_per_m: Annotated[float, Of("standard_error")]
+    gravity_corrected_stiffness_N_per_m: Annotated[float, Of("corrected_stiffness")]
 
 
 class Window(Document):
@@ -416,41 +411,41 @@ class Drop(Document):
     """The estimate of one drop."""
 
     format: str
-    verdict: str
+    verdict: Annotated[str, Of("verdict.value")]
     """What model and record say of each other, in a sentence."""
     consistent: bool
     """Whether single numbers hold within their intervals."""
     rotordrop_version: str
     fingerprint: str
     """Hash of a probe drop as this computer computes it."""
-    machine: str
-    record: str
-    record_sha256: str
-    recorded: str
+    machine: Annotated[str, Of("machine.name")]
+    record: Annotated[str, Of(lambda made: made.name if made.record.path is None else made.record.path.name)]
+    record_sha256: Annotated[str, Of("record.sha256")]
+    recorded: Annotated[str, Of("record.event_date")]
     """When the recorder says the drop was; empty where it does not."""
     simulated_record: bool
     """Whether the record is known to be simulated."""
     method: Literal["tracked", "replay"]
     quick: bool
-    drop_instant_s: float
+    drop_instant_s: Annotated[float, Of("drop_instant.value")]
     """Power-off in record time."""
-    drop_instant_interval_90_s: Pair
-    speed_Hz: float
+    drop_instant_interval_90_s: Annotated[Pair, Of("drop_instant.interval_90")]
+    speed_Hz: Annotated[float, Of(lambda made: made.speed / (2.0 * math.pi))]
     """Rotor speed at power-off."""
-    estimated_until_s: float
+    estimated_until_s: Annotated[float, Of("until")]
     """End of the part that the numbers are of."""
     warnings: list[str]
     notes: list[str]
-    consistency: Consistency
+    consistency: Annotated[Consistency, Of(lambda made: made)]
     bearings: dict[str, Bearing]
     structure: list[Structure]
     advice: list[Advice]
     cross_check: list[CrossCheck]
-    later_motion: list[LaterMotion]
+    later_motion: Annotated[list[LaterMotion], Of("later")]
     parameters: list[Parameter]
     joint: Joint | None
     """How the errors of what belongs to the machine hang together."""
-    sensors: dict[str, Sensor]
+    sensors: Annotated[dict[str, Sensor], Of(lambda made: {one.sensor: one for one in made.sensors})]
     unbalance: list[Unbalance]
     fixed: str | None = ABSENT
     """Where supports and friction of a replay were taken from; null where they were identified."""
@@ -459,7 +454,7 @@ class Drop(Document):
     identification: Identification = ABSENT
     settled: dict[str, Settled] = ABSENT
     first_contact: dict[str, FirstContact] = ABSENT
-    agreement: Agreement = ABSENT
+    agreement: Annotated[Agreement, Of("agreement")] = ABSENT
     document_sha256: str = ABSENT
     """Digest of the other values."""
 

@@ -11,9 +11,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.document import stated
 from rotordrop.elements.face import UNPRESSED
 from rotordrop.elements.race_bearing import THROWN, numbers_of
-from rotordrop.estimate.bearing_drop import BearingDrop, History, published_bearing, simulated_bearings
+from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
+from rotordrop.estimate.published import Bearing
 from rotordrop.evidence.impacts import HOP, after_flights
 from rotordrop.machine.plausibility import doubts_of_speed
 from rotordrop.report.content import (
@@ -380,53 +382,44 @@ def simulation_numbers(result: DropResult, machine: Machine | None = None) -> di
     The machine that was simulated gives the use of its clearances.
     """
     certificate, bearings = result.certificate, {}
-    parts: dict[str, Any] = {
-        "tolerance": result.tolerance,
-        "reduction": result.reduction,
-        "energy_residual_J": certificate.energy_residual,
-        "energy_scale_J": certificate.energy_scale,
-    }
+    parts = stated(
+        result,
+        "tolerance reduction energy_residual_J=certificate.energy_residual "
+        "energy_scale_J=certificate.energy_scale",
+    )
     for name in ("peak_change_tolerance", "peak_change_truncation"):
         if (change := getattr(certificate, name)) is not None:
             parts[name] = change.tolist()
     for index, one in enumerate(simulated_bearings(result)):
         pressure, half_width, moment = result.peak_contact_pressure(index)
         bearings[one.name] = {
-            **published_bearing(one).as_json(),
+            **Bearing.of_result(one).as_json(),
             "peak_contact_pressure_Pa": {"value": pressure, "time_s": moment},
             "contact_half_width_m": {"value": half_width},
         }
-    numbers: dict[str, Any] = {
-        "machine": result.machine_name,
-        "method": "simulation",
-        "speed_Hz": result.initial_speed / (2 * math.pi),
-        "final_speed_Hz": float(result.speed[-1]) / (2 * math.pi),
-        "duration_s": float(result.time[-1]),
-        "outcome": result.outcome,
-        "finished": result.finished,
-        "certificate": parts,
-        "bearings": bearings,
-    }
+    numbers = stated(
+        result,
+        "machine=machine_name method speed_Hz final_speed_Hz duration_s outcome finished certificate "
+        "bearings",
+        method="simulation",
+        speed_Hz=result.initial_speed / (2 * math.pi),
+        final_speed_Hz=float(result.speed[-1]) / (2 * math.pi),
+        duration_s=result.time[-1],
+        certificate=parts,
+        bearings=bearings,
+    )
     for use in () if machine is None else clearance_uses(machine, result):
-        entry = {
-            "node": use.node,
-            "gap_m": use.gap,
-            "largest_travel_m": use.travel,
-            "travel_over_gap": use.share,
-            "time_s": use.time,
-        }
+        entry = stated(use, "node gap_m largest_travel_m=travel travel_over_gap=share time_s")
         if use.contacts is not None:
             entry |= {"contacts": len(use.contacts), "peak_force_N": use.peak_force}
             entry |= {"first_contact_s": float(use.contacts.start[0])} if len(use.contacts) else {}
         numbers.setdefault("stops" if use.stop else "clearances", {})[use.name] = entry
     for ribbon in () if machine is None else ribbon_uses(machine, result):
-        numbers.setdefault("ribbons", {})[ribbon.name] = {
-            "slip_force_N": ribbon.slip_force,
-            "peak_force_N": {"value": ribbon.peak_force, "time_s": ribbon.peak_time},
-            "slipped_s": ribbon.slipped,
-            "first_slip_s": ribbon.first_slip if math.isfinite(ribbon.first_slip) else None,
-            "dissipated_J": ribbon.dissipated,
-        }
+        numbers.setdefault("ribbons", {})[ribbon.name] = stated(
+            ribbon,
+            "slip_force_N peak_force_N slipped_s first_slip_s dissipated_J",
+            peak_force_N={"value": ribbon.peak_force, "time_s": ribbon.peak_time},
+        )
     if machine is not None and machine.axial:
         latest = int(np.argmax(np.abs(result.axial_displacement)))
         numbers["axial"] = {
@@ -453,29 +446,22 @@ def _magnets_json(result: DropResult, magnets: MagnetHistory) -> dict[str, Any]:
     ):
         known[name] = dict(zip(magnets.names, largest.tolist(), strict=True))
     if (lift := result.lift) is not None:
-        known["lift"] = {
-            "begun_s": lift.begun,
-            "free_from_s": lift.free_from,
-            "succeeded": lift.succeeded,
-            "contacts": lift.contacts,
-        }
+        known["lift"] = stated(lift, "begun_s free_from_s succeeded contacts")
     return known
 
 
 def _landed_faces(one: Landing) -> dict[str, Any]:
     force, moment = one.contacts.peak
-    entry: dict[str, Any] = {
-        "gap_m": one.gap,
-        "largest_travel_m": one.travel,
-        "time_s": one.travel_time,
-        "contacts": len(one.contacts),
-        "landings": landing_count(one),
-        "peak_force_N": {"value": force, "time_s": moment if len(one.contacts) else None},
-        "contact_angle_rad": one.contact_angle,
-        "contact_edge_rad": {"value": one.edge_angle, "time_s": one.edge_time},
-        "shoulder_angle_rad": one.climb.shoulder,
-        "beyond_shoulder": one.climb.excess is not None,
-    }
+    entry = stated(
+        one,
+        "gap_m largest_travel_m=travel time_s=travel_time contacts landings peak_force_N contact_angle_rad "
+        "contact_edge_rad shoulder_angle_rad=climb.shoulder beyond_shoulder",
+        contacts=len(one.contacts),
+        landings=landing_count(one),
+        peak_force_N={"value": force, "time_s": moment if len(one.contacts) else None},
+        contact_edge_rad={"value": one.edge_angle, "time_s": one.edge_time},
+        beyond_shoulder=one.climb.excess is not None,
+    )
     return entry | ({"first_contact_s": float(one.contacts.start[0])} if len(one.contacts) else {})
 
 

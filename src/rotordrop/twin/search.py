@@ -21,9 +21,9 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Extension, Values
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import IdentificationError
-from rotordrop.estimate.bearing_drop import finite
 from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import Evidence
+from rotordrop.files import finite
 from rotordrop.machine import Machine
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.track.calibration import (

@@ -24,11 +24,10 @@ from rotordrop.estimate.bearing_drop import (
     Motion,
     Origin,
     highest,
-    published_bearing,
     when_largest,
 )
 from rotordrop.estimate.changed import WATCHED, changes, unlike
-from rotordrop.estimate.published import Joint, Parameter, Value
+from rotordrop.estimate.published import Bearing, Joint, Parameter, Value
 from rotordrop.evidence.impacts import shortest_flight
 from rotordrop.known import NINETY, Known
 from rotordrop.units import GRAVITY
@@ -427,11 +426,11 @@ def test_a_peak_may_be_wherever_the_force_may_be_largest():
 
 def test_times_and_counts_are_published_with_their_intervals():
     drop = fallen((BEGUN[0], BEGUN[0] + CONTACT))
-    plain = published_bearing(drop).model_dump(exclude_none=True)
+    plain = Bearing.of_result(drop).model_dump(exclude_none=True)
     assert not {"impacts_interval_90", "contact_from_interval_90_s"} & plain.keys()
     peak = replace(drop.peak_force, time_interval_90=(0.01, 0.02))
     known = replace(drop, peak_force=peak, count_interval_90=(1, 3), contact_from_interval_90=(0.007, 0.03))
-    told = published_bearing(known).model_dump(exclude_none=True)
+    told = Bearing.of_result(known).model_dump(exclude_none=True)
     assert told["peak_force_N"]["time_interval_90_s"] == [0.01, 0.02]
     assert told["impacts_interval_90"] == [1, 3]
     assert told["contact_from_interval_90_s"] == [0.007, 0.03]
