@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import refuse_unusable
@@ -98,17 +99,11 @@ class Clearance:
 
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""
-        return {
-            "bearing": self.bearing,
-            "air_gap_m": self.gap,
-            "standard_error_m": self.standard_error,
-            "interval_90_m": list(self.interval_90),
-            "radius_m": self.radius,
-            "sag_m": self.sag,
-            "centre_m": self.centre.tolist(),
-            "polygon_m": self.polygon.tolist(),
-            "out_of_round_m": self.out_of_round,
-        }
+        return stated(
+            self,
+            "bearing air_gap_m=gap standard_error_m interval_90_m radius_m sag_m centre_m polygon_m "
+            "out_of_round_m",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,12 +121,7 @@ class Wear:
 
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""
-        return {
-            "bearing": self.bearing,
-            "growth_m": self.growth,
-            "interval_90_m": list(self.interval_90),
-            "centre_moved_m": self.moved.tolist(),
-        }
+        return stated(self, "bearing growth_m interval_90_m centre_moved_m=moved")
 
 
 def measure_clearance(

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
@@ -26,7 +27,6 @@ from rotordrop.estimate.bearing_drop import (
     Motion,
     Origin,
     deepest,
-    finite,
     simulated_bearings,
 )
 from rotordrop.estimate.bearing_drop import Role as MotionRole
@@ -407,40 +407,38 @@ def _document(
     )
 
     def by_bearing(values: Array) -> dict[str, list[float]]:
-        return {name: [float(v) for v in values[b]] for b, name in enumerate(names)}
+        return dict(zip(names, values.tolist(), strict=True))
 
+    settled = {f"{key}_m": getattr(gap.rest, key) for key in ("radius", "sideways", "sway")} | {
+        "indentation_m": gap.sag.indentation,
+        "race_deflection_m": gap.sag.race,
+        "support_deflection_m": gap.sag.support,
+        "vertical_zero_sigma_m": gap.zero_sigma,
+    }
     return {
-        "speed": {
-            "aero_time_constant_s": fit.aero_time_constant.as_json()
+        "speed": stated(
+            fit,
+            "aero_time_constant_s profile_time_constant_s friction_loss_Hz simulated_end_Hz",
+            aero_time_constant_s=fit.aero_time_constant
             if math.isfinite(fit.aero_time_constant.value)
             else None,
-            "profile_time_constant_s": finite(fit.profile_time_constant),
-            "friction_loss_Hz": fit.friction_loss / (2.0 * np.pi),
-            "simulated_end_Hz": float(replayed.result.speed[-1]) / (2.0 * np.pi),
-        },
-        "initial_state": {
-            "displacement_m": by_bearing(initial.displacement),
-            "velocity_m_per_s": by_bearing(initial.velocity),
-            "remanent_force_N": initial.remanent_force.tolist(),
-            "remanence_time_constant_s": initial.decay,
-            "misfit": initial.misfit,
-            "modal_expansion": {
+            friction_loss_Hz=fit.friction_loss / (2.0 * np.pi),
+            simulated_end_Hz=replayed.result.speed[-1] / (2.0 * np.pi),
+        ),
+        "initial_state": stated(
+            initial,
+            "displacement_m velocity_m_per_s remanent_force_N remanence_time_constant_s=decay misfit "
+            "modal_expansion",
+            displacement_m=by_bearing(initial.displacement),
+            velocity_m_per_s=by_bearing(initial.velocity),
+            modal_expansion={
                 "displacement_m": by_bearing(expanded.at_bearings),
                 "velocity_m_per_s": by_bearing(expanded.velocity_at_bearings),
             },
-        },
+        ),
         "identification": _searched(impacts.support, impacts.friction, replayed.draws),
         "settled": {
-            name: {
-                "radius_m": float(gap.rest.radius[b]),
-                "sideways_m": float(gap.rest.sideways[b]),
-                "sway_m": float(gap.rest.sway[b]),
-                "indentation_m": float(gap.sag.indentation[b]),
-                "race_deflection_m": float(gap.sag.race[b]),
-                "support_deflection_m": float(gap.sag.support[b]),
-                "vertical_zero_sigma_m": float(gap.zero_sigma[b]),
-            }
-            for b, name in enumerate(names)
+            name: {key: float(values[b]) for key, values in settled.items()} for b, name in enumerate(names)
         },
     }
 
@@ -451,21 +449,17 @@ def _searched(
     """What was searched for; a step that was not made is left out."""
     entry: dict[str, Any] = {}
     if support is not None:
-        entry["support"] = {
-            "starts": support.coarse.starts,
-            "agreeing": support.coarse.agreeing,
-            "windows_s": [*support.coarse.windows, *support.search.windows],
-            "misfit": support.search.best.misfit,
-            "simulations": support.coarse.evaluations + support.search.evaluations,
-            "ended_early": support.search.ended_early or None,
-            "correlations": [asdict(pair) for pair in support.correlations],
-        }
+        entry["support"] = stated(
+            support,
+            "starts=coarse.starts agreeing=coarse.agreeing windows_s misfit=search.best.misfit simulations "
+            "ended_early correlations",
+            windows_s=[*support.coarse.windows, *support.search.windows],
+            simulations=support.coarse.evaluations + support.search.evaluations,
+            ended_early=support.search.ended_early or None,
+            correlations=[asdict(pair) for pair in support.correlations],
+        )
     if friction is not None:
-        entry["friction_sweep"] = {
-            "dynamic": friction.coefficients.tolist(),
-            "disagreement_m": friction.disagreement.tolist(),
-            "window_s": list(friction.window),
-        }
+        entry["friction_sweep"] = stated(friction, "dynamic=coefficients disagreement_m window_s")
     if draws is not None:
         entry["draws"] = {"count": len(draws), "rejected": draws.rejected}
     return entry

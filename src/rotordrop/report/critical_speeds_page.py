@@ -12,8 +12,8 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
-from rotordrop.files import finite
 from rotordrop.report.content import (
     Card,
     Column,
@@ -476,30 +476,26 @@ def critical_speeds_json(
 ) -> dict[str, Any]:
     """Everything the page shows, ready for JSON, SI units; null where there is no line."""
     told = {name: _map_json(found) for name, found in maps.items()}
-    return dict(finite({"maps": told, "campbell": {name: _campbell_json(d) for name, d in diagrams.items()}}))
+    return {"maps": told, "campbell": {name: _campbell_json(d) for name, d in diagrams.items()}}
 
 
 def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
-    return {
-        "whirl": found.whirl,
-        "stiffness_N_m": found.stiffness.tolist(),
-        "massless_Hz": found.massless.tolist(),
-        "with_support_mass_Hz": found.with_support_mass.tolist(),
-        "bearings": {
-            part.bearing: {
-                "load_N": part.load,
-                "tangent_N_m": part.tangent,
-                "simple_N_m": part.simple,
-                "support_N_m": part.support,
-                "contact_N_m": part.contact,
-                "equivalent_tangent_N_m": part.equivalent("tangent"),
-                "equivalent_simple_N_m": part.equivalent("simple"),
-            }
-            | (_relaxing_json(found, part) if part.branches else {})
-            for part in found.lines
-        },
-        "at_the_machine_Hz": {name: values.tolist() for name, values in found.at_lines.items()},
+    bearings = {
+        part.bearing: stated(
+            part,
+            "load_N tangent_N_m simple_N_m support_N_m contact_N_m equivalent_tangent_N_m "
+            "equivalent_simple_N_m",
+            equivalent_tangent_N_m=part.equivalent("tangent"),
+            equivalent_simple_N_m=part.equivalent("simple"),
+        )
+        | (_relaxing_json(found, part) if part.branches else {})
+        for part in found.lines
     }
+    return stated(
+        found,
+        "whirl stiffness_N_m massless_Hz with_support_mass_Hz bearings at_the_machine_Hz=at_lines",
+        bearings=bearings,
+    )
 
 
 def _relaxing_json(found: CriticalSpeedMap, part: EquivalentStiffness) -> dict[str, Any]:
@@ -514,21 +510,18 @@ def _relaxing_json(found: CriticalSpeedMap, part: EquivalentStiffness) -> dict[s
 
 def _campbell_json(diagram: CampbellDiagram) -> dict[str, Any]:
     shapes = diagram.shapes[0]
-    return {
-        "speed_Hz": (diagram.speed / TURN).tolist(),
-        "frequency_Hz": diagram.frequency.tolist(),
-        "damping_ratio": diagram.damping_ratio.tolist(),
-        "whirl": diagram.whirl.tolist(),
-        "node_positions_m": [float(z) for z in diagram.node_positions],
-        "shapes_at_lowest_speed": {"real": shapes.real.tolist(), "imaginary": shapes.imag.tolist()},
-        "critical_speeds": [
-            {
-                "speed_Hz": crossing.speed / TURN,
-                "line": crossing.line,
-                "direction": crossing.direction,
-                "damping_ratio": crossing.damping_ratio,
-                "amplification_factor": amplification_factor(crossing.damping_ratio),
-            }
+    return stated(
+        diagram,
+        "speed_Hz frequency_Hz damping_ratio whirl node_positions_m shapes_at_lowest_speed critical_speeds",
+        speed_Hz=diagram.speed / TURN,
+        shapes_at_lowest_speed={"real": shapes.real, "imaginary": shapes.imag},
+        critical_speeds=[
+            stated(
+                crossing,
+                "speed_Hz line direction damping_ratio amplification_factor",
+                speed_Hz=crossing.speed / TURN,
+                amplification_factor=amplification_factor(crossing.damping_ratio),
+            )
             for crossing in diagram.crossings
         ],
-    }
+    )

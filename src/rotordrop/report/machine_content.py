@@ -11,6 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
+from rotordrop.document import stated
 from rotordrop.elements.catalog.boundary import clearance_range
 from rotordrop.elements.catalog.lookup import CatalogueBearing
 from rotordrop.machine.ross_files import ImportedRotor, Spring
@@ -229,69 +230,52 @@ def machine_json(
     machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
 ) -> dict[str, object]:
     """Give what ``rotordrop check`` found, ready for JSON, in SI units."""
-    sag, controlled = summary.levitated_sag, {}
-    if (loop := summary.loop) is not None:
-        controlled["control_loop"] = {
-            "stable": loop.stable,
-            "growth_per_s": loop.growth,
-            "frequency_Hz": loop.frequency,
-            "delay_s": loop.delay,
-            "longest_delay_s": loop.longest_delay,
-        }
-    return {
-        "machine": machine.name,
-        **inertias_json(summary.fe),
-        "free_free_Hz": [float(value) for value in summary.free_free],
-        "settled_Hz": [float(value) for value in summary.settled],
-        "levitated_sag_m": None if sag is None else [float(value) for value in sag],
-        "bearings": {
+    parts = "machine free_free_Hz settled_Hz levitated_sag_m bearings"
+    parts += " magnets" if summary.magnets else ""
+    parts += " control_loop=loop" if summary.loop is not None else ""
+    made = stated(
+        summary,
+        f"{parts} warnings defaults inferred",
+        machine=machine.name,
+        bearings={
             rest.name: {
                 "load_N": rest.load,
                 **{figure.field: figure.value for figure in rest.figures},
-                "contact_pressure_at_rest_Pa": rest.contact_pressure,
-                "tangent_stiffness_N_per_m": rest.tangent_stiffness,
-                "equivalent_stiffness_N_per_m": rest.equivalent_stiffness,
-                "support_frequency_Hz": rest.support_frequency,
+                **stated(
+                    rest,
+                    "contact_pressure_at_rest_Pa=contact_pressure tangent_stiffness_N_per_m "
+                    "equivalent_stiffness_N_per_m support_frequency_Hz",
+                ),
             }
             for rest in summary.bearings
         },
-        **({"magnets": {one.name: _magnet_json(one) for one in summary.magnets}} if summary.magnets else {}),
-        **controlled,
-        "warnings": [warning.message for warning in warnings],
-        "defaults": [list(entry) for entry in machine.defaults_in_use],
-        "inferred": [list(entry) for entry in machine.inferred],
-    }
+        magnets={one.name: _magnet_json(one) for one in summary.magnets},
+        control_loop=None
+        if summary.loop is None
+        else stated(summary.loop, "stable growth_per_s frequency_Hz delay_s longest_delay_s"),
+        warnings=[warning.message for warning in warnings],
+        defaults=machine.defaults_in_use,
+        inferred=machine.inferred,
+    )
+    return {"machine": made.pop("machine"), **inertias_json(summary.fe), **made}
 
 
 def _magnet_json(one: MagnetSummary) -> dict[str, object]:
-    known: dict[str, object] = {
-        "force_by_current_N_per_A": one.by_current,
-        "negative_stiffness_N_per_m": one.by_way,
-        "inductance_H": one.inductance,
-        "spare_force_at_rest_N": one.spare_at_rest,
-        "linear_lift": {
-            "deepest_m": one.lift.deepest,
-            "time_s": one.lift.time if math.isfinite(one.lift.time) else None,
-            "speed_m_per_s": one.lift.speed,
-        },
-    }
+    known = stated(
+        one,
+        "force_by_current_N_per_A=by_current negative_stiffness_N_per_m=by_way inductance_H "
+        "spare_force_at_rest_N=spare_at_rest linear_lift",
+        linear_lift=stated(one.lift, "deepest_m time_s speed_m_per_s"),
+    )
     if one.margins is not None:
-        known |= {
-            "crossover_Hz": one.margins.crossover / (2.0 * math.pi),
-            "phase_margin_rad": one.margins.phase,
-            "delay_margin_s": one.margins.delay,
-        }
+        keys = "crossover_Hz phase_margin_rad=phase delay_margin_s=delay"
+        known |= stated(one.margins, keys, crossover_Hz=one.margins.crossover / (2.0 * math.pi))
     return known
 
 
 def inertias_json(fe: RotorFE) -> dict[str, object]:
     """Mass, centre of gravity and inertias of a rotor, ready for JSON [SI]."""
-    return {
-        "mass_kg": fe.total_mass,
-        "centre_of_gravity_m": fe.centre_of_gravity,
-        "polar_inertia_kg_m2": fe.polar_inertia,
-        "diametral_inertia_kg_m2": fe.diametral_inertia,
-    }
+    return stated(fe, "mass_kg=total_mass centre_of_gravity_m polar_inertia_kg_m2 diametral_inertia_kg_m2")
 
 
 POINTS = 801
@@ -512,12 +496,7 @@ def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
 
 
 def _bearing_json(spring: Spring) -> dict[str, object]:
-    entry: dict[str, object] = {
-        "node": spring.node,
-        "name": spring.name,
-        "stiffness_N_per_m": spring.stiffness,
-        "damping_N_s_per_m": spring.damping,
-    }
+    entry = stated(spring, "node name stiffness_N_per_m damping_N_s_per_m")
     if spring.support is not None:
         entry["support"] = _bearing_json(spring.support) | {"mass_kg": spring.support_mass}
     return entry
@@ -566,31 +545,17 @@ def bearing_content(written: str, found: Sequence[CatalogueBearing], *, whole: b
 
 def bearing_json(bearing: CatalogueBearing) -> dict[str, object]:
     """Give a bearing ready for JSON, in SI units."""
-    balls = bearing.complement
-    return {
-        "designation": bearing.designation,
-        "maker": bearing.maker,
-        "listed": bearing.listed,
-        "kind": bearing.kind,
-        "bore_m": bearing.bore,
-        "outside_diameter_m": bearing.outside_diameter,
-        "width_m": bearing.width,
-        "contact_angle_rad": bearing.contact_angle,
-        "contact_angle_range_rad": bearing.contact_angle_range,
-        "ball_material": bearing.ball_material,
-        "ball_count": balls.ball_count,
-        "ball_count_range": balls.count_range,
-        "ball_diameter_m": balls.ball_diameter,
-        "ball_diameter_range_m": balls.diameter_range,
-        "pitch_diameter_m": balls.pitch_diameter,
-        "conformity": balls.conformity,
-        "conformity_range": balls.conformity_range,
-        "basis": balls.basis,
-        "clearance_range_m": clearance_of(bearing),
-        "preload_N": bearing.preload,
-        "preload_basis": bearing.preload_basis or None,
-        "axial_rigidity_N_per_m": bearing.axial_rigidity,
-    }
+    return stated(
+        bearing,
+        "designation maker listed kind bore_m outside_diameter_m width_m contact_angle_rad "
+        "contact_angle_range_rad ball_material ball_count=complement.ball_count "
+        "ball_count_range=complement.count_range ball_diameter_m=complement.ball_diameter "
+        "ball_diameter_range_m=complement.diameter_range pitch_diameter_m=complement.pitch_diameter "
+        "conformity=complement.conformity conformity_range=complement.conformity_range "
+        "basis=complement.basis clearance_range_m preload_N preload_basis axial_rigidity_N_per_m",
+        clearance_range_m=clearance_of(bearing),
+        preload_basis=bearing.preload_basis or None,
+    )
 
 
 def clearance_of(bearing: CatalogueBearing) -> tuple[float, float] | None:

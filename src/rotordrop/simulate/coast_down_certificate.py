@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
 from rotordrop.progress import Shown
@@ -66,11 +67,12 @@ class CoastDownCertificate:
 
     def as_json(self) -> dict[str, Any]:
         """All fields, ready for JSON."""
-        values = vars(self) | {
-            "peak_change": self.peak_change.tolist(),
-            "contacts": self.contacts.astype(int).tolist(),
-        }
-        return values | {"agrees": self.agrees, "statement": self.sentence()}
+        return stated(
+            self,
+            "tolerance tighter_tolerance peak_change median_force_change high_force_change speed_change "
+            "standstill_change dissipated_change contacts agrees statement=sentence",
+            contacts=self.contacts.astype(int),
+        )
 
 
 def certify_coast_down(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.labelled import Stored
 from rotordrop.simulate.case import FIRST_WINDOW
 from rotordrop.simulate.result import SimulationResult
@@ -63,17 +64,13 @@ class Maximum:
     def as_json(self) -> dict[str, Any]:
         """All fields, ready for JSON."""
         finite = np.isfinite(self.later)
-        return {
-            "quantity": self.quantity,
-            "bearing": self.bearing,
-            "unit": QUANTITIES[self.quantity][1],
-            "value": self.value,
-            "time_s": self.time,
-            "within_first_0.2_s": self.in_first_window,
-            "largest_later": self.later if finite else None,
-            "largest_later_time_s": self.later_time if finite else None,
-            "statement": self.sentence(),
-        }
+        return stated(
+            self,
+            "quantity bearing unit value time_s within_first_0.2_s=in_first_window largest_later=later "
+            "largest_later_time_s statement=sentence",
+            unit=QUANTITIES[self.quantity][1],
+            largest_later_time_s=self.later_time if finite else None,
+        )
 
 
 def first_window_sentence(maxima: Iterable[Mapping[str, Any]]) -> str:
@@ -179,35 +176,22 @@ class CoastDownResult(SimulationResult):
 
     def as_json(self) -> dict[str, Any]:
         """Everything but the samples, ready for JSON, SI units."""
-        windows = {name: np.round(value, 12).tolist() for name, value in vars(self.windows).items()}
-        return {
-            "machine": self.machine_name,
-            "bearings": list(self.bearing_names),
-            "initial_speed_rad_s": self.initial_speed,
-            "tolerance": self.tolerance,
-            "reduction": self.reduction,
-            "output_step_s": self.output_step,
-            "end_time_s": self.end_time,
-            "standstill_time_s": self.standstill_time,
-            "finished": self.finished,
-            "outcome": self.outcome,
-            "maxima": [maximum.as_json() for maximum in self.maxima()],
-            "whirl_s": {
-                name: {"forward": float(f), "backward": float(b)}
-                for name, (f, b) in zip(self.bearing_names, self.whirl_time, strict=True)
-            },
-            "contacts": {n: int(c) for n, c in zip(self.bearing_names, self.contacts, strict=True)},
-            "contact_energy_J": {
-                n: float(e) for n, e in zip(self.bearing_names, self.contact_energy, strict=True)
-            },
-            "dissipated_J": self.dissipated,
-            "air_work_J": self.air_work,
-            "energy_residual_J": self.energy_residual,
-            "energy_scale_J": self.energy_scale,
-            "steps": self.steps,
-            "rejected_steps": self.rejected_steps,
-            "quantile_levels": list(QUANTILES),
-            "quantities": list(QUANTITIES),
-            "windows": windows,
-            "samples": None if self.path is None else str(self.path),
-        } | ({} if self.heat is None else {"heat": self.heat.as_json(self.bearing_names)})
+
+        def named(values: Iterable[Any]) -> dict[str, Any]:
+            return dict(zip(self.bearing_names, values, strict=True))
+
+        found = stated(
+            self,
+            "machine=machine_name bearings=bearing_names initial_speed_rad_s=initial_speed tolerance "
+            "reduction output_step_s end_time_s standstill_time_s finished outcome maxima whirl_s contacts "
+            "contact_energy_J dissipated_J air_work_J energy_residual_J energy_scale_J steps rejected_steps "
+            "quantile_levels quantities windows samples",
+            whirl_s=named(dict(zip(("forward", "backward"), one, strict=True)) for one in self.whirl_time),
+            contacts=named(map(int, self.contacts)),
+            contact_energy_J=named(self.contact_energy),
+            quantile_levels=QUANTILES,
+            quantities=list(QUANTITIES),
+            windows={name: np.round(value, 12) for name, value in vars(self.windows).items()},
+            samples=None if self.path is None else str(self.path),
+        )
+        return found | ({} if self.heat is None else {"heat": self.heat.as_json(self.bearing_names)})

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.evidence.impacts import Settling
-from rotordrop.files import finite, new_hdf5
+from rotordrop.files import new_hdf5
 from rotordrop.known import Known
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress
@@ -124,6 +125,17 @@ class SpeedLaw:
     standstill: Known
     """When it stopped [s]."""
 
+    def as_json(self) -> dict[str, Any]:
+        """Everything known of it, ready for JSON."""
+        return stated(
+            self,
+            "time_constant_s=exponential.time_constant "
+            "exponential_residual_rms_rad_s=exponential.residual_rms "
+            "exponential_statement=exponential.statement dry_rad_s2=drag.constant linear_1_s=drag.linear "
+            "quadratic_1_rad=drag.quadratic drag_residual_rms_rad_s=drag.residual_rms "
+            "drag_statement=drag.statement standstill_s",
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneAnalysis:
@@ -149,18 +161,14 @@ class CoastDownAnalysis:
 
     def as_json(self) -> dict[str, Any]:
         """All findings, ready for JSON; amplitudes are zero-to-peak in m unless the name says otherwise."""
-        content = {
-            "recorded": self.signal.recorded,
-            "sampling_rate_hz": self.signal.sampling_rate,
-            "centre": self.signal.centre,
-            "air_gap_m": dict(self.signal.air_gap),
-            "speed_law": None if self.speed_law is None else _law_json(self.speed_law),
-            "lines": [line.as_json() for line in self.lines],
-            "planes": {name: _plane_json(plane) for name, plane in self.planes.items()},
-            "force_and_stress": [dict(found) for found in self.signal.force_and_stress],
-            "force_and_stress_statements": [str(one["statement"]) for one in self.signal.force_and_stress],
-        }
-        return {key: finite(value) for key, value in content.items()}
+        return stated(
+            self,
+            "recorded=signal.recorded sampling_rate_hz=signal.sampling_rate centre=signal.centre "
+            "air_gap_m=signal.air_gap speed_law lines planes force_and_stress=signal.force_and_stress "
+            "force_and_stress_statements",
+            planes={name: _plane_json(plane) for name, plane in self.planes.items()},
+            force_and_stress_statements=[str(one["statement"]) for one in self.signal.force_and_stress],
+        )
 
 
 @one_thread()
@@ -304,65 +312,37 @@ def _speed_law(signal: CoastDownSignal) -> SpeedLaw | None:
     )
 
 
-def _law_json(law: SpeedLaw) -> dict[str, Any]:
-    return {
-        "time_constant_s": law.exponential.time_constant.as_json(),
-        "exponential_residual_rms_rad_s": law.exponential.residual_rms,
-        "exponential_statement": law.exponential.statement,
-        "dry_rad_s2": law.drag.constant.as_json(),
-        "linear_1_s": law.drag.linear.as_json(),
-        "quadratic_1_rad": law.drag.quadratic.as_json(),
-        "drag_residual_rms_rad_s": law.drag.residual_rms,
-        "drag_statement": law.drag.statement,
-        "standstill_s": law.standstill.as_json(),
-    }
-
-
 def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
     history, track = plane.history, plane.track
-    later = np.isfinite(history.largest_later)
-    found: dict[str, Any] = {
-        "largest_displacement_m": history.largest,
-        "largest_displacement_interval_90_m": history.largest_interval_90,
-        "largest_displacement_time_s": history.largest_time,
-        "largest_indentation_m": history.largest_indentation,
-        "largest_indentation_interval_90_m": history.largest_indentation_interval_90,
-        "largest_later_m": history.largest_later if later else None,
-        "largest_later_interval_90_m": history.largest_later_interval_90,
-        "largest_later_time_s": history.largest_later_time if later else None,
-        "first_0.2_s_held_the_maximum": bool(held_maximum(history)),
-        "statement": history.statement,
-        "impacts": len(plane.settling.touched),
-        "impacts_interval_90": plane.settling.count_interval_90,
-        "contact_from_s": plane.settling.contact_from,
-        "contact_from_interval_90_s": plane.settling.contact_from_interval_90,
-        "settling": plane.settling_words,
-        "resonances": [resonance.as_json() for resonance in plane.resonances],
-        "waterfalls": [_waterfall_json(item) for item in plane.waterfalls],
-    }
+    later = {} if np.isfinite(history.largest_later) else {"largest_later_time_s": None}
+    found = stated(
+        history,
+        "largest_displacement_m=largest largest_displacement_interval_90_m=largest_interval_90 "
+        "largest_displacement_time_s=largest_time largest_indentation_m "
+        "largest_indentation_interval_90_m largest_later_m largest_later_interval_90_m largest_later_time_s "
+        "first_0.2_s_held_the_maximum statement",
+        **{"first_0.2_s_held_the_maximum": held_maximum(history)},
+        **later,
+    ) | stated(
+        plane,
+        "impacts impacts_interval_90=settling.count_interval_90 contact_from_s=settling.contact_from "
+        "contact_from_interval_90_s=settling.contact_from_interval_90 settling=settling_words resonances "
+        "waterfalls",
+        impacts=len(plane.settling.touched),
+        waterfalls=[
+            stated(  # the whole field is in the figure and the record
+                fall,
+                "component amplitude_kind points=settings.points overlap=settings.overlap resolution_hz "
+                "frames frequency_hz rms_over_frames_m=average",
+                frames=len(fall.time),
+            )
+            for fall in plane.waterfalls
+        ],
+    )
     if track is not None:
-        found["orders"] = {
-            "time_s": track.time.tolist(),
-            "speed_hz": (track.speed / (2.0 * np.pi)).tolist(),
-            "orders": track.orders.tolist(),
-            "turns_per_window": track.revolutions,
-            "major_axis_zero_to_peak_m": track.major_axis.tolist(),
-        }
+        keys = "time_s speed_hz orders turns_per_window=revolutions major_axis_zero_to_peak_m=major_axis"
+        found["orders"] = stated(track, keys, speed_hz=track.speed / (2.0 * np.pi))
     return found
-
-
-def _waterfall_json(fall: Waterfall) -> dict[str, Any]:
-    """Settings and the average over the frames; the whole field is in the figure and the record."""
-    return {
-        "component": fall.component,
-        "amplitude_kind": fall.amplitude_kind,
-        "points": fall.settings.points,
-        "overlap": fall.settings.overlap,
-        "resolution_hz": fall.resolution,
-        "frames": len(fall.time),
-        "frequency_hz": fall.frequency.tolist(),
-        "rms_over_frames_m": fall.average().tolist(),
-    }
 
 
 FORMAT = "rotordrop frequencies 1"
@@ -397,15 +377,9 @@ def _put(group: Any, name: str, values: Any, unit: str) -> None:
 
 def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
     history, track = plane.history, plane.track
-    for name, values, unit in (
-        ("time", history.time, "s"),
-        ("smallest", history.lowest, "m"),
-        ("largest", history.highest, "m"),
-        ("smallest_xy", history.lowest_xy, "m"),
-        ("largest_xy", history.highest_xy, "m"),
-        ("air_gap", history.air_gap, "m"),
-    ):
-        _put(group, f"displacement/{name}", values, unit)
+    for name in ("time", "lowest", "highest", "lowest_xy", "highest_xy", "air_gap"):
+        called = name.replace("lowest", "smallest").replace("highest", "largest")
+        _put(group, f"displacement/{called}", getattr(history, name), "s" if name == "time" else "m")
     for fall in plane.waterfalls:
         place = group.create_group(f"waterfall_{fall.component}")
         place.attrs["points"], place.attrs["overlap"] = fall.settings.points, fall.settings.overlap

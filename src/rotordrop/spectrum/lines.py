@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
@@ -41,31 +42,16 @@ class Line(SeenLine):
 
     def as_json(self) -> dict[str, Any]:
         """Everything known about the line, ready for JSON; amplitudes are zero-to-peak in m."""
-        return {
-            "kind": self.kind,
-            "label": self.label,
-            "named": self.named,
-            "confidence": round(self.confidence, 4),
-            "reason": self.reason,
-            "frequency_hz": self.frequency,
-            "frequency_error_hz": self.frequency_error,
-            "order": self.order,
-            "order_error": self.order_error,
-            "drift_hz": list(self.drift),
-            "width_hz": self.width,
-            "amplitude_zero_to_peak_m": self.amplitude,
-            "amplitude_xy_zero_to_peak_m": {plane: list(xy) for plane, xy in self.amplitude_xy.items()},
-            "forward_m": self.forward,
-            "backward_m": self.backward,
-            "floor_zero_to_peak_m": self.floor,
-            "ratio_to_floor": self.ratio,
-            "first_seen_s": self.first_seen,
-            "last_seen_s": self.last_seen,
-            "candidates": [
-                {"name": m.candidate.name, "probability": m.probability, "deviation": m.deviation}
-                for m in self.name.matches
+        return stated(
+            self,
+            "kind label named confidence reason frequency_hz frequency_error_hz order order_error drift_hz "
+            "width_hz amplitude_zero_to_peak_m=amplitude amplitude_xy_zero_to_peak_m=amplitude_xy forward_m "
+            "backward_m floor_zero_to_peak_m=floor ratio_to_floor=ratio first_seen_s last_seen_s candidates",
+            confidence=round(self.confidence, 4),
+            candidates=[
+                stated(match, "name=candidate.name probability deviation") for match in self.name.matches
             ],
-        }
+        )
 
 
 EVEN = 1.0 / math.sqrt(12.0)

@@ -13,6 +13,7 @@ from scipy.ndimage import label
 from scipy.signal import find_peaks, peak_widths
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.orders import OrderTrack
@@ -47,22 +48,13 @@ class PassedResonance:
 
     def as_json(self) -> dict[str, Any]:
         """Everything known about the resonance, ready for JSON; amplitudes are zero-to-peak in m."""
-        return {
-            "order": self.order,
-            "plane": self.plane,
-            "time_s": self.time,
-            "speed_hz": self.speed / math.tau,
-            "frequency_hz": self.frequency,
-            "frequency_error_hz": self.frequency_error,
-            "width_hz": self.width,
-            "amplitude_zero_to_peak_m": self.amplitude,
-            "rise": self.rise,
-            "certain": self.certain,
-            "mode": self.name.label,
-            "named": self.name.named,
-            "confidence": self.name.confidence,
-            "reason": self.name.reason,
-        }
+        return stated(
+            self,
+            "order plane time_s speed_hz frequency_hz frequency_error_hz width_hz "
+            "amplitude_zero_to_peak_m=amplitude rise certain mode=name.label named=name.named "
+            "confidence=name.confidence reason=name.reason",
+            speed_hz=self.speed / math.tau,
+        )
 
 
 def find_resonances(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.landing_sleeve import with_amounts
 from rotordrop.elements.magnet import FORCES
 from rotordrop.elements.parameter import below
@@ -356,27 +357,22 @@ def confounded_of(problem: DropProblem, covariance: Array) -> tuple[Confounded, 
 
 def calibration_json(calibration: Calibration) -> dict[str, object]:
     """The calibration ready for JSON: values, identifiability, confounded pairs, checks."""
-    return {
-        "values": {path: value.as_json() for path, value in calibration.values.items()},
-        "identifiability": [
-            {
-                "path": e.path,
-                "prior_standard_deviation": e.prior_sigma,
-                "posterior_standard_deviation": e.posterior_sigma,
-                "verdict": e.verdict,
-            }
-            for e in calibration.identifiability
+    return stated(
+        calibration,
+        "values identifiability confounded checks consistent structure nis sentence",
+        identifiability=[
+            stated(
+                one,
+                "path prior_standard_deviation=prior_sigma posterior_standard_deviation=posterior_sigma "
+                "verdict",
+            )
+            for one in calibration.identifiability
         ],
-        "confounded": [
-            {"first": c.first, "second": c.second, "correlation": c.correlation, "separated_by": c.way_out}
-            for c in calibration.confounded
+        confounded=[
+            stated(one, "first second correlation separated_by=way_out") for one in calibration.confounded
         ],
-        "checks": {
-            name: [{"name": c.name, "passed": c.passed, "message": c.said()} for c in checks]
+        checks={
+            name: [stated(one, "name passed message=said") for one in checks]
             for name, checks in calibration.checks.items()
         },
-        "consistent": calibration.consistent,
-        "structure": [one.as_json() for one in calibration.structure],
-        "nis": {name: value if math.isfinite(value) else None for name, value in calibration.nis.items()},
-        "sentence": calibration.sentence(),
-    }
+    )
