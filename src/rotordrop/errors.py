@@ -116,7 +116,7 @@ class NothingFallsError(RecordError):
         self.seen = seen
         self.remedy = remedy
         self.moved = moved
-        super().__init__(f"nothing falls in the record: {seen}; {remedy}")
+        super().__init__(f"no fall is seen in the record: {seen}; {remedy}")
 
 
 class UnmatchedError(RecordError):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import NothingFallsError, RecordError
 from rotordrop.evidence.events import FALLEN_SHARE, fall_accelerations, planes_at_bearings
-from rotordrop.evidence.impacts import BEGUN, Settling, find_impacts
+from rotordrop.evidence.impacts import BEGUN, SMOOTHING, Settling, find_impacts
 from rotordrop.evidence.touch import crossing
 from rotordrop.evidence.wall import CENTRED, Wall, find_wall
 from rotordrop.known import NINETY
@@ -218,9 +218,11 @@ def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
 def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     """Last sample of the levitated part, first sample by which the rotor lies away from it, accelerations.
 
-    No gap is known yet: every plane is scaled by how far it strays in all.
+    No gap is known yet: every plane is scaled by how far it strays in all. A running mean keeps the largest of
+    many noisy readings from counting as motion.
     """
     first = max(int(0.01 * rate), 8)
+    raw = _calmed(raw, rate)
     away = np.column_stack(
         [np.hypot(*(path - np.mean(path[:first], axis=0)).T) for path in raw.swapaxes(0, 1)]
     )
@@ -232,10 +234,16 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     found = [fall_accelerations(path, far, rate) for path, far in zip(away.T, reach, strict=True)]
     fastest = max(float(one.max()) for one in found)
     if still or np.any(reach < 5e-6):
+        ended = np.hypot(*np.median(raw[3 * len(raw) // 4 :] - np.mean(raw[:first], axis=0), axis=0).T)
+        what = "as one that its magnets hold throughout, or one that was dropped before"
+        if np.any(ended > np.maximum(usual, _LEAST_FALL)):
+            what = (
+                f"but ends {1e6 * float(np.max(ended)):.3g} µm from there: whether it falls, or was dropped "
+                "before, is not determined"
+            )
         raise NothingFallsError(
             f"the shaft strays by {1e6 * float(np.max([reach, usual])):.3g} µm in all and by "
-            f"{1e6 * float(np.max(usual)):.3g} µm in its first 10 ms, as one that its magnets hold "
-            "throughout, or one that was dropped before",
+            f"{1e6 * float(np.max(usual)):.3g} µm in its first 10 ms, {what}",
             "give a recording in which the rotor is let go: this one ends before that or begins after it",
             None if still else (float(np.max(reach)), fastest),
         )
@@ -260,6 +268,13 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
             )
     back = int(fall_time(float(np.max(reach))) * rate) + int(3e-3 * rate)
     return max(sunk - back, first), sunk, tuple(float(one[0]) for one in found)
+
+
+def _calmed(path: Array, rate: float) -> Array:
+    """Running mean along the first axis over `SMOOTHING`: a fall stays as it is, noise hardly does."""
+    from scipy.ndimage import uniform_filter1d
+
+    return uniform_filter1d(path, 2 * int(0.5 * SMOOTHING * rate) + 1, axis=0, mode="nearest")
 
 
 def _turn(path: Array, turn: Array) -> None:
@@ -287,7 +302,7 @@ def where_floating(paths: list[Path], rate: float) -> NDArray[np.bool_]:
     near = np.ones(len(paths[0].position), dtype=np.bool_)
     for path in paths:
         size = max(0.5 * path.gap, 2.0 * float(np.hypot(*path.levitated)) if path.gap else 0.0)
-        away = np.hypot(*(path.position - path.levitated).T)
+        away = np.hypot(*(_calmed(path.position, rate) - path.levitated).T)
         near &= away < min(size, 0.7 * path.gap)
     flight = 4.0 * fall_time(max(path.gap for path in paths))
     for start, length in zip(*runs_of(near), strict=True):

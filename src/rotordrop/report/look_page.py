@@ -104,7 +104,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
             Statement(f"The rotor touched while its magnets hold or pull it: {', '.join(parts)}.", "warning")
         ]
     elif seen.motion.paths:
-        said = [Statement(f"No contact is seen, and {seen.no_fall}")]
+        said = [Statement(f"No contact and {seen.no_fall}")]
     else:
         said = [Statement(seen.no_fall)]
     said += [
@@ -136,7 +136,7 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         subtitle=(
             "a drop is not determined: the unit of the readings is in doubt"
             if doubted
-            else "no drop in this record"
+            else "no drop seen in this record"
             if seen.motion.paths
             else "a drop is not determined: no pair of channels shows a plane"
         ),
