@@ -103,15 +103,6 @@ Json = Annotated[
     Path | None,
     file_option("--json", "Write the result as JSON to FILE; '-' prints it in place of the summary."),
 ]
-Data = Annotated[
-    Path | None,
-    Option(
-        metavar="FOLDER",
-        help="Write every table of the report as CSV.",
-        file_okay=False,
-        show_default=False,
-    ),
-]
 Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
 TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
 Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]

@@ -30,7 +30,7 @@ BETWEEN_LINES_S = 5.0
 
 OUTPUTS = ("json", "report", "output")
 """Parameters of the verbs that name files to write; other paths are read."""
-FILLED = ("target", "folder", "data")
+FILLED = ("target", "folder")
 """Parameters that name a folder to fill, or a file that is never replaced unasked."""
 
 _inputs: list[Path] = []
@@ -59,23 +59,18 @@ def deliver(
     summary: ReportContent | Callable[[Console], None],
     *,
     report: Path | None = None,
-    data: Path | None = None,
     output: Path | None = None,
 ) -> None:
-    """Write page, tables and JSON where they were asked for, and print the summary.
+    """Write page and JSON where they were asked for, and print the summary.
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
-    in place of the summary, which is a page or a function that prints on the console it is given. Pages and
-    tables need a page. The output was written before and is named.
+    in place of the summary, which is a page or a function that prints on the console it is given; a report
+    needs a page. The output was written before and is named.
     """
     if not callable(summary) and report is not None:
         from rotordrop.report.page import write_page
 
         write_page(summary, report)
-    if not callable(summary) and data is not None:
-        from rotordrop.report.csv_files import write_data
-
-        write_data(summary, data)
     if json_file == STANDARD_OUTPUT:
         sealed = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"

@@ -37,7 +37,6 @@ def compare(
         ),
     ] = False,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Compare several drops: which was worst, and how sure that is; or what changed between two.
@@ -45,8 +44,7 @@ def compare(
     Example: rotordrop compare drop1.json drop2.json
     """
     if changed:
-        others = {"--scatter": scatter, "--limit": limit, "--report": report}
-        refuse_beside("--changes", others | {"--data": data})
+        refuse_beside("--changes", {"--scatter": scatter, "--limit": limit, "--report": report})
         _deliver_changes(estimates, json)
         return
     from rotordrop.estimate.published import read_drops
@@ -93,7 +91,7 @@ def compare(
         }
     verdict = limit_statement(drops, limits).text
     numbers = {"left_out": left_out(drops), "bearings": ranked, "verdict": verdict}
-    deliver(numbers, json, page, report=report, data=data)
+    deliver(numbers, json, page, report=report)
 
 
 def _deliver_changes(estimates: list[Path], json: Path | None) -> None:

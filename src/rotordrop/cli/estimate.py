@@ -55,7 +55,6 @@ def estimate(
     everything: Annotated[
         bool, Option("--all", help="Show also identified values, every note and the parts of intervals.")
     ] = False,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Estimate touchdown-bearing force and stress from recorded drops.
@@ -83,7 +82,7 @@ def estimate(
             f"Calibrate it with 'rotordrop calibrate {machine.name} RECORD... --output calibrated.toml', "
             "or leave --quick out."
         )
-    reports, outputs, folders = (places_beside(named, records) for named in (report, output, data))
+    reports, outputs = (places_beside(named, records) for named in (report, output))
     if output is not None:
         require_format(output)
     require_places(json, *reports, *outputs)
@@ -104,11 +103,9 @@ def estimate(
     screens = pages if everything else [estimate_screen(made) for made in estimates]
     for made, place in zip(estimates, outputs, strict=False):
         made.save(place)
-    for made, place in zip(estimates, folders, strict=False):
-        made.data(place)
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
-    written = ", ".join(map(str, (*reports, *outputs, *folders)))
+    written = ", ".join(map(str, (*reports, *outputs)))
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
     deliver(numbers, json, lambda out: _summarise(screens, written, out))

@@ -273,7 +273,6 @@ def waterfall(
         Path | None, file_option("--output", "Write waterfalls, envelopes, orders and speed as HDF5.", "-o")
     ] = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Find and name the frequencies of a coast-down, and say whether 0.2 s held the maximum.
@@ -318,9 +317,9 @@ def waterfall(
         simulated=simulated,
         against=against.value,
         highest=highest,
-        drawn=not (report is None and data is None),
+        drawn=report is not None,
     )
     if output is not None:
         write_findings(found, output)
     content = {"simulated_record": bool(simulated), **found.as_json()}
-    deliver(content, json, page, report=report, data=data)
+    deliver(content, json, page, report=report)

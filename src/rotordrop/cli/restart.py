@@ -37,7 +37,6 @@ def restart(
         int | None, Option(min=0, metavar="N", help="Next drops to simulate a speed; 0 leaves them out.")
     ] = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Show what changed since earlier drops, what the next one and a lift would be, and what to check.
@@ -74,4 +73,4 @@ def restart(
             found = next_drops(described, speed, limits, drop=drop, drops=count, progress=bar)
         found = replace(found, lift=lift_now(described, drop=drop))
     card = restart_card(drop, earlier=earlier, checks=made, foreseen=found)
-    deliver(restart_numbers(card), json, restart_page(card, drop), report=report, data=data)
+    deliver(restart_numbers(card), json, restart_page(card, drop), report=report)

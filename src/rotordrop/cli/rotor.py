@@ -24,7 +24,6 @@ def critical_speeds(
         list[Held] | None, Option(help="What holds the rotor; all that the machine has when left out.")
     ] = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Show critical speeds on supports of any stiffness, and damped modes against the speed.
@@ -49,4 +48,4 @@ def critical_speeds(
             progress(f"Campbell diagram, {item.value}", number / parts)
             diagrams[item.value] = campbell_diagram(described, grid, item.value)
     page = critical_speeds_page(described, maps, diagrams)
-    deliver(critical_speeds_json(maps, diagrams), json, page, report=report, data=data)
+    deliver(critical_speeds_json(maps, diagrams), json, page, report=report)

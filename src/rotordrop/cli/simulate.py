@@ -84,7 +84,6 @@ def simulate(
         Path | None, file_option("--output", "Write all histories as HDF5 (NetCDF4).", "-o")
     ] = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Simulate a drop and show forces, stresses and contacts of every touchdown bearing.
@@ -141,13 +140,13 @@ def simulate(
     result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
         result.save(output)
-    if report is None and data is None:
+    if report is None:
         said = simulate_summary(result, described)  # draws nothing: plotly takes half a second to load
     else:
         from rotordrop.report.simulate_page import simulate_page
 
         said = simulate_page(result, described)
-    deliver(simulation_numbers(result, described), json, said, report=report, data=data, output=output)
+    deliver(simulation_numbers(result, described), json, said, report=report, output=output)
     result.check_finished()
 
 

@@ -51,7 +51,6 @@ def study_run(
     above: AboveOption = None,
     output: DropsOption = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Compute what is missing of a study and show how force, stress and whirl are spread.
@@ -69,7 +68,7 @@ def study_run(
     home = place if begun else folder or place.with_suffix("")
     with progress_bar(planned.name) as bar:
         results = run_study(planned, home, threads=threads, dask=dask, progress=bar)
-    _deliver_results(results, place, by or (), above or (), output, report, data, json)
+    _deliver_results(results, place, by or (), above or (), output, report, json)
 
 
 def study_show(
@@ -78,7 +77,6 @@ def study_show(
     above: AboveOption = None,
     output: DropsOption = None,
     report: options.Report = None,
-    data: options.Data = None,
     json: options.Json = None,
 ) -> None:
     """Show what is there of a study: how force, stress and whirl are spread.
@@ -87,7 +85,7 @@ def study_show(
     """
     from rotordrop.study.summary import load_results
 
-    _deliver_results(load_results(place), place, by or (), above or (), output, report, data, json)
+    _deliver_results(load_results(place), place, by or (), above or (), output, report, json)
 
 
 def _deliver_results(
@@ -97,7 +95,6 @@ def _deliver_results(
     above: Sequence[str],
     output: Path | None,
     report: Path | None,
-    data: Path | None,
     json: Path | None,
 ) -> None:
     """Write what was asked for, and print how force, stress and whirl are spread."""
@@ -123,7 +120,7 @@ def _deliver_results(
     if output is not None:
         save_results(results, output)
     page = study_page(results, by, limits)
-    deliver(study_numbers(results, by, limits), json, page, report=report, data=data)
+    deliver(study_numbers(results, by, limits), json, page, report=report)
 
 
 def study_repeat(

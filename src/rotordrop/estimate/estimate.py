@@ -339,11 +339,6 @@ class Estimate:
         page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
         _above("rotordrop.report.page", "write_page")(page, path)
 
-    def data(self, folder: str | Path) -> None:
-        """Write every table of the report as CSV into a folder."""
-        page = _above("rotordrop.report.estimate_page", "estimate_page")(self)
-        _above("rotordrop.report.csv_files", "write_data")(page, folder)
-
     def rows(self) -> list[dict[str, Any]]:
         """One row per bearing with peaks, intervals and air gap, for a table of many drops [SI]."""
         found = []

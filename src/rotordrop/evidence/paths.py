@@ -218,8 +218,8 @@ def held_motion(record: Record, gaps: tuple[Gap | None, ...]) -> Motion:
 def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
     """Last sample of the levitated part, first sample by which the rotor lies away from it, accelerations.
 
-    No gap is known yet: every plane is scaled by how far it strays in all. A running mean keeps the largest of
-    many noisy readings from counting as motion.
+    No gap is known yet: every plane is scaled by how far it strays in all. A running mean keeps the largest
+    of many noisy readings from counting as motion.
     """
     first = max(int(0.01 * rate), 8)
     raw = _calmed(raw, rate)

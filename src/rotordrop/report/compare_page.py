@@ -181,18 +181,16 @@ def _name(one: ComparedDrop) -> str:
 
 
 def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
-    """One line a number, one column a drop, and below what the worst impact of each was."""
+    """One line a number, one column a drop."""
 
     def of(one: ComparedDrop) -> Column:
-        return Column(
-            one.label,
-            lambda number: one.number(bearing, number) if number else one.hardest(bearing),
-        )
+        return Column(one.label, lambda number: one.number(bearing, number))
 
     stated = {field for one in drops for field in one.drop.bearings[bearing].numbers}
-    rows = [*(number for number in NUMBERS if number.field in stated), None]
-    first = Column("severity", lambda number: number.label if number else "worst impact")
-    return table(rows, (first, *map(of, drops)), f"{bearing}: severity of every drop", NOTE)
+    rows = [number for number in NUMBERS if number.field in stated]
+    return table(
+        rows, (Column("severity", "label"), *map(of, drops)), f"{bearing}: severity of every drop", NOTE
+    )
 
 
 def _boxes(drops: Sequence[ComparedDrop]) -> tuple[StressBox, ...]:
@@ -299,23 +297,6 @@ class ComparedDrop:
             status=found.status or "",
             range_only=not self.drop.consistent,
         )
-
-    def hardest(self, bearing: str) -> str:
-        """Which impact gave the peak at a bearing, and which part of impulse and energy it made."""
-        impacts = self.drop.bearings[bearing].impacts
-        if not impacts:
-            return "–"
-        first = max(range(len(impacts)), key=lambda k: impacts[k].peak_force_N.value)
-        hit, parts = impacts[first], []
-        for part, all_of_it, name in (
-            (hit.impulse_N_s, [one.impulse_N_s for one in impacts], "impulse"),
-            (hit.dissipated_energy_J, [one.dissipated_energy_J for one in impacts], "energy"),
-        ):
-            whole = math.fsum(one.value for one in all_of_it)
-            if whole > 0.0:
-                parts.append(f"{percent(part.value / whole)} of the {name}")
-        moment = shown(hit.peak_time_s, "time", 3)
-        return f"impact {first + 1} of {len(impacts)} at {moment}: {' and '.join(parts)}"
 
 
 def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:

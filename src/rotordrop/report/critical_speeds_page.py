@@ -1,9 +1,9 @@
-"""The report on critical speeds: map (Neisi 2020, Fig. 19), Campbell diagrams, mode shapes, numbers."""
+"""The report on critical speeds: map (Neisi 2020, Fig. 19), Campbell diagrams, numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.arrays import Array
 from rotordrop.document import stated
 from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
 from rotordrop.report.content import (
@@ -34,14 +33,12 @@ from rotordrop.report.style import (
     INK,
     LIMIT,
     LOG_LABELS,
-    MILLI,
     MUTED,
     SERIES,
     TURN,
     curve,
     finished,
     panels,
-    plain,
     upright,
 )
 from rotordrop.rotor.campbell import (
@@ -63,7 +60,6 @@ if TYPE_CHECKING:
 
 HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
-SHAPES = 6
 ON_CARD = 6
 """Critical speeds on a card; all stand in the table."""
 AT_LINES = {
@@ -79,7 +75,6 @@ _WHIRL_WORDS = {
 }
 DIRECTIONS = {"forward": SERIES[0], "backward": SERIES[1], "mixed": SERIES[2]}
 _DASHES = {"tangent": "solid", "simple": "dash"}
-_EQUAL = 0.005
 _WORST_FIRST = ("bad", "good", "warning", "notice")
 CLEAR = "In its AMBs: no critical speed is nearer to the nominal speed than API 617 asks for."
 ASSUMED = (
@@ -334,19 +329,12 @@ def _map_section(found: CriticalSpeedMap) -> Section:
 
 
 def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:
-    nodes, name = machine.rotor.node_positions, diagram.suspension
-    bearings = [(b.name, nodes[b.node - 1]) for b in machine.touchdown_bearings]
     lines = Figure(
         campbell_figure(diagram, HIGHEST, float(machine.speed.nominal)),
         "Damped frequencies and damping ratios against the rotor speed; circles: critical speeds; dashed "
         "upright: nominal speed.",
     )
-    shapes = Figure(
-        mode_shape_figure(diagram, bearings, SHAPES, float(machine.speed.nominal)),
-        "Shapes of the lowest forward and mixed modes at the nominal speed, in the plane of the largest "
-        "deflection.",
-    )
-    return Section(f"{_held(machine, name)}: Campbell diagram and shapes", figures=(lines, shapes))
+    return Section(f"{_held(machine, diagram.suspension)}: Campbell diagram", figures=(lines,))
 
 
 def critical_speed_figure(found: CriticalSpeedMap) -> go.Figure:
@@ -427,48 +415,6 @@ def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | N
     figure.update_yaxes(range=[0.0, highest], col=1)
     figure.update_yaxes(title_text="damping ratio [%]", rangemode="tozero", col=2)
     return finished(figure, "rotor speed [Hz]", "frequency [Hz]")
-
-
-def mode_shape_figure(
-    diagram: CampbellDiagram, bearings: Sequence[tuple[str, float]], count: int, speed: float
-) -> go.Figure:
-    """Draw the shapes of the lowest modes at a speed [rad/s] in the plane of their largest deflection.
-
-    Bearings are marked at their positions [m]. Backward modes, whose shapes are nearly those of the forward
-    ones, are left out; of two modes of one frequency only the first is drawn.
-    """
-    figure = panels(("",), height=320)
-    at = int(np.argmin(np.abs(diagram.speed - speed)))
-    seen = np.isfinite(diagram.whirl[at])
-    drawn = [k for k in _distinct(diagram.frequency[at]) if seen[k] and diagram.direction(k) != "backward"]
-    for index, k in enumerate(drawn[:count]):
-        shape = diagram.shapes[at, k]
-        plane = int(np.argmax(np.max(np.abs(shape), axis=0)))
-        curve(
-            figure,
-            MILLI * diagram.node_positions,
-            shape[:, plane].real,
-            f"{diagram.frequency[at, k]:.1f} Hz, {diagram.direction(k)}",
-            colour=SERIES[index % len(SERIES)],
-            width=1.6,
-            hover="%{x:.0f} mm: %{y:.3f}",
-        )
-    for name, position in bearings:
-        upright(figure, MILLI * position, MUTED, "dot")
-        figure.add_annotation(
-            x=MILLI * position, y=1.0, yref="paper", text=plain(name), showarrow=False, yanchor="bottom"
-        )
-    return finished(figure, "position from node 1 [mm]", "deflection, largest 1 [1]")
-
-
-def _distinct(frequency: Array) -> list[int]:
-    """Indices of frequencies that differ from the one before, lowest first."""
-    chosen: list[int] = []
-    for k in np.argsort(frequency):
-        known = chosen and abs(frequency[k] - frequency[chosen[-1]]) <= _EQUAL * frequency[k]
-        if np.isfinite(frequency[k]) and not known:
-            chosen.append(int(k))
-    return chosen
 
 
 def critical_speeds_json(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from rotordrop.known import Known
-from rotordrop.units import KINDS, format_chance, si_unit
+from rotordrop.units import KINDS, format_chance
 
 System: TypeAlias = Literal["SI", "US"]
 
@@ -105,12 +105,6 @@ class Quantity:
             return cls(value=value, kind=kind, digits=digits)
         shared = {name: getattr(known, name) for name in _OF_KNOWN}
         return cls(kind=kind, digits=digits, range_only=range_only, **shared)
-
-    @property
-    def si_unit(self) -> str:
-        """SI unit of the value; empty for a pure number."""
-        own = {"dimension": "m", "duration": "s", "short_time": "s"}.get(self.kind)
-        return own or (si_unit(self.kind) if self.kind in KINDS else "")
 
     @property
     def ends(self) -> tuple[float, float]:

@@ -189,31 +189,6 @@ def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, 
     assert "No space left on device" in _told(capsys)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "verb",
-    [
-        pytest.param(verb, id=verb.name)
-        for verb in app.VerbTable.verbs().values()
-        if verb.name in CALLS and any(parameter.name == "data" for parameter in verb.load().params)
-    ],
-)
-@pytest.mark.parametrize(
-    ("place", "made"), [("file/data", False), ("gone/data", True), ("/proc/data", False)]
-)
-def test_a_folder_that_cannot_be_made_is_a_sentence(verb, place, made, things, tmp_path, monkeypatch, capsys):
-    """Those above it are made; in /proc nobody makes one, not even root."""
-    (tmp_path / "file").write_text("mine")
-    folder = tmp_path / place
-    monkeypatch.chdir(things)
-    code = run([*CALLS[verb.name].split(), "--data", str(folder)])
-    if place == "gone/data":
-        assert code == 0 and any(folder.iterdir())
-    else:
-        assert code == 6 and "cannot make the folder" in _told(capsys)
-    assert (tmp_path / "file").read_text() == "mine"
-
-
 @pytest.mark.parametrize(
     "call",
     [

@@ -78,14 +78,10 @@ def test_parquet_without_its_package_says_what_it_needs(estimate, tmp_path, monk
         estimate.save(tmp_path / "histories.parquet")
 
 
-def test_page_numbers_and_data_are_written(estimate, tmp_path):
+def test_page_and_numbers_are_written(estimate, tmp_path):
     estimate.report(tmp_path / "page.html")
     estimate.save(tmp_path / "numbers.json")
     assert {path.name for path in tmp_path.iterdir()} == {"page.html", "numbers.json"}
-    estimate.data(tmp_path / "data")
-    files = {path.name for path in (tmp_path / "data").iterdir()}
-    assert "table_parameters_of_the_machine.csv" in files
-    assert all(name.startswith("table_") for name in files)
 
 
 def test_ball_loads_agree_with_the_largest_and_with_the_force(estimate):

@@ -1,20 +1,16 @@
 """Tables and sentences of the report: impacts, parameters, cross-check, data quality, stress distribution."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rotordrop.cli.app import run
 from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.known import Known
-from rotordrop.machine import example_path
-from rotordrop.report.content import Column, ReportContent, Section, Table, table
-from rotordrop.report.csv_files import write_data
+from rotordrop.report.content import Column, Table, table
 from rotordrop.report.drop_sections import (
     impact_figure,
     impact_table,
@@ -200,42 +196,3 @@ def test_thinned_outliers_keep_both_ends_and_leave_no_gap():
     assert (kept[0], kept[-1]) == (values.min(), values.max())
     distance = np.min(np.abs(values[:2000, None] - kept[None, :]), axis=1)
     assert distance.max() <= (values.max() - values.min()) / 300
-
-
-def rows_of(path):
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.reader(stream))
-
-
-def tables():
-    force = Quantity(value=1234.5, kind="force", interval_90=(1200.0, 1300.0))
-    table = Table(columns=("what", "peak"), rows=(('NDE, "left"', force), ("DE", "–")), caption="Peaks")
-    mixed = Table(
-        columns=("quantity", "value"),
-        rows=(("gap", Quantity(value=2.5e-4, kind="length")), ("mass", Quantity(value=60.0, kind="mass"))),
-        caption="Peaks",
-    )
-    return ReportContent(title="t", summary=(table,), sections=(Section(heading="s", tables=(mixed,)),))
-
-
-def test_a_quantity_has_its_unit_and_its_interval_in_columns_of_their_own(tmp_path):
-    first, second = write_data(tables(), tmp_path / "there")
-    assert (first.name, second.name) == ("table_peaks.csv", "table_peaks_2.csv")
-    assert rows_of(first) == [
-        ["what", "peak [N]", "peak 5 % [N]", "peak 95 % [N]"],
-        ['NDE, "left"', "1234.5", "1200", "1300"],
-        ["DE", "–", "", ""],
-    ]
-    assert rows_of(second)[1:] == [["gap", "0.00025 m"], ["mass", "60 kg"]]
-
-
-def test_what_was_simulated_is_marked_in_every_row(tmp_path):
-    for path in write_data(replace(tables(), simulated="A simulated record."), tmp_path):
-        head, *rows = rows_of(path)
-        assert head[-1] == "simulated" and {row[-1] for row in rows} == {"yes"}
-
-
-def test_a_verb_writes_them(tmp_path):
-    assert run(["critical-speeds", str(example_path("small")), "--data", str(tmp_path / "data")]) == 0
-    written = {path.name for path in (tmp_path / "data").iterdir()}
-    assert "table_critical_speeds_with_damping_and_separation_margins.csv" in written
