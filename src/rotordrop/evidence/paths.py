@@ -274,7 +274,9 @@ def _calmed(path: Array, rate: float) -> Array:
     """Running mean along the first axis over `SMOOTHING`: a fall stays as it is, noise hardly does."""
     from scipy.ndimage import uniform_filter1d
 
-    return uniform_filter1d(path, 2 * int(0.5 * SMOOTHING * rate) + 1, axis=0, mode="nearest")
+    window = 2 * int(0.5 * SMOOTHING * rate) + 1
+    mean: Array = uniform_filter1d(path, window, axis=0, mode="nearest")
+    return mean
 
 
 def _turn(path: Array, turn: Array) -> None:
