@@ -285,9 +285,11 @@ class Unbalance(Document):
 class Speed(Document):
     """Speed in a replay."""
 
-    aero_time_constant_s: Value | None
+    aero_time_constant_s: Annotated[
+        Value | None, Of(lambda fit: tau if math.isfinite((tau := fit.aero_time_constant).value) else None)
+    ]
     profile_time_constant_s: float | None
-    friction_loss_Hz: float
+    friction_loss_Hz: Annotated[float, Of(lambda fit: fit.friction_loss / (2.0 * math.pi))]
     simulated_end_Hz: float
 
 
@@ -304,7 +306,7 @@ class InitialState(Document):
     displacement_m: dict[str, list[float]]
     velocity_m_per_s: dict[str, list[float]]
     remanent_force_N: list[Any]
-    remanence_time_constant_s: float
+    remanence_time_constant_s: Annotated[float, Of("decay")]
     misfit: float
     modal_expansion: Expansion
 
@@ -320,19 +322,19 @@ class Correlation(Document):
 class Supports(Document):
     """The search for the supports."""
 
-    starts: int
-    agreeing: int
-    windows_s: list[float]
-    misfit: float
-    simulations: int
-    ended_early: str | None
+    starts: Annotated[int, Of("coarse.starts")]
+    agreeing: Annotated[int, Of("coarse.agreeing")]
+    windows_s: Annotated[list[float], Of(lambda fit: (*fit.coarse.windows, *fit.search.windows))]
+    misfit: Annotated[float, Of("search.best.misfit")]
+    simulations: Annotated[int, Of(lambda fit: fit.coarse.evaluations + fit.search.evaluations)]
+    ended_early: Annotated[str | None, Of(lambda fit: fit.search.ended_early or None)]
     correlations: list[Correlation]
 
 
 class FrictionSweep(Document):
     """The sweep of the friction coefficient."""
 
-    dynamic: list[float]
+    dynamic: Annotated[list[float], Of("coefficients")]
     disagreement_m: list[float]
     window_s: Pair
 
@@ -340,15 +342,15 @@ class FrictionSweep(Document):
 class Draws(Document):
     """Draws behind the intervals."""
 
-    count: int
+    count: Annotated[int, Of(len)]
     rejected: int
 
 
 class Identification(Document):
     """What a replay searched for."""
 
-    support: Supports = ABSENT
-    friction_sweep: FrictionSweep = ABSENT
+    support: Annotated[Supports, Of("support")] = ABSENT
+    friction_sweep: Annotated[FrictionSweep, Of("friction")] = ABSENT
     draws: Draws = ABSENT
 
 

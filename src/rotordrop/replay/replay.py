@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.document import stated
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
@@ -35,7 +34,8 @@ from rotordrop.estimate.estimate import Estimate, FittedParameter, FrictionSweep
 from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimate.published import Drop
+from rotordrop.estimate.published import Draws as DrawsMade
+from rotordrop.estimate.published import Drop, Identification, InitialState, Speed
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.rest import AirGap as IdentifiedGap
@@ -396,7 +396,7 @@ def _document(
     evidence: Evidence, impacts: Identified, gap: IdentifiedGap, replayed: Replayed
 ) -> dict[str, Any]:
     """Initial state, speed law, settled rest and search of a replay, ready for the published document."""
-    names, fit, initial = replayed.result.bearing_names, evidence.speed, known(evidence.fall)
+    names, initial = replayed.result.bearing_names, known(evidence.fall)
     # The paper's start, beside ours: two rigid modes from the samples around power-off.
     expanded = expand_initial_state(
         evidence.record.time,
@@ -416,19 +416,11 @@ def _document(
         "vertical_zero_sigma_m": gap.zero_sigma,
     }
     return {
-        "speed": stated(
-            fit,
-            "aero_time_constant_s profile_time_constant_s friction_loss_Hz simulated_end_Hz",
-            aero_time_constant_s=fit.aero_time_constant
-            if math.isfinite(fit.aero_time_constant.value)
-            else None,
-            friction_loss_Hz=fit.friction_loss / (2.0 * np.pi),
-            simulated_end_Hz=replayed.result.speed[-1] / (2.0 * np.pi),
+        "speed": Speed.of_result(
+            evidence.speed, simulated_end_Hz=float(replayed.result.speed[-1]) / (2.0 * np.pi)
         ),
-        "initial_state": stated(
+        "initial_state": InitialState.of_result(
             initial,
-            "displacement_m velocity_m_per_s remanent_force_N remanence_time_constant_s=decay misfit "
-            "modal_expansion",
             displacement_m=by_bearing(initial.displacement),
             velocity_m_per_s=by_bearing(initial.velocity),
             modal_expansion={
@@ -436,33 +428,13 @@ def _document(
                 "velocity_m_per_s": by_bearing(expanded.velocity_at_bearings),
             },
         ),
-        "identification": _searched(impacts.support, impacts.friction, replayed.draws),
+        "identification": Identification.of_result(
+            impacts, **({} if replayed.draws is None else {"draws": DrawsMade.of_result(replayed.draws)})
+        ),
         "settled": {
             name: {key: float(values[b]) for key, values in settled.items()} for b, name in enumerate(names)
         },
     }
-
-
-def _searched(
-    support: SupportFit | None, friction: FrictionSweep | None, draws: Draws | None
-) -> dict[str, Any]:
-    """What was searched for; a step that was not made is left out."""
-    entry: dict[str, Any] = {}
-    if support is not None:
-        entry["support"] = stated(
-            support,
-            "starts=coarse.starts agreeing=coarse.agreeing windows_s misfit=search.best.misfit simulations "
-            "ended_early correlations",
-            windows_s=[*support.coarse.windows, *support.search.windows],
-            simulations=support.coarse.evaluations + support.search.evaluations,
-            ended_early=support.search.ended_early or None,
-            correlations=[asdict(pair) for pair in support.correlations],
-        )
-    if friction is not None:
-        entry["friction_sweep"] = stated(friction, "dynamic=coefficients disagreement_m window_s")
-    if draws is not None:
-        entry["draws"] = {"count": len(draws), "rejected": draws.rejected}
-    return entry
 
 
 def _identified_machine(machine: Machine, impacts: Identified, gap: IdentifiedGap) -> Machine:

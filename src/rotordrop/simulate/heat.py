@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.physics import ball_set, ball_table, ring, thermal
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
@@ -116,32 +117,27 @@ class Heat:
         return {names[b]: self._numbers(b, names[b]) for b in self.warmed}
 
     def _numbers(self, b: int, name: str) -> dict[str, Any]:
-        nodes = {}
-        for node, called in enumerate(NODES):
-            over = self.temperature[:, b, node]
+        nodes, preload = {}, self.preload[:, b]
+        for over, called in zip(self.temperature[:, b].T, NODES, strict=True):
             at = int(np.argmax(over))
             nodes[called] = {"largest_K": over[at], "time_s": self.time[at], "end_K": over[-1]}
         race, when, over_housing = self.hottest(b)
-        most = int(np.argmax(self.preload[:, b]))
-        return {
-            "race_K": {"largest": race, "time_s": when, "above_housing": over_housing},
-            "nodes": {
-                called: {key: float(one) for key, one in node.items()} for called, node in nodes.items()
+        most = int(np.argmax(preload))
+        return stated(
+            self,
+            "race_K nodes preload_N air_gap_end_m heat_J statement",
+            race_K={"largest": race, "time_s": when, "above_housing": over_housing},
+            nodes=nodes,
+            preload_N={
+                "start": preload[0],
+                "largest": preload[most],
+                "time_s": self.time[most],
+                "end": preload[-1],
             },
-            "preload_N": {
-                "start": float(self.preload[0, b]),
-                "largest": float(self.preload[most, b]),
-                "time_s": float(self.time[most]),
-                "end": float(self.preload[-1, b]),
-            },
-            "air_gap_end_m": float(self.gap[-1, b]),
-            "heat_J": {
-                "taken": float(self.taken[b]),
-                "gone": float(self.gone[b]),
-                "held": float(self.held[b]),
-            },
-            "statement": self.sentence(b, name)[0],
-        }
+            air_gap_end_m=self.gap[-1, b],
+            heat_J={"taken": self.taken[b], "gone": self.gone[b], "held": self.held[b]},
+            statement=self.sentence(b, name)[0],
+        )
 
 
 def warms(p: KernelParameters) -> NDArray[np.int64]:
