@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 from rotordrop import build_drop_model, simulate_drop
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.load import Load
-from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_set import ball_set_axial_force, ball_set_force

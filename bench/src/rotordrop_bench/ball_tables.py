@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.ball_numbers import BallNumbers
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import BearingNumbers, numbers_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
 from rotordrop.rotor.parameters import FASTEST
@@ -66,10 +65,9 @@ def face_row(bearing: TouchdownBearing, face: FaceViolation) -> Array:
     return row[D.THRUST :]
 
 
-def _pair(bearing: TouchdownBearing, what: str) -> tuple[BallNumbers, Any]:
+def _pair(bearing: TouchdownBearing, what: str) -> tuple[BearingNumbers, Any]:
     """Numbers and constants of a preloaded pair of rows, which what a violation asks for needs."""
     numbers = numbers_of(bearing)
-    assert isinstance(numbers, BallNumbers)
     constants = numbers.constants
     if not (constants.preloaded and len(constants.axial_signs) == 2):
         raise UsageError(

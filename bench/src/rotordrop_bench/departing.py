@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rotordrop.arrays import Array, Integers
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import structure_rows as structure_rows_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
@@ -171,7 +170,7 @@ def _drawn_values(machine: Machine, random: np.random.Generator) -> dict[str, fl
 def _bearing_values(
     bearing: TouchdownBearing, common: dict[str, float], random: np.random.Generator
 ) -> dict[str, float]:
-    support, contact, friction = bearing.support, bearing.contact, bearing.friction
+    support, contact, friction, balls = bearing.support, bearing.contact, bearing.friction, bearing.bearing
     stiffness = _within(support.stiffness, _log_uniform(random, 0.6, 1.45))
     mass = _within(support.mass, _log_uniform(random, 0.6, 1.45))
     ratio = float(support.damping) / (2.0 * math.sqrt(float(support.stiffness) * float(support.mass)))
@@ -189,13 +188,8 @@ def _bearing_values(
         "friction.dynamic": dynamic,
         "friction.static": dynamic * common["static"],
         "friction.stribeck_speed": _within(friction.stribeck_speed, common["stribeck"]),
-        # a factor on what is described, or a value of a range
-        **{
-            spread.path: float(random.uniform(spread.low, spread.high))
-            if spread.described is None
-            else _within(spread.described, _log_uniform(random, spread.low, spread.high))
-            for spread in numbers_of(bearing).spreads()
-        },
+        "preload": _within(balls.preload, _log_uniform(random, 0.8, 1.25)),
+        "bearing.first_ball_angle": float(random.uniform(0.0, 2.0 * math.pi / balls.ball_count)),
         "race.inertia": _within(bearing.race.inertia, _log_uniform(random, 0.85, 1.2)),
         "race.mass": _within(bearing.race.mass, common["race_mass"]),
         "race.drag_coefficient": float(bearing.race.drag_coefficient) * common["drag"],

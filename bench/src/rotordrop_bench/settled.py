@@ -10,8 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rotordrop.arrays import Array
-from rotordrop.elements.ball_numbers import BallNumbers
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
@@ -213,7 +212,6 @@ def _departing_rest(model: DropModel, angle: float) -> Array:
 def _way_along(model: DropModel, b: int) -> float:
     """Axial way [m] of a race that carries its static load and the thrust on its face."""
     numbers = numbers_of(model.machine.touchdown_bearings[b])
-    assert isinstance(numbers, BallNumbers)
     thrust = float(departures_in(model)[b, D.THRUST])
     return thrust_pair(numbers.constants, numbers.deflection(float(model.load_shares[b]))[0], thrust)[2]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import published
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine

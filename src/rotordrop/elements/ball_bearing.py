@@ -32,7 +32,7 @@ from rotordrop.physics import ring
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
-    from rotordrop.elements.ball_numbers import BallNumbers
+    from rotordrop.elements.bearing_numbers import BearingNumbers
     from rotordrop.elements.catalog.lookup import CatalogueBearing
 
 BallMaterial = Literal["silicon nitride", "steel"]
@@ -442,11 +442,12 @@ class BallBearing(RaceBearing):
             values["preload"] = Known(value=force, status=status, range=bounds, source=why, unit="N")
         return values
 
-    def numbers(self) -> BallNumbers:
+    def numbers(self) -> BearingNumbers:
         """Give the numbers that follow from it."""
-        from rotordrop.elements.ball_numbers import BallNumbers  # compiled: a description needs no compiler
+        from rotordrop.elements.bearing_numbers import BearingNumbers  # loads the laws of balls
 
-        return BallNumbers(self)
+        rings = self.ring_youngs_modulus.value, self.ring_poisson_ratio.value
+        return BearingNumbers(rings, self)
 
     def check_bore(self, radius: float) -> None:
         """Refuse a bore [m] that reaches into the inner ring or the balls."""

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
-from rotordrop.arrays import Array
 from rotordrop.elements.race import Race
-from rotordrop.elements.race_bearing import BearingFigure, BearingNumbers, Excess, RaceBearing
+from rotordrop.elements.race_bearing import RaceBearing
 from rotordrop.elements.values import PoissonRatio, PositiveLength, Pressure, default
 from rotordrop.known import Known
-from rotordrop.physics import ball_set
+
+if TYPE_CHECKING:
+    from rotordrop.elements.bearing_numbers import BearingNumbers
 
 
 class Sleeve(RaceBearing):
@@ -38,9 +35,11 @@ class Sleeve(RaceBearing):
     )
     no_face: ClassVar[str] = "a sleeve has no race that could give way axially"
 
-    def numbers(self) -> SleeveNumbers:
+    def numbers(self) -> BearingNumbers:
         """Give the numbers that follow from it."""
-        return SleeveNumbers(self)
+        from rotordrop.elements.bearing_numbers import BearingNumbers  # loads the laws of balls
+
+        return BearingNumbers((self.youngs_modulus.value, self.poisson_ratio.value))
 
     def check_bore(self, radius: float) -> None:
         """Take any bore: nothing lies around it."""
@@ -53,59 +52,3 @@ class Sleeve(RaceBearing):
         """Nothing spins with it."""
         none = Known(value=0.0, status="default", source="a sleeve does not spin", unit="kg")
         return race.completed_with({"width": width, "mass": none, "inertia": replace(none, unit="kg m^2")})
-
-
-@dataclass(frozen=True)
-class SleeveNumbers(BearingNumbers):
-    """The numbers of a sleeve: rigid, held, without rolling elements."""
-
-    sleeve: Sleeve
-
-    held: ClassVar[bool] = True
-    play: ClassVar[float] = 0.0
-    drag_diameter: ClassVar[float] = 0.0
-
-    @property
-    def ring_material(self) -> tuple[float, float]:
-        """Young's modulus [Pa] and Poisson's ratio [1] of the sleeve."""
-        return self.sleeve.youngs_modulus.value, self.sleeve.poisson_ratio.value
-
-    def entries(self) -> Array:
-        """No ball set."""
-        return np.zeros(ball_set.N_ENTRIES)
-
-    def places(self, least: int = 0, facing: float = 0.0) -> Array:
-        """No places but padding, which bears nothing."""
-        return np.zeros((3, least))
-
-    def deflection(self, load: float) -> tuple[float, float]:
-        """Nothing gives way between rotor and support but the contact."""
-        return 0.0, math.inf
-
-    def seat(self, load: float) -> tuple[float, float]:
-        """It stays in the middle."""
-        return 0.0, 0.0
-
-    def simple_stiffness(self, load: float) -> float:
-        """Rigid."""
-        return math.inf
-
-    def in_series(self, contact: float, load: float) -> tuple[float, float, float]:
-        """The contact is all that lies on the support."""
-        return math.inf, contact, contact
-
-    def damping(self, time: float, load: float) -> float:
-        """None but that of contact and support."""
-        return 0.0
-
-    def figures(self, load: float) -> tuple[BearingFigure, ...]:
-        """Nothing holds it but its support."""
-        return ()
-
-    def excesses(self, omega: float, load: float) -> Iterator[Excess]:
-        """Nothing turns."""
-        yield from ()
-
-    def room_to_grow(self) -> tuple[float, str]:
-        """Nothing is compared: heat of a sleeve is not reckoned."""
-        return math.inf, "nothing"

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, ClassVar
 from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.ball_bearing import BallBearing, outer_ring
+from rotordrop.elements.bearing_numbers import BearingFigure, Excess, numbers_of
 from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import Parameter, Rule, stated_only
 from rotordrop.elements.race import STEEL_DENSITY, Race
-from rotordrop.elements.race_bearing import BearingFigure, Excess, numbers_of
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -159,7 +159,7 @@ def _force_at(bearing: TouchdownBearing, omega: float) -> Callable[[float], floa
     from rotordrop.physics.fast_balls import FastBalls, centred_balls
 
     balls, numbers = bearing.bearing, numbers_of(bearing)
-    constants = numbers.constants  # type: ignore[attr-defined]
+    constants = numbers.constants
     count, rows = constants.ball_count, constants.row_count
 
     def slow(growth: float) -> float:
@@ -200,16 +200,8 @@ def heat_figures(bearing: TouchdownBearing, omega: float) -> tuple[BearingFigure
         return ()
     has = format_quantity(0.5 * float(heat.ball_conductance), "heat_conductance")
     note = f"from race to outer race through the balls, which have {has}, at nominal speed"
-    label = "conductance for a steady state"
-    return (
-        BearingFigure(
-            field="steady_conductance_W_per_K",
-            label=label,
-            kind="heat_conductance",
-            value=limit[0],
-            note=note,
-        ),
-    )
+    label, unit = "conductance for a steady state", "heat_conductance"
+    return (BearingFigure("steady_conductance_W_per_K", label, unit, limit[0], note=note),)
 
 
 def runaway(bearing: TouchdownBearing, omega: float) -> Excess | None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import following, parameter, published
 from rotordrop.estimate.estimate import FittedParameter
 from rotordrop.known import NINETY, Known

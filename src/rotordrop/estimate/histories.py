@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.files import atomic_path, new_hdf5

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.elements.race_bearing import Ratings, numbers_of
+from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
@@ -32,7 +32,7 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
     if stress.value > 0.0:
         yield "severity.static_safety", _falling(stress.known, static_safety_of_stress)
     ratings = numbers_of(estimate.machine.bearing(bearing.name)).ratings()
-    if ratings is not None and force.value > 0.0:
+    if force.value > 0.0:
         yield (
             "severity.static_safety_of_rating",
             _falling(force.known, lambda load: static_safety_of_load(ratings.static, load)),
@@ -41,7 +41,7 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
         yield "severity.impulse_N_s", _sum([one.impulse for one in bearing.impacts], "N s")
         yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
     yield from _indices(estimate, bearing)
-    if ratings is not None and bearing.force_vector is not None and bearing.impacts:
+    if bearing.force_vector is not None and bearing.impacts:
         loads = numbers_of(estimate.machine.bearing(bearing.name)).element_loads_under(bearing.force_vector)
         yield from _fatigue(bearing, ratings, loads, estimate.speed)
 

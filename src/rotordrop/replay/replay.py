@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Role, Step
-from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.elements.touchdown_bearing import AIR_GAP, TouchdownBearing
 from rotordrop.estimate.agreement import compare_orbits, spread_horizon

@@ -15,8 +15,8 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Role
-from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.elements.table import published, row_of
 from rotordrop.estimate.advice import is_wide
 from rotordrop.estimate.bearing_drop import BearingDrop, History
@@ -386,11 +386,9 @@ def _severity(estimate: Estimate) -> Section:
 
     rated: dict[str, list[str]] = {}
     for name in found:
-        if (own := numbers_of(estimate.machine.bearing(name)).ratings()) is None:
-            text = "no load ratings"
-        else:
-            static, dynamic = (shown(value, "force", 3) for value in (own.static, own.dynamic))
-            text = f"C0 = {static} of all rows ({own.rows}), C = {dynamic} of one, {own.source}"
+        own = numbers_of(estimate.machine.bearing(name)).ratings()
+        static, dynamic = (shown(value, "force", 3) for value in (own.static, own.dynamic))
+        text = f"C0 = {static} of all rows ({own.rows}), C = {dynamic} of one, {own.source}"
         rated.setdefault(text, []).append(name)
     rows = [one for one in NUMBERS[MAIN:] if any(one.field in values for values in found.values())]
     columns = (Column("severity", "label"), *map(at, found))

@@ -36,7 +36,7 @@ from rotordrop.rotor.suspension import Support, link
 from rotordrop.rotor.whirl import matrices_of
 
 if TYPE_CHECKING:
-    from rotordrop.elements.race_bearing import BearingFigure
+    from rotordrop.elements.bearing_numbers import BearingFigure
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE

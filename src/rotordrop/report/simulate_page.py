@@ -12,8 +12,8 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.document import stated
+from rotordrop.elements.bearing_numbers import THROWN, numbers_of
 from rotordrop.elements.face import UNPRESSED
-from rotordrop.elements.race_bearing import THROWN, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
 from rotordrop.estimate.published import Bearing
 from rotordrop.evidence.impacts import HOP, after_flights
@@ -260,7 +260,7 @@ def _verdict(
     if len(bearings) > 1 and all(np.allclose(one.force.values, first, 0.0, near) for one in bearings):
         said.append(Statement(SYMMETRIC))
     known = () if machine is None else machine.touchdown_bearings
-    unrated = [one.name for one in known if numbers_of(one).rolling_elements() is None]
+    unrated = [one.name for one in known if numbers_of(one).balls is None]
     if rated := [bearing for bearing in bearings if bearing.name not in unrated]:
         said.append(static_limit_statement(rated))
     # of a drop that broke off nothing is good

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from rotordrop.arrays import Array
+from rotordrop.elements.bearing_numbers import BearingFigure, numbers_of
 from rotordrop.elements.face import UNPRESSED, Face
-from rotordrop.elements.race_bearing import BearingFigure, numbers_of
 from rotordrop.elements.table import rows
 from rotordrop.elements.thermal import heat_figures, runaway
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -212,9 +212,9 @@ def _heat(bearing: TouchdownBearing, rest: BearingSummary, omega: float) -> Iter
     if (hot := runaway(bearing, omega)) is not None:
         yield _warning(hot.kind, bearing.name, hot.value, hot.limit, hot.text)
     race, radius, numbers = bearing.race, float(bearing.bore_radius), numbers_of(bearing)
-    room, against = numbers.room_to_grow()
-    if room == math.inf or bearing.thermal is not None:
+    if bearing.bearing.no_race or bearing.thermal is not None:
         return
+    room, against = numbers.room_to_grow()
     sliding, rolling = friction_heat(
         F_r=max(rest.load, 0.0),
         mu=float(bearing.friction.dynamic),

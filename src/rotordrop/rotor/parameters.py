@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.bearing_numbers import numbers_of, places_of
 from rotordrop.elements.description import Placed
-from rotordrop.elements.race_bearing import numbers_of, places_of
 from rotordrop.elements.support import support_sag
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine

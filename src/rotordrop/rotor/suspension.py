@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.support import support_deflection
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import Ratings
+from rotordrop.elements.bearing_numbers import Ratings
 
 LIFE = 1e6
 """Revolutions of the basic rating life at the basic dynamic load rating, its definition in ISO 281."""

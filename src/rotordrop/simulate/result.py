@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import Climb, numbers_of
+from rotordrop.elements.bearing_numbers import Climb, numbers_of
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.load import load_now

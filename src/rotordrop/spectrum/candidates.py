@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
 from rotordrop.physics.contact import depth_at
@@ -241,8 +241,14 @@ def machine_candidates(machine: Machine, planes: dict[str, str] | None = None) -
     defects = [
         candidate
         for bearing in machine.touchdown_bearings
-        if (elements := numbers_of(bearing).rolling_elements()) is not None
-        for candidate in bearing_defect_candidates(bearing.name, **vars(elements))
+        if (balls := numbers_of(bearing).balls) is not None
+        for candidate in bearing_defect_candidates(
+            bearing.name,
+            ball_count=balls.ball_count,
+            ball_diameter=float(balls.ball_diameter),
+            pitch_diameter=float(balls.pitch_diameter),
+            contact_angle=float(balls.contact_angle),
+        )
     ]
     return (*order_candidates(), *swings, *settled_modes(machine), *mains_candidates(), *defects)
 

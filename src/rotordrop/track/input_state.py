@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.physics import columns as L
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.forces import stress_at_force

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.cli.app import run
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import RecordError
 from rotordrop.evidence.clearance import measure_clearance, wear_between
 from rotordrop.machine import example_path, load_machine

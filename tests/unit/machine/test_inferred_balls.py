@@ -5,7 +5,7 @@ import math
 import pytest
 from tests.reference.ball_bearing_catalogue import geometry_of
 
-from rotordrop.elements.ball_numbers import inferred_stress_sigma
+from rotordrop.elements.bearing_numbers import inferred_stress_sigma
 from rotordrop.elements.catalog.boundary import DIMENSION_SERIES, boundary_dimensions
 from rotordrop.elements.catalog.designation import read_designation
 from rotordrop.elements.catalog.inference import (

@@ -10,7 +10,7 @@ from tests.reference.rotor_shapes import bending_part
 from tests.scaled_machines import scaled_machine
 
 from rotordrop import Known, example_machine
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.errors import SimulationError
 from rotordrop.physics.ball_bearing import bearing_constants

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import trapezoid
 from scipy.special import ndtr
 
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.catalog.inference import dynamic_rating
-from rotordrop.elements.race_bearing import numbers_of
 from rotordrop.errors import UsageError
 from rotordrop.estimate.severity_numbers import static_safety_of_load, static_safety_of_stress
 from rotordrop.machine import example_machine

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotordrop import Known, build_drop_model, example_machine
-from rotordrop.elements.race_bearing import numbers_of
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import parameter
 from rotordrop.estimate import simulated_coast_down
 from rotordrop.estimate.bearing_drop import Motion, deepest

@@ -1,9 +1,9 @@
-"""What a ball bearing states of itself."""
+"""What the bearing of a race states of itself: the numbers of balls, or of a sleeve, which has none."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -13,24 +13,10 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS, BallBearing
 from rotordrop.elements.catalog.inference import dynamic_rating, static_rating
-from rotordrop.elements.race_bearing import (
-    THROWN,
-    BearingFigure,
-    BearingNumbers,
-    Climb,
-    Excess,
-    Ratings,
-    RollingElements,
-    Spread,
-)
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY, Known
-from rotordrop.physics import ring
-from rotordrop.physics.ball_bearing import (
-    BearingConstants,
-    ball_centrifugal_force,
-    bearing_constants,
-)
+from rotordrop.physics import ball_set, ring
+from rotordrop.physics.ball_bearing import BearingConstants, ball_centrifugal_force, bearing_constants
 from rotordrop.physics.ball_bearing_response import bearing_response, simple_radial_stiffness
 from rotordrop.physics.ball_loads import ball_loads, displacement_under, loads_and_angles
 from rotordrop.physics.ball_set import (
@@ -44,12 +30,12 @@ from rotordrop.physics.ball_set import (
 from rotordrop.physics.ball_table import BallTable, ball_table
 from rotordrop.physics.contact import contact_energy, depth_at
 from rotordrop.physics.fast_balls import FastBalls, centred_balls, offset_on_springs
-from rotordrop.physics.hertz import compliance, race_contact
+from rotordrop.physics.hertz import LineContact, compliance, cylinder_in_bore, race_contact
 from rotordrop.physics.ring import STOP_STIFFNESS, row_rigidity, seat_on_springs
 from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
-    from rotordrop.elements.ball_bearing import BallBearing
+    from rotordrop.elements.touchdown_bearing import TouchdownBearing
 
 CENTRIFUGAL_SHARE = 0.1
 """Ball centrifugal force over preload ball load from which it counts: chosen, not measured."""
@@ -61,6 +47,97 @@ _STEEL = (208e9, 0.3)
 _HARD_PUSH, _PUSHES = 10.0, 101
 """Load over that at rest [1] for which rigid and sprung preload are compared, as of a first impact; forces
 tried up to it."""
+
+
+THROWN = "ball centrifugal force"
+"""Kind of excess of rolling elements that turn fast."""
+
+
+@dataclass(frozen=True)
+class BearingFigure:
+    """A number that a bearing states of itself at rest."""
+
+    field: str
+    """Its field in a document, unit included."""
+    label: str
+    """What it is called."""
+    kind: str
+    """Kind of quantity, which sets the unit it is shown in."""
+    value: float
+    """Its value [SI]."""
+    described: Known | None = None
+    """The same as the machine file describes it, with its range."""
+    note: str = ""
+    """What to add when it is shown."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Excess:
+    """Something beyond a limit: what it is, the two numbers compared [SI], the text.
+
+    ``doubtful`` says that the description looks wrong; else the drop model ends there.
+    """
+
+    kind: str
+    value: float
+    limit: float
+    text: str
+    doubtful: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ratings:
+    """What a bearing bears by the standards, and what follows from its balls."""
+
+    static: float
+    """Static radial load rating C_0 of the whole bearing [N], ISO 76."""
+    dynamic: float
+    """Basic dynamic radial load rating C of one row [N], ISO 281."""
+    rows: int
+    balls: int
+    """Rows, and balls of each."""
+    gamma: float
+    cosine: float
+    """Ball diameter times cosine of the contact angle over pitch diameter, and that cosine [1]."""
+    conformity_inner: float
+    conformity_outer: float
+    """Groove radius over ball diameter [1]."""
+    source: str
+    """Where the load ratings come from."""
+
+
+SHOULDER = "shoulder of the race"
+"""Kind of excess of rolling elements that climb out of their grooves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Climb:
+    """How far rolling elements climb in their grooves [rad from the middle of the groove], shape (T,)."""
+
+    angle: Array
+    edge: Array
+    """Largest contact angle of a loaded element, and that of the edge of its contact ellipse."""
+    shoulder: float
+    """Angle at which the groove ends."""
+
+    @property
+    def highest(self) -> int:
+        """Index of the instant at which an edge lies highest."""
+        return int(np.argmax(self.edge))
+
+    @property
+    def excess(self) -> Excess | None:
+        """What lies beyond the shoulder, where a contact reaches over it."""
+        edge, angle = float(self.edge[self.highest]), float(self.angle[self.highest])
+        if edge <= self.shoulder:
+            return None
+        reach, at, room = (f"{math.degrees(one):.3g}°" for one in (edge, angle, self.shoulder))
+        text = (
+            f"the contact of a ball reaches {reach} up its groove (contact angle {at}), and the shoulder "
+            f"stands at {room}; the model takes the groove to go on: force and stress are not those of a "
+            "contact cut off there"
+        )
+        return Excess(kind=SHOULDER, value=edge, limit=self.shoulder, text=text)
 
 
 @lru_cache(maxsize=64)
@@ -77,34 +154,52 @@ def _speed_table(balls: BallBearing, fastest: float) -> BallTable:
 
 
 @dataclass(frozen=True, eq=False)
-class BallNumbers(BearingNumbers):
-    """The numbers of a ball bearing, from its description."""
+class BearingNumbers:
+    """The numbers of a ball bearing, or of a sleeve: rigid, held, without balls."""
 
-    balls: BallBearing
+    ring_material: tuple[float, float]
+    """Young's modulus [Pa] and Poisson's ratio [1] of the rings, or of the sleeve."""
+    balls: BallBearing | None = None
+    """The ball bearing; None for a sleeve."""
+
+    @property
+    def rolling(self) -> BallBearing:
+        """The ball bearing, of one that is no sleeve."""
+        assert self.balls is not None
+        return self.balls
 
     @cached_property
     def constants(self) -> BearingConstants:
-        """What does not change during a drop."""
-        return _constants(self.balls)
+        """What does not change during a drop, of balls."""
+        return _constants(self.rolling)
 
     @property
     def held(self) -> bool:
-        """Whether the balls are preloaded."""
-        return self.constants.preloaded
+        """Whether the race is held in the middle without any load on it: by preload."""
+        return self.balls is None or self.constants.preloaded
 
     @property
     def play(self) -> float:
-        """Radial play [m], half the clearance of deep grooves."""
-        return self.constants.radial_play
+        """Way of the race from the middle to where it first meets a force [m]: half the clearance."""
+        return 0.0 if self.balls is None else self.constants.radial_play
+
+    def rotor_contact(self, bearing: TouchdownBearing, shaft: tuple[float, float]) -> LineContact:
+        """Line contact with a rotor over the width of the race; Young's modulus [Pa], Poisson's ratio [1]."""
+        bore, eta = float(bearing.bore_radius), compliance(*shaft, *self.ring_material)
+        return cylinder_in_bore(bore - float(bearing.air_gap), bore, float(bearing.race.width), eta)
 
     def element_loads(self, moved: Array, rings: Array, along: Array) -> Array:
-        """Load of every ball [N].
+        """Load of every ball [N], (T, rows, Z); a sleeve has none.
+
+        The race has moved (x, y) [m], (T, 2), and along the axis, (T,), sprung rings from it, (T,).
 
         Raises
         ------
         UsageError
             With ball_inertia: the load depends on the speed of the race, and differs between the races.
         """
+        if self.balls is None:
+            return np.zeros((len(moved), 0, 0))
         if self.balls.ball_inertia:
             raise UsageError(
                 "the load of every ball is not known with ball_inertia = true, where it differs between the "
@@ -113,15 +208,15 @@ class BallNumbers(BearingNumbers):
         return loads_and_angles(self.constants, moved, rings, along)[0]
 
     def element_loads_under(self, force: Array) -> Array:
-        """Load of every ball [N] where they push the race with a force."""
-        if self.balls.sprung:
+        """Load of every ball [N], (T, rows, Z), where they push the race with a force (x, y) [N], (T, 2)."""
+        if self.rolling.sprung:
             seats = seat_on_springs(self.constants, self.rings(), force)
             return ball_loads(self.constants, seats[:, :2], seats[:, 2])
         return ball_loads(self.constants, displacement_under(self.constants, force))
 
     def climb(self, moved: Array, along: Array) -> Climb:
-        """How far the balls climb in the grooves of the race that has less room for them."""
-        balls, constants = self.balls, self.constants
+        """How far the balls climb in the race that has less room for them; arguments as `element_loads`."""
+        balls, constants = self.rolling, self.constants
         diameter, angle = float(balls.ball_diameter), constants.radial_contact_angle
         height = SHOULDER_HEIGHT * diameter if balls.shoulder_height is None else float(balls.shoulder_height)
         load, angles = loads_and_angles(constants, moved, 0.0, along)
@@ -143,15 +238,19 @@ class BallNumbers(BearingNumbers):
 
     def axial_figures(self, law: Array, gap: float, push: float) -> Iterator[BearingFigure]:
         """Stiffness along the axis and against tilt; force of a landing through a gap [m] by a push [N]."""
-        constants, balls = self.constants, self.balls
+        constants, balls = self.constants, self.rolling
         if self.held:
-            rest = bearing_response(constants, np.zeros(5), row_spacing=self.row_spacing)
-            yield _figure("axial_stiffness_N_per_m", "axial stiffness", "stiffness", rest.stiffness[2, 2])
-            yield _figure(
+            # rows without a given distance stand as far apart as they are wide
+            apart = balls.row_spacing or balls.usual_race_width()[0] / constants.row_count
+            rest = bearing_response(constants, np.zeros(5), row_spacing=float(apart))
+            yield BearingFigure(
+                "axial_stiffness_N_per_m", "axial stiffness", "stiffness", float(rest.stiffness[2, 2])
+            )
+            yield BearingFigure(
                 "tilt_stiffness_N_m_per_rad",
                 "tilt stiffness",
                 "rotational_stiffness",
-                rest.stiffness[3, 3],
+                float(rest.stiffness[3, 3]),
                 note=f'arrangement "{balls.arrangement}"; a drop has no tilt of the race',
             )
         if push > 0.0:
@@ -159,14 +258,7 @@ class BallNumbers(BearingNumbers):
             angle = math.degrees(float(self.climb(np.zeros((1, 2)), np.array([way])).angle[0]))
             thrust, through = format_quantity(push, "force"), format_quantity(gap, "length")
             note = f"of {thrust} through {through}, without any loss, contact angle {angle:.3g}°"
-            yield _figure("landing_force_N", "axial force of a landing", "force", force, note=note)
-
-    @property
-    def row_spacing(self) -> float:
-        """Axial distance of the middles of the rows [m]; that of their width where none is given."""
-        if self.balls.row_spacing is not None:
-            return float(self.balls.row_spacing)
-        return self.balls.usual_race_width()[0] / self.constants.row_count
+            yield BearingFigure("landing_force_N", "axial force of a landing", "force", force, note=note)
 
     def landing(self, law: Array, gap: float, push: float) -> tuple[float, float]:
         """Largest axial force [N] and way of the race [m] where a constant push [N] closes a gap [m].
@@ -204,7 +296,7 @@ class BallNumbers(BearingNumbers):
 
     def ratings(self) -> Ratings:
         """Load ratings as given, else by ISO 76 and ISO 281 from the balls."""
-        b = self.balls
+        b = self.rolling
         angle, rows = float(b.contact_angle), b.rows
         row = (b.ball_count, float(b.ball_diameter), float(b.pitch_diameter), angle)
         given = [b.static_load_rating, b.dynamic_load_rating]
@@ -227,27 +319,22 @@ class BallNumbers(BearingNumbers):
 
     @property
     def drag_diameter(self) -> float:
-        """Pitch diameter [m]."""
-        return float(self.balls.pitch_diameter)
-
-    @property
-    def ring_material(self) -> tuple[float, float]:
-        """Young's modulus [Pa] and Poisson's ratio [1] of the rings."""
-        return float(self.balls.ring_youngs_modulus), float(self.balls.ring_poisson_ratio)
+        """Twice the arm of the drag on the race [m]: the pitch diameter."""
+        return 0.0 if self.balls is None else float(self.balls.pitch_diameter)
 
     def entries(self) -> Array:
-        """Stiffness of a ball, groove distance and offsets, stress coefficient."""
-        return ball_set_entries(self.constants)
+        """Numbers of the force law, shape (N,), in the order of `rotordrop.physics.ball_set`."""
+        return np.zeros(ball_set.N_ENTRIES) if self.balls is None else ball_set_entries(self.constants)
 
     @property
     def lines_of_contact(self) -> float:
-        """As a radial motion projects them."""
-        return lines_of_contact(self.constants)
+        """Dashpots along the lines of contact of all balls over the radial damping [1]."""
+        return 0.0 if self.balls is None else lines_of_contact(self.constants)
 
     def rings(self) -> Array:
-        """Mass, springs, stop and fit of outer rings that springs press on."""
+        """Numbers of outer rings that springs press on, in the order of `rotordrop.physics.ring`."""
         numbers, balls = np.zeros(ring.N_ENTRIES), self.balls
-        if balls.sprung:
+        if balls is not None and balls.sprung:
             numbers[ring.MASS], numbers[ring.RATE] = balls.ring_mass, balls.spring_rate
             numbers[ring.TRAVEL], numbers[ring.FRICTION] = balls.ring_travel, balls.fit_friction
             numbers[ring.DAMPING] = balls.ring_damping
@@ -258,14 +345,22 @@ class BallNumbers(BearingNumbers):
 
     def speed_table(self, fastest: float) -> BallTable | None:
         """Balls up to a speed of the race [rad/s], where their inertia counts."""
-        return _speed_table(self.balls, fastest) if self.balls.ball_inertia else None
+        inert = self.balls is not None and self.balls.ball_inertia
+        return _speed_table(self.rolling, fastest) if inert else None
 
     def places(self, least: int = 0, facing: float = 0.0) -> Array:
-        """Direction of every ball and how many stand there."""
+        """Where the force acts around the race, shape (3, Z), padded to ``least`` places.
+
+        With ``facing`` only the rows that axial motion towards +z (1) or -z (-1) loads.
+        """
+        if self.balls is None:
+            return np.zeros((3, least))
         return balls_of(self.constants, least, facing)
 
     def deflection(self, load: float) -> tuple[float, float]:
-        """Way of the race under a load [N] and tangent stiffness there [N/m]."""
+        """Way of the race downwards under a load [N]: the way [m] and the tangent stiffness there [N/m]."""
+        if self.balls is None:
+            return 0.0, math.inf
         if self.balls.sprung:
             _, y, q = seat_on_springs(self.constants, self.rings(), np.array([[0.0, load]]))[0]
             # small and fast motion does not slide the rings in their fits: the tangent is that of held ones
@@ -273,16 +368,36 @@ class BallNumbers(BearingNumbers):
         return static_deflection(self.constants, load)
 
     def seat(self, load: float) -> tuple[float, float]:
-        """Straight below the middle with preload; else in the gap of the lowest balls [m]."""
+        """Where the race comes to rest under a downward load [N]: x and y [m].
+
+        Straight below the middle with preload; else in the gap of the lowest balls.
+        """
         if self.held:
             return 0.0, -self.deflection(load)[0]
         return loose_race_seat(self.constants, load)
 
-    def simple_stiffness(self, load: float) -> float:
-        """Stiffness [N/m] by Palmgren's formula, which knows no preload."""
-        balls = (float(self.balls.ball_youngs_modulus), float(self.balls.ball_poisson_ratio))
+    def tangent_stiffness(self, load: float) -> float:
+        """Radial stiffness [N/m] under a static load [N] downwards."""
+        return self.deflection(load)[1]
+
+    def in_series(self, contact: float, load: float) -> tuple[float, float, float]:
+        """Stiffness [N/m] under a load [N] of a contact, given, and behind its race, tangent and simple.
+
+        On a sleeve the contact is all that lies on the support.
+        """
+        if self.balls is None:
+            return math.inf, contact, contact
+        return contact, self.tangent_stiffness(load), self._simple_stiffness(self.balls, load)
+
+    def damping(self, time: float, load: float) -> float:
+        """Its damping [N s/m] under a static load [N] where damping over tangent stiffness is given [s]."""
+        return 0.0 if self.balls is None else time * self.tangent_stiffness(load)
+
+    def _simple_stiffness(self, bearing: BallBearing, load: float) -> float:
+        """Radial stiffness [N/m] by Palmgren's formula, which knows no preload."""
+        balls = (float(bearing.ball_youngs_modulus), float(bearing.ball_poisson_ratio))
         return simple_radial_stiffness(
-            float(self.balls.ball_diameter),
+            float(bearing.ball_diameter),
             self.constants.row_count * self.constants.ball_count,
             self.constants.radial_contact_angle,
             load,
@@ -299,35 +414,39 @@ class BallNumbers(BearingNumbers):
         return bearing_response(self.constants, [*self.seat(load), 0.0, 0.0, 0.0]).ball_loads
 
     def figures(self, load: float) -> tuple[BearingFigure, ...]:
-        """The preload and its stress; or else the play, its angle and how the balls lie."""
-        constants, balls = self.constants, self.balls
+        """What holds the race without a load, and how it lies under a rotor at rest of a load [N]."""
+        if (balls := self.balls) is None:
+            return ()
+        constants = self.constants
         if self.held:
             return (
-                _figure("preload_N", "preload of a row", "force", float(balls.preload), balls.preload),
-                _figure("preload_stress_Pa", "stress by preload", "pressure", self._preload_stress),
-                *self._on_springs(load),
+                BearingFigure("preload_N", "preload of a row", "force", float(balls.preload), balls.preload),
+                BearingFigure("preload_stress_Pa", "stress by preload", "pressure", self._preload_stress),
+                *self._on_springs(balls, load),
             )
         loads, clearance = self.ball_loads(load), 2.0 * self.play
         shared = f"on {np.count_nonzero(loads)} balls"
-        axial = _figure("axial_play_m", "axial play", "length", constants.axial_play)
+        axial = BearingFigure("axial_play_m", "axial play", "length", constants.axial_play)
         return (
-            _figure("clearance_m", "radial clearance", "length", clearance, balls.clearance),
+            BearingFigure("clearance_m", "radial clearance", "length", clearance, balls.clearance),
             *((axial,) if constants.row_count == 1 else ()),
-            _figure("contact_angle_rad", "free contact angle", "angle", constants.contact_angle),
-            _figure("ball_load_N", "largest ball load at rest", "force", np.max(loads), note=shared),
+            BearingFigure("contact_angle_rad", "free contact angle", "angle", constants.contact_angle),
+            BearingFigure(
+                "ball_load_N", "largest ball load at rest", "force", float(np.max(loads)), note=shared
+            ),
         )
 
-    def _on_springs(self, load: float) -> Iterator[BearingFigure]:
+    def _on_springs(self, balls: BallBearing, load: float) -> Iterator[BearingFigure]:
         """What springs in place of spacers would leave of the force, at a push of many times a load [N]."""
-        if self.balls.sprung or load <= 0.0:
+        if balls.sprung or load <= 0.0:
             return
-        springs = self.balls.changed(preload_kind="spring", ball_inertia=False).numbers()
+        springs = balls.changed(preload_kind="spring", ball_inertia=False).numbers()
         heavy = _HARD_PUSH * load
         pushes = np.column_stack([np.zeros(_PUSHES), np.linspace(0.0, heavy, _PUSHES)])
         way = -seat_on_springs(springs.constants, springs.rings(), pushes)[:, 1]
         left = float(np.interp(static_deflection(self.constants, heavy)[0], way, pushes[:, 1])) / heavy
         note = f"of {_HARD_PUSH:g} times this load; the preload is rigid, by preload_kind"
-        yield _figure(
+        yield BearingFigure(
             "force_on_springs",
             "peak force if preloaded by springs, ≈ ×",
             "dimensionless",
@@ -336,8 +455,13 @@ class BallNumbers(BearingNumbers):
         )
 
     def excesses(self, omega: float, load: float) -> Iterator[Excess]:
-        """Speed beyond what the maker allows, centrifugal force of the balls, stress by preload."""
-        speed, limit = format_quantity(omega, "speed"), self.balls.limiting_speed
+        """What is beyond a limit when the race turns at ω [rad/s] under a static load [N].
+
+        Speed beyond what the maker allows, stress by preload, centrifugal force of the balls.
+        """
+        if (balls := self.balls) is None:
+            return
+        speed, limit = format_quantity(omega, "speed"), balls.limiting_speed
         if limit is not None and omega > float(limit):
             allowed = format_quantity(float(limit), "speed")
             text = f"a race that reaches the rotor's {speed} turns faster than the {allowed} its maker allows"
@@ -349,9 +473,9 @@ class BallNumbers(BearingNumbers):
                 f"the preload alone presses the balls with {pressed}, and ISO 76 rates bearings up to {rated}"
             )
             yield Excess(kind="preload", value=stress, limit=STATIC_STRESS, text=text, doubtful=True)
-        if self.balls.ball_inertia:
+        if balls.ball_inertia:
             return
-        force = float(ball_centrifugal_force(self.balls, omega))
+        force = float(ball_centrifugal_force(balls, omega))
         carried = self.constants.preload_ball_load if self.held else float(np.max(self.ball_loads(load)))
         if force > CENTRIFUGAL_SHARE * carried:
             thrown, against = format_quantity(force, "force"), format_quantity(carried, "force")
@@ -359,17 +483,17 @@ class BallNumbers(BearingNumbers):
             text = (
                 f"at {speed} of the race each ball is thrown outwards with {thrown}, not small against {what}"
             )
-            text = f"{text} {against}; {self._at_speed(omega)}the drop model leaves this out"
+            text = f"{text} {against}; {self._at_speed(balls, omega)}the drop model leaves this out"
             yield Excess(kind=THROWN, value=force, limit=carried, text=text)
 
-    def _at_speed(self, omega: float) -> str:
+    def _at_speed(self, bearing: BallBearing, omega: float) -> str:
         """What the inertia of the balls makes of a preloaded pair that turns at ω [rad/s]."""
         if not self.held:
             return ""
         constants = self.constants
-        balls = FastBalls.of(self.balls, constants)
+        balls = FastBalls.of(bearing, constants)
         offset = constants.axial_offset
-        if self.balls.sprung:
+        if bearing.sprung:
             offset = offset_on_springs(balls, constants.ball_count, constants.preload, omega)
         state, _orbit = centred_balls(balls, omega, offset)
         load = float(state.outer_load[0])
@@ -383,7 +507,10 @@ class BallNumbers(BearingNumbers):
         )
 
     def room_to_grow(self) -> tuple[float, str]:
-        """Elastic approach of a preloaded ball, or the play that closes [m]."""
+        """What the growth of a hot race is compared with [m], and a text with the place ``{room}`` for it.
+
+        Elastic approach of a preloaded ball, or the play that closes.
+        """
         if not self.held:
             return self.play, "its radial play of {room}, which closes"
         approach = (self.constants.preload_ball_load / self.constants.ball_stiffness) ** (2.0 / 3.0)
@@ -391,30 +518,27 @@ class BallNumbers(BearingNumbers):
 
     @property
     def stress_sigma(self) -> float:
-        """How far the stress is uncertain by balls inferred from a designation [1]."""
-        return inferred_stress_sigma(self.balls)
-
-    def rolling_elements(self) -> RollingElements:
-        """The balls."""
-        return RollingElements(
-            ball_count=self.balls.ball_count,
-            ball_diameter=float(self.balls.ball_diameter),
-            pitch_diameter=float(self.balls.pitch_diameter),
-            contact_angle=float(self.balls.contact_angle),
-        )
-
-    def spreads(self) -> Iterator[Spread]:
-        """Preload and angle of the first ball."""
-        yield Spread(path="preload", low=0.8, high=1.25, described=self.balls.preload)
-        yield Spread(path="bearing.first_ball_angle", low=0.0, high=2.0 * math.pi / self.balls.ball_count)
+        """Relative standard deviation [1] of the stress at a force by balls inferred from a designation."""
+        return inferred_stress_sigma(self.rolling)
 
 
-def _figure(
-    field: str, label: str, kind: str, value: float, described: Known | None = None, note: str = ""
-) -> BearingFigure:
-    return BearingFigure(
-        field=field, label=label, kind=kind, value=float(value), described=described, note=note
-    )
+def numbers_of(bearing: TouchdownBearing) -> BearingNumbers:
+    """The numbers of a touchdown bearing, whatever its kind."""
+    return bearing.bearing.numbers()
+
+
+def places_of(bearings: Sequence[TouchdownBearing]) -> Array:
+    """Places of every bearing, shape (B, 3, Z), padded to the longest.
+
+    Where a bearing has a face, its rows stand apart: those that motion towards +z loads in its own place, the
+    others B places behind, (2 B, 3, Z).
+    """
+    apart = [float(bearing.face is not None) for bearing in bearings]
+    asked = [(numbers_of(bearing), face) for bearing, face in zip(bearings, apart, strict=True)]
+    if any(apart):
+        asked += [(one, -face) for one, face in asked]
+    longest = max((one.places(0, facing).shape[1] for one, facing in asked), default=0)
+    return np.array([one.places(longest, facing) for one, facing in asked]).reshape(len(asked), 3, -1)
 
 
 def inferred_stress_sigma(bearing: BallBearing) -> float:
