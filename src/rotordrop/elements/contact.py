@@ -48,11 +48,7 @@ class Contact(Description):
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "damping": Usual(
-            least=0.0,
-            most=20.0,
-            kind="contact_damping",
-            look="steel has 0.05 to 0.5 s/m at low speed",
-            label="contact damping",
+            least=0.0, most=20.0, look="steel has 0.05 to 0.5 s/m at low speed", label="contact damping"
         ),
     }
 

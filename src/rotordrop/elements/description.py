@@ -45,7 +45,6 @@ class Usual:
 
     least: float
     most: float
-    kind: str
     look: str
     label: str = ""
 

@@ -20,11 +20,7 @@ _RATIO_ERROR = 0.15
 
 
 SLIDING = Usual(
-    least=0.005,
-    most=0.8,
-    kind="dimensionless",
-    look="steel on steel has 0.05 to 0.4; is it in percent?",
-    label="friction",
+    least=0.005, most=0.8, look="steel on steel has 0.05 to 0.4; is it in percent?", label="friction"
 )
 """Bounds of a coefficient of dry friction."""
 
@@ -54,7 +50,6 @@ class Friction(Description):
         "static": Usual(
             least=0.005,
             most=1.2,
-            kind="dimensionless",
             look="it is 1 to 1.5 times the dynamic coefficient",
             label="static friction",
         ),

@@ -34,9 +34,9 @@ BEAM_GAIN_SIGMA = 0.03
 """Relative standard deviation of what a beam in place of the rotor gets wrong between bearing and sensor [1]:
 gains take it up. Such a gain went 5 % off on a rotor whose forces came out within 4 %."""
 
-ELASTIC = Usual(least=20e9, most=700e9, kind="pressure", look="E of steel is 210 GPa; check the unit")
-DENSITY = Usual(least=800.0, most=2.3e4, kind="density", look="steel has 7850 kg/m^3; check the unit")
-POISSON = Usual(least=0.05, most=0.499, kind="dimensionless", look="metals have 0.25 to 0.35")
+ELASTIC = Usual(least=20e9, most=700e9, look="E of steel is 210 GPa; check the unit")
+DENSITY = Usual(least=800.0, most=2.3e4, look="steel has 7850 kg/m^3; check the unit")
+POISSON = Usual(least=0.05, most=0.499, look="metals have 0.25 to 0.35")
 
 
 class Material(Description):
@@ -269,9 +269,7 @@ class Rotor(Description):
     """Discs and point masses."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
-        "modal_damping": Usual(
-            least=0.0, most=0.3, kind="dimensionless", look="a shaft has 0.001 to 0.05; is it in percent?"
-        ),
+        "modal_damping": Usual(least=0.0, most=0.3, look="a shaft has 0.001 to 0.05; is it in percent?"),
     }
 
     @classmethod

@@ -59,12 +59,8 @@ class Sensor(Placed):
     """Whether the sensor gave no readings; the machine then goes without it."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
-        "gain": Usual(
-            least=0.5, most=2.0, kind="dimensionless", look="true displacement over reading is near 1"
-        ),
-        "sensitivity": Usual(
-            least=1e2, most=1e7, kind="voltage_sensitivity", look="eddy-current sensors have 1 to 100 mV/um"
-        ),
+        "gain": Usual(least=0.5, most=2.0, look="true displacement over reading is near 1"),
+        "sensitivity": Usual(least=1e2, most=1e7, look="eddy-current sensors have 1 to 100 mV/um"),
     }
 
     @property

@@ -39,7 +39,7 @@ class BalanceGrade(Description):
     """Permissible unbalance of the whole rotor [kg m], where it is given beside the grade."""
 
     usual: ClassVar[Mapping[str, Usual]] = {
-        "at_speed": Usual(least=1.0, most=2e4, kind="speed", look="check the unit"),
+        "at_speed": Usual(least=1.0, most=2e4, look="check the unit"),
     }
 
     @classmethod

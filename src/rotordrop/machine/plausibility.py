@@ -151,10 +151,10 @@ def _out_of_bounds(part: Description, name: str) -> Iterator[Doubt]:
     called = getattr(part, "name", None)
     name = called if isinstance(called, str) and called and not isinstance(part, Machine) else name
     for field in type(part).model_fields:
-        value, usual = getattr(part, field), part.usual.get(field)
-        if isinstance(value, Known) and usual is not None and value is not LEFT_OUT:
+        value, usual, physical = getattr(part, field), part.usual.get(field), part.physical(field)
+        if isinstance(value, Known) and usual and physical and value is not LEFT_OUT:
             label, bounds = usual.label or field.replace("_", " "), (usual.least, usual.most)
-            yield from _outside(label, name, value.value, *bounds, usual.kind, usual.look)
+            yield from _outside(label, name, value.value, *bounds, physical.kind, usual.look)
         inside = f"{name} {field}" if name == "machine" else name
         held = value.items() if isinstance(value, dict) else [(inside, value)]
         for key, item in held:
