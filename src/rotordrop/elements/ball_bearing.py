@@ -577,10 +577,8 @@ PARAMETERS: tuple[Parameter, ...] = (
         guess_sigma=0.15,
         entries=bearing_entries(L.AXIAL_OFFSET),
         step=Step.IMPACTS,
-        field="preload_N",
         stored="bearing.preload",
         estimated_by=_by_offset,
-        taken_over="welcome",
     ),
 )
 """Unknowns of a ball bearing."""

@@ -132,16 +132,12 @@ def palmgren_stiffness(length: float) -> float:
     return per_mm * math.pow(1e3, LINE_CONTACT)
 
 
-def _of_the_file(bearing: Any, load: float, slope: float) -> float:
-    # the file's stiffness belongs to the fitted exponent: equal force at the typical indentation
-    return -slope * math.log(bearing.contact.typical_depth(load))
+def pair_of_the_file(bearing: Any, found: Values, load: float) -> Values:
+    """Contact of a bearing as a machine file has it, by path below it: from fitted values and mean load [N].
 
-
-def _pair_of_the_file(bearing: Any, found: Values, load: float) -> Values:
-    """Exponent within its limits, and the stiffness that belongs to it.
-
-    The fit, and what is reported, gives the stiffness [N/m^n] of the exponent in the machine description, to
-    be compared with it; a description holds one pair, with the same force at a typical indentation.
+    Exponent within its limits, and the stiffness that belongs to it. The fit, and what is reported, gives
+    the stiffness [N/m^n] of the exponent in the machine description, to be compared with it; a description
+    holds one pair, with the same force at a typical indentation.
     """
     exponent, stiffness = found.get("contact.exponent"), found.get("contact.stiffness")
     if exponent is None or stiffness is None or stiffness.interval_90 is None:
@@ -167,9 +163,6 @@ EXPONENT = Parameter(
         Entry(array="bearing", column=L.CONTACT_EXPONENT),
         Entry(array="bearing", column=L.CONTACT_STIFFNESS, rule=Rule.AT_TYPICAL_DEPTH),
     ),
-    field="contact.exponent",
-    changes={"contact.stiffness": _of_the_file},
-    filed=_pair_of_the_file,
 )
 
 PARAMETERS: tuple[Parameter, ...] = (
@@ -182,9 +175,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.2,
         entries=bearing_entries(L.CONTACT_STIFFNESS),
         step=Step.IMPACTS,
-        leading=True,
-        field="contact.stiffness_N_per_m_n",
-        taken_over="welcome",
         separated_by={"air_gap": "a static push with a known force gives the contact stiffness"},
     ),
     EXPONENT,
@@ -196,8 +186,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         guess_sigma=0.6,
         entries=bearing_entries(L.CONTACT_DAMPING),
         step=Step.IMPACTS,
-        field="contact.damping_s_per_m",
-        taken_over="welcome",
     ),
 )
 """Unknowns of a contact."""

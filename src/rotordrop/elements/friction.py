@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -87,12 +86,9 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="dimensionless",
         role=Role.DERIVED,
         step=Step.SWEEP,
-        field="friction.static",
-        taken_over="welcome",
     ),
     Parameter(
         path="friction.dynamic",
-        worn=math.log(1.2),
         label="dynamic friction coefficient",
         kind="dimensionless",
         measured_by="a speed sensor on the inner race of {owner}",
@@ -103,8 +99,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         late_drift_factor=5.0,
         entries=bearing_entries(L.FRICTION_DYNAMIC, L.FRICTION_STATIC),
         step=Step.SWEEP,
-        field="friction.dynamic",
-        taken_over="needed",
         separated_by={"race.inertia": "a speed sensor on the inner race gives its spin-up"},
     ),
     Parameter(
@@ -117,7 +111,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         late_drift_factor=5.0,
         entries=bearing_entries(L.STRIBECK_SPEED),
         spin_up_only=True,
-        field="friction.stribeck_speed_m_per_s",
     ),
 )
 """Unknowns of the friction."""

@@ -138,17 +138,8 @@ class Parameter:
     """Kernel entries it sets; empty where it is no parameter of the drop model."""
     step: Step = Step.NONE
     """Step of the replay that finds it."""
-    decisive: bool = False
-    leading: bool = False
-    """Whether the fit of the first impacts tells minima apart by it; whether the first window shows it."""
     spin_up_only: bool = False
     """Whether it only says when a race catches up with the rotor: it may go far without moving a force."""
-    inferred_with: str = ""
-    """Path of another value of the part that is inferred from the same size, with the same error in it."""
-    field: str = ""
-    """Field of the JSON document, unit included."""
-    taken_over: Literal["needed", "welcome", "no"] = "no"
-    """Whether an earlier estimate must have, or may have, it to stand for the identification."""
     common_sigma: float = 0.0
     """For a value of each sensor: prior standard deviation of what the sensors of a group have in common,
     where it differs from that of one of them."""
@@ -158,14 +149,6 @@ class Parameter:
     """What measurement would make it known, with ``{owner}`` for what has it; empty where none is usual."""
     separated_by: dict[str, str] = dataclasses.field(default_factory=dict)
     """What measurement would tell it from another parameter, by the path of the other."""
-    by_drawing: bool = False
-    """Whether a drawing would make it known."""
-    worn: float | None = None
-    """Change by wear that two drops are asked for: [SI], or of the logarithm."""
-    floor: float | None = None
-    """Where published intervals end [SI]."""
-    model_error: float = 0.0
-    """Standard error by what a fit leaves out of it, as a share of its value [1]."""
     stored: str = ""
     """Where the description of a part has it, if not at its path; a part of a kind without it has none."""
     estimated_by: Callable[[Any], Measure] | None = None
@@ -173,22 +156,12 @@ class Parameter:
     ratio: tuple[str, str] | None = None
     """Two values of the description whose ratio it is; estimated by its factor on the described ratio. A
     machine file has the first of the two in its place."""
-    wider: Callable[[Any], float | None] | None = None
-    """Prior standard deviation of a part that may be anything; None where that of the row holds."""
     scaled: Callable[[Any, float], tuple[float, tuple[float, float]]] | None = None
     """Scale of the prior of a part and its limits [SI], for the mean load of a bearing [N]."""
     follows: tuple[str, Callable[[Any, Known], Known]] | None = None
     """Path of the value of the same part that it follows, and how: from part and value."""
-    filed: Callable[[Any, Values, float], Values] | None = None
-    """Values of a part, by path below it, as a machine file has them; from part, fitted values and mean load
-    of a bearing [N]."""
-    changes: Mapping[str, Callable[[Any, float, float], float]] = dataclasses.field(default_factory=dict)
-    """What it changes of another value in the machine file, by its path: from part, mean load [N] and slope
-    of the value over the number that is estimated."""
     seen: Callable[[Any], Seen] | None = None
     """What a sensor reads per unit of it."""
-    lag: bool = False
-    """Whether it is the time by which a sensor lags behind."""
     amount: str = ""
     """Path below its owner of the amount of which it is the part along a mark of the rotor: it is as large,
     and unknown in every drop anew, because nobody knows where the mark stands when a drop begins."""
@@ -203,6 +176,12 @@ class Parameter:
     def unit(self) -> str:
         """SI unit; ``"1"`` for a pure number."""
         return si_unit(self.kind) or "1"
+
+    @property
+    def field(self) -> str:
+        """Field of the JSON document, unit included, such as ``"support.stiffness_N_per_m"``."""
+        unit = si_unit(self.kind).replace("/", "_per_").replace(" ", "_").replace("^2", "2")
+        return f"{self.path}_{unit.replace('^', '_')}" if unit else self.path
 
     @property
     def display_kind(self) -> str:
@@ -399,7 +378,7 @@ def of_one_unknown(
         joined=", " if frame else "; ",
         frame=frame or "{}",
         rows=(row,),
-        begins_as_base_model=alone and not row.lag,
+        begins_as_base_model=alone,
     )
 
 

@@ -93,7 +93,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         reach=4.0,
         drift=0.02,
         entries=bearing_entries(L.RACE_MASS),
-        field="race.mass_kg",
     ),
     Parameter(
         path="race.inertia",
@@ -110,13 +109,9 @@ PARAMETERS: tuple[Parameter, ...] = (
         entries=bearing_entries(L.RACE_INERTIA),
         step=Step.IMPACTS,
         spin_up_only=True,
-        inferred_with="race.mass",
-        field="race.inertia_kg_m2",
-        taken_over="welcome",
     ),
     Parameter(
         path="race.drag_coefficient",
-        worn=math.log(2.0),
         label="drag coefficient of the race",
         kind="dimensionless",
         guess_sigma=0.5,
@@ -124,7 +119,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.2,
         entries=bearing_entries(L.DRAG_COEFFICIENT),
         spin_up_only=True,
-        field="race.drag_coefficient",
     ),
 )
 """Unknowns of a race."""

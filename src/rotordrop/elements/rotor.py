@@ -445,7 +445,6 @@ EXTENSIONS: tuple[Extension, ...] = (
             measured_by="the first bending frequency of the free rotor, from a hammer test",
             guess_sigma=0.03,
             given_sigma=0.01,
-            by_drawing=True,
             reach=1.3,
             entries=(Entry(array="modes", column=0, rule=Rule.RATIO),),
         ),

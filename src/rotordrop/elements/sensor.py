@@ -162,24 +162,20 @@ PARAMETERS: tuple[Parameter, ...] = (
 )
 """Unknowns of every sensor."""
 
+LAG = Parameter(
+    path="time_constant",
+    owner="sensor",
+    label="time constant of the sensor",
+    kind="time",
+    shown_as="short_time",
+    guess_sigma=0.1,
+    reach=300.0,
+    common_sigma=1.2,
+)
+"""Time by which a sensor lags behind."""
+
 EXTENSIONS: tuple[Extension, ...] = (
-    of_one_unknown(
-        Parameter(
-            path="time_constant",
-            owner="sensor",
-            lag=True,
-            label="time constant of the sensor",
-            kind="time",
-            shown_as="short_time",
-            guess_sigma=0.1,
-            reach=300.0,
-            common_sigma=1.2,
-        ),
-        "sensor lag",
-        1e-5,
-        ("µs", 1e-6),
-        "sensors that lag behind by {}",
-    ),
+    of_one_unknown(LAG, "sensor lag", 1e-5, ("µs", 1e-6), "sensors that lag behind by {}", alone=False),
     of_one_unknown(
         Parameter(
             path="cross_axis",

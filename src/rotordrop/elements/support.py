@@ -171,6 +171,11 @@ class Support(Description):
         """Displacement and velocity (x, y) of its foundation, or none."""
         return (L.INTERNAL,) * L.FOUNDATION_STATES if self.foundation_share is not None else ()
 
+    @property
+    def has_guessed_axes(self) -> bool:
+        """Whether its axes are turned by what no estimate has found."""
+        return self.coupling is not None and self.coupling.status != "estimated"
+
     def fill(self, row: Array) -> None:
         """Write the columns of the support, after those of its mount."""
         super().fill(row)
@@ -215,11 +220,6 @@ def support_deflection(row: Array, load: float) -> float:
     return coupled / (1.0 + cubic * sag**2)  # next order: a few parts in ten thousand of 3 µm
 
 
-def _of_turned_axes(bearing: Any) -> float | None:
-    coupling = bearing.support.coupling
-    return TURNED_ANISOTROPY if coupling is not None and coupling.status != "estimated" else None
-
-
 def _cubic_scale(bearing: Any, load: float) -> tuple[float, tuple[float, float]]:
     """Scale of a cubic term, and its limits: hard impacts at most double the stiffness, or take a fifth."""
     scale = (float(bearing.support.stiffness) / (PEAK_LOADS * load)) ** 2
@@ -261,7 +261,6 @@ def _growth(bearing: Any, found: Values, load: float) -> str:
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         path="support.stiffness",
-        worn=math.log(1.1),
         label="support stiffness",
         kind="stiffness",
         measured_by="a hammer test of the touchdown-bearing housing at {owner}",
@@ -271,10 +270,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.02,
         entries=bearing_entries(L.SUPPORT_STIFFNESS_Y, L.SUPPORT_STIFFNESS_X),
         step=Step.IMPACTS,
-        decisive=True,
-        leading=True,
-        field="support.stiffness_N_per_m",
-        taken_over="needed",
         separated_by={
             "support.mass": (
                 "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
@@ -287,9 +282,7 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="dimensionless",
         guess_sigma=0.03,
         entries=(Entry(array="bearing", column=L.SUPPORT_STIFFNESS_X, rule=Rule.SCALE),),
-        field="support.anisotropy",
         ratio=("support.stiffness_horizontal", "support.stiffness"),
-        wider=_of_turned_axes,
     ),
     Parameter(
         path="support.mass",
@@ -302,14 +295,9 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.02,
         entries=bearing_entries(L.SUPPORT_MASS_Y, L.SUPPORT_MASS_X),
         step=Step.IMPACTS,
-        decisive=True,
-        leading=True,
-        field="support.mass_kg",
-        taken_over="needed",
     ),
     Parameter(
         path="support.damping",
-        worn=math.log(1.1),
         label="support damping",
         kind="damping",
         measured_by="a hammer test of the touchdown-bearing housing at {owner}",
@@ -319,9 +307,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.1,
         entries=bearing_entries(L.SUPPORT_DAMPING_Y, L.SUPPORT_DAMPING_X),
         step=Step.IMPACTS,
-        leading=True,
-        field="support.damping_N_s_per_m",
-        taken_over="needed",
     ),
 )
 """Unknowns of a support."""

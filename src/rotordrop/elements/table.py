@@ -126,7 +126,7 @@ def fitted_row(path: str) -> Parameter | None:
 
 def published() -> dict[str, Parameter]:
     """Rows of bearings by their field in the JSON document."""
-    return {row.field: row for row in rows("bearing") if row.field}
+    return {row.field: row for row in rows("bearing")}
 
 
 def separating_measurement(first: Parameter, second: Parameter) -> str:

@@ -192,9 +192,6 @@ Sensors that read 1 % of the motion across, as mounted 0.6° aside, moved gaps o
 
 AIR_GAP = Parameter(
     path="air_gap",
-    worn=10e-6,
-    floor=0.0,
-    model_error=MODEL_GAP_ERROR,
     label="air gap",
     kind="length",
     measured_by="a lift check at {owner}",
@@ -207,7 +204,6 @@ AIR_GAP = Parameter(
     drift=0.032,
     entries=bearing_entries(L.AIR_GAP),
     step=Step.TAIL,
-    field="air_gap_m",
     separated_by={"offset": "a lift test of the rotor in its magnets gives the diametral clearance"},
 )
 
@@ -219,7 +215,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="stiffness",
         role=Role.DERIVED,
         step=Step.FIRST_CONTACT,
-        field="equivalent_stiffness_N_per_m",
     ),
 )
 """Unknowns of the clearance, and of bearing and support together."""
@@ -234,8 +229,6 @@ DAMPING: tuple[Parameter, ...] = (
         drift=0.2,
         entries=(Entry(array="bearing", column=L.BEARING_DAMPING, rule=Rule.RATIO),),
         step=Step.IMPACTS,
-        field="damping_time_s",
-        taken_over="welcome",
     ),
 )
 """Unknowns of the damping of the bearing."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.table import rows
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, drop_of, read_drop
@@ -42,7 +43,7 @@ def machine_with_fixed(machine: Machine, drop: Drop, place: str) -> Machine:
                 f"{place} has no touchdown bearing {bearing.name!r}; it has "
                 f"{', '.join(drop.bearings)}. Use an estimate of the same machine."
             )
-        for row in (row for row in rows("bearing") if row.taken_over != "no"):
+        for row in (row for row in rows("bearing") if row.step in (Step.IMPACTS, Step.SWEEP)):
             found = entry.numbers.get(row.field)
             if found is not None:
                 values[row.path_of(bearing.name)] = Known(
@@ -52,7 +53,7 @@ def machine_with_fixed(machine: Machine, drop: Drop, place: str) -> Machine:
                     standard_error=found.standard_error,
                     source=f"estimate {place}",
                 )
-            elif row.taken_over == "needed":
+            elif row.role is Role.SOUGHT:
                 raise UsageError(
                     f"{place} has no {row.field!r} for {bearing.name!r}; it has {', '.join(entry.numbers)}. "
                     "Give an estimate that identified supports and friction."

@@ -33,6 +33,8 @@ from rotordrop.rotor.unknowns import Unknown, bearing_unknowns
 from rotordrop.simulate._loop import Control
 from rotordrop.simulate._run import PHASE, Run, Setup, error_scale, follow
 
+LEADING = ("support.stiffness", "support.mass", "support.damping", "contact.stiffness")
+"""What the first window shows; by the first two the fit tells minima apart."""
 TOLERANCE = 1e-7
 LARGEST_STEP = 1e-3
 MOST_STEPS = 400_000
@@ -116,8 +118,8 @@ class FirstImpacts:
                 one.sigma,
                 one.begin if one.parameter.role is Role.SOUGHT else one.mean,
                 *((STEP, 0.5, BOUND_FACTOR) if one.logarithmic else one.sigma * np.array([1e-2, 2.0, 5.0])),
-                one.parameter.leading,
-                one.parameter.decisive,
+                one.parameter.path in LEADING,
+                one.parameter.path in LEADING[:2],
                 one.parameter.role is Role.CONSIDERED,
             )
             for one in self.unknowns

@@ -13,6 +13,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.air import PARAMETERS as AERO
+from rotordrop.elements.contact import EXPONENT
 from rotordrop.elements.magnet import REMANENCE, REMANENCE_TIME
 from rotordrop.elements.parameter import (
     SMALLEST_GAP,
@@ -25,6 +26,7 @@ from rotordrop.elements.parameter import (
     parts_of,
 )
 from rotordrop.elements.sensor import Sensor
+from rotordrop.elements.support import TURNED_ANISOTROPY
 from rotordrop.elements.table import row_of, rows, structure_rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
@@ -201,8 +203,8 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
                 model, row, bearing.name, index, quantity, known, published=measure.value_of, limits=limits
             )
         elif row.ratio is not None:  # by its factor on the described ratio
-            wider = None if row.wider is None else row.wider(bearing)
-            known = Prior(mean=0.0, sigma=prior(row, quantity).sigma if wider is None else wider, start=0.0)
+            wider = TURNED_ANISOTROPY if bearing.support.has_guessed_axes else prior(row, quantity).sigma
+            known = Prior(mean=0.0, sigma=wider, start=0.0)
 
             def at_ratio(theta: float, described: float = float(quantity)) -> float:
                 return described * math.exp(theta)
@@ -398,31 +400,27 @@ def file_of_fitted(model: DropModel, unknowns: Sequence[Unknown], exponents: Seq
     bearings = {bearing.name: bearing for bearing in model.machine.touchdown_bearings}
     through, load = np.eye(len(unknowns)), float(np.mean(model.load_shares))
     for (owner, _), k in places.items():
-        row = unknowns[k].parameter
+        row, stiffness = unknowns[k].parameter, places.get((owner, "contact.stiffness"))
         slope = exponents[k] if is_logarithmic(unknowns[k]) else 1.0
-        for path, change in row.changes.items():
-            if (owner, path) in places:
-                through[places[owner, path], k] = change(bearings[owner], load, slope)
+        if row is EXPONENT and stiffness is not None:
+            # the file's stiffness belongs to the fitted exponent: equal force at the typical indentation
+            through[stiffness, k] = -slope * math.log(bearings[owner].contact.typical_depth(load))
         if row.ratio is not None and (owner, row.ratio[1]) in places:
             through[k, places[owner, row.ratio[1]]] = 1.0
     return through
 
 
 def inferred_together(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> None:
-    """Let values inferred from one size err together in a prior covariance (P, P): a heavy race turns hard.
+    """Let mass and inertia inferred from one size err together in a prior covariance (P, P).
 
-    The error of the one is part of that of the other.
+    The error of the mass is part of that of the inertia.
     """
-    parts = dict(parts_of(model.machine, "bearing"))
-    places = {(one.owner, one.parameter.path): k for k, one in enumerate(unknowns)}
-    for (owner, _), k in places.items():
-        row = unknowns[k].parameter
-        other = places.get((owner, row.inferred_with))
-        if other is None:
-            continue
-        both = (row.described(parts[owner]), unknowns[other].parameter.described(parts[owner]))
-        if all(one.status == "inferred" for one in both) and block[other, other] < block[k, k]:
-            block[k, other] = block[other, k] = block[other, other]
+    places = {one.path: k for k, one in enumerate(unknowns)}
+    for bearing in model.machine.touchdown_bearings:
+        m, i = (places.get(f"{bearing.name}.race.{name}") for name in ("mass", "inertia"))
+        inferred = bearing.race.mass.status == bearing.race.inertia.status == "inferred"
+        if inferred and m is not None and i is not None and block[m, m] < block[i, i]:
+            block[i, m] = block[m, i] = block[m, m]
 
 
 def correlate(model: DropModel, unknowns: Sequence[Unknown], block: Array) -> None:

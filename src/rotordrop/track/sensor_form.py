@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rotordrop.arrays import Array, Integers
+from rotordrop.elements.sensor import LAG
 from rotordrop.elements.support import support_sag
 from rotordrop.errors import UsageError
 from rotordrop.evidence.colour import SlowNoise, decay
@@ -155,7 +156,7 @@ def sensor_form(
     """What the sensors of a machine do beyond gain, offset and runout, as the filter takes it."""
     names = [sensor.name for sensor in model.machine.sensors]
     terms = [(names.index(u.owner), k) for k, u in enumerate(unknowns) if u.parameter.seen is not None]
-    lagging = [k for name in names for k, u in enumerate(unknowns) if u.parameter.lag and u.owner == name]
+    lagging = [k for name in names for k, u in enumerate(unknowns) if u.parameter is LAG and u.owner == name]
     first = model.layout.sensors.start
     s = rows.shape[1]
     return SensorForm(

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.document import stated
+from rotordrop.elements.contact import pair_of_the_file
 from rotordrop.elements.landing_sleeve import with_amounts
 from rotordrop.elements.magnet import FORCES
 from rotordrop.elements.parameter import below
@@ -264,9 +265,8 @@ def as_filed(machine: Machine, values: dict[str, Known]) -> dict[str, Known]:
     """Fitted values as a machine file has them: some belong to each other, such as a contact's."""
     found, load = dict(values), float(np.mean(bearing_load_shares(machine)))
     for bearing in machine.touchdown_bearings:
-        for filed in [row.filed for row in rows("bearing") if row.filed is not None]:
-            changed = filed(bearing, below(values, f"{bearing.name}."), load)
-            found |= {f"{bearing.name}.{path}": value for path, value in changed.items()}
+        changed = pair_of_the_file(bearing, below(values, f"{bearing.name}."), load)
+        found |= {f"{bearing.name}.{path}": value for path, value in changed.items()}
     return found
 
 

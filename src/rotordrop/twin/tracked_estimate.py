@@ -158,7 +158,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
 
 def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     """What to measure of a machine whose rotor is not known by its drawing, or whose forces are wide."""
-    unsure = any(unknown.parameter.by_drawing for unknown in drop.problem.unknowns)
+    unsure = any(unknown.path == "rotor.stiffness_factor" for unknown in drop.problem.unknowns)
     loads = (_loads(drop, judged, b).peak_force for b in range(len(drop.problem.model.bearing_names)))
     wide = any(is_wide(one.known) for one in loads)
     # of a model that does not fit the covariances say nothing

@@ -11,7 +11,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import parameter
-from rotordrop.elements.touchdown_bearing import MODEL_GAP_ERROR
+from rotordrop.elements.touchdown_bearing import AIR_GAP, MODEL_GAP_ERROR
 from rotordrop.estimate.estimate import FittedParameter, SensorErrors
 from rotordrop.estimate.published import Joint
 from rotordrop.known import NINETY, Known, Status
@@ -67,17 +67,7 @@ def identified(unknown: Unknown, theta: float, sigma: float, widening: float = 1
 def within_bounds(row: Parameter, interval: tuple[float, float]) -> tuple[float, float]:
     """An interval that ends where the quantity does: no air gap is below zero."""
     low, high = interval
-    return interval if row.floor is None else (max(low, row.floor), max(high, row.floor))
-
-
-def left_out(unknown: Unknown) -> float:
-    """Standard error of a parameter by what the fit leaves out of it."""
-    return unknown.parameter.model_error * unknown.begin
-
-
-def model_error(unknown: Unknown, sigma: float) -> float:
-    """Standard error of a parameter with what the fit leaves out of it."""
-    return math.hypot(sigma, left_out(unknown))
+    return (max(low, 0.0), max(high, 0.0)) if row is AIR_GAP else interval
 
 
 def parameter_widening(unknown: Unknown, sigma: float, widening: float) -> float:
@@ -146,9 +136,10 @@ def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening
     sigma = np.sqrt(np.maximum(np.diag(covariance)[problem.parameter_slice], 0.0))
     values = []
     for unknown, t, s in zip(problem.unknowns, theta.tolist(), sigma.tolist(), strict=True):
-        error = model_error(unknown, s)
+        left_out = MODEL_GAP_ERROR * unknown.begin if unknown.parameter is AIR_GAP else 0.0
+        error = math.hypot(s, left_out)
         wider = parameter_widening(unknown, error, widening)
-        value, allowed = identified(unknown, t, error, wider), NINETY * wider * left_out(unknown)
+        value, allowed = identified(unknown, t, error, wider), NINETY * wider * left_out
         values.append(replace(value, allowance_90=allowed) if allowed > 0.0 else value)
     races = list(zip(problem.unknowns, values, strict=True))
     astray = {u.owner for u, v in races if u.parameter.spin_up_only and v.status == AT_BOUND}
