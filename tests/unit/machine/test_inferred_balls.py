@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from tests.reference.ball_bearing_catalogue import geometry_of
 
@@ -18,6 +19,7 @@ from rotordrop.elements.catalog.inference import (
 )
 from rotordrop.elements.catalog.lookup import ball_size, designations, find_bearing
 from rotordrop.errors import MachineFileError
+from rotordrop.known import NINETY
 from rotordrop.machine import loads_machine
 from rotordrop.physics.ball_bearing import axial_rigidity, bearing_constants
 from rotordrop.physics.hertz import compliance, race_contact
@@ -168,9 +170,10 @@ def test_a_rigidity_narrows_what_size_and_ratings_leave_open():
     }
     rigidity = PairRigidity(value=pair_rigidity(row, conformity, 290.0), preload=290.0)
     alone, known = infer_balls(**size), infer_balls(**size, rigidity=rigidity)
-    assert alone.conformity == (0.53, 0.011)
-    assert known.conformity[1] < 0.9 * alone.conformity[1]
-    assert abs(known.conformity[0] - conformity) < abs(alone.conformity[0] - conformity)
+    known_width, width = (np.ptp(found.conformity_range) for found in (known, alone))
+    assert (alone.conformity, width) == (0.53, pytest.approx(2.0 * NINETY * 0.011))
+    assert known_width < 0.9 * width
+    assert abs(known.conformity - conformity) < abs(alone.conformity - conformity)
 
 
 def test_a_rigidity_in_the_file_narrows_the_grooves_and_deep_grooves_are_those_of_the_tables(small_text):
@@ -184,8 +187,8 @@ def test_a_rigidity_in_the_file_narrows_the_grooves_and_deep_grooves_are_those_o
         described(small_text, 'designation = "7014 CD"\naxial_rigidity = "88 N/um"')
     balls = infer_balls(kind="deep groove", dimension_series="10", bore=0.08, outside_diameter=0.125)
     row = (balls.ball_count, balls.ball_diameter, balls.pitch_diameter, 0.0)
-    assert balls.conformity[0] == 0.52
-    assert groove_factors(row, balls.conformity[0]) == pytest.approx((1.0, 1.0), abs=1e-12)
+    assert balls.conformity == 0.52
+    assert groove_factors(row, balls.conformity) == pytest.approx((1.0, 1.0), abs=1e-12)
 
 
 def test_ratings_of_wide_grooves_are_those_of_the_same_balls():

@@ -6,11 +6,10 @@ import math
 from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal
 
+from rotordrop.elements.catalog.designation import Kind
 from rotordrop.errors import UsageError
-
-Kind = Literal["deep groove", "angular contact"]
+from rotordrop.known import NINETY
 
 # Mean and standard deviation of the ball diameter over the height of the cross-section, 2 D_w / (D - d), and
 # of the share of the pitch circle that balls fill, Z D_w / (π D_pw). Of the spindle bearings whose balls are
@@ -67,22 +66,23 @@ class PairRigidity:
 
 
 @dataclass(frozen=True, kw_only=True)
-class InferredBalls:
-    """Balls of one row, with what is not known about them."""
+class BallComplement:
+    """Balls of one row: published, or reconstructed with what that rests on."""
 
     ball_count: int
-    """Most probable number of balls."""
+    """Balls per row."""
     ball_diameter: float
     pitch_diameter: float
-    """Most probable D_w, and D_pw [m]."""
-    count_range: tuple[int, int]
-    """90 % interval of the number of balls."""
-    diameter_range: tuple[float, float]
-    """90 % interval of D_w [m]."""
-    conformity: tuple[float, float]
-    """Middle and standard deviation of the groove radius over ball diameter [1]."""
+    """D_w and D_pw [m]."""
+    conformity: float
+    """Groove radius over ball diameter of both races [1]."""
     basis: str
-    """What it rests on."""
+    """What the numbers rest on."""
+    count_range: tuple[int, int] | None = None
+    """90 % interval of the balls per row, where they are inferred."""
+    diameter_range: tuple[float, float] | None = None
+    conformity_range: tuple[float, float] | None = None
+    """90 % intervals of D_w [m] and of the conformity [1], where they are inferred."""
 
 
 def static_rating(
@@ -157,7 +157,7 @@ def infer_balls(
     static_load_rating: float | None = None,
     dynamic_load_rating: float | None = None,
     rigidity: PairRigidity | None = None,
-) -> InferredBalls:
+) -> BallComplement:
     """Infer the balls of a row from boundary dimensions [m], load ratings [N] and the rigidity of a pair.
 
     Every standard ball and every count gets a weight: how usual such a ball is in the cross-section, how
@@ -201,13 +201,15 @@ def infer_balls(
     ]
     source = f" and its {' and '.join(rated)} load rating (ISO 76, ISO 281)" if rated else ""
     source += " and its axial rigidity" if rigidity else ""
-    return InferredBalls(
+    middle, sigma = _moments([(f, w) for (_, _, f), w in weights.items()]) if told else _CONFORMITY[kind]
+    return BallComplement(
         ball_count=count,
         ball_diameter=diameter,
         pitch_diameter=pitch,
         count_range=(int(counts[0]), int(counts[1])),
         diameter_range=diameters,
-        conformity=_CONFORMITY[kind] if not told else _moments([(f, w) for (_, _, f), w in weights.items()]),
+        conformity=middle,
+        conformity_range=(middle - NINETY * sigma, middle + NINETY * sigma),
         basis=(
             f"inferred from the boundary dimensions{source}: {counts[0]:.0f} to {counts[1]:.0f} balls of "
             f"{1e3 * diameters[0]:.4g} to {1e3 * diameters[1]:.4g} mm, 90 %"

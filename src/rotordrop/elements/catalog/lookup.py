@@ -19,9 +19,8 @@ from rotordrop.elements.catalog.boundary import (
     known_bores,
 )
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
-from rotordrop.elements.catalog.inference import PairRigidity, infer_balls
+from rotordrop.elements.catalog.inference import BallComplement, PairRigidity, infer_balls
 from rotordrop.errors import UsageError
-from rotordrop.known import NINETY
 from rotordrop.require import require
 
 _UNSAID_ANGLE, _UNSAID_ANGLES = math.radians(25.0), (math.radians(15.0), math.radians(30.0))
@@ -32,26 +31,6 @@ _HYBRID_PRELOAD = 0.6
 
 class UnknownBearingError(UsageError, LookupError):
     """A designation that is in no catalogue, and of which nothing can be inferred."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BallComplement:
-    """Balls of one row: published, or reconstructed with what that rests on."""
-
-    ball_count: int
-    """Balls per row."""
-    ball_diameter: float
-    pitch_diameter: float
-    """D_w and D_pw [m]."""
-    conformity: float
-    """Groove radius over ball diameter of both races [1]."""
-    basis: str
-    """What the numbers rest on."""
-    count_range: tuple[int, int] | None = None
-    """90 % interval of the balls per row, where they are inferred."""
-    diameter_range: tuple[float, float] | None = None
-    conformity_range: tuple[float, float] | None = None
-    """90 % intervals of D_w [m] and of the conformity [1], where they are inferred."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +188,6 @@ def infer_from_designation(
         else replace(rigidity, hybrid=read.hybrid),
     )
     preload, basis = _usual_preload(read, size[0], angle)
-    middle, sigma = balls.conformity
     return CatalogueBearing(
         maker=read.maker or "ISO 15",
         designation=read.written,
@@ -221,16 +199,7 @@ def infer_from_designation(
         axial_rigidity={},
         lift_off={},
         ball_material="silicon nitride" if read.hybrid else "steel",
-        complement=BallComplement(
-            ball_count=balls.ball_count,
-            ball_diameter=balls.ball_diameter,
-            pitch_diameter=balls.pitch_diameter,
-            conformity=middle,
-            basis=balls.basis,
-            count_range=balls.count_range,
-            diameter_range=balls.diameter_range,
-            conformity_range=(middle - NINETY * sigma, middle + NINETY * sigma),
-        ),
+        complement=balls,
         kind=read.kind,
         contact_angle_range=angles,
         listed=False,
