@@ -51,6 +51,8 @@ _BALL_MATERIALS: dict[BallMaterial, dict[str, tuple[float, str]]] = {
 }
 
 _SPRUNG = ("spring_rate", "ring_mass", "ring_travel", "fit_friction", "ring_damping")
+RING_STATE = "rings {}"
+"""State that holds the way of the sprung rings of a bearing."""
 _BALL_HEIGHT = 1.16
 """Ball diameter over half the height of the cross-section [1], 2 · 0.58 of spindle bearings."""
 
@@ -263,9 +265,9 @@ class BallBearing(RaceBearing):
         return ""
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """Way and speed of outer rings that springs press on."""
-        return (L.POSITION, L.VELOCITY) if self.sprung else ()
+        return {RING_STATE: L.POSITION, f"{RING_STATE} velocity": L.VELOCITY} if self.sprung else {}
 
     def _has_clearance(self, entry: CatalogueBearing | None = None) -> bool:
         """Whether the rows have play: a clearance is given, or the grooves are deep."""

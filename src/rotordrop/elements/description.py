@@ -147,9 +147,9 @@ class Description(BaseModel):
         return sorted({"changed", *type(self).model_fields} | own)
 
     @property
-    def further_states(self) -> tuple[int, ...]:
-        """Kinds of the states that it adds to the model of a drop."""
-        return ()
+    def further_states(self) -> Mapping[str, int]:
+        """Kinds of the states that it adds to a drop, by name, with ``{}`` for what has it."""
+        return {}
 
     @property
     def beyond_estimates(self) -> tuple[str, str] | None:

@@ -28,6 +28,9 @@ SIDES: Mapping[str, float] = {"both": 0.0, "+z": 1.0, "-z": -1.0}
 """Side of a face as the kernels know it; +z points to higher nodes."""
 
 
+AXIAL_STATE = "race {} axial"
+"""State that holds the axial displacement of the race of a bearing."""
+
 UNPRESSED = (
     "no load along the axis presses the rotor to it, so it bears nothing; describe the thrust as [[loads]] "
     'with direction = "axial" (towards higher nodes) or "-axial", the weight of a vertical rotor too'
@@ -80,9 +83,9 @@ class Face(Description):
             )
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """Axial displacement and velocity of the race."""
-        return L.POSITION, L.VELOCITY
+        return {AXIAL_STATE: L.POSITION, f"{AXIAL_STATE} velocity": L.VELOCITY}
 
     @property
     def law(self) -> Array:

@@ -265,9 +265,9 @@ class ActiveMagneticBearing(Placed):
         return "default" not in (self.stiffness.status, self.damping.status)
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """The currents of its four coils."""
-        return (L.INTERNAL,) * 4
+        return {f"current {{}} {coil}": L.INTERNAL for coil in ("x+", "x-", "y+", "y-")}
 
     @property
     def remembered(self) -> int:

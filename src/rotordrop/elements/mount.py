@@ -92,16 +92,11 @@ class Mount(Description):
         return self.stop is not None or len(self.further_states) > 0
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """The stretch, x and y, of each spring that slips or relaxes."""
-        return (L.POSITION,) * len(self.stretches)
-
-    @property
-    def stretches(self) -> tuple[str, ...]:
-        """What each of its further states is the stretch of [m], such as "ribbon x" or "branch 1 y"."""
         springs = ["ribbon"] * (self.ribbon is not None)
         springs += [f"branch {k + 1}" for k in range(len(self.maxwell))]
-        return tuple(f"{spring} {axis}" for spring in springs for axis in "xy")
+        return {f"mount {{}} {spring} {axis}": L.POSITION for spring in springs for axis in "xy"}
 
     @property
     def stiffnesses(self) -> dict[str, float]:

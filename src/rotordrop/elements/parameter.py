@@ -319,10 +319,6 @@ class Extension:
             return {}
         return self._of_parts(machine, self.neutral)
 
-    def base_values(self, machine: Any) -> dict[str, Known]:
-        """Values with which the base model is followed as with this extension."""
-        return self._of_parts(machine, self.base)
-
     def _of_parts(self, machine: Any, values: Callable[[Any], dict[str, Known]]) -> dict[str, Known]:
         parts = parts_of(machine, self.owner)
         return {
@@ -335,8 +331,9 @@ class Extension:
         return changed
 
     def as_base_model(self, machine: M) -> M:
-        """The machine followed as with this extension, which says nothing."""
-        changed: M = cast(Any, machine).with_values(self.base_values(machine))
+        """The machine followed as with this extension, which says nothing; itself where that is the same."""
+        values = self._of_parts(machine, self.base)
+        changed: M = cast(Any, machine).with_values(values) if values else machine
         return changed
 
     def found(self, machine: Any, values: Values, mean_load: float) -> str:

@@ -64,9 +64,9 @@ class Sensor(Placed):
     }
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """The reading it has got to, where it lags behind."""
-        return () if self.time_constant is None else (L.INTERNAL,)
+        return {} if self.time_constant is None else {"reading {}": L.INTERNAL}
 
 
 def check_sensors_resolve_motion(sensors: tuple[Sensor, ...], nodes: tuple[float, ...]) -> None:

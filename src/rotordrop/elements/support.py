@@ -167,9 +167,10 @@ class Support(Description):
     states_at: ClassVar[int] = L.BEARING_OWN
 
     @property
-    def further_states(self) -> tuple[int, ...]:
+    def further_states(self) -> Mapping[str, int]:
         """Displacement and velocity (x, y) of its foundation, or none."""
-        return (L.INTERNAL,) * L.FOUNDATION_STATES if self.foundation_share is not None else ()
+        ends = ("x", "y", "x velocity", "y velocity") if self.foundation_share is not None else ()
+        return {f"foundation {{}} {end}": L.INTERNAL for end in ends}
 
     @property
     def has_guessed_axes(self) -> bool:

@@ -92,7 +92,11 @@ class StateLayout:
         """Give the layout that the elements of a machine ask for, its magnets with ``loops`` only."""
         bearings = machine.touchdown_bearings
         asked = [
-            {part.states_at: part.further_states for part in (bearing, *bearing.parts) if part.further_states}
+            {
+                part.states_at: tuple(part.further_states.values())
+                for part in bearing.parts
+                if part.further_states
+            }
             for bearing in bearings
         ]
         # by column, not by part: who lists the parts of a bearing otherwise moves no state
@@ -203,18 +207,10 @@ class StateLayout:
     def _names_of_further(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:
         names = [f"further state {k + 1}" for k in range(self.sensors.stop - self.race_spin.stop)]
         for bearing, first in zip(bearings, self.bearing_at(), strict=True):
-            foundation = [f"foundation {bearing.name} {axis}" for axis in "xy"]
-            known = {
-                L.RING_STATES: [ring_state(bearing.name)],
-                L.FACE_STATES: [axial_state(bearing.name)],
-                L.BEARING_OWN: foundation,
-            }
-            named = {at: [*called, *(f"{one} velocity" for one in called)] for at, called in known.items()}
-            named[L.MOUNT_STATES] = [mount_state(bearing.name, one) for one in bearing.mount.stretches]
-            for place, called in named.items():
-                if first[place] >= 0:
-                    at = first[place] - self.race_spin.stop
-                    names[at : at + len(called)] = called
+            for part in bearing.parts:
+                called = [name.format(bearing.name) for name in part.further_states]
+                at = first[part.states_at] - self.race_spin.stop
+                names[at : at + len(called)] = called
         return tuple(names)
 
     def bore(self, states: Array) -> Array:
@@ -236,23 +232,8 @@ class StateLayout:
         return np.zeros(self.size)
 
 
-def mount_state(bearing: str, stretch: str) -> str:
-    """Name of the state that holds a stretch of the mount of a bearing, such as "ribbon x"."""
-    return f"mount {bearing} {stretch}"
-
-
-def ring_state(bearing: str) -> str:
-    """Name of the state that holds the way of the sprung rings of a bearing."""
-    return f"rings {bearing}"
-
-
 ROTOR_AXIAL = "rotor axial"
 """Name of the state that holds the axial displacement of the rotor."""
-
-
-def axial_state(bearing: str) -> str:
-    """Name of the state that holds the axial displacement of the race of a bearing."""
-    return f"race {bearing} axial"
 
 
 def _first_of(counts: tuple[int, ...], start: int, owners: int) -> Integers:

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
+from rotordrop.elements.ball_bearing import RING_STATE
 from rotordrop.elements.bearing_numbers import numbers_of
+from rotordrop.elements.face import AXIAL_STATE
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write
 from rotordrop.physics.hertz import LineContact
 from rotordrop.require import require
-from rotordrop.rotor.layout import ROTOR_AXIAL, axial_state, ring_state
+from rotordrop.rotor.layout import ROTOR_AXIAL
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
 from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
@@ -193,7 +195,7 @@ class DropResult(SimulationResult):
 
     def ring_travel(self, bearing: int | str) -> Array:
         """Way of sprung outer rings of a bearing from their balls [m], (T,); zero between spacers."""
-        return self._state_called(ring_state(self.bearing_names[self.index_of(bearing)]))
+        return self._state_called(RING_STATE.format(self.bearing_names[self.index_of(bearing)]))
 
     @property
     def axial_displacement(self) -> Array:
@@ -202,7 +204,7 @@ class DropResult(SimulationResult):
 
     def race_axial_displacement(self, bearing: int | str) -> Array:
         """Displacement of a race along the axis [m], (T,); zero without a face."""
-        return self._state_called(axial_state(self.bearing_names[self.index_of(bearing)]))
+        return self._state_called(AXIAL_STATE.format(self.bearing_names[self.index_of(bearing)]))
 
     def _state_called(self, name: str) -> Array:
         if name not in self.state_names:

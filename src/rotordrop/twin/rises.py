@@ -57,9 +57,11 @@ class LogLikelihoodGains:
 
             def rise(one: Extension) -> float:
                 with_it = self._negative_log_likelihood(one.added_to(self.machine))
-                if not one.base_values(self.machine):
-                    return described.result() - with_it
-                return self._negative_log_likelihood(one.as_base_model(self.machine)) - with_it
+                plain = one.as_base_model(self.machine)
+                without = (
+                    described.result() if plain is self.machine else self._negative_log_likelihood(plain)
+                )
+                return without - with_it
 
             return list(zip(pool.map(rise, extensions), extensions, strict=True))
 

@@ -525,7 +525,7 @@ class Search:
     def _beside(self, found: Candidate, extension: Extension) -> Candidate:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
         described, had = found.machine, tuple(one.extension for one in found.accepted)
-        plain = extension.as_base_model(described) if extension.base_values(described) else described
+        plain = extension.as_base_model(described)
         against = math.exp(-evidence_threshold(len(found.fit.problems)))
         try:
             without = found if plain is described else self._again(found, plain)
