@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rotordrop import build_drop_model, load_result, simulate_coast_down, simulate_drop
-from rotordrop.elements.table import row_of
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
@@ -251,13 +250,12 @@ def test_what_check_says_of_a_pair_without_a_steady_state():
     assert "frictional heat" not in {one.kind for one in machine_warnings(machine, summary)}
 
 
-def test_a_parameter_moves_its_columns_and_is_a_row_of_the_table():
+def test_a_value_of_the_heat_moves_its_columns():
     machine = loads_machine(text_of())
     changed = machine.with_values({"NDE.thermal.ball_conductance": 16.0, "NDE.thermal.race_capacity": 60.0})
     row = build_drop_model(changed, "quick").parameters.bearing[0, L.THERMAL : L.THERMAL_END]
     assert list(row[thermal.CONDUCTANCE + np.array([thermal.RACE, thermal.BALLS])]) == [16.0, 16.0]
     assert list(row[[thermal.SKIN, thermal.RACE]]) == [15.0, 45.0]
-    assert row_of("NDE.thermal.ball_conductance").unit == "W/K"
     assert loads_machine(machine_text(machine)).touchdown_bearings == machine.touchdown_bearings
 
 
