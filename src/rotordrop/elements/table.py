@@ -24,7 +24,6 @@ from rotordrop.elements import (
     rotor,
     sensor,
     support,
-    thermal,
     touchdown_bearing,
     unbalance,
 )
@@ -62,7 +61,6 @@ _ELEMENTS = (
     landing_sleeve,
     ball_bearing,
     mount,
-    thermal,
     air,
     recorder,
     load,

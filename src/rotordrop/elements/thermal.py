@@ -13,7 +13,6 @@ from rotordrop.elements import values as V
 from rotordrop.elements.ball_bearing import BallBearing, outer_ring
 from rotordrop.elements.bearing_numbers import BearingFigure, Excess, numbers_of
 from rotordrop.elements.description import Description
-from rotordrop.elements.parameter import Parameter, Rule, stated_only
 from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
@@ -223,43 +222,3 @@ def runaway(bearing: TouchdownBearing, omega: float) -> Excess | None:
         "springs in place of spacers keep the preload"
     )
     return Excess(kind=RUNAWAY, value=has, limit=limit[0], text=text)
-
-
-def _row(path: str, label: str, kind: str, sigma: float, *columns: int) -> Parameter:
-    row = stated_only(f"thermal.{path}", label, kind, sigma, *(L.THERMAL + one for one in columns))
-    if len(columns) == 1:
-        return row
-    return replace(row, entries=tuple(replace(one, rule=Rule.RATIO) for one in row.entries))  # they share it
-
-
-_CAPACITY, _CONDUCTANCE = law.CAPACITY, law.CONDUCTANCE
-_RACE = _CAPACITY + law.SKIN, _CAPACITY + law.RACE
-_HELD, _PASSED, _PART = "heat_capacity", "heat_conductance", "dimensionless"
-STATED: tuple[Parameter, ...] = tuple(
-    _row(*row)
-    for row in (
-        ("sleeve_capacity", "heat capacity of the landing sleeve", _HELD, 0.7, _CAPACITY + law.SLEEVE),
-        ("race_capacity", "heat capacity of the race", _HELD, 0.15, *_RACE),
-        ("ball_capacity", "heat capacity of the balls", _HELD, 0.15, _CAPACITY + law.BALLS),
-        ("outer_capacity", "heat capacity of the outer races", _HELD, 0.25, _CAPACITY + law.OUTER),
-        ("housing_capacity", "heat capacity of the housing", _HELD, 0.4, _CAPACITY + law.HOUSING),
-        ("sleeve_conductance", "conductance of sleeve and race", _PASSED, 0.8, _CONDUCTANCE + law.SLEEVE),
-        ("skin_conductance", "conductance in the race", _PASSED, 0.25, _CONDUCTANCE + law.SKIN),
-        (
-            "ball_conductance",
-            "conductance of balls and each race",
-            _PASSED,
-            0.55,
-            _CONDUCTANCE + law.RACE,
-            _CONDUCTANCE + law.BALLS,
-        ),
-        ("outer_conductance", "conductance to the housing", _PASSED, 0.8, _CONDUCTANCE + law.OUTER),
-        ("sleeve_to_rotor", "conductance along the rotor", _PASSED, 0.8, law.SLEEVE_OUT),
-        ("housing_to_ambient", "conductance of the housing", _PASSED, 0.7, law.HOUSING_OUT),
-        ("slip_share", "share of the heat of sliding in the race", _PART, 0.25, law.SLIP_SHARE),
-        ("ball_share", "share of the friction of balls in them", _PART, 0.25, law.BALL_SHARE),
-        ("expansion", "thermal expansion of the races", "expansion", 0.05, law.EXPANSION),
-        ("ball_expansion", "thermal expansion of the balls", "expansion", 0.05, law.BALL_EXPANSION),
-    )
-)
-"""Unknowns of the heat of a bearing, of which a drop determines next to nothing."""
