@@ -142,7 +142,8 @@ def pair_of_the_file(bearing: Any, found: Values, load: float) -> Values:
     exponent, stiffness = found.get("contact.exponent"), found.get("contact.stiffness")
     if exponent is None or stiffness is None or stiffness.interval_90 is None:
         return {}
-    exponent = EXPONENT.known_within(exponent)
+    ends = EXPONENT.within(exponent.low), EXPONENT.within(exponent.high)
+    exponent = replace(exponent, value=EXPONENT.within(exponent.value), interval_90=ends)
     depth = bearing.contact.typical_depth(load)
     factor = depth ** (float(bearing.contact.exponent) - exponent.value)
     low, high = stiffness.interval_90

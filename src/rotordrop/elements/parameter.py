@@ -193,11 +193,6 @@ class Parameter:
         """Whether all drops of a machine share it."""
         return self.owner in _OF_A_MACHINE and not self.amount
 
-    @property
-    def errs_jointly(self) -> bool:
-        """Whether a calibrated machine file says how its error goes with those of others."""
-        return self.owner == "bearing" and self.shared
-
     def named(self, owner: str) -> str:
         """Name for people, with what it belongs to."""
         if self.owner in ("unbalance", "load"):
@@ -216,12 +211,6 @@ class Parameter:
     def within(self, value: float) -> float:
         """The value, or the limit of the model it lies beyond."""
         return min(max(value, self.lower), self.upper)
-
-    def known_within(self, known: Known) -> Known:
-        """A value and its interval, each or the limit of the model it lies beyond."""
-        low, high = known.interval_90 or (known.value, known.value)
-        ends = self.within(low), self.within(high)
-        return dataclasses.replace(known, value=self.within(known.value), interval_90=ends)
 
     def stated(self, part: Any) -> Known | None:
         """The value as the description has it; None where it leaves it out."""

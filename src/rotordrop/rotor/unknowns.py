@@ -378,7 +378,7 @@ def is_logarithmic(unknown: Unknown) -> bool:
 
 def is_of_a_bearing(unknown: Unknown) -> bool:
     """Whether it is a value of a touchdown bearing: these err together in a calibrated file."""
-    return unknown.parameter.errs_jointly
+    return unknown.parameter.owner == "bearing" and unknown.parameter.shared
 
 
 def slope_signs(unknowns: Sequence[Unknown], theta: Array, sigma: Array) -> Array:
