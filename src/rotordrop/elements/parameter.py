@@ -298,6 +298,9 @@ class Extension:
     base: Callable[[Any], dict[str, Known]] = lambda _: {}
     """Values with which a machine says what the base model says and is followed as with this extension:
     smaller process noise in the fall is no evidence of a long remanence."""
+    inferred: bool = False
+    """Whether it widens what a silent file leaves to be inferred: it is as probable as not, and as another
+    minimum may lie there its search begins from guesses too."""
 
     def values(self, machine: Any) -> dict[str, Known]:
         """Values that a description with this extension names; none where it names some already."""

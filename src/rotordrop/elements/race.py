@@ -152,5 +152,6 @@ EXTENSIONS: tuple[Extension, ...] = (
         sentence=_carried,
         joined=", ",
         frame="races heavier than the size of their bearings tells, with all that spins along: {}",
+        inferred=True,
     ),
 )

@@ -266,8 +266,10 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
     return search.followed(found)
 
 
-def evidence_threshold(drops: int) -> float:
+def evidence_threshold(extension: Extension, drops: int) -> float:
     """Rise of the log likelihood with which an extension is as probable as the model without it [1]."""
+    if extension.inferred:
+        return 0.0
     return math.log((1.0 - ASSUMED_SHARE) / ASSUMED_SHARE) + drops * RISE_OF_NOTHING
 
 
@@ -526,10 +528,10 @@ class Search:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
         described, had = found.machine, tuple(one.extension for one in found.accepted)
         plain = extension.as_base_model(described)
-        against = math.exp(-evidence_threshold(len(found.fit.problems)))
+        against = math.exp(-evidence_threshold(extension, len(found.fit.problems)))
         try:
             without = found if plain is described else self._again(found, plain)
-            other = self._again(found, extension.added_to(described))
+            other = self._with_it(found, extension)
         except IdentificationError:
             return found
         if against * bayes_factor(other, without) >= 1.0:
@@ -547,6 +549,15 @@ class Search:
             stated = replace(other, accepted=(*found.accepted, Accepted(extension=extension, gain=gain)))
         before = [replace(one, odds=scale * one.odds) for one in found.alternatives]
         return replace(stated, alternatives=worth_keeping((*before, alternative)))
+
+    def _with_it(self, found: Candidate, extension: Extension) -> Candidate:
+        """A candidate with an extension more, from where it has come to rest or from guesses."""
+        machine = extension.added_to(found.machine)
+        other = self._again(found, machine)
+        if extension.inferred:
+            anew = self.refine(replace(found, machine=machine, fit=self.fit_base(machine)))
+            other = min(other, anew, key=lambda one: one.sized_score)
+        return other
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
         """The same with another machine, from where the candidate has come to rest."""

@@ -150,7 +150,8 @@ def test_lost_extensions_and_worse_halves_stay_behind(lp400):
     assert names(found) == [] and found.machine == lp400
 
 
-ASKED = evidence_threshold(1)
+CARRIED, *OTHERS = sorted(EXTENSIONS, key=lambda one: not one.inferred)
+ASKED = evidence_threshold(OTHERS[0], 1)
 
 
 class Weighed:
@@ -276,7 +277,8 @@ def test_what_the_readings_ask_for_beside_a_model_that_fits_is_added(
 
 
 def test_rises_odds_and_verdicts_of_extensions():
-    assert 0.0 < evidence_threshold(1) < evidence_threshold(2) < 2.0 * evidence_threshold(1)
+    assert 0.0 < ASKED < evidence_threshold(OTHERS[0], 2) < 2.0 * ASKED
+    assert evidence_threshold(CARRIED, 1) == 0.0 and not any(one.inferred for one in OTHERS)
     one, two = (Known(value=v, interval_90=(v - half, v + half)) for v, half in ((3.0, 0.3), (4.0, 0.4)))
     assert derived(lambda a, b: a + b, one, two) == pytest.approx((7.0, 6.5, 7.5))
     assert Verdict.EXTENDED.holds and not Verdict.WIDENED.holds and not Verdict.REPLACED.holds
