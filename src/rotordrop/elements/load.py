@@ -169,9 +169,13 @@ def check_times(points: tuple[LoadPoint, ...] | tuple[BasePoint, ...]) -> None:
 
 
 def _pushed(_machine: Any, found: Values, _load: float) -> str:
-    share = itself(found["side_force"])
-    push, lean = in_words(share, "% of the weight", 0.01), in_words(share, "deg", math.pi / 180.0)
-    return f"a steady force in +x of {push}, or a machine out of level by {lean}"
+    share, low, high = itself(found["side_force"])
+    push = in_words((share, low, high), "% of the weight", 0.01)
+    lean = in_words((math.atan(share), math.atan(low), math.atan(high)), "deg", math.pi / 180.0)
+    less = 100.0 * (1.0 - math.cos(math.atan(share)))  # of a weight that then points aside
+    return (
+        f"a steady force in +x of {push}, or a machine out of level by {lean}, all forces {less:.1f} % less"
+    )
 
 
 STATED: tuple[Parameter, ...] = (

@@ -504,12 +504,13 @@ class Search:
         return found
 
     def rising(self, found: Candidate) -> list[Extension]:
-        """The extensions worth fitting: they make the first impacts likelier more than all others, linearised
-        at a fit, and the whole drop likelier too.
+        """The extensions worth fitting: they make the first impacts likelier more than all others, or widen
+        what was inferred, linearised at a fit, and the whole drop likelier too.
         """
         able = [one for one in EXTENSIONS if one.values(found.machine)]
         early = [pair for pair in self.rises(found, CALIBRATION_STAGE).of_all(able) if pair[0] > 0.0]
-        most = [one for _, one in sorted(early, key=lambda pair: -pair[0])[:MOST_TRIED]]
+        ranked = [one for _, one in sorted(early, key=lambda pair: -pair[0])]
+        most = [*ranked[:MOST_TRIED], *(one for one in ranked[MOST_TRIED:] if one.inferred)]
         if self.drops.calibrate_only or not most:
             return most
         return [one for rise, one in self.rises(found, WHOLE_STAGE).apart(most) if rise > 0.0]
