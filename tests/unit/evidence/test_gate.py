@@ -584,6 +584,26 @@ def test_a_single_sensor_is_refused_in_words(drop, machine):
         check_record(alone, machine.model_copy(update={"sensors": machine.sensors[:1]}))
 
 
+@pytest.mark.parametrize(
+    ("factor", "kind", "severity"),
+    [(1.0, "beyond the air gap", "warning"), (25.4, "wrong air gap", "stop")],
+)
+def test_a_whirl_beyond_the_gap_is_told_from_a_wrong_unit_by_its_fall(
+    whole_drop, machine, factor, kind, severity
+):
+    """It hides its gap; the fall before it has one gravity in the right unit."""
+
+    def whirls(s):
+        grown = np.interp(whole_drop.time, [0.04, 0.07, 0.2, 0.25], [0.0, 1.0, 1.0, 0.0])[:, None]
+        angle = 2.0 * np.pi * -90.0 * whole_drop.time
+        circle = 2.5 * 250e-6 * np.column_stack([np.sin(angle), np.cos(angle)])
+        level = s[: len(s) // 10].mean(axis=0)
+        return factor * (s + grown * (level + np.hstack([circle, circle]) - s))
+
+    said = [one for one in check_record(signals(whirls)(whole_drop), machine) if one.kind == kind]
+    assert [one.severity for one in said] == [severity]
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("recorded", ["alone", "with its tail"])
 def test_a_gap_of_the_machine_file_that_the_record_contradicts_is_named(
