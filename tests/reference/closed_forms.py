@@ -1,34 +1,13 @@
-"""Closed forms only tests compare with: whirl, line contact, pendulum, lift-off, equilibrium of a bearing."""
+"""Closed forms only tests compare with: contact of spheres, pendulum, lift-off, equilibrium of a bearing."""
 
 import numpy as np
 
 from rotordrop.physics.ball_bearing import row_axial_force
 from rotordrop.physics.ball_bearing_response import bearing_response
-from rotordrop.physics.elementary import power
 from rotordrop.physics.hertz import point_contact
 from rotordrop.physics.pendulum import period_ratio, small_frequency
 
-_PALMGREN = 3.84e-5
-"""Palmgren's line contact ``δ = 3.84e-5 Q^0.9 / l^0.8`` in millimetre and newton."""
 _MOST_STEPS = 500
-
-
-def rolling_whirl_speed(omega_r, R_i, c_r):
-    """Backward whirl speed [rad/s] of a rotor that rolls without sliding in a fixed bore, ``ω_r R_i / c_r``.
-
-    Rotor speed [rad/s], bore radius [m], air gap [m]. Never reached in a drop: a real whirl locks to a
-    coupled natural frequency of rotor and support far below.
-    Source: Black 1968; Bartha 1998 (dry friction whirl).
-    """
-    return omega_r * R_i / c_r
-
-
-def whirl_force(m, c_r, omega_w):
-    """Contact force [N] that keeps a mass [kg] on a circle of radius c_r [m] at a whirl speed [rad/s].
-
-    Source: ``m c ω²``.
-    """
-    return m * c_r * omega_w**2
 
 
 def circular_contact(R_1, R_2, eta):
@@ -37,23 +16,6 @@ def circular_contact(R_1, R_2, eta):
     Source: Johnson, Contact Mechanics, ch. 4.
     """
     return point_contact(2.0 * (1.0 / R_1 + 1.0 / R_2), 0.0, eta)
-
-
-def line_contact_stiffness(length):
-    """Stiffness [N/m^(10/9)] of a line contact of a given length [m], with the exponent 10/9 of Neisi 2020.
-
-    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N). Differs from the paper: it says "Hertzian model".
-    """
-    per_load = 1e-3 * _PALMGREN / power(1e3 * length, 0.8)
-    return float(power(per_load, -10.0 / 9.0))
-
-
-def line_contact_approach(Q, length):
-    """Approach [m] of a line contact under a load [N] and of a given length [m].
-
-    Source: Palmgren, ``δ = 3.84e-5 Q^0.9 / l^0.8`` (mm, N).
-    """
-    return float(1e-3 * _PALMGREN * power(Q, 0.9) / power(1e3 * length, 0.8))
 
 
 def rectangle_shear_coefficient(nu):

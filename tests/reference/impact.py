@@ -53,14 +53,6 @@ def elastic_indentation(m, K, n, v_0):
     return float(((n + 1.0) * m * v_0**2 / (2.0 * K)) ** (1.0 / (n + 1.0)))
 
 
-def elastic_peak_force(m, K, n, v_0):
-    """Largest force [N] of an undamped impact; arguments as in `elastic_indentation`.
-
-    Source: Johnson, Contact Mechanics, section 11.4.
-    """
-    return float(K * elastic_indentation(m, K, n, v_0) ** n)
-
-
 def elastic_contact_time(m, K, n, v_0):
     """Duration [s] of an undamped impact; arguments as in `elastic_indentation`.
 

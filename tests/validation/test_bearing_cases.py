@@ -125,14 +125,6 @@ def stribeck_loaded_inner_race(inputs):
     }
 
 
-def palmgren_line_contact(inputs):
-    first = inputs["l_mm"][0]
-    stiffness = {f"K(l={mm} mm)": closed_forms.line_contact_stiffness(1e-3 * mm) for mm in inputs["l_mm"]}
-    return stiffness | {
-        f"delta(Q=1000 N,l={first} mm)": closed_forms.line_contact_approach(inputs["Q"], 1e-3 * first)
-    }
-
-
 def cylinder_on_a_block(inputs):
     (E_1, E_2), (nu_1, nu_2) = inputs["E"], inputs["nu"]
     line = hertz.LineContact(
@@ -255,7 +247,6 @@ CASES = {
     "H05": stribeck_loaded_inner_race,
     "H06a": gmn_catalogue,
     "H07a": fag_catalogue,
-    "H08": palmgren_line_contact,
     "H09": circular_contacts,
     "H11": papers_touchdown_bearing,
     "H12": cylinder_on_a_block,

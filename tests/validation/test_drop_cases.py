@@ -1,4 +1,4 @@
-"""Drops of rigid rotors and of the paper's machine: mirrored, undamped, swinging, in a seal, at rest."""
+"""Drops of rigid rotors and of the paper's machine: undamped, swinging, in a seal, at rest."""
 
 import math
 from dataclasses import replace
@@ -13,44 +13,10 @@ from rotordrop import build_drop_model, example_machine, simulate_drop
 from rotordrop.physics import columns as L
 from rotordrop.physics.pendulum import period_ratio, small_frequency
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.simulate.case import CentredStart, DropCase, PlacedStart
+from rotordrop.simulate.case import CentredStart, DropCase
 
 HUGE = 1e12
 """Tolerance that lets every step of the given length pass."""
-
-
-def mirrored(inputs):
-    what = inputs["mirrored"]
-    mirror = np.array([-1.0, 1.0])
-    start = PlacedStart(
-        displacement=np.array([[30e-6, -120e-6], [-50e-6, -90e-6]]),
-        velocity=np.array([[0.02, -0.05], [-0.03, 0.01]]),
-    )
-    image = start
-    if "place" in what:
-        image = PlacedStart(displacement=start.displacement * mirror, velocity=start.velocity * mirror)
-    machine = example_machine("paper")
-    speed = 2.0 * math.pi * inputs["speed_hz"]
-    case = DropCase(
-        speed=speed,
-        duration=inputs["duration_s"],
-        tolerance=HUGE,
-        largest_step=inputs["fixed_step_s"],
-        start=start,
-    )
-    other = replace(case, start=image, speed=-speed if "speed" in what else speed)
-    sign = -1.0 if "unbalance phase" in what else 1.0
-    one = simulate_drop(build_drop_model(_with_phases(machine, 1.0), "quick"), case)
-    two = simulate_drop(build_drop_model(_with_phases(machine, sign), "quick"), other)
-    assert len(one.contacts) > 0
-    clearance = min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    error = float(np.max(np.abs(two.displacement - one.displacement * mirror)))
-    return {"max |x_mirrored + x| / clearance": error / clearance}
-
-
-def _with_phases(machine, sign):
-    phases = {f"unbalance.{i}.phase": sign * (0.6 + i) for i in range(len(machine.unbalances))}
-    return machine.with_values(phases)
 
 
 def undamped(inputs):
@@ -137,7 +103,6 @@ def test_printed_loads_one_agrees_and_one_is_flagged():
 
 
 CASES = {
-    "M01": mirrored,
     "M03": undamped,
     "P01": small_swing,
     "P02a": large_swing,
