@@ -2,7 +2,7 @@
 
 import gzip
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import h5py
@@ -168,23 +168,33 @@ def as_wav(path: Path, readings: np.ndarray, rate: int, bits: int = 16) -> None:
 
 
 def as_comtrade(
-    path: Path, kind: str, table: np.ndarray, rate: int, before: float, offset: float = 0.0
+    path: Path,
+    kind: str,
+    table: np.ndarray,
+    rate: int,
+    before: float,
+    offset: float = 0.0,
+    *,
+    names: Sequence[str] = NAMES,
+    step: float = 0.01,
+    revision: int = 1999,
 ) -> None:
-    """Four channels [µm] and the speed [Hz] in steps of 0.01, begun `before` [s] the trigger."""
-    lines = ["Station,Recorder,1999", "5,5A,0D"]
-    for number, name in enumerate([*NAMES, "Speed"], start=1):
+    """Four channels [µm] and the speed [Hz] in steps, begun `before` [s] the trigger."""
+    lines = [f"Station,Recorder,{revision}", "5,5A,0D"]
+    for number, name in enumerate([*names, "Speed"], start=1):
         unit = "Hz" if name == "Speed" else "um"
-        lines.append(f"{number},{name},,,{unit},0.01,{offset},0,-32767,32767,1,1,P")
+        lines.append(f"{number},{name},,,{unit},{step},{offset},0,-32767,32767,1,1,P")
     stamps = ["16/10/2019,13:42:07.000000", f"16/10/2019,13:42:{7 + before:09.6f}"]
     lines += ["50", "1", f"{rate},{len(table)}", *stamps, kind, "1"]
+    lines += ["0,0", "B,3"] * (revision == 2013)
     path.with_suffix(".cfg").write_text("\r\n".join(lines) + "\r\n")
-    counts, step = np.rint((table - offset) * 100).astype(int), 10**6 // rate
+    counts, apart = np.rint((table - offset) / step).astype(int), 10**6 // rate
     if kind == "ASCII":
-        rows = [f"{i + 1},{step * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
+        rows = [f"{i + 1},{apart * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
         path.with_suffix(".dat").write_text("\r\n".join(rows) + "\r\n\x1a")
         return
     sign = {"BINARY": "h", "BINARY32": "i", "FLOAT32": "f"}[kind]
-    packed = [struct.pack(f"<II5{sign}", i + 1, step * i, *row) for i, row in enumerate(counts)]
+    packed = [struct.pack(f"<II5{sign}", i + 1, apart * i, *row) for i, row in enumerate(counts)]
     path.with_suffix(".dat").write_bytes(b"".join(packed))
 
 

@@ -1,6 +1,5 @@
 """One recording as the recorders of many makers export it, written by hand after their documents."""
 
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -312,30 +311,11 @@ def comtrade(kind: str, *, single: bool) -> Callable[[Path], None]:
     """Configuration and samples, side by side or in one file."""
 
     def write(path: Path) -> None:
-        lines = ["Machine hall,REC1,2013", "5,5A,0D"]
-        for k, name in enumerate([*TAGS, "Speed"], start=1):
-            lines.append(
-                f"{k},{name},,,{'Hz' if k == 5 else 'um'},{0.001 if k == 5 else 0.01},0,0,-32767,32767,1,1,P"
-            )
-        lines += [
-            "50",
-            "1",
-            f"{1 / STEP:.0f},{COUNT}",
-            "04/05/2023,10:45:47.000000",
-            "04/05/2023,10:45:47.001000",
-        ]
-        lines += [kind, "1", "0,0", "B,3"]
-        counts = np.rint(np.column_stack([MICRONS * 100, SPEED * 1000])).astype(int)
-        if kind == "ASCII":
-            rows = [f"{i + 1},{50 * i}," + ",".join(map(str, row)) for i, row in enumerate(counts)]
-            data = ("\r\n".join(rows) + "\r\n").encode()
-        else:
-            data = b"".join(struct.pack("<II5i", i + 1, 50 * i, *row) for i, row in enumerate(counts))
-        text = "\r\n".join(lines) + "\r\n"
+        table, form = np.column_stack([MICRONS, SPEED]), {"names": TAGS, "step": 0.001, "revision": 2013}
+        every_format.as_comtrade(path, kind, table, round(1 / STEP), 1e-3, **form)
         if not single:
-            path.write_text(text)
-            path.with_suffix(".dat").write_bytes(data)
             return
+        text, data = path.with_suffix(".cfg").read_bytes().decode(), path.with_suffix(".dat").read_bytes()
         size = "" if kind == "ASCII" else f": {len(data)}"
         head = f"--- file type: CFG ---\r\n{text}--- file type: INF ---\r\n\r\n--- file type: HDR ---\r\n\r\n"
         head += f"--- file type: DAT {kind}{size} ---\r\n"

@@ -153,21 +153,14 @@ def test_the_air_gap_is_below_in_the_vertical_and_on_both_sides_in_the_horizonta
     assert gaps(one, 1) == {(280.0, 280.0)} and len(shapes(one, 1)) == 1
 
 
-def test_displacement_comes_back_in_micrometres_and_milliseconds():
-    drawn = displacement_figure(bearings())
-    for panel, axis in ((1, 0), (2, 1)):
-        item = trace(drawn, "simulated", panel)
-        assert_allclose(item.x, 1e3 * TIME, rtol=SINGLE)
-        assert_allclose(item.y, 1e6 * motion("").displacement[:, axis], rtol=SINGLE, atol=1e-4)
-    assert "x [µm]" in drawn.layout.yaxis.title.text
-    assert "y [µm]" in drawn.layout.yaxis2.title.text
-
-
 def test_the_displacement_has_horizontal_left_and_vertical_right_of_every_bearing():
-    given = 1e6 * motion("measured", "measured", 0.1).displacement
+    given, drawn = 1e6 * motion("measured", "measured", 0.1).displacement, charts()["zoom together"]
     for panel, axis in ((1, 0), (2, 1), (3, 0), (4, 1)):
-        item = trace(charts()["zoom together"], "measured", panel)
+        item = trace(drawn, "measured", panel)
+        assert_allclose(item.x, 1e3 * TIME, rtol=SINGLE)
         assert_allclose(item.y, given[:, axis], rtol=SINGLE, atol=1e-4)
+    titles = drawn.layout.yaxis.title.text, drawn.layout.yaxis2.title.text
+    assert "x [µm]" in titles[0] and "y [µm]" in titles[1]
 
 
 def test_distance_stress_and_speed_have_their_units():

@@ -12,7 +12,7 @@ import pytest
 from tests.unit.report.conftest import section
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
-from rotordrop.elements.table import published
+from rotordrop.elements.table import published, rows
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Section, Table
 from rotordrop.report.estimate_page import spoken
@@ -51,22 +51,31 @@ def test_loads_of_every_bearing(estimate, page, document):
     assert compared >= 6
 
 
+def same(told, known):
+    """Whether the document says what Python does."""
+    interval = told.get("interval_90")
+    return (told["value"], told.get("standard_error"), told.get("status", known.status)) == (
+        known.value,
+        known.standard_error,
+        known.status,
+    ) and (None if interval is None else tuple(interval)) == known.interval_90
+
+
 def test_every_identified_value(estimate, page, document):
-    rows = section(page, "Parameters").tables[0].rows
-    by_label = {row[0]: row for row in rows}
+    listed = section(page, "Parameters").tables[0].rows
+    by_label = {row[0]: row for row in listed}
     assert by_label["static friction coefficient"][-1] == "the record does not determine it"
     compared = 0
     for (field, row), (b, bearing) in product(published().items(), enumerate(estimate.bearings)):
-        lines = [line for line in rows if line[0] == row.label and line[2 + b]]
+        lines = [line for line in listed if line[0] == row.label and line[2 + b]]
         if field in bearing.values and lines:
             found = reduce(getitem, field.split("."), document["bearings"][bearing.name])
-            assert lines[0][2 + b].value == found["value"] == bearing.values[field].value
+            assert lines[0][2 + b].value == found["value"] and same(found, bearing.values[field])
             said = lines[0][-1]
             own = dict(one.split(": ") for one in said.split("; ") if ": " in one) or {bearing.name: said}
             assert own.get(bearing.name, "") == found["status"].replace(
                 "determined", "", found["status"] == "determined"
             )
-            assert bearing.values[field].status == found["status"]
             compared += 1
     assert compared >= 30
 
@@ -83,14 +92,19 @@ def test_every_parameter_and_sensor(estimate, page, document):
     shown |= {("", row[0]): row[1:3] for row in tables[1].rows}
     assert not any("." in name or "unbalance 0" in name for _, name in shown), "a path, or a count from zero"
     assert shown["NDE", "support stiffness"][0].levelled == "90 %: 50 to 200 N/µm"
-    in_json = {one["path"]: one["estimate"]["value"] for one in document["parameters"]}
+    in_json = {one["path"]: one for one in document["parameters"]}
+    for name, row in product(names, rows("bearing")):
+        assert row.path_of(name) in in_json or row.field in estimate.bearing(name).values, row.path
     assert len(estimate.parameters) == len(in_json)
     for one in estimate.parameters:
         if one.row.owner == "unbalance":  # its amount stands in a table of its own
             continue
         machine = one.scope == "machine"
-        _, found = shown[(one.owner, one.row.label) if machine else ("", spoken(one))]
-        assert found.value == one.estimate.value == in_json[one.path]
+        before, found = shown[(one.owner, one.row.label) if machine else ("", spoken(one))]
+        assert (before.value, found.value) == (one.prior.value, one.estimate.value)
+        assert same(in_json[one.path]["estimate"], one.estimate) and same(
+            in_json[one.path]["prior"], one.prior
+        )
         assert found.interval_90 == one.estimate.interval_90
         if machine and one.owner:  # the rotor is at no bearing
             assert estimate.bearing(one.owner).values[one.row.field] == one.estimate
@@ -98,8 +112,9 @@ def test_every_parameter_and_sensor(estimate, page, document):
     assert tables[2].rows[0][3].value == pytest.approx(0.46e-6, rel=0.15)  # the noise of the first
     for row, sensor in zip(tables[2].rows, estimate.sensors, strict=True):
         told = document["sensors"][sensor.sensor]
-        assert row[1].value == told["gain_error"]["value"] == sensor.gain_error.value
-        assert row[2].value == told["offset_m"]["value"] == sensor.offset.value
+        assert (row[1].value, row[2].value) == (sensor.gain_error.value, sensor.offset.value)
+        assert same(told["gain_error"], sensor.gain_error) and same(told["offset_m"], sensor.offset)
+        assert told["noise_m"] == sensor.noise
     for row, plane, told in zip(tables[3].rows, estimate.unbalance, document["unbalance"], strict=True):
         assert row[1].value == told["amount_kg_m"]["value"] == plane.amount.value
         assert (plane.phase, row[2]) == (None, plane.reason)  # the record has no mark
@@ -111,8 +126,8 @@ def test_statistics_and_cross_check(estimate, page, document):
     for bearing in estimate.bearings:
         told = document["bearings"][bearing.name]["stress_statistics_Pa"]
         assert told["median"] == bearing.statistics.median
-    rows = section(page, "Checks").tables[-1].rows if estimate.cross_check else ()
-    for row, one, check in zip(rows, document["cross_check"], estimate.cross_check, strict=True):
+    listed = section(page, "Checks").tables[-1].rows if estimate.cross_check else ()
+    for row, one, check in zip(listed, document["cross_check"], estimate.cross_check, strict=True):
         assert row[1].value == one["estimate"] == check.estimate.value
         assert row[2].value == one["cross_check"] == check.check
 
