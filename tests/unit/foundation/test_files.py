@@ -97,21 +97,6 @@ def test_text_is_utf_8_with_plain_line_ends_and_json_reads_back(tmp_path):
     assert json.loads((tmp_path / "t.json").read_text()) == {"bearings": {"NDE": {"value": 2.5e-4}}}
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
-def test_a_full_disk_is_an_output_error_that_names_the_target(tmp_path):
-    target = tmp_path / "out.txt"
-    with (
-        pytest.raises(
-            OutputError, match=r"cannot write .*out\.txt: No space left on device; choose another place"
-        ),
-        atomic_path(target) as temporary,
-    ):
-        temporary.write_text("begun")
-        with open("/dev/full", "w") as full:
-            full.write("x")
-    assert os.listdir(tmp_path) == []
-
-
 def test_an_error_about_another_file_is_not_renamed(tmp_path):
     with pytest.raises(FileNotFoundError, match="input"), atomic_path(tmp_path / "out.txt"):
         open(tmp_path / "input.csv")
@@ -178,28 +163,6 @@ def test_what_a_killed_run_left_is_removed_and_a_running_one_is_left_alone(tmp_p
     assert begun in os.listdir(tmp_path), "somebody still writes it"
     assert len(os.listdir(tmp_path)) == 4
     ended(running, signal.SIGKILL)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="limits as on POSIX")
-def test_a_full_disk_under_hdf5_ends_with_a_sentence(tmp_path):
-    program = (
-        "import resource, signal, sys, numpy\n"
-        "from rotordrop.files import new_hdf5\n"
-        "from rotordrop.errors import OutputError\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))\n"
-        "try:\n"
-        "    with new_hdf5(sys.argv[1]) as file:\n"
-        "        file.create_dataset('a', data=numpy.random.rand(100_000), compression='gzip')\n"
-        "except OutputError as error:\n"
-        "    print(error)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(tmp_path / "out.h5")], capture_output=True, text=True, check=True
-    )
-    assert "out.h5: File too large; choose another place" in done.stdout
-    assert done.stderr == ""
-    assert os.listdir(tmp_path) == []
 
 
 def test_names_too_long_or_of_another_encoding_and_folders_that_cannot_be_made_are_told(tmp_path):

@@ -93,31 +93,6 @@ def test_the_rotor_has_the_published_mass_and_shares(machine):
     assert machine.rotor.mass - far == pytest.approx(17.8, abs=0.05)
 
 
-def test_node_positions_are_those_of_the_paper_to_the_micrometre(machine):
-    assert machine.rotor.node_positions[3] == pytest.approx(0.07, abs=1e-15)
-    assert machine.rotor.node_positions[25] == pytest.approx(0.856591, abs=1e-15)
-    assert machine.rotor.node_positions[-1] == pytest.approx(1.115523, abs=1e-15)
-    rotor = machine.rotor
-    assert len(rotor.elements) == len(rotor.node_positions) - 1 == 35
-    ends = [z + e.length for z, e in zip(rotor.node_positions, rotor.elements, strict=False)]
-    assert ends == pytest.approx(rotor.node_positions[1:], abs=1e-15)
-    parts = {e.part for e in machine.rotor.elements if e.layer_diameter is not None}
-    assert parts == {"NDE AMB laminations", "DE AMB laminations", "generator core + magnets/band"}
-
-
-def test_reference_machine_bearings():
-    nde, de = example_machine("paper").touchdown_bearings
-    assert (nde.name, nde.node, de.name, de.node) == ("NDE", 4, "DE", 26)
-    assert float(nde.air_gap) == pytest.approx(275e-6, abs=1e-18)
-    assert float(de.air_gap) == pytest.approx(285e-6, abs=1e-18)
-    assert float(nde.support.stiffness) == 1e8
-    assert float(de.support.stiffness) == 4e8
-    assert float(de.support.damping) == pytest.approx(2 * 0.025 * math.sqrt(4e8 * 40.0), rel=1e-14)
-    assert float(nde.bearing.preload) == 530.0
-    assert float(nde.contact.stiffness) == 8.3e8
-    assert float(nde.contact.exponent) == pytest.approx(10 / 9, rel=1e-15)
-
-
 def test_the_recorded_machine_is_that_of_its_owner():
     friction = example_machine("lp400").touchdown_bearings[0].friction
     assert friction.dynamic.status == "guess"

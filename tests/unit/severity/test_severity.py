@@ -106,12 +106,6 @@ def test_at_a_tenth_of_the_rating_life_is_a_thousand_times_longer(balls, ratio):
     assert share == pytest.approx(1e-3 / LIFE, rel=5e-3)
 
 
-@pytest.mark.parametrize("ratio", [0.1, 0.5])
-def test_life_goes_with_the_cube_of_the_load(ratio):
-    whole, less = (share_by_16281(ROW, *steady(part * C, 5.0)) for part in (1.0, ratio))
-    assert less == pytest.approx(ratio**3 * whole, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("value", "error", "expected"),
     [

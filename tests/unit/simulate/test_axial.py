@@ -24,7 +24,6 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing_response import bearing_response
 from rotordrop.physics.ball_set import (
     ball_set_energy,
-    two_row_axial_damping,
     two_row_axial_force,
     two_row_force,
 )
@@ -217,15 +216,6 @@ def test_deep_grooves_are_damped_as_far_as_their_angle_has_opened(clearance):
         expected = 2.0 * math.sin(angle) ** 2 * model.parameters.bearing[1, L.BEARING_DAMPING]
         for side in (1.0, -1.0):
             assert damped_at(model, side * way) == pytest.approx((expected, expected), rel=1e-6, abs=1e-9)
-
-
-@pytest.mark.parametrize("way", [0.0, 7e-6, -40e-6, 0.3e-3])
-@pytest.mark.parametrize("deep", [False, True], ids=["pair", "deep grooves"])
-def test_axial_damping_is_that_of_its_mirror_image(way, deep):
-    p = build_drop_model(deep_grooves() if deep else faced(), "quick").parameters
-    numbers, rows = p.bearing[1, L.ROLLING : L.ROLLING_END], (p.balls[1], p.balls[3])
-    damping = two_row_axial_damping(numbers, rows, way)
-    assert two_row_axial_damping(numbers, rows, -way) == pytest.approx(damping, rel=1e-12)
 
 
 @pytest.mark.parametrize("arrangement", ["", 'arrangement = "O"\n'])

@@ -196,15 +196,6 @@ def test_readers_of_netcdf_and_xarray_see_names_units_and_axes(drop, saved):
     assert data.attrs["outcome"] == drop.outcome
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.9])
-def test_a_truncated_file_is_refused(saved, tmp_path, share):
-    content = saved.read_bytes()
-    broken = tmp_path / "broken.h5"
-    broken.write_bytes(content[: int(share * len(content))])
-    with pytest.raises(SimulationError, match=r"broken\.h5 cannot be read as a drop result"):
-        load_result(broken)
-
-
 def test_files_of_another_kind_and_missing_ones_are_refused(tmp_path):
     import h5py
 

@@ -253,21 +253,9 @@ def test_memory_for_the_smoother_does_not_grow_with_the_drop(flight, monkeypatch
     np.testing.assert_array_equal(passes[0].means, passes[1].means[:20])
 
 
-def test_a_later_sample_only_narrows(filtered, flight):
-    smoothed = smooth(filtered)
-    np.testing.assert_array_equal(smoothed.means[-1], filtered.means[-1])
-    np.testing.assert_allclose(smoothed.covariance(filtered.done - 1), filtered.last, rtol=1e-6)
-    smoothed = smooth(filtered, kept=(0, 20, 40))
-    for i in (0, 20, 40):
-        before, after = np.diag(filtered.covariance(i)), np.diag(smoothed.covariance(i))
-        assert np.all(after <= before * (1.0 + 1e-6))
-        assert np.all(after >= 0.0)
-        assert np.all(after[before > 0.0] > 0.0)
+def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, random):
     with pytest.raises(IndexError, match=r"sample 7 was not kept; kept are \[0, 59\]"):
         smooth(filtered).covariance(7)
-
-
-def test_watched_functions_have_the_covariance_of_the_whole(flight, filtered, random):
     gradients = random.standard_normal((3, len(flight.mean)))
     smoothed = smooth(filtered, watched=gradients, kept=(30,))
     np.testing.assert_allclose(
@@ -299,20 +287,11 @@ def test_missing_readings_are_left_out(flight):
     readings[:, 2] = np.nan
     readings[10:20] = np.nan
     partial = replace(flight, readings=readings, speed=np.full_like(flight.speed, np.nan))
-    found = forward(partial, SETTINGS)
+    found, plain = forward(partial, SETTINGS), PlainFilter(partial).run()
     assert found.done == len(flight.time)
-    assert not np.isfinite(found.innovations[:, 2]).any()
-    assert not np.isfinite(found.innovations[10:20]).any()
-    assert np.isfinite(found.innovations[20:, [0, 1, 3]]).all()
-    place = flight.n_dynamic + len(flight.unknowns) + 2
-    others = [place - 2, place - 1, place + 1]
-    prior = deviations_of(flight.covariance) ** 2
-    shrunk = np.diag(found.last) / prior
-    assert shrunk[place] > 0.999 * np.max(shrunk[others])
-    plain = PlainFilter(partial).run()
-    assert in_deviations(found.means[-1] - plain.means[-1], plain.covariances[-1]) < 1e-6
-    means, covariances = plain.smoothed()
-    assert in_deviations(smooth(found).means[15] - means[15], covariances[15]) < 1e-3
+    assert np.array_equal(np.isfinite(found.innovations[:, :4]), np.isfinite(readings))
+    follows(found, plain)
+    smooths(smooth(found, kept=range(found.done)), plain)
 
 
 def test_the_covariance_stays_positive_definite_through_impacts(impacts, impacts_filtered):
@@ -358,92 +337,36 @@ def quiet(problem):
 NOISELESS = PassSettings(impulse=0.0, share=0.0, spin_noise=0.0, speed_noise=0.0)
 
 
-def linear_readings(problem, reference):
-    """All readings as a linear function of the estimate at the first sample: matrix, values, deviations."""
-    found = forward(problem, NOISELESS, reference=reference)
-    kept = found.filter_segment(0, problem.covariance.copy(), keep=True)[1]
-    n, s = len(problem.mean), problem.n_dynamic
-    columns = s + len(problem.unknowns)
-    deviation = np.eye(n)  # of the estimate at sample i from its reference, by that at sample 0
-    shift = np.zeros(n)
-    rows, left, sigma = [], [], []
-    for i in range(found.done):
-        if i > 0:
-            F = np.eye(n)
-            F[:s, :columns] = kept.F[i]
-            step = PlainFilter(problem, NOISELESS)
-            ahead = step._predicted(i, reference[i - 1], np.zeros((n, n)))[0][:s]
-            deviation, shift = F @ deviation, F @ shift
-            shift[:s] += ahead - reference[i, :s]
-            shift[s:] += reference[i - 1, s:] - reference[i, s:]
-        for c in range(problem.n_channels + 1):
-            row = kept.H[i, c]
-            if not row.any():
-                continue
-            value, expected, variance = expected_reading(problem, reference[i], i, c)
-            rows.append(row @ deviation)
-            left.append(value - expected - row @ shift)
-            sigma.append(np.sqrt(variance))
-    return np.array(rows), np.array(left), np.array(sigma)
-
-
-def expected_reading(problem, at, i, c):
-    values = {}
-    for number, (value, function, _, variance) in enumerate(PlainFilter(problem)._readings(i)):
-        values[number] = (value, function(at)[1], variance)
-    return values[c]
-
-
-def test_two_chained_drops_are_one_joint_least_squares_fit(flight):
-    """Shared parameters and sensors, a start of its own for every drop, nothing random in the motion."""
+def test_drops_of_a_chain_know_the_same_in_either_order(flight):
+    """Shared parameters and sensors, a start of its own for every drop, nothing random: one least squares."""
     first = quiet(flight)
-    shared = first.machine_indices
-    own = np.setdiff1d(np.arange(len(first.mean)), shared)
     shifted = first.mean.copy()
     shifted[first.model.layout.modal_x.start] += 2e-5
-    second = replace(first, mean=shifted, readings=first.readings + 1.5e-6 * np.cos(np.arange(60.0))[:, None])
-    references = [np.array(forward(p, NOISELESS).means) for p in (first, second)]
-    drops = [first, second]
-    filtered = filtered_chain(drops, NOISELESS, references, 0.003)
-    chained = smoothed_chain(drops, filtered)
-    alone = [means[0] for means in smoothed_means_of_chain(drops, filtered)]
+    change = 1.5e-6 * np.cos(np.arange(60.0))[:, None]
+    drops = [first, replace(first, mean=shifted, readings=first.readings + change)]
+    paths = [np.array(forward(problem, NOISELESS).means) for problem in drops]
 
-    n = len(first.mean)
-    places = [np.arange(n), np.zeros(n, dtype=int)]
-    places[1][shared], places[1][own] = shared, n + np.arange(len(own))
-    total = n + len(own)
-    prior = np.zeros(total)
-    unit = np.ones(total)
-    information, score = np.zeros((total, total)), np.zeros(total)
-    for d, problem in enumerate((first, second)):
-        prior[places[d]] = problem.mean
-        unit[places[d]] = deviations_of(problem.covariance)
-    own_blocks = [(np.arange(n), first.covariance), (places[1][own], second.covariance[np.ix_(own, own)])]
-    for where, block in own_blocks:
-        scaled = block / np.outer(unit[where], unit[where])
-        known = np.diag(block) == 0.0
-        scaled[known, known] = 1e-16
-        information[np.ix_(where, where)] += np.linalg.inv(scaled)
-    for d, problem in enumerate((first, second)):
-        rows, left, sigma = linear_readings(problem, references[d])
-        weighted = rows * unit[places[d]] / sigma[:, None]
-        start = (prior[places[d]] - references[d][0]) / unit[places[d]]
-        information[np.ix_(places[d], places[d])] += weighted.T @ weighted
-        score[places[d]] += weighted.T @ (left / sigma - weighted @ start)
-    joint = prior + unit * np.linalg.solve(information, score)
-    spread = np.linalg.inv(information) * np.outer(unit, unit)
-    for d, smoothed in enumerate(chained):
-        deviations = np.sqrt(np.diag(spread)[places[d]])
-        for means in (smoothed.means[0], alone[d]):
-            assert np.max(np.abs(means - joint[places[d]]) / deviations) < 2e-3
-        found = np.sqrt(np.diag(smoothed.covariance(0)))
-        open_ = np.diag(first.covariance) > 0.0
-        assert np.count_nonzero(~open_) == 1  # the rotor angle
-        np.testing.assert_allclose(found[open_], deviations[open_], rtol=2e-3)
-    lone = smoothed_chain([first], filtered_chain([first], NOISELESS, references[:1], 0.003))[0]
-    gap = first.n_dynamic + len(first.unknowns) + first.n_channels  # an offset, which both drops see
-    assert chained[0].covariance(0)[gap, gap] < lone.covariance(0)[gap, gap]
-    assert chained[0].means[-1][shared] == pytest.approx(chained[1].means[0][shared], rel=1e-4, abs=1e-12)
+    def told(order):
+        """Means and covariances at the first sample of every drop; the means by the pass for means alone."""
+        problems, references = [drops[k] for k in order], [paths[k] for k in order]
+        filtered = filtered_chain(problems, NOISELESS, references, 0.003)
+        alone = [means[0] for means in smoothed_means_of_chain(problems, filtered)]
+        smoothed = [(one.means[0], one.covariance(0)) for one in smoothed_chain(problems, filtered)]
+        return {k: (*one, other) for k, one, other in zip(order, smoothed, alone, strict=True)}
+
+    forth, back = told((0, 1)), told((1, 0))
+    shared = first.machine_indices
+    for k in (0, 1):
+        (mean, covariance, alone), (other, as_well, other_alone) = forth[k], back[k]
+        for one in (other, alone, other_alone):
+            assert in_deviations(one - mean, covariance) < 2e-3
+        unit = deviations_of(covariance)
+        assert np.abs((as_well - covariance) / np.outer(unit, unit)).max() < 4e-3
+        lone = told((k,))[k]
+        narrower = np.diag(covariance)[shared] / np.maximum(np.diag(lone[1])[shared], 1e-300)
+        assert np.all(narrower < 1.0 + 1e-3) and narrower.min() < 0.99
+        assert in_deviations((lone[0] - mean)[shared], covariance[np.ix_(shared, shared)]) > 0.1
+    assert forth[0][0][shared] == pytest.approx(forth[1][0][shared], rel=1e-4, abs=1e-12)
 
 
 def test_what_leaves_its_place_ends_the_pass(flight):

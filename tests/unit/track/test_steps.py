@@ -46,23 +46,17 @@ def test_the_first_level_of_a_channel_is_the_mean_of_what_it_read():
     assert np.isnan(first_level(time, readings, 0.49e-3)[2])
 
 
-def test_a_displacement_is_as_uncertain_as_its_covariance_says():
-    dice = np.random.default_rng(2)
-    roots = dice.normal(size=(6, 2 * WATCHED, 2 * WATCHED))
-    watched = roots @ roots.transpose(0, 2, 1)
-    rows = {name: dice.normal(size=(WATCHED, 4)) for name in ("NDE", "DE")}
-    problem: Any = SimpleNamespace(
-        model=SimpleNamespace(bearing_names=("NDE", "DE")), watched_rows=lambda name: rows[name]
-    )
-    smoothed: Any = SimpleNamespace(means=dice.normal(size=(6, 4)), watched=watched)
-    values, sigma = displacements_of(problem, smoothed)
-    for b, name in enumerate(rows):
-        for axis in range(2):
-            assert values[:, b, axis] == pytest.approx(smoothed.means @ rows[name][3 + axis])
-            place = WATCHED * b + 3 + axis
-            assert sigma[:, b, axis] ** 2 == pytest.approx(watched[:, place, place])
-    smoothed.watched = -watched
-    assert np.all(displacements_of(problem, smoothed)[1] == 0.0)  # below zero by rounding only
+def test_a_displacement_is_as_uncertain_as_its_covariance_says(impacts, impacts_smoothed):
+    roots = np.random.default_rng(2).normal(size=(len(impacts_smoothed.means), 2 * WATCHED, 2 * WATCHED))
+    smoothed = replace(impacts_smoothed, watched=roots @ roots.transpose(0, 2, 1))
+    values, sigma = displacements_of(impacts, smoothed)
+    for b, name in enumerate(impacts.model.bearing_names):
+        for axis, place in enumerate(WATCHED * b + 3 + np.arange(2)):
+            row = impacts.watched_rows(name)[3 + axis]
+            assert values[:, b, axis] == pytest.approx(smoothed.means @ row)
+            assert sigma[:, b, axis] ** 2 == pytest.approx(smoothed.watched[:, place, place])
+    below = replace(smoothed, watched=-smoothed.watched)
+    assert np.all(displacements_of(impacts, below)[1] == 0.0)  # below zero by rounding only
 
 
 def test_damping_holds_the_parameters_to_the_pass_before(impacts):

@@ -25,6 +25,15 @@ def bearing_state(initial, time):
     return np.array([shape @ part.T for part in parts])
 
 
+def errors_of(initial, time):
+    """Standard errors (B, 2) of the places at the bearings."""
+    turn, states = initial.fall.transition(initial.decay, time), initial.unknowns.states
+    covariance = turn @ initial.covariance[states, states] @ turn.T
+    shape, m = initial.fall.model.parameters.bearing_shape, initial.fall.n_modes
+    parts = (covariance[:m, :m], covariance[m : 2 * m, m : 2 * m])
+    return np.sqrt([np.diag(shape @ part @ shape.T) for part in parts]).T
+
+
 def true_state(drop, time):
     k = round(time / 1e-5)
     displacement = drop.result.displacement
@@ -40,15 +49,7 @@ def test_state_power_off_and_remanent_lift_are_found_and_leave_noise(initial, dr
     assert 0.7 < initial.misfit < 1.3
     true = np.array([[f["x_N"], f["vertical_N"]] for f in drop.truth["remanent_force"]])
     assert initial.remanent_force == pytest.approx(true, abs=15.0)
-    turn = initial.fall.transition(initial.decay, late)
-    states = initial.unknowns.states
-    shape = initial.fall.model.parameters.bearing_shape
-    m = initial.fall.n_modes
-    covariance = turn @ initial.covariance[states, states] @ turn.T
-    for axis in range(2):
-        part = slice(axis * m, (axis + 1) * m)
-        sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
-        assert np.all(np.abs(place[:, axis]) < 4.0 * sigma + 0.05e-6)
+    assert np.all(np.abs(place) < 4.0 * errors_of(initial, late) + 0.05e-6)
 
 
 def test_zeros_of_the_sensors_make_the_rest_as_unsure_as_they_are(evidence, sensing):
@@ -71,20 +72,7 @@ def test_without_amb_planes_the_fall_ends_where_it_did(drop, truth, contacts):
     place, velocity = bearing_state(initial, late) - true_state(drop, late)
     assert np.abs(place).max() < 8e-6
     assert np.abs(velocity).max() < 15e-3
-    turn, m = initial.fall.transition(initial.decay, late), initial.fall.n_modes
-    covariance = turn @ initial.covariance[initial.unknowns.states, initial.unknowns.states] @ turn.T
-    shape = initial.fall.model.parameters.bearing_shape
-    for axis in range(2):
-        part = slice(axis * m, (axis + 1) * m)
-        sigma = np.sqrt(np.diag(shape @ covariance[part, part] @ shape.T))
-        assert np.all(np.abs(place[:, axis]) < 3.0 * sigma)
-
-
-def test_square_root_squares_to_the_covariance(initial):
-    root = initial.square_root()
-    scale = np.sqrt(np.diag(initial.covariance))
-    product = (root @ root.T) / np.outer(scale, scale)
-    assert product == pytest.approx(initial.covariance / np.outer(scale, scale), abs=1e-8)
+    assert np.all(np.abs(place) < 3.0 * errors_of(initial, late))
 
 
 def test_modal_expansion_misses_the_sag_that_the_fit_finds(drop, initial, rest, model, sensing):
