@@ -650,6 +650,7 @@ def test_a_fall_that_leans_stops_only_where_sensors_look_elsewhere(kind, severit
         ("late channel", "A", "wrong gain", "A", False),
         ("late channel", "A", "wrong gain", "B", True),
         ("soft saturation", "A, B", "turned sensors", "A, B", False),
+        ("soft saturation", "A", "noise", "A", False),
         ("hum", "A", "wrong gain", "A", True),
     ],
 )

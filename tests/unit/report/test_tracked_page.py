@@ -15,8 +15,9 @@ from rotordrop.estimate.changed import changes
 from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.published import LaterMotion, drop_of
+from rotordrop.evidence.quality.finding import Finding
 from rotordrop.report.drop_sections import drop_sections, impact_table
-from rotordrop.report.estimate_page import cross_check_statements, estimate_page
+from rotordrop.report.estimate_page import cross_check_statements, estimate_page, estimate_screen
 from rotordrop.report.page import render_page
 from rotordrop.report.told_changes import told_changes
 from rotordrop.track.consistency import Check
@@ -92,6 +93,15 @@ def test_loads_of_the_cross_check_are_called_so(estimate):
     assert document["consistent"] is False and document["verdict"] == Verdict.REPLACED.value
     assert document["bearings"]["DE"]["origin"] == "independent cross-check"
     assert list(document)[:3] == ["format", "verdict", "consistent"]
+
+
+def test_a_cross_check_that_disagrees_and_exchanged_planes_come_first(estimate):
+    assert (
+        estimate_screen(replace(estimate, cross_check=(check(3000.0, 6300.0),))).verdict[0].level == "warning"
+    )
+    ends = Finding(kind="swapped ends", message="", remedy="exchange the planes", severity="warning")
+    said = [one.text for one in estimate_screen(replace(estimate, findings=(ends,))).verdict]
+    assert any(one.startswith("to do next: exchange the planes") for one in said)
 
 
 def test_what_gave_way_is_not_compared_with_itself(estimate):
