@@ -201,7 +201,10 @@ def _judgement(estimate: Estimate) -> Statement:
         level = "notice"
     elif estimate.consistent and any(check.failed for check in estimate.checks):
         level = "warning"
-    return Statement(estimate.verdict_in(names_in(estimate)), level)
+    text = estimate.verdict_in(names_in(estimate))
+    if level == "good" and any(not one.agrees and not one.replaced for one in estimate.cross_check):
+        return Statement(f"{text} The independent cross-check disagrees.", "warning")
+    return Statement(text, level)
 
 
 def _part(estimate: Estimate) -> Statement:
@@ -652,10 +655,10 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     loads, verdict = _loads(estimate), _short(judgement, LONGEST_VERDICT)
     said: list[Statement] = []
     left = LINES - 4 - len(loads.rows) - _lines(verdict)
-    # of a model that failed the way out comes first: what the record itself says of it, then what to do
+    # a way out comes first: what the record itself says of the failure, then what to do
     seen = [one for one in grave if one in quality_statements(estimate.findings)]
     ranked = [*seen, *calm[:1], *(one for one in grave if one not in seen), *calm[1:]]
-    if estimate.consistent:
+    if not told[0]:
         ranked = [*grave, *calm]
     for one in ranked:
         room = left - (len(said) + 1 < len(ranked))
@@ -678,6 +681,10 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
     )
 
 
+_WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
+"""Findings without which no model fits, whatever else is measured."""
+
+
 def _lines(one: Statement) -> int:
     """Lines of a statement in a terminal, behind its level."""
     return len(wrap(f"{one.level}: {one.sentence}", WIDTH))
@@ -685,6 +692,7 @@ def _lines(one: Statement) -> int:
 
 def _remedies(estimate: Estimate) -> Iterator[str]:
     """What to do next, first what may well let the model fit."""
+    yield from (one.remedy for one in estimate.findings if one.severity == "warning" and one.kind in _WIRING)
     if estimate.machine.rotor.is_beam and not estimate.consistent:
         yield DRAWING  # nothing else that is measured makes a beam the rotor
         return
