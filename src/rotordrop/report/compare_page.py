@@ -131,7 +131,7 @@ def _verdict(
             f"{name}: {', '.join(one.name for one in drops if one.drop.machine == name)}" for name in machines
         )
         said.append(Statement(f"These are drops of {len(machines)} machines, {whose}.", "warning"))
-    texts: dict[str, list[str]] = {}
+    texts: dict[tuple[str, Level], list[str]] = {}
     # the surest first
     places = [(number, bearing) for number in FIRST for bearing in bearings]
     if len(drops) - len(excluded) < 2:
@@ -139,6 +139,7 @@ def _verdict(
         said.append(Statement("Nothing is ranked: fewer than two drops are left."))
     chance = {key: max(one.worst_drop) for key, one in ranked.items()}
     for number, bearing in sorted(places, key=lambda place: -chance.get((place[1], place[0].field), 1.0)):
+        sure = chance.get((bearing, number.field), 0.0) >= SURE
         if (bearing, number.field) in ranked:
             text = f"{ranked[bearing, number.field].statement}."
         else:
@@ -146,8 +147,8 @@ def _verdict(
                 "not every drop states an interval, so the order of the numbers says nothing about which "
                 "drop was the worst."
             )
-        texts.setdefault(text, []).append(f"{bearing} {number.label}")
-    said += [Statement(f"{', '.join(of)}: {text}") for text, of in texts.items()]
+        texts.setdefault((text, "good" if sure else "warning"), []).append(f"{bearing} {number.label}")
+    said += [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in texts.items()]
     if any(one.drop_scatter is None for one in ranked.values()):
         said.append(Statement(UNKNOWN_SCATTER))
     said += [Statement(f"{one.name}: {text}", "warning") for one in drops for text in one.drop.warnings]

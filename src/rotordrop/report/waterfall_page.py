@@ -168,12 +168,13 @@ def frequency_sections(
         f"Distance of the rotor from the bearing centre over the whole coast-down, {role}, with the "
         "air-gap window (Neisi 2020, Fig. 17).",
     )
-    reasons = tuple(f"{line.label}: {line.reason}." for line in analysis.lines)
+    lines = analysis.lines
+    reasons = tuple(f"{line.label}: {line.reason}." for line in lines if line.named)
     tracked = any(plane.track is not None for plane in analysis.planes.values())
     return (
         Section("Displacement over the coast-down", figures=(displacement,)),
         _waterfall_section(analysis, against, highest),
-        Section(LINES, reasons or (NO_LINE,), tables=(line_table(analysis),) if reasons else ()),
+        Section(LINES, reasons if lines else (NO_LINE,), tables=(line_table(analysis),) if lines else ()),
         *((_order_section(analysis),) if tracked else ()),
         *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law, role),)),
     )
@@ -202,7 +203,7 @@ def _covered(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
 def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     histories = {name: plane.history for name, plane in analysis.planes.items()}
     clear = [name for name, history in histories.items() if held_clearly(history)]
-    said = [*_covered(analysis)]
+    said: list[Statement] = []
     if clear:
         window = histories[clear[0]].window
         text = f"The first {window:g} s held the largest displacement at {' and '.join(clear)}."
@@ -211,6 +212,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
         if name not in clear:
             held = held_maximum(history)
             said.append(Statement(f"{name}: {history.statement}", "good" if held else "warning"))
+    said += _covered(analysis)
     named = [line for line in analysis.lines if line.named]
     largest = ", ".join(
         f"{line.label} {where_of(line)} ({shown(line.amplitude, 'length', 3)})" for line in named[:SAID]
