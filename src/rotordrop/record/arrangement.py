@@ -195,10 +195,12 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
             members = [one for one in sensors if one.name.lower().startswith(name.lower())] or members
         stand = ", ".join(f"{s.name} at {math.degrees(float(s.angle)):.4g} deg" for s in members)
         if len(members) != len(entries):
-            known = listed(dict.fromkeys(sensor.bearing or "" for sensor in sensors))
+            known = list(dict.fromkeys(sensor.bearing or "" for sensor in sensors))
+            ask = f'--map "{known[0]}: {", ".join(one.label for one, _ in entries)}", one for each plane'
             raise UsageError(
                 f"the plane {name!r} names {channels_in_words(len(entries))}; the machine has "
-                + (f"{len(members)} sensors there ({stand})" if members else f"the planes {known}")
+                + (f"{len(members)} sensors there ({stand})" if members else f"the planes {listed(known)}")
+                + f"; say which is which in place of [planes]: {ask}"
             )
         untold = seats([channel for channel, _ in entries], members)
         for sensor, (channel, angle) in zip(untold, entries, strict=True):
