@@ -137,9 +137,11 @@ def test_columns_become_metres_with_names_units_and_speed():
     np.testing.assert_allclose(record.reading(NAMES[1]), 1e-6 * MICRONS[:, 1])
     assert record.speed[0] == pytest.approx(2.0 * math.pi * 60.0)
     assert not record.speed_by_hand
-    record = Record.from_arrays(MACHINE, "20 kHz", MICRONS, unit="um", speed="60 Hz")
-    assert record.speed_by_hand
-    assert record.speed[0] == pytest.approx(2.0 * math.pi * 60.0)
+    for start, speed in (("-0.25 s", "60 Hz"), (-0.25, 2.0 * math.pi * 60.0)):
+        record = Record.from_arrays(MACHINE, "20 kHz", MICRONS, unit="um", start=start, speed=speed)
+        assert record.speed_by_hand and record.time[0] == -0.25
+        assert record.speed[0] == pytest.approx(2.0 * math.pi * 60.0)
+        assert "speed given by hand: 60.00 Hz (3600 rpm)" in record.notes
 
 
 def test_a_table_is_read_as_the_file_of_the_same_columns_would_be():
