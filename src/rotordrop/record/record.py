@@ -47,7 +47,7 @@ from rotordrop.record.tacho import passages, readings_of_held_signal
 from rotordrop.require import each, numbers, require
 from rotordrop.series import stride_of
 from rotordrop.sketch import sketch
-from rotordrop.units import parse_quantity
+from rotordrop.units import format_quantity, in_si, parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
@@ -124,9 +124,9 @@ class Record:
         signals: Mapping[str, ArrayLike] | ArrayLike,
         *,
         unit: str | Mapping[str, str],
-        speed: str | tuple[ArrayLike, str] | None = None,
+        speed: str | float | tuple[ArrayLike, str] | None = None,
         time_unit: str = "s",
-        start: str = "0 s",
+        start: str | float = 0.0,
     ) -> Record:
         """Make a record of arrays.
 
@@ -140,10 +140,12 @@ class Record:
             Readings by the name of the sensor, or one column for every sensor of the machine in its order.
         unit : str or mapping
             Unit of the readings, such as "um" or "mV", of all or by the name of the sensor.
-        speed : str or tuple, optional
-            "60 Hz" given by hand, or readings with their unit, ``(array, "rpm")``.
-        time_unit, start : str
-            Unit of the times; first instant where a sampling rate is given.
+        speed : str, float or tuple, optional
+            "60 Hz" or a float [rad/s] given by hand, or readings with their unit, ``(array, "rpm")``.
+        time_unit : str
+            Unit of the times.
+        start : str or float
+            First instant where a sampling rate is given; a float is in seconds.
 
         Examples
         --------
@@ -158,7 +160,7 @@ class Record:
         require(unit, "unit", str, Mapping, hint="Say it, for example unit='um'")
         columns = _columns(signals, names)
         count = len(next(iter(columns.values())))
-        first = parse_quantity(start, "time")
+        first = in_si(start, "time", "start")
         if isinstance(time, str):
             rate = require(parse_quantity(time, "frequency"), "the sampling rate in time", float, above=0.0)
             clock = np.asarray(first + np.arange(count) / rate)
@@ -166,7 +168,8 @@ class Record:
             unit_of_time = require(time_unit, "time_unit", str, among=_TIME_UNITS)
             stamps = numbers(time, "time", finite=True)
             if stamps.ndim == 0:
-                raise RecordError(f"time is one number; write the sampling rate as text: '{stamps:g} Hz'")
+                expected = "a time for each sample, or the sampling rate as text, such as '20 kHz'"
+                raise RecordError(f"time is one number, {stamps:g}; expected {expected}")
             if first or stamps.shape != (count,):
                 words = (
                     f"time has the shape {stamps.shape} and the signals have {count} samples, from {start}"
@@ -190,7 +193,7 @@ class Record:
         frame: Any,
         *,
         unit: str | Mapping[str, str] | None = None,
-        speed: str | None = None,
+        speed: str | float | None = None,
         profile: Profile | None = None,
     ) -> Record:
         """Make a record of a table with named columns, such as a pandas data frame.
@@ -203,8 +206,8 @@ class Record:
             Columns named as in a file, "X1 [um]", "speed [rpm]"; a column "time [s]", or times as the index.
         unit : str or mapping, optional
             Unit of the columns that do not name one, of all or by column.
-        speed : str, optional
-            Speed given by hand, such as "60 Hz".
+        speed : str or float, optional
+            Speed given by hand, such as "60 Hz", or a float [rad/s].
         profile : Profile, optional
             Which column is which sensor, where the names differ.
         """
@@ -483,7 +486,7 @@ def record_of(
     constant, told = None, ""
     if profile.speed.constant is not None:
         constant = parse_quantity(profile.speed.constant, "speed")
-        told = f"speed given by hand: {profile.speed.constant}"
+        told = f"speed given by hand: {format_quantity(constant, 'speed')}"
     elif of_speed is None and pulses is None:
         constant, told = speed_told(recording.metadata)
     notes += [told] if told else []
@@ -549,14 +552,13 @@ def _record_of_channels(
     machine: Machine, channels: Sequence[Channel], clock: Array, speed: Any, rules: Profile
 ) -> Record:
     """A record of channels in memory, with the speed given by hand or as readings."""
-    if isinstance(speed, str):
-        parse_quantity(speed, "speed")
-        rules = rules.model_copy(update={"speed": SpeedSource(constant=speed)})
+    if isinstance(speed, str | int | float):
+        constant = f"{in_si(speed, 'speed', 'speed')!r} rad/s"
+        rules = rules.model_copy(update={"speed": SpeedSource(constant=constant)})
     elif speed is not None:
         if not isinstance(speed, tuple) or len(speed) != 2 or not isinstance(speed[1], str):
-            what = repr(speed) if isinstance(speed, int | float) else f"a {type(speed).__name__}"
-            expected = "a text such as '60 Hz', or readings with their unit, (array, 'rpm')"
-            raise UsageError(f"speed is {what}; expected {expected}")
+            expected = "a text such as '60 Hz', a float [rad/s], or readings with their unit, (array, 'rpm')"
+            raise UsageError(f"speed is a {type(speed).__name__}; expected {expected}")
         values, name = numbers(speed[0], "speed"), "shaft speed"
         if values.shape != clock.shape:
             raise RecordError(f"the speed has the shape {values.shape}; the time has {clock.shape}")
