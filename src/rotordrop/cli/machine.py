@@ -128,7 +128,12 @@ def _simple_text(numbers: Sequence[str]) -> str:
                 raise typer.BadParameter(str(error)) from None  # makes it ask again
             return said
 
-        given[name] = typer.prompt(_QUESTIONS[name], err=True, value_proc=readable)
+        try:
+            given[name] = typer.prompt(_QUESTIONS[name], err=True, value_proc=readable)
+        except typer.Abort:
+            said = " ".join(f'--set "{one}={value}"' for one, value in given.items())
+            console(sys.stderr).print(f"\ngo on with: rotordrop init --simple {said}", soft_wrap=True)
+            raise
     return simple_text(given)
 
 

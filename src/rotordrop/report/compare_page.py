@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
@@ -15,7 +14,6 @@ from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.report.content import Column, Figure, Level, ReportContent, Section, Statement, Table, table
 from rotordrop.report.quantity import Quantity, display_unit, one_line, shown
-from rotordrop.report.stress_box import StressBox, stress_box_figure
 from rotordrop.report.style import axis_title, bars, curve, finished, panels, plain
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
@@ -194,15 +192,6 @@ def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
     )
 
 
-def _boxes(drops: Sequence[ComparedDrop]) -> tuple[StressBox, ...]:
-    return tuple(
-        StressBox(one.name, bearing, entry.stress_statistics_Pa, np.zeros(0))
-        for one in drops
-        if one.drop.consistent  # of others no single number holds
-        for bearing, entry in one.drop.bearings.items()
-    )
-
-
 def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ranked: Rankings) -> Section:
     figures, tables = [], [_severity_table(drops, bearing) for bearing in bearings]
     stated = {field for one in drops for bearing in bearings for field in one.drop.bearings[bearing].numbers}
@@ -217,10 +206,6 @@ def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ra
             for bearing in bearings
             if (bearing, number.field) in ranked
         ]
-    if not (boxes := _boxes(drops)):
-        return Section("Severity", figures=tuple(figures), tables=tuple(tables))
-    caption = "Distribution of the stress within each drop, outliers left out (Neisi 2020, Fig. 16)."
-    figures.append(Figure(stress_box_figure(boxes), caption))
     return Section("Severity", figures=tuple(figures), tables=tuple(tables))
 
 

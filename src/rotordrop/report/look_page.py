@@ -357,7 +357,7 @@ def _impacts(seen: Look) -> Table:
         Column("plane", "plane"),
         Column("touches at (record time, 90 %)", touch),
         Column("azimuth (90 %)", azimuth),
-        Column("beyond the air gap", "depth", "length"),
+        Column("beyond the air gap", lambda one: one.depth if one.depth > 0.0 else None, "length"),
         Column("radial velocity before", "approach", "velocity"),
         Column("and after", "rebound", "velocity"),
     )
@@ -367,8 +367,8 @@ def _impacts(seen: Look) -> Table:
         f"{path.name} ± {shown(path.wall.distance_error, 'length', 2)}" for path in seen.motion.paths
     )
     rule += (
-        f" Distances beyond the air gap are known to {known} (90 %), velocities are up to "
-        f"{1e3 * TOO_SLOW:g} mm/s too small."
+        f" Distances beyond the air gap are known to {known} (90 %), – where none shows; velocities are up "
+        f"to {1e3 * TOO_SLOW:g} mm/s too small."
     )
     return table(
         seen.impacts[:MOST_LISTED], columns, "Impacts by displacement alone", f"{rule} {note}".strip()

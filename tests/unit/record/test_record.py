@@ -141,7 +141,7 @@ def test_columns_become_metres_with_names_units_and_speed():
         record = Record.from_arrays(MACHINE, "20 kHz", MICRONS, unit="um", start=start, speed=speed)
         assert record.speed_by_hand and record.time[0] == -0.25
         assert record.speed[0] == pytest.approx(2.0 * math.pi * 60.0)
-        assert "speed given by hand: 60.00 Hz (3600 rpm)" in record.notes
+        assert "speed given by hand: 60.0 Hz (3600 rpm)" in record.notes
 
 
 def test_a_table_is_read_as_the_file_of_the_same_columns_would_be():
