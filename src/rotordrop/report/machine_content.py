@@ -156,20 +156,19 @@ def _card(machine: Machine, rest: BearingSummary, brief: bool) -> Card:
         digits = 2 if figure.field == ON_SPRINGS else 4  # of one push, no estimate
         return fact(figure.label, known, figure.kind, digits, note=figure.note)
 
+    more = (
+        fact("pressure of rotor on race at rest", rest.contact_pressure, "pressure"),
+        fact("in series with the support", rest.equivalent_stiffness, "stiffness"),
+        fact("support by itself", rest.support_frequency, "frequency"),
+    )
     return Card(
         rest.name,
         (
             fact("share of the weight", rest.load, "force"),
             fact("air gap", machine.bearing(rest.name).air_gap, "length"),
             *(stated(one) for one in rest.figures if not (brief and one.field == ON_SPRINGS)),
-            *(
-                ()
-                if brief
-                else (fact("pressure of rotor on race at rest", rest.contact_pressure, "pressure"),)
-            ),
             fact("tangent stiffness at rest", rest.tangent_stiffness, "stiffness"),
-            fact("in series with the support", rest.equivalent_stiffness, "stiffness"),
-            fact("support by itself", rest.support_frequency, "frequency"),
+            *(() if brief else more),
         ),
     )
 

@@ -176,10 +176,7 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
 
 TRUSTED_CHANGE = 5e-3
 """Change of a peak at a tighter tolerance beyond which it is a warning [1]; chosen, not measured."""
-NO_INTERVAL = (
-    "One run with given parameters, no interval. A drop is chaotic: after about 50 ms compare statistics "
-    "(study run)."
-)
+NO_INTERVAL = "One run, no interval. A drop is chaotic: after about 50 ms compare statistics (study run)."
 NUMERICAL = "Numerical error: "
 EQUAL = 1e-6
 """Difference of forces over their peak that is rounding [1]; chosen, not measured."""
@@ -198,7 +195,7 @@ def simulate_summary(result: DropResult, machine: Machine | None = None) -> Repo
         subtitle=f"from {speed}, {duration} after power-off",
         simulated=SIMULATED_MACHINE,
         verdict=_verdict(result, bearings, machine, uses),
-        cards=tuple(_card(result, b, bearing) for b, bearing in enumerate(bearings)),
+        cards=tuple(_card(result, bearing) for bearing in bearings),
         facts=(
             ("machine", result.machine_name if path is None else f"{result.machine_name} ({path.name})"),
             ("rotor basis", result.reduction),
@@ -210,12 +207,9 @@ def simulate_summary(result: DropResult, machine: Machine | None = None) -> Repo
     )
 
 
-def _card(result: DropResult, index: int, bearing: BearingDrop) -> Card:
+def _card(result: DropResult, bearing: BearingDrop) -> Card:
     card = headline_card(bearing)
-    pressure, half_width, pressed_at = result.peak_contact_pressure(index)
-    note = f"at {shown(pressed_at, 'time', 3)}, {shown(2.0 * half_width, 'length', 3)} wide"
     figures = list(card.figures)
-    figures.insert(2, fact("Peak pressure, rotor on race", pressure, "pressure", note=note))
     if bearing.first_contact is not None and bearing.air_gap is not None:
         deepest = float(bearing.motions[0].radial.values.max()) - bearing.air_gap.upper
         figures.append(fact(BEYOND_GAP, deepest, "length", 3))
