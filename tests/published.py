@@ -1,6 +1,6 @@
 """Published estimates of which a test needs a part; what it does not name is empty."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from rotordrop.estimate.published import FORMAT, Bearing, Consistency, Drop, Value
@@ -45,10 +45,10 @@ def value(number: float, low: float | None = None, high: float | None = None) ->
     return Value(value=number, **({} if low is None or high is None else {"interval_90": [low, high]}))
 
 
-def bearing(numbers: Mapping[str, Value], impacts: Sequence[Any] = ()) -> Bearing:
+def bearing(numbers: Mapping[str, Value]) -> Bearing:
     """A bearing with its numbers by path."""
     return Bearing.model_construct(
-        origin="", numbers=dict(numbers), stress_statistics_Pa=STATISTICS, impacts=list(impacts)
+        numbers=dict(numbers), stress_statistics_Pa=STATISTICS, impacts=[], origin=""
     )
 
 

@@ -142,10 +142,8 @@ class Record:
             Unit of the readings, such as "um" or "mV", of all or by the name of the sensor.
         speed : str, float or tuple, optional
             "60 Hz" or a float [rad/s] given by hand, or readings with their unit, ``(array, "rpm")``.
-        time_unit : str
-            Unit of the times.
-        start : str or float
-            First instant where a sampling rate is given; a float is in seconds.
+        time_unit, start : str
+            Unit of the times; first instant, also as a float [s], where a sampling rate is given.
 
         Examples
         --------

@@ -129,11 +129,9 @@ def waterfall_page(
         at = f"at {shown(history.largest_time, 'duration', 3)}"
         last = math.nan if settled.contact_from is None else settled.contact_from
         beyond = (history.largest_indentation, "length", history.largest_indentation_interval_90)
-        later = (history.largest_later, "length", history.largest_later_interval_90)
         told = [
             ("Largest displacement", history.largest, "length", history.largest_interval_90, at),
             (BEYOND_GAP, *beyond, ""),
-            ("Largest after 0.2 s", *later, ""),
         ]
         if analysis.signal.recorded:  # a simulation knows its contacts, and need not guess them
             between = (settled.count_interval_90, settled.contact_from_interval_90)
