@@ -627,6 +627,7 @@ LONGEST_VERDICT, LONGEST = 270, 185
 LINES, WIDTH = 16, 100
 """Of a terminal; two more say what was written."""
 MORE = " … (--all)"
+_WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
 MEAN = "mean_force_0p15_0p2_N"
 ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement")
 """What is not shown where the model does not fit: there would be ranges from end to end."""
@@ -679,10 +680,6 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
         verdict=(verdict, *said),
         screen=loads,
     )
-
-
-_WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
-"""Findings without which no model fits, whatever else is measured."""
 
 
 def _lines(one: Statement) -> int:
