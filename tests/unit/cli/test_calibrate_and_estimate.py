@@ -300,17 +300,7 @@ def test_records_that_are_no_drops_are_refused(verb, arguments, message, tmp_pat
     assert not output.exists()
 
 
-def not_a_number(record):
-    signals = record.signals.copy()
-    signals[2200:2300, 2] = np.nan
-    return replace(record, signals=signals)
-
-
 FAULTS = {
-    "NaN": (
-        not_a_number,
-        r"cannot be used: missing samples S_DE_A at 0\.01 s: 100 of 3001 samples are NaN.*export the",
-    ),
     "unit": (
         lambda record: replace(record, signals=1e3 * record.signals),
         r"cannot be used: wrong unit factor S_NDE_A.*span .* × the air gap of 250 µm in lp400\.toml, a drop "
