@@ -20,6 +20,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics import touch
 from rotordrop.physics._compile import Form, inner_kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
+from rotordrop.physics.contact import contact_energy
 from rotordrop.physics.elementary import cube_root
 from rotordrop.physics.spin import race_drag_torque
 from rotordrop.rotor.layout import StateLayout
@@ -48,7 +49,7 @@ from rotordrop.simulate._rhs import race_deflection as deflection_of_race
 from rotordrop.simulate._rhs import race_velocity as velocity_of_race
 from rotordrop.simulate._rhs import rises_with_travel as rises_along
 from rotordrop.simulate._rhs import true_motion as motion_in_bearing
-from rotordrop_bench import departure
+from rotordrop_bench import departure as D
 
 NUMBERS, STATES_AT = L.N_BEARING_COLUMNS, L.N_BEARING_PLACES
 """First column of a departure in a row of ``bearing``; column of ``bearing_at`` of its first state."""
@@ -75,17 +76,17 @@ class _Layout(StateLayout):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        kinds = np.concatenate([self.kinds, np.tile(departure.KINDS, self.n_bearings)])
+        kinds = np.concatenate([self.kinds, np.tile(D.KINDS, self.n_bearings)])
         object.__setattr__(self, "kinds", kinds)
 
     def bearing_at(self) -> Integers:
         """Places of the states of each bearing, shape (B, 10): those of its departure last."""
-        first = self.work_in + 1 + departure.N_STATES * np.arange(self.n_bearings)
+        first = self.work_in + 1 + D.N_STATES * np.arange(self.n_bearings)
         return np.column_stack([super().bearing_at(), first])
 
     def names(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:
         """Name of every state, in order."""
-        count = range(1, departure.N_STATES + 1)
+        count = range(1, D.N_STATES + 1)
         return *super().names(bearings), *(f"departure {one.name} {k}" for one in bearings for k in count)
 
 
@@ -103,7 +104,7 @@ class DepartingModel(DropModel):
         """State, shape (n,), of a centred rotor with all at rest; loose bearings lie in their seats."""
         state, p = super().at_rest(), self.parameters
         for b, bearing in enumerate(self.machine.touchdown_bearings):
-            weight, loose = p.bearing[b, L.RACE_WEIGHT], p.departure[b, departure.LOOSE_WAY]
+            weight, loose = p.bearing[b, L.RACE_WEIGHT], p.departure[b, D.LOOSE_WAY]
             if loose > 0.0:
                 sag = weight / p.bearing[b, L.SUPPORT_STIFFNESS_Y]
                 state[self.layout.race][2 * b + 1] = numbers_of(bearing).seat(weight)[1] - loose - sag
@@ -113,7 +114,7 @@ class DepartingModel(DropModel):
 def departures_in(model: DropModel) -> Array:
     """Departures of all bearings of a model [SI], shape (B, C); (0, C) where it does not depart."""
     p = model.parameters
-    return p.departure if isinstance(p, DepartingParameters) else np.zeros((0, departure.N_COLUMNS))
+    return p.departure if isinstance(p, DepartingParameters) else np.zeros((0, D.N_COLUMNS))
 
 
 def departing(model: DropModel, rows: Array) -> DropModel:
@@ -134,7 +135,7 @@ def departing(model: DropModel, rows: Array) -> DropModel:
 def departing_at(b: int, y: Array, p: KernelParameters) -> tuple[Array, Array]:
     """Numbers and states of what departs at one bearing."""
     first = p.bearing_at[b, STATES_AT]
-    return p.bearing[b, NUMBERS:], y[first : first + departure.N_STATES]
+    return p.bearing[b, NUMBERS:], y[first : first + D.N_STATES]
 
 
 @inner_kernel
@@ -143,14 +144,14 @@ def true_motion(c: int, b: int, y: Array, p: KernelParameters) -> tuple[float, f
     ux, uy, vx, vy = motion_in_bearing(c, b, y, p)
     s, own = departing_at(b, y, p)
     angle, spin = y[p.rotor_at[L.ROTOR_ANGLE]], y[p.rotor_at[L.ROTOR_SPEED]]
-    return departure.against_bore(s, own, angle, spin, ux, uy, vx, vy)
+    return D.against_bore(s, own, angle, spin, ux, uy, vx, vy)
 
 
 @inner_kernel
 def gap_at(t: float, b: int, y: Array, p: KernelParameters) -> float:
     """Air gap that drifts and closes."""
     s, own = departing_at(b, y, p)
-    return departure.gap_now(s, own, t, p.bearing[b, L.AIR_GAP])
+    return D.gap_now(s, own, t, p.bearing[b, L.AIR_GAP])
 
 
 @lean_kernel
@@ -164,9 +165,9 @@ def contact_values(
     row, gap = p.bearing[b], gap_at(t, b, y, p)
     numbers, law = row[L.TOUCH : L.TOUCH_END], row[L.CONTACT : L.CONTACT_END]
     s, own = departing_at(b, y, p)
-    at = departure.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
-    law = s[at : at + departure.LAW_UNTIL] if at >= 0 else law
-    left, omega = departure.friction_left(s, own), y[p.rotor_at[L.ROTOR_SPEED]]
+    at = D.law_at(s, math.sqrt(ux * ux + uy * uy) - gap)
+    law = s[at : at + D.LAW_UNTIL] if at >= 0 else law
+    left, omega = D.friction_left(s, own), y[p.rotor_at[L.ROTOR_SPEED]]
     delta, F_r, F_mu, nx, ny, sliding, lost = touch.touch(numbers, gap, law, ux, uy, vx, vy, omega, omega_i)
     return delta, F_r, left * F_mu, nx, ny, left * sliding, lost
 
@@ -176,7 +177,7 @@ def race_deflection(b: int, y: Array, p: KernelParameters) -> tuple[float, float
     """Deflection in the axes of the balls, which the cage has turned."""
     x, z = deflection_of_race(b, y, p)
     _, own = departing_at(b, y, p)
-    return departure.turned(own[departure.CAGE_ANGLE], x, z)
+    return D.turned(own[D.CAGE_ANGLE], x, z)
 
 
 @inner_kernel
@@ -184,7 +185,7 @@ def race_velocity(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
     """Velocity that is damped: none while the bearing is loose in its seat."""
     x, z = deflection_of_race(b, y, p)
     s, _ = departing_at(b, y, p)
-    held = departure.held_share(s, x, z)
+    held = 0.0 if x * x + z * z < s[D.LOOSE_WAY] * s[D.LOOSE_WAY] else 1.0
     wx, wy = velocity_of_race(b, y, p)
     return held * wx, held * wy
 
@@ -192,7 +193,7 @@ def race_velocity(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
 @inner_kernel
 def rises_with_travel(b: int, p: KernelParameters) -> bool:
     """Not where a thrust presses on the face of the race."""
-    rises: bool = rises_along(b, p) and p.bearing[b, NUMBERS + departure.THRUST] == 0.0
+    rises: bool = rises_along(b, p) and p.bearing[b, NUMBERS + D.THRUST] == 0.0
     return rises
 
 
@@ -200,21 +201,21 @@ def rises_with_travel(b: int, p: KernelParameters) -> bool:
 def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
     """Force of balls by a table, of a pair of rows under a thrust, or of those in a cage that has turned."""
     s, own = departing_at(b, y, p)
-    back = -own[departure.CAGE_ANGLE]
+    back = -own[D.CAGE_ANGLE]
     x, z = race_deflection(b, y, p)
     way = math.sqrt(x * x + z * z)
-    if s[departure.TABLE_SPEEDS] > 0.0:
-        force = departure.from_table(s, departure.TABLE_FORCE, way, y[p.bearing_at[b, L.RACE_SPIN]])
-    elif s[departure.THRUST] > 0.0:
-        force = departure.ring_of_balls(s, way, own[departure.AXIAL + 1])[0]
+    if s[D.TABLE_SPEEDS] > 0.0:
+        force = D.from_table(s, D.TABLE_FORCE, way, y[p.bearing_at[b, L.RACE_SPIN]])
+    elif s[D.THRUST] > 0.0:
+        force = D.ring_of_balls(s, way, own[D.AXIAL + 1])[0]
     else:
         F_x, F_y, by_spin = force_of_balls(b, y, p, work)
         if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
             return F_x, F_y, by_spin
-        F_x, F_y = departure.turned(back, F_x, F_y)
+        F_x, F_y = D.turned(back, F_x, F_y)
         return F_x, F_y, 0.0
     rise = force / max(way, 1e-15)
-    F_x, F_y = departure.turned(back, rise * x, rise * z)
+    F_x, F_y = D.turned(back, rise * x, rise * z)
     return F_x, F_y, 0.0
 
 
@@ -224,11 +225,11 @@ def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, flo
     s, own = departing_at(b, y, p)
     x, z = race_deflection(b, y, p)
     way = math.sqrt(x * x + z * z)
-    if s[departure.TABLE_SPEEDS] > 0.0:
+    if s[D.TABLE_SPEEDS] > 0.0:
         spin = y[p.bearing_at[b, L.RACE_SPIN]]
-        load = max(departure.from_table(s, departure.TABLE_LOAD, way, spin), 0.0)
-    elif s[departure.THRUST] > 0.0:
-        load = departure.hardest_ball(s, way, own[departure.AXIAL + 1])
+        load = max(D.from_table(s, D.TABLE_LOAD, way, spin), 0.0)
+    elif s[D.THRUST] > 0.0:
+        load = D.hardest_ball(s, way, own[D.AXIAL + 1])
     else:
         return loads_of_race(b, y, p)
     return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
@@ -245,28 +246,28 @@ def add_departing_thrust(
     n_q, r, spin = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
     s, own = departing_at(b, y, p)
     _, rates = departing_at(b, dy, p)
-    row, shape, at = p.bearing[b], p.bearing_shape[b], departure.AXIAL
-    if s[departure.THRUST] == 0.0:
+    row, shape, at = p.bearing[b], p.bearing_shape[b], D.AXIAL
+    if s[D.THRUST] == 0.0:
         rates[at : at + 4] = 0.0
         return 0.0, 0.0, 0.0, 0.0, 0.0
     _, _, sx, sy = modal_parts(y, p)
     _, _, ax, ay = modal_parts(dy, p)
     vx, vy = project(shape, sx) - y[n_q + r], project(shape, sy) - y[n_q + r + 1]
     slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[spin]
-    push, F_x, F_y, torque, sliding, lost = departure.landed(s, own, vx, vy, slip)
+    push, F_x, F_y, torque, sliding, lost = D.landed(s, own, vx, vy, slip)
     for k in range(shape.shape[0]):
         ax[k] -= shape[k] * F_x
         ay[k] -= shape[k] * F_y
     dy[n_q + r] += F_x / row[L.RACE_MASS]
     dy[n_q + r + 1] += F_y / row[L.RACE_MASS]
     x, z = race_deflection(b, y, p)
-    held = departure.ring_of_balls(s, math.sqrt(x * x + z * z), own[at + 1])[1]
+    held = D.ring_of_balls(s, math.sqrt(x * x + z * z), own[at + 1])[1]
     drag = race_drag_torque(
         abs(held), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
     )
     dy[spin] += (torque - drag) / row[L.RACE_INERTIA]
-    thrust = 0.0 if t < p.spin[L.POWER_OFF_DELAY] else s[departure.THRUST]
-    damped = s[departure.ALONG] * row[L.BEARING_DAMPING] * own[at + 3]
+    thrust = 0.0 if t < p.spin[L.POWER_OFF_DELAY] else s[D.THRUST]
+    damped = s[D.ALONG] * row[L.BEARING_DAMPING] * own[at + 3]
     rates[at], rates[at + 1] = own[at + 2], own[at + 3]
     rates[at + 2] = (thrust - push) / p.spin[L.ROTOR_MASS]
     rates[at + 3] = (push - held - damped) / row[L.RACE_MASS]
@@ -275,74 +276,91 @@ def add_departing_thrust(
 
 
 @lean_kernel
-def add_tilt(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
-    """Rates of the tilt of a race under the contact force that ``dy`` holds so far; power it takes [W]."""
-    race = p.rotor_at[L.N_COORDINATES] + p.bearing_at[b, L.RACE]
-    s, own = departing_at(b, y, p)
-    _, rates = departing_at(b, dy, p)
-    lost: float = departure.mode_rates(
-        s[departure.TILT_MODE : departure.TILT_MODE + departure.MODE_WIDTH],
-        dy[race],
-        dy[race + 1],
-        own[departure.TILT : departure.TILT + 4],
-        rates[departure.TILT : departure.TILT + 4],
-    )
-    return lost
-
-
-@lean_kernel
 def sleeve_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     """Torque on the rotor [N m] of the contact force that ``dy`` holds so far, beside that of friction.
 
-    Source: virtual work of `departure.sleeve`.
+    Source: virtual work of `D.sleeve`.
     """
     s, own = departing_at(b, y, p)
-    if s[departure.SLEEVE_OFF] == 0.0 and s[departure.SLEEVE_OVAL] == 0.0:
+    if s[D.SLEEVE_OFF] == 0.0 and s[D.SLEEVE_OVAL] == 0.0:
         return 0.0
     body = p.contact_at[p.bearing_at[b, L.CONTACTS], L.CONTACT_BODY]
     qx, qy, _sx, _sy = modal_parts(y, p)
-    x = project(p.bearing_shape[b], qx) - y[body] - own[departure.TILT] - s[departure.CENTRE_X]
-    z = project(p.bearing_shape[b], qy) - y[body + 1] - own[departure.TILT + 1] - s[departure.CENTRE_Y]
-    _x, _z, by_x, by_z = departure.sleeve(s, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
+    x = project(p.bearing_shape[b], qx) - y[body] - own[D.TILT] - s[D.CENTRE_X]
+    z = project(p.bearing_shape[b], qy) - y[body + 1] - own[D.TILT + 1] - s[D.CENTRE_Y]
+    _x, _z, by_x, by_z = D.sleeve(s, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
     at = p.rotor_at[L.N_COORDINATES] + body
     torque: float = -by_x * dy[at] - by_z * dy[at + 1]
     return torque
 
 
 @lean_kernel
-def add_departing_support(
-    b: int, F_x: float, F_y: float, sliding: float, y: Array, p: KernelParameters, dy: Array
+def add_mode(
+    b: int, mode: int, first: int, F_x: float, F_y: float, y: Array, p: KernelParameters, dy: Array
 ) -> float:
-    """Rates of a support that departs, its foundation, the heat of sliding and the cage; power lost [W].
+    """Rates of foundation or tilt, by first column and state, under a force [N]; power it takes [W].
 
-    ``F_x, F_y`` is the force on the support [N], ``sliding`` the heat of friction [W].
+    Source: a mode that the force drives, ``u'' = F/M - ω² u - 2ζω u'``.
     """
-    n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
-    row = p.bearing[b]
     s, own = departing_at(b, y, p)
     _, rates = departing_at(b, dy, p)
-    k_x, k_y, c_x, c_y, lost = departure.support_force(
-        s,
-        own,
-        rates,
-        row[L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1],
-        row[L.SUPPORT_DAMPING_X : L.SUPPORT_DAMPING_Y + 1],
-        y[h],
-        y[h + 1],
-        y[n_q + h],
-        y[n_q + h + 1],
-    )
+    compliance, lost = s[mode + D.COMPLIANCE], 0.0
+    for axis in range(2):
+        force = F_x if axis == 0 else F_y
+        u, v = own[first + axis], own[first + 2 + axis]
+        brake = s[mode + D.DECAY_X + axis] * v
+        rates[first + axis] = v
+        rates[first + 2 + axis] = compliance * force - s[mode + D.SQUARE_X + axis] * u - brake
+        lost += brake * v
+    return lost / compliance if compliance > 0.0 else 0.0
+
+
+@lean_kernel
+def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, dy: Array) -> float:
+    """Rates of a support that departs, and of its foundation, under a force [N]; power that they take [W].
+
+    Source: principal axes turned by an angle; ``K h (1 + k h²)`` along each, or the gradient of
+    ``(1 + k h²/2)`` times the energy of the linear springs, with h the whole deflection; slip of a bristle of
+    Dahl 1968, ``z' = (v - |v| z) / travel``; a stop of spring and dashpot that do not pull. Not validated.
+    """
+    n_q, h, row = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing[b]
+    s, own = departing_at(b, y, p)
+    _, rates = departing_at(b, dy, p)
+    x, z = y[h] - own[D.FOUNDATION], y[h + 1] - own[D.FOUNDATION + 1]
+    vx, vz = y[n_q + h] - own[D.FOUNDATION + 2], y[n_q + h + 1] - own[D.FOUNDATION + 3]
+    cosine, sine, k = s[D.AXIS_COSINE], s[D.AXIS_SINE], s[D.HARDENING]
+    along, across = cosine * x + sine * z, cosine * z - sine * x
+    first, second = row[L.SUPPORT_STIFFNESS_X] * along, row[L.SUPPORT_STIFFNESS_Y] * across
+    if s[D.RADIAL] == 0.0:
+        first *= 1.0 + k * along * along
+        second *= 1.0 + k * across * across
+    else:  # no force without a potential
+        share = 1.0 + 0.5 * k * (along * along + across * across)
+        pull = 0.5 * k * (first * along + second * across)
+        first, second = first * share + pull * along, second * share + pull * across
+    damp_first = row[L.SUPPORT_DAMPING_X] * (cosine * vx + sine * vz)
+    damp_second = row[L.SUPPORT_DAMPING_Y] * (cosine * vz - sine * vx)
+    c_x, c_y = cosine * damp_first - sine * damp_second, cosine * damp_second + sine * damp_first
+    speed, slip = math.sqrt(vx * vx + vz * vz), s[D.SLIP_FORCE]
+    slip_x, slip_y = own[D.SLIP_X], own[D.SLIP_Y]
+    rates[D.SLIP_X] = (vx - speed * slip_x) / s[D.SLIP_TRAVEL]
+    rates[D.SLIP_Y] = (vz - speed * slip_y) / s[D.SLIP_TRAVEL]
+    lost = c_x * vx + c_y * vz + slip * speed * (slip_x * slip_x + slip_y * slip_y)
+    stop_x = stop_y = 0.0
+    way = math.sqrt(x * x + z * z)
+    depth = way - s[D.STOP_GAP]
+    by_stop = 0.0
+    if s[D.STOP_STIFFNESS] != 0.0 and depth > 0.0:
+        rate, elastic = (x * vx + z * vz) / way, s[D.STOP_STIFFNESS] * depth
+        force = max(elastic + s[D.STOP_DAMPING] * rate, 0.0)
+        stop_x, stop_y, by_stop = force * x / way, force * z / way, (force - elastic) * rate
+    held_x, held_y, by_ribbon = D.ribbon_force(s, own, rates, vx, vz)
+    k_x = cosine * first - sine * second + slip * slip_x + stop_x + held_x
+    k_y = cosine * second + sine * first + slip * slip_y + stop_y + held_y
     dy[n_q + h] = (F_x - c_x - k_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] = (F_y - c_y - k_y) / row[L.SUPPORT_MASS_Y]
-    rates[departure.HEAT] = sliding
-    rates[departure.CAGE_ANGLE] = s[departure.CAGE_RATIO] * y[p.bearing_at[b, L.RACE_SPIN]]
-    return lost + departure.mode_rates(
-        s[departure.FOUNDATION_MODE : departure.FOUNDATION_MODE + departure.MODE_WIDTH],
-        k_x + c_x,
-        k_y + c_y,
-        own[departure.FOUNDATION : departure.FOUNDATION + 4],
-        rates[departure.FOUNDATION : departure.FOUNDATION + 4],
-    )
+    by_foundation = add_mode(b, D.FOUNDATION_MODE, D.FOUNDATION, k_x + c_x, k_y + c_y, y, p, dy)
+    return lost + by_stop + by_ribbon + by_foundation
 
 
 @lean_kernel
@@ -351,28 +369,31 @@ def bearing_accelerations(
 ) -> tuple[float, float]:
     """Forces at one bearing whose race tilts and is pushed along, and whose support departs."""
     n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
+    r, spin = n_q + p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
+    s, _ = departing_at(b, y, p)
+    _, rates = departing_at(b, dy, p)
     friction = sliding = lost = 0.0
     for c in range(p.bearing_at[b, L.CONTACTS], p.bearing_at[b, L.CONTACTS_END]):
         force, by_sliding, by_law = add_contact(t, c, b, y, p, dy)
         friction += force
         sliding += by_sliding
         lost += by_law
-    F_x, F_y, by_balls, by_drag = 0.0, 0.0, 0.0, 0.0
-    by_tilt, by_sleeve = add_tilt(b, y, p, dy), sleeve_torque(b, y, p, dy)
+    F_x, F_y, by_balls, by_drag, by_fit = 0.0, 0.0, 0.0, 0.0, 0.0
+    by_tilt = add_mode(b, D.TILT_MODE, D.TILT, dy[r], dy[r + 1], y, p, dy)
+    by_sleeve = sleeve_torque(b, y, p, dy)
     if p.bearing[b, L.NOT_ROUND] != 0.0:
         by_sleeve += landing_torque(b, y, p, dy)
     if p.bearing_at[b, L.RACE] >= 0:
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
-        dy[p.bearing_at[b, L.RACE_SPIN]] = 0.0
+        dy[spin] = 0.0
     by_face, rubbed, by_landing, by_moving, by_rolling = add_departing_thrust(t, b, y, p, dy)
     by_balls += by_moving
-    by_fit = 0.0
     if p.bearing_at[b, L.RING_STATES] >= 0:
         by_rings, by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls)
         by_balls += by_rings
-    F_x, F_y = F_x + dy[n_q + h], F_y + dy[n_q + h + 1]
-    by_support = by_tilt + add_departing_support(b, F_x, F_y, sliding, y, p, dy) + by_fit
+    rates[D.HEAT], rates[D.CAGE_ANGLE] = sliding, s[D.CAGE_RATIO] * y[spin]
+    by_support = by_tilt + add_support(b, F_x + dy[n_q + h], F_y + dy[n_q + h + 1], y, p, dy) + by_fit
     power = work.power[b]
     sliding, lost, by_drag = sliding + rubbed, lost + by_landing, by_drag + by_rolling
     power[SLIDING], power[IN_CONTACT] = sliding, lost
@@ -398,28 +419,65 @@ def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
     s, own = departing_at(b, y, p)
     x, z = race_deflection(b, y, p)
     way = math.sqrt(x * x + z * z)
-    if s[departure.TABLE_SPEEDS] > 0.0:
-        return departure.table_energy(s, way, y[p.bearing_at[b, L.RACE_SPIN]])
-    if s[departure.THRUST] > 0.0:
-        pressed: float = departure.ring_of_balls(s, way, own[departure.AXIAL + 1])[2]
-        return pressed + departure.axial_energy(s, own, p.spin[L.ROTOR_MASS], p.bearing[b, L.RACE_MASS])
+    if s[D.TABLE_SPEEDS] > 0.0:
+        spin, steps, energy = y[p.bearing_at[b, L.RACE_SPIN]], 64, 0.0
+        for k in range(steps + 1):  # Simpson's rule on the force
+            weight = 1.0 if k in (0, steps) else (4.0 if k % 2 == 1 else 2.0)
+            energy += weight * D.from_table(s, D.TABLE_FORCE, way * k / steps, spin)
+        return energy * way / (3.0 * steps)
+    if s[D.THRUST] > 0.0:
+        rotor, race, v_rotor, v_race = own[D.AXIAL], own[D.AXIAL + 1], own[D.AXIAL + 2], own[D.AXIAL + 3]
+        depth = max(rotor - race - s[D.FACE_GAP], 0.0)
+        energy = p.spin[L.ROTOR_MASS] * v_rotor**2 + p.bearing[b, L.RACE_MASS] * v_race**2
+        energy += s[D.FACE_STIFFNESS] * depth * depth
+        return float(D.ring_of_balls(s, way, race)[2] + 0.5 * energy)
     return energy_of_balls(b, y, p)
 
 
 @lean_kernel
 def touch_energy(b: int, delta: float, p: KernelParameters) -> float:
-    """Energy in a contact with a law of its own."""
+    """Energy in a contact, piece by piece where its law has pieces."""
     row = p.bearing[b]
-    law = row[L.CONTACT : L.CONTACT_END]
-    return departure.energy_in_contact(row[NUMBERS:], law, delta) if delta > 0.0 else 0.0
+    pieces, energy, low = int(row[NUMBERS + D.LAW_PIECES]), 0.0, 0.0
+    if delta > 0.0 and pieces == 0:
+        return contact_energy(row[L.CONTACT : L.CONTACT_END], delta)
+    for i in range(pieces if delta > 0.0 else 0):
+        at = NUMBERS + D.LAW + i * D.LAW_WIDTH
+        piece = row[at : at + D.LAW_UNTIL]
+        high = delta if i == pieces - 1 else min(delta, row[at + D.LAW_UNTIL])
+        energy += contact_energy(piece, high) - (contact_energy(piece, low) if low > 0.0 else 0.0)
+        if high == delta:
+            break
+        low = high
+    return energy
 
 
 @lean_kernel
 def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
     """Energy of a support that departs, of foundation and tilt."""
     s, own = departing_at(b, y, p)
-    h, springs = p.bearing_at[b, L.SUPPORT], p.bearing[b, L.SUPPORT_STIFFNESS_X : L.SUPPORT_STIFFNESS_Y + 1]
-    return departure.stored_energy(s, own, springs, y[h], y[h + 1])
+    h, row = p.bearing_at[b, L.SUPPORT], p.bearing[b]
+    x, z = y[h] - own[D.FOUNDATION], y[h + 1] - own[D.FOUNDATION + 1]
+    cosine, sine, k = s[D.AXIS_COSINE], s[D.AXIS_SINE], s[D.HARDENING]
+    along, across = cosine * x + sine * z, cosine * z - sine * x
+    first, second = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
+    first, second = 0.5 * first * along * along, 0.5 * second * across * across
+    if s[D.RADIAL] > 0.0:
+        energy = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
+    else:
+        energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
+    depth = max(math.sqrt(x * x + z * z) - s[D.STOP_GAP], 0.0)
+    energy += 0.5 * s[D.STOP_STIFFNESS] * depth * depth
+    for i in range(D.STRETCH, D.AXIAL):
+        energy += 0.5 * s[D.RIBBON_STIFFNESS] / D.YIELDS.shape[0] * own[i] * own[i]
+    energy += 0.5 * s[D.SLIP_FORCE] * s[D.SLIP_TRAVEL] * (own[D.SLIP_X] ** 2 + own[D.SLIP_Y] ** 2)
+    for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
+        stored = 0.0
+        for axis in range(2):
+            stored += s[mode + D.SQUARE_X + axis] * own[place + axis] ** 2 + own[place + 2 + axis] ** 2
+        if s[mode + D.COMPLIANCE] > 0.0:
+            energy += 0.5 * stored / s[mode + D.COMPLIANCE]
+    return energy
 
 
 PARTS = (

@@ -15,7 +15,6 @@ from rotordrop.arrays import Array
 from rotordrop.physics import columns as L
 from rotordrop.physics import contact
 from rotordrop.physics._compile import inner_kernel, lean_kernel
-from rotordrop.physics.contact import contact_energy
 from rotordrop.physics.elementary import exp, sine_cosine
 
 # Columns of a departure, one row per bearing; SI units.
@@ -161,27 +160,6 @@ def law_at(s: Array, delta: float) -> int:
 
 
 @lean_kernel
-def energy_in_contact(s: Array, law: Array, delta: float) -> float:
-    """Energy [J] of the contact at a positive indentation [m], piece by piece where its law has pieces.
-
-    Source: integral of `law_at`.
-    """
-    pieces = int(s[LAW_PIECES])
-    if pieces == 0:
-        return contact_energy(law, delta)
-    energy, low = 0.0, 0.0
-    for i in range(pieces):
-        at = LAW + i * LAW_WIDTH
-        piece = s[at : at + LAW_UNTIL]
-        high = delta if i == pieces - 1 else min(delta, s[at + LAW_UNTIL])
-        energy += contact_energy(piece, high) - (contact_energy(piece, low) if low > 0.0 else 0.0)
-        if high == delta:
-            break
-        low = high
-    return energy
-
-
-@lean_kernel
 def turned(angle: float, x: float, y: float) -> tuple[float, float]:
     """A vector in axes turned by an angle [rad]; in its own unit.
 
@@ -189,87 +167,6 @@ def turned(angle: float, x: float, y: float) -> tuple[float, float]:
     """
     sine, cosine = sine_cosine(angle)
     return cosine * x + sine * y, cosine * y - sine * x
-
-
-@lean_kernel
-def support_force(
-    s: Array,
-    own: Array,
-    rates: Array,
-    springs: Array,
-    dampers: Array,
-    x: float,
-    y: float,
-    vx: float,
-    vy: float,
-) -> tuple[float, float, float, float, float]:
-    """Forces of a departing support [N] at a deflection [m] and its rate [m/s], and the power it takes [W].
-
-    Parameters
-    ----------
-    s, own, rates : ndarray
-        Departure [SI], its states and their rates, of which those of the slip are filled [1/s].
-    springs, dampers : ndarray, shape (2,)
-        Stiffness [N/m] and damping [N s/m] along the first axis and across.
-    x, y, vx, vy : float
-        Displacement [m] and velocity [m/s] of the support.
-
-    Returns
-    -------
-    tuple of float
-        Force of the springs, slip included, and of the dampers along x and y [N]; power lost [W].
-
-    Notes
-    -----
-    Source: principal axes turned by an angle; ``K h (1 + k h²)`` along each, or the gradient of
-    ``(1 + k h²/2)`` times the energy of the linear springs, with h the whole deflection; slip of a bristle of
-    Dahl 1968, ``z' = (v - |v| z) / travel``. Not validated.
-    """
-    x, y, vx, vy = x - own[0], y - own[1], vx - own[2], vy - own[3]
-    c, z = s[AXIS_COSINE], s[AXIS_SINE]
-    along = c * x + z * y
-    across = c * y - z * x
-    first, second = springs[0] * along, springs[1] * across
-    k = s[HARDENING]
-    if s[RADIAL] == 0.0:
-        first *= 1.0 + k * along * along
-        second *= 1.0 + k * across * across
-    else:  # no force without a potential
-        share = 1.0 + 0.5 * k * (along * along + across * across)
-        pull = 0.5 * k * (first * along + second * across)
-        first = first * share + pull * along
-        second = second * share + pull * across
-    damp_first = dampers[0] * (c * vx + z * vy)
-    damp_second = dampers[1] * (c * vy - z * vx)
-    damp_x = c * damp_first - z * damp_second
-    damp_y = c * damp_second + z * damp_first
-    speed = math.sqrt(vx * vx + vy * vy)
-    zx, zy = own[SLIP_X], own[SLIP_Y]
-    rates[SLIP_X] = (vx - speed * zx) / s[SLIP_TRAVEL]
-    rates[SLIP_Y] = (vy - speed * zy) / s[SLIP_TRAVEL]
-    slip = s[SLIP_FORCE]
-    lost = damp_x * vx + damp_y * vy + slip * speed * (zx * zx + zy * zy)
-    stop_x, stop_y, by_stop = stop_force(s, x, y, vx, vy)
-    held_x, held_y, by_ribbon = ribbon_force(s, own, rates, vx, vy)
-    F_x = c * first - z * second + slip * zx + stop_x + held_x
-    F_y = c * second + z * first + slip * zy + stop_y + held_y
-    return F_x, F_y, damp_x, damp_y, lost + by_stop + by_ribbon
-
-
-@lean_kernel
-def stop_force(s: Array, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
-    """Force of a stop [N] on a support moved by (x, y) [m] at a rate [m/s], and the power it takes [W].
-
-    Source: spring and dashpot in parallel (Kelvin and Voigt) beyond a gap, which do not pull.
-    """
-    h = math.sqrt(x * x + y * y)
-    depth = h - s[STOP_GAP]
-    if s[STOP_STIFFNESS] == 0.0 or depth <= 0.0:
-        return 0.0, 0.0, 0.0
-    rate = (x * vx + y * vy) / h
-    elastic = s[STOP_STIFFNESS] * depth
-    force = max(elastic + s[STOP_DAMPING] * rate, 0.0)
-    return force * x / h, force * y / h, (force - elastic) * rate
 
 
 @lean_kernel
@@ -324,26 +221,6 @@ def from_table(s: Array, what: int, way: float, spin: float) -> float:
 
 
 @lean_kernel
-def held_share(s: Array, x: float, y: float) -> float:
-    """Share of the damping of the balls that acts on a race moved by (x, y) [m]: none while it is loose.
-
-    Source: a bearing that its seat does not press moves freely in it.
-    """
-    return 0.0 if x * x + y * y < s[LOOSE_WAY] * s[LOOSE_WAY] else 1.0
-
-
-@lean_kernel
-def table_energy(s: Array, way: float, spin: float) -> float:
-    """Energy [J] of a race deflected by a way [m] at a spin [rad/s]. Source: Simpson's rule on the force."""
-    steps = 64
-    energy = 0.0
-    for k in range(steps + 1):
-        weight = 1.0 if k in (0, steps) else (4.0 if k % 2 == 1 else 2.0)
-        energy += weight * from_table(s, TABLE_FORCE, way * k / steps, spin)
-    return energy * way / (3.0 * steps)
-
-
-@lean_kernel
 def ring_of_balls(s: Array, way: float, along: float) -> tuple[float, float, float]:
     """Radial and axial force [N] and energy [J] of a pair of rows whose race has moved by (way, along) [m].
 
@@ -377,16 +254,6 @@ def hardest_ball(s: Array, way: float, along: float) -> float:
 
 
 @lean_kernel
-def face_depth(s: Array, own: Array) -> float:
-    """How deep the shoulder stands in the face of the race [m]; negative before it lands.
-
-    Source: definition.
-    """
-    depth: float = own[AXIAL] - own[AXIAL + 1] - s[FACE_GAP]
-    return depth
-
-
-@lean_kernel
 def landed(
     s: Array, own: Array, vx: float, vy: float, slip: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -396,7 +263,7 @@ def landed(
     powers that sliding and the face take [W] come last. Source: spring and dashpot in parallel (Kelvin and
     Voigt) that do not pull; Coulomb's friction at points of a ring.
     """
-    depth = face_depth(s, own)
+    depth = own[AXIAL] - own[AXIAL + 1] - s[FACE_GAP]
     if depth <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     elastic, rate = s[FACE_STIFFNESS] * depth, own[AXIAL + 2] - own[AXIAL + 3]
@@ -411,74 +278,3 @@ def landed(
         torque += pull * s[FACE_ARM] * (ty * cosine - tx * sine)
         sliding += pull * (tx * tx + ty * ty)
     return push, F_x, F_y, torque, sliding, (push - elastic) * rate
-
-
-@lean_kernel
-def axial_energy(s: Array, own: Array, rotor_mass: float, race_mass: float) -> float:
-    """Energy [J] of the axial motion of rotor and race, of masses [kg], and of the face between them.
-
-    Source: integral of `landed`.
-    """
-    depth = max(face_depth(s, own), 0.0)
-    energy: float = rotor_mass * own[AXIAL + 2] ** 2 + race_mass * own[AXIAL + 3] ** 2
-    energy += s[FACE_STIFFNESS] * depth * depth
-    return 0.5 * energy
-
-
-@lean_kernel
-def mode_rates(mode: Array, force_x: float, force_y: float, own: Array, rates: Array) -> float:
-    """Fill the rates of foundation or tilt, (4,), under a force [N]; returns the power that it takes [W].
-
-    ``mode`` (5,) as in the columns. Source: a mode that the force drives, ``u'' = F/M - ω² u - 2ζω u'``.
-    """
-    lost = 0.0
-    for axis in range(2):
-        force = force_x if axis == 0 else force_y
-        u, v = own[axis], own[2 + axis]
-        brake = mode[DECAY_X + axis] * v
-        rates[axis] = v
-        rates[2 + axis] = mode[COMPLIANCE] * force - mode[SQUARE_X + axis] * u - brake
-        lost += brake * v
-    power: float = lost / mode[COMPLIANCE] if mode[COMPLIANCE] > 0.0 else 0.0
-    return power
-
-
-@lean_kernel
-def mode_energy(mode: Array, own: Array) -> float:
-    """Energy [J] of foundation or tilt in its displacement and velocity (4,).
-
-    Source: integral of `mode_rates`.
-    """
-    if mode[COMPLIANCE] == 0.0:
-        return 0.0
-    energy = 0.0
-    for axis in range(2):
-        energy += mode[SQUARE_X + axis] * own[axis] ** 2 + own[2 + axis] ** 2
-    stored: float = 0.5 * energy / mode[COMPLIANCE]
-    return stored
-
-
-@lean_kernel
-def stored_energy(s: Array, own: Array, springs: Array, x: float, y: float) -> float:
-    """Energy [J] of a departing support at a displacement [m], of its slip, of foundation and tilt.
-
-    ``springs`` (2,) as in `support_force`. Source: integral of `support_force` and `mode_rates`.
-    """
-    x, y = x - own[0], y - own[1]
-    c, z, k = s[AXIS_COSINE], s[AXIS_SINE], s[HARDENING]
-    along, across = c * x + z * y, c * y - z * x
-    first, second = 0.5 * springs[0] * along * along, 0.5 * springs[1] * across * across
-    if s[RADIAL] > 0.0:
-        energy = (first + second) * (1.0 + 0.5 * k * (x * x + y * y))
-    else:
-        energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
-    depth = math.sqrt(x * x + y * y) - s[STOP_GAP]
-    if depth > 0.0:
-        energy += 0.5 * s[STOP_STIFFNESS] * depth * depth
-    for i in range(STRETCH, AXIAL):
-        energy += 0.5 * s[RIBBON_STIFFNESS] / YIELDS.shape[0] * own[i] * own[i]
-    energy += 0.5 * s[SLIP_FORCE] * s[SLIP_TRAVEL] * (own[SLIP_X] ** 2 + own[SLIP_Y] ** 2)
-    energy += mode_energy(s[FOUNDATION_MODE : FOUNDATION_MODE + MODE_WIDTH], own[FOUNDATION : FOUNDATION + 4])
-    energy += mode_energy(s[TILT_MODE : TILT_MODE + MODE_WIDTH], own[TILT : TILT + 4])
-    stored: float = energy
-    return stored
