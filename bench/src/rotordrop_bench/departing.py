@@ -15,7 +15,6 @@ import numpy as np
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
-from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics import touch
 from rotordrop.physics._compile import Form, inner_kernel, lean_kernel
@@ -94,11 +93,6 @@ class DepartingModel(DropModel):
     """A model whose bearings depart from it."""
 
     parameters: DepartingParameters
-
-    def with_machine(self, machine: Machine) -> DropModel:
-        """The same model, which departs in the same way, of a machine with other bearings or values."""
-        rows = self.parameters.departure
-        return departing(departing(self, rows[:0]).with_machine(machine), rows)
 
     def at_rest(self) -> Array:
         """State, shape (n,), of a centred rotor with all at rest; loose bearings lie in their seats."""
@@ -312,7 +306,8 @@ def add_mode(
         rates[first + axis] = v
         rates[first + 2 + axis] = compliance * force - s[mode + D.SQUARE_X + axis] * u - brake
         lost += brake * v
-    return lost / compliance if compliance > 0.0 else 0.0
+    power: float = lost / compliance if compliance > 0.0 else 0.0
+    return power
 
 
 @lean_kernel
@@ -360,7 +355,8 @@ def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, d
     dy[n_q + h] = (F_x - c_x - k_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] = (F_y - c_y - k_y) / row[L.SUPPORT_MASS_Y]
     by_foundation = add_mode(b, D.FOUNDATION_MODE, D.FOUNDATION, k_x + c_x, k_y + c_y, y, p, dy)
-    return lost + by_stop + by_ribbon + by_foundation
+    total: float = lost + by_stop + by_ribbon + by_foundation
+    return total
 
 
 @lean_kernel
@@ -463,7 +459,7 @@ def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
     first, second = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
     first, second = 0.5 * first * along * along, 0.5 * second * across * across
     if s[D.RADIAL] > 0.0:
-        energy = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
+        energy: float = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
     else:
         energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
     depth = max(math.sqrt(x * x + z * z) - s[D.STOP_GAP], 0.0)
