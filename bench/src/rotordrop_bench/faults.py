@@ -103,31 +103,25 @@ def _block(count: int, value: float | None, which: str = "one") -> Spoil:
     return _readings(change)
 
 
-def _each(make: Callable[[Array, Record, Random], Array], which: str = "all") -> Spoil:
-    """Change the readings (N, C) of some channels."""
+def _each(make: Callable[..., Array], which: str = "all", **how: Any) -> Spoil:
+    """Change the readings (N, C) of some channels by a function of readings, record, generator and how."""
 
     def change(s: Array, record: Record, random: Random) -> None:
         columns = _columns(record, random, which)
-        s[:, columns] = make(s[:, columns], record, random)
+        s[:, columns] = make(s[:, columns], record, random, **how)
 
     return _readings(change)
 
 
-def _clipped(share: float, noise: float) -> Spoil:
-    def make(s: Array, record: Record, random: Random) -> Array:
-        level = np.mean(s[record.time < -0.02], axis=0)
-        reach = share * np.max(np.abs(s - level), axis=0)
-        return np.clip(s, level - reach, level + reach) + random.normal(0.0, noise, s.shape)
-
-    return _each(make)
+def _clipped(s: Array, record: Record, random: Random, share: float, noise: float = 0.0) -> Array:
+    level = np.mean(s[record.time < -0.02], axis=0)
+    reach = share * np.max(np.abs(s - level), axis=0)
+    return np.clip(s, level - reach, level + reach) + random.normal(0.0, noise, s.shape)
 
 
-def _saturated(level: float) -> Spoil:
-    def make(s: Array, record: Record, random: Random) -> Array:
-        limit = level * float(np.max(np.abs(s)))
-        return limit * np.tanh(s / limit)
-
-    return _each(make)
+def _saturated(s: Array, record: Record, random: Random, level: float) -> Array:
+    limit = level * float(np.max(np.abs(s)))
+    return limit * np.tanh(s / limit)
 
 
 def _spikes(count: int, size: float) -> Spoil:
@@ -138,33 +132,29 @@ def _spikes(count: int, size: float) -> Spoil:
     return _readings(change)
 
 
-def _low_pass(corner: float) -> Spoil:
-    def make(s: Array, record: Record, random: Random) -> Array:
-        level = np.mean(s[:200], axis=0)
-        sections = butter(2, corner, fs=record.sampling_rate, output="sos")
-        return np.asarray(level + sosfilt(sections, s - level, axis=0))
-
-    return _each(make)
+def _low_pass(s: Array, record: Record, random: Random, corner: float) -> Array:
+    level = np.mean(s[:200], axis=0)
+    sections = butter(2, corner, fs=record.sampling_rate, output="sos")
+    return np.asarray(level + sosfilt(sections, s - level, axis=0))
 
 
-def _coupled(corner: float) -> Spoil:
-    def make(s: Array, record: Record, random: Random) -> Array:
-        upper, lower = butter(1, corner, btype="high", fs=record.sampling_rate)
-        return np.asarray(lfilter(upper, lower, s - np.mean(s[:50], axis=0), axis=0))
-
-    return _each(make)
+def _coupled(s: Array, record: Record, random: Random, corner: float) -> Array:
+    upper, lower = butter(1, corner, btype="high", fs=record.sampling_rate)
+    return np.asarray(lfilter(upper, lower, s - np.mean(s[:50], axis=0), axis=0))
 
 
 def _added(
-    which: str, drift: float = 0.0, noise: float = 0.0, hum: tuple[float, float] = (0.0, 0.0)
-) -> Spoil:
+    s: Array,
+    record: Record,
+    random: Random,
+    drift: float = 0.0,
+    noise: float = 0.0,
+    hum: float = 0.0,
+    at: float = 0.0,
+) -> Array:
     """Drift [m/s], noise [m rms], hum of a size [m] and frequency [Hz]."""
-
-    def make(s: Array, record: Record, random: Random) -> Array:
-        slow = drift * (record.time - record.time[0]) + hum[0] * np.sin(2 * np.pi * hum[1] * record.time)
-        return np.asarray(s + slow[:, None] + random.normal(0.0, noise, s.shape))
-
-    return _each(make, which)
+    slow = drift * (record.time - record.time[0]) + hum * np.sin(2 * np.pi * at * record.time)
+    return np.asarray(s + slow[:, None] + random.normal(0.0, noise, s.shape))
 
 
 def _lost(lasts: float, since: float = 0.0, until: float = 0.2) -> Spoil:
@@ -186,12 +176,12 @@ def _twice(s: Array, record: Record, random: Random) -> Array:
     return np.vstack([s[: at + count], s[at:-count]])
 
 
-def _clock(change: Callable[[Array, Record, Random], Array], rate: float = 1.0) -> Spoil:
+def _clock(change: Callable[..., Array], rate: float = 1.0, **how: Any) -> Spoil:
     """Change the times of the readings, and the rate by a factor; the speed keeps to the new clock."""
 
     def spoil(record: Record, machine: Machine, random: Random) -> tuple[Record, Machine]:
         assert record.speed_time is not None
-        time = change(record.time.copy(), record, random)
+        time = change(record.time.copy(), record, random, **how)
         moved = np.interp(record.speed_time, record.time, time)
         rated = record.sampling_rate * rate
         return replace(record, time=time, sampling_rate=rated, speed_time=moved), machine
@@ -203,12 +193,9 @@ def _faster(factor: float) -> Spoil:
     return _clock(lambda t, r, _: t[0] + (t - t[0]) / factor, factor)
 
 
-def _stepped(samples: int) -> Spoil:
-    def change(time: Array, record: Record, random: Random) -> Array:
-        time[_place(record, random, 10) :] += samples / record.sampling_rate
-        return time
-
-    return _clock(change)
+def _stepped(time: Array, record: Record, random: Random, samples: int) -> Array:
+    time[_place(record, random, 10) :] += samples / record.sampling_rate
+    return time
 
 
 def _uneven(time: Array, record: Record, random: Random) -> Array:
@@ -332,25 +319,25 @@ SIZED: dict[str, Spoil] = {
     "4 zeros in one channel": _block(4, 0.0),
     "512 zeros in one channel": _block(512, 0.0),
     "64 zeros in all": _block(64, 0.0, "all"),
-    "clipped at 80 %": _clipped(0.8, 0.0),
-    "clipped at 50 %": _clipped(0.5, 0.0),
-    "clipped at 70 %, 0.2 µm noise": _clipped(0.7, 0.2e-6),
-    "saturates softly at 1.0 × the largest": _saturated(1.0),
-    "saturates softly at 1.5 × the largest": _saturated(1.5),
+    "clipped at 80 %": _each(_clipped, share=0.8),
+    "clipped at 50 %": _each(_clipped, share=0.5),
+    "clipped at 70 %, 0.2 µm noise": _each(_clipped, share=0.7, noise=0.2e-6),
+    "saturates softly at 1.0 × the largest": _each(_saturated, level=1.0),
+    "saturates softly at 1.5 × the largest": _each(_saturated, level=1.5),
     "1 spike of 100 µm": _spikes(1, 100e-6),
     "10 spikes of 50 µm": _spikes(10, 50e-6),
     "steps of 2 µm": _each(lambda s, r, d: 2e-6 * np.round(s / 2e-6)),
-    "AC coupling 3 Hz": _coupled(3.0),
-    "low-pass 100 Hz": _low_pass(100.0),
-    "low-pass 400 Hz": _low_pass(400.0),
-    "hum 10 µm, 50 Hz": _added("all", hum=(10e-6, 50.0)),
+    "AC coupling 3 Hz": _each(_coupled, corner=3.0),
+    "low-pass 100 Hz": _each(_low_pass, corner=100.0),
+    "low-pass 400 Hz": _each(_low_pass, corner=400.0),
+    "hum 10 µm, 50 Hz": _each(_added, "all", hum=10e-6, at=50.0),
     "steps of 8 µm": _each(lambda s, r, d: 8e-6 * np.round(s / 8e-6)),
-    "AC coupling 1 Hz": _coupled(1.0),
-    "hum 100 µm, 60 Hz": _added("all", hum=(100e-6, 60.0)),
-    "drift of one by 100 µm/s": _added("one", drift=100e-6),
-    "drift of all by 100 µm/s": _added("all", drift=100e-6),
-    "noise 10 µm in one": _added("one", noise=10e-6),
-    "noise 5 µm in all": _added("all", noise=5e-6),
+    "AC coupling 1 Hz": _each(_coupled, corner=1.0),
+    "hum 100 µm, 60 Hz": _each(_added, "all", hum=100e-6, at=60.0),
+    "drift of one by 100 µm/s": _each(_added, "one", drift=100e-6),
+    "drift of all by 100 µm/s": _each(_added, "all", drift=100e-6),
+    "noise 10 µm in one": _each(_added, "one", noise=10e-6),
+    "noise 5 µm in all": _each(_added, "all", noise=5e-6),
     "1 sample lost": _lost(1),
     "5 samples lost": _lost(5),
     "5 samples lost in the first 5 ms": _lost(5, 2e-3, 5e-3),
@@ -358,8 +345,8 @@ SIZED: dict[str, Spoil] = {
     "20 ms lost": _lost(20e-3),
     "5 ms there twice": _readings(_twice),
     "jitter of 0.1 samples in the clock": _clock(_uneven),
-    "clock 20 samples back": _stepped(-20),
-    "clock 20 samples on": _stepped(20),
+    "clock 20 samples back": _clock(_stepped, samples=-20),
+    "clock 20 samples on": _clock(_stepped, samples=20),
     "ms as s": _clock(lambda t, r, _: 1e3 * t, 1e-3),
     "rate + 2 %": _faster(1.02),
     "rate + 10 %": _faster(1.1),
