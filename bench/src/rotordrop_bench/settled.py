@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
 
-from rotordrop.arrays import Array
+from rotordrop.arrays import Array, Integers
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import SimulationError
 from rotordrop.physics import columns as L
@@ -53,25 +52,66 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
     machine that departs from its model the one nearest to that: slip in a support has crept to nothing, the
     cage stands where it stood. The rotor stands at an angle [rad].
     """
-    if len(departures_in(model)):
-        return _departing_rest(model, angle)
-    parameters = without_magnets(model)
-    mass = coordinate_masses(model)
-    state = model.at_rest()
-    state[model.layout.modal_y] = _guess(model)
-    state[model.layout.rotor_angle] = angle
-    n_q = model.layout.n_coordinates
+    parameters, layout, rows = without_magnets(model), model.layout, departures_in(model)
+    n_q, departs = layout.n_coordinates, len(rows) > 0
+    if departs:
+        state, parameters = layout.zeros(), _on_one_place_of_sleeves(parameters, angle)
+        at, mass, start, thrust = _departing_start(model)
+    else:
+        state = model.at_rest()
+        state[layout.modal_y] = _guess(model)
+        at, mass, start, thrust = np.arange(n_q), _masses(model), state[:n_q].copy(), np.zeros(n_q)
+    state[layout.rotor_angle] = angle
+    velocities = np.where(at < n_q, at + n_q, at + 2)
+    work, form = scratch_of(parameters), parameters.form
+    derivative, stored = form.of(drop_derivative), form.of(stored_energy)
 
-    def completed(coordinates: Array) -> Array:
-        return np.concatenate([coordinates, state[n_q:]])
+    def completed(place: Array) -> Array:
+        whole = state.copy()
+        whole[at] = place
+        return whole
 
-    return lowest_energy(
-        state[:n_q],
-        mass,
-        float(np.max(np.abs(parameters.gravity))),
-        lambda q: _energy(completed(q), parameters) - load_potential(model, q),
-        lambda q: _force_and_stiffness(model, parameters, mass, completed(q)),
-        model.machine.name,
+    def energy_at(place: Array) -> float:
+        stands = float(stored(LONG_AFTER, completed(place), parameters, False))
+        return stands - load_potential(model, place) - float(np.dot(thrust, place))
+
+    def force_at(place: Array) -> Array:
+        rates = layout.zeros()
+        derivative(LONG_AFTER, completed(place), parameters, rates, work)
+        return np.asarray(mass * rates[velocities])
+
+    def stiffness_at(place: Array) -> Array:
+        if departs:
+            steps = DIFFERENCE * np.eye(len(place))
+            columns = [(force_at(place - s) - force_at(place + s)) / (2.0 * DIFFERENCE) for s in steps]
+            found = np.column_stack(columns)
+            return np.asarray(0.5 * (found + found.T))
+        jacobian = np.zeros((layout.n_dynamic, layout.n_dynamic))
+        drop_jacobian(LONG_AFTER, completed(place), parameters, jacobian)
+        return -mass[:, None] * jacobian[n_q : 2 * n_q, :n_q]
+
+    # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
+    # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
+    least = float(np.max(np.abs(parameters.gravity))) / float(np.max(np.abs(start)))
+    place, energy = start, energy_at(start)
+    rounding = 1e-12 * energy
+    damping = LEAST_DAMPING * least
+    for _ in range(MOST_ITERATIONS):
+        step = np.linalg.solve(stiffness_at(place) + damping * np.diag(mass), force_at(place))
+        tried = energy_at(place + step)
+        if tried > energy + abs(rounding):
+            damping = max(4.0 * damping, least)
+            continue
+        place, energy = place + step, tried
+        moved = float(np.max(np.abs(step)))
+        smallest = max(SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(place))))
+        if damping <= LEAST_DAMPING * least and moved < smallest:
+            return place[:n_q]
+        damping = max(0.1 * damping, LEAST_DAMPING * least)
+    raise SimulationError(
+        f"no position of rest was found for the rotor of {model.machine.name!r} in {MOST_ITERATIONS} "
+        f"iterations; the last step still moved it by {moved:.3g} √kg m. Check that its touchdown bearings "
+        "carry it (rotordrop check shows the load shares)"
     )
 
 
@@ -98,48 +138,7 @@ def load_potential(model: DropModel, coordinates: Array) -> float:
     return work
 
 
-def lowest_energy(
-    start: Array,
-    mass: Array,
-    weight: float,
-    energy_at: Callable[[Array], float],
-    force_and_stiffness: Callable[[Array], tuple[Array, Array]],
-    name: str,
-) -> Array:
-    """Coordinates (n,) of lowest energy [J] near a start, by Newton steps damped until the energy falls.
-
-    The largest generalised weight sets the scale of the damping by the mass (n,) behind each coordinate; the
-    force left over has shape (n,), the tangent stiffness (n, n).
-    """
-    # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
-    # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
-    least = weight / float(np.max(np.abs(start)))
-    place, energy = start, energy_at(start)
-    rounding = 1e-12 * energy
-    damping = LEAST_DAMPING * least
-    for _ in range(MOST_ITERATIONS):
-        force, stiffness = force_and_stiffness(place)
-        step = np.linalg.solve(stiffness + damping * np.diag(mass), force)
-        trial = place + step
-        tried = energy_at(trial)
-        if tried > energy + abs(rounding):
-            damping = max(4.0 * damping, least)
-            continue
-        place, energy = trial, tried
-        moved = float(np.max(np.abs(step)))
-        if damping <= LEAST_DAMPING * least and moved < max(
-            SMALLEST_CHANGE, 1e-12 * float(np.max(np.abs(place)))
-        ):
-            return place
-        damping = max(0.1 * damping, LEAST_DAMPING * least)
-    raise SimulationError(
-        f"no position of rest was found for the rotor of {name!r} in {MOST_ITERATIONS} "
-        f"iterations; the last step still moved it by {moved:.3g} √kg m. Check that its touchdown bearings "
-        "carry it (rotordrop check shows the load shares)"
-    )
-
-
-def coordinate_masses(model: DropModel) -> Array:
+def _masses(model: DropModel) -> Array:
     """Mass behind each coordinate, shape (n_q,): 1 for modal amplitudes, [kg] for races and supports."""
     layout, bearing = model.layout, model.parameters.bearing
     mass = np.ones(layout.n_coordinates)
@@ -148,72 +147,37 @@ def coordinate_masses(model: DropModel) -> Array:
     return mass
 
 
-def _energy(state: Array, parameters: KernelParameters) -> float:
-    return float(parameters.form.of(stored_energy)(LONG_AFTER, state, parameters, False))
-
-
-def _departing_rest(model: DropModel, angle: float) -> Array:
-    plain = departing(model, departures_in(model)[:0])
-    parameters, n_q = without_magnets(model), model.layout.n_coordinates
+def _on_one_place_of_sleeves(parameters: KernelParameters, angle: float) -> KernelParameters:
+    """A rotor rests on one place of an oval sleeve, as it would on an eccentric one."""
     parameters = parameters._replace(bearing=parameters.bearing.copy())
     assert isinstance(parameters, DepartingParameters)
     for row in parameters.departure:
-        if row[D.SLEEVE_OVAL] != 0.0:  # it rests on one place of its sleeve, as an eccentric one would
+        if row[D.SLEEVE_OVAL] != 0.0:
             off_x, off_y, _, _ = D.sleeve(row, angle, 0.0, -1.0)
             row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = math.hypot(off_x, off_y), 0.0
             row[D.SLEEVE_ANGLE] = math.atan2(off_y, off_x) - angle
-    found = _on_their_tables(model, settled_coordinates(plain))
-    places, mass = list(range(n_q)), list(coordinate_masses(model))
-    start, thrust = list(found), [0.0] * n_q
-    for b, row in enumerate(parameters.departure):
-        first = parameters.bearing_at[b, STATES_AT]
+    return parameters
+
+
+def _departing_start(model: DropModel) -> tuple[Integers, Array, Array, Array]:
+    """Places in the state of what a departing machine comes to rest with, masses, a start and thrusts [N]."""
+    p, n_q, rows = model.parameters, model.layout.n_coordinates, departures_in(model)
+    found = _on_their_tables(model, settled_coordinates(departing(model, rows[:0])))
+    entries = list(zip(range(n_q), _masses(model), found, [0.0] * n_q, strict=True))
+    for b, row in enumerate(rows):
+        first = p.bearing_at[b, STATES_AT]
         for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
-            if row[mode + D.COMPLIANCE] > 0.0:
-                places += [first + place, first + place + 1]
-                mass += [1.0 / row[mode + D.COMPLIANCE]] * 2
-                start, thrust = [*start, 0.0, 0.0], [*thrust, 0.0, 0.0]
+            if (compliance := row[mode + D.COMPLIANCE]) > 0.0:
+                entries += [(first + place + axis, 1.0 / compliance, 0.0, 0.0) for axis in range(2)]
         if (push := float(row[D.THRUST])) > 0.0:
-            along = _way_along(model, b)
-            places += [first + D.AXIAL, first + D.AXIAL + 1]
-            mass += [parameters.spin[L.ROTOR_MASS], parameters.bearing[b, L.RACE_MASS]]
-            start += [along + row[D.FACE_GAP] + push / row[D.FACE_STIFFNESS], along]
-            thrust += [push, 0.0]
-    at, masses = np.array(places), np.array(mass)
-    velocities = np.where(at < n_q, at + n_q, at + 2)
-    work, derivative = scratch_of(parameters), parameters.form.of(drop_derivative)
-
-    def completed(coordinates: Array) -> Array:
-        state = model.layout.zeros()
-        state[model.layout.rotor_angle] = angle
-        state[at] = coordinates
-        return state
-
-    def force(coordinates: Array) -> Array:
-        rates = model.layout.zeros()
-        derivative(LONG_AFTER, completed(coordinates), parameters, rates, work)
-        return np.asarray(masses * rates[velocities])
-
-    def force_and_stiffness(coordinates: Array) -> tuple[Array, Array]:
-        steps = DIFFERENCE * np.eye(len(coordinates))
-        columns = [(force(coordinates - s) - force(coordinates + s)) / (2.0 * DIFFERENCE) for s in steps]
-        stiffness = np.column_stack(columns)
-        return force(coordinates), 0.5 * (stiffness + stiffness.T)
-
-    return lowest_energy(
-        np.array(start),
-        masses,
-        float(np.max(np.abs(parameters.gravity))),
-        lambda q: _energy(completed(q), parameters) - load_potential(model, q) - float(np.dot(thrust, q)),
-        force_and_stiffness,
-        model.machine.name,
-    )[:n_q]
-
-
-def _way_along(model: DropModel, b: int) -> float:
-    """Axial way [m] of a race that carries its static load and the thrust on its face."""
-    numbers = numbers_of(model.machine.touchdown_bearings[b])
-    thrust = float(departures_in(model)[b, D.THRUST])
-    return thrust_pair(numbers.constants, numbers.deflection(float(model.load_shares[b]))[0], thrust)[2]
+            numbers = numbers_of(model.machine.touchdown_bearings[b])
+            down = numbers.deflection(float(model.load_shares[b]))[0]
+            along = thrust_pair(numbers.constants, down, push)[2]
+            landed = along + row[D.FACE_GAP] + push / row[D.FACE_STIFFNESS]
+            entries.append((first + D.AXIAL, p.spin[L.ROTOR_MASS], landed, push))
+            entries.append((first + D.AXIAL + 1, p.bearing[b, L.RACE_MASS], along, 0.0))
+    at, mass, start, thrust = (np.array(column) for column in zip(*entries, strict=True))
+    return at, mass, start, thrust
 
 
 def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
@@ -236,20 +200,6 @@ def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
     found[layout.race][1::2] -= down
     found[layout.modal_y] += _rigid(model, -down[:, None])[:, 0]
     return found
-
-
-def _force_and_stiffness(
-    model: DropModel, parameters: KernelParameters, mass: Array, state: Array
-) -> tuple[Array, Array]:
-    """Force left over (n_q,) and tangent stiffness (n_q, n_q) of a state at standstill."""
-    layout = model.layout
-    n_q, size = layout.n_coordinates, layout.n_dynamic
-    change, work = layout.zeros(), scratch_of(parameters)
-    jacobian = np.zeros((size, size))
-    drop_derivative(LONG_AFTER, state, parameters, change, work)
-    drop_jacobian(LONG_AFTER, state, parameters, jacobian)
-    rows = slice(n_q, 2 * n_q)
-    return mass * change[rows], -mass[:, None] * jacobian[rows, :n_q]
 
 
 def _guess(model: DropModel) -> Array:
