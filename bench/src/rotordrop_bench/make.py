@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import numpy as np
-
 from rotordrop.errors import UsageError
 from rotordrop_bench.departures import departures
 from rotordrop_bench.drops import DROPS, VERSION, BenchDrop
@@ -37,12 +35,6 @@ def bench_recording(drop: BenchDrop) -> SyntheticDrop:
     return synthesize_drop(
         hidden, speed, drop.drop_seed, sensor_chain=chain, duration=DURATION, tail=drop.tail, name=drop.name
     )
-
-
-def happened(made: SyntheticDrop) -> bool:
-    """Whether every bearing was reached within `LATEST_CONTACT`."""
-    first = [made.result.contacts.of_bearing(b).start for b in range(len(made.result.bearing_names))]
-    return all(len(start) > 0 and float(np.min(start)) <= LATEST_CONTACT for start in first)
 
 
 def chosen_drops(only: Iterable[str]) -> tuple[BenchDrop, ...]:
@@ -76,7 +68,7 @@ def make_bench(
     for i, drop in enumerate(missing):
         report(drop.name, i / len(missing))
         made = bench_recording(drop)
-        if not happened(made):
+        if not made.reached(LATEST_CONTACT):
             raise UsageError(
                 f"{drop.name} is no drop here: a bearing was not reached within "
                 f"{LATEST_CONTACT:g} s. Your computer rounds differently (rotordrop doctor "

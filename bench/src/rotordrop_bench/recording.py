@@ -51,6 +51,11 @@ class SyntheticDrop:
     result: DropResult = field(repr=False)
     """The simulated drop itself."""
 
+    def reached(self, latest: float) -> bool:
+        """Whether the rotor touched every bearing within this time of power-off [s]."""
+        first = [self.result.contacts.of_bearing(b).start for b in range(len(self.result.bearing_names))]
+        return all(len(start) > 0 and float(np.min(start)) <= latest for start in first)
+
 
 def synthesize_drop(
     hidden: HiddenMachine,
@@ -131,20 +136,17 @@ def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
     sensors = hidden.machine.sensors
     errors = drawn_errors(chain, len(sensors), stream(hidden.seed, "sensors"))
     broken = [hidden.violations.of_sensor(sensor.name) for sensor in sensors]
-    keys = ("plane_shift", "cross_axis", "follows_housing", "time_constant", "curvature", "curvature_at")
-    wrong = {key: np.array([float(getattr(one, key)) for one in broken]) for key in keys}
+    wrong = {
+        key: np.array([float(getattr(one, key)) for one in broken]) for key in SensorViolation.model_fields
+    }
     random = stream(hidden.seed, "cross axis")
     drawn = random.uniform(0.5, 1.0, len(sensors)) * random.choice([-1.0, 1.0], len(sensors))
     alone = [hidden.violations.sensor.get(sensor.name) for sensor in sensors]
     exact = [one is not None and "cross_axis" in one.model_fields_set for one in alone]
-    return replace(
-        errors,
-        plane_shift=errors.plane_shift + wrong["plane_shift"],
-        cross_axis=wrong["cross_axis"] * np.where(exact, 1.0, drawn),
-        follows_housing=wrong["follows_housing"],
-        time_constant=wrong["time_constant"],
-        curvature=wrong["curvature"] / wrong["curvature_at"] ** 2,
-    )
+    wrong["plane_shift"] += errors.plane_shift
+    wrong["cross_axis"] *= np.where(exact, 1.0, drawn)
+    wrong["curvature"] /= wrong.pop("curvature_at") ** 2
+    return replace(errors, **wrong)
 
 
 def _record(

@@ -33,7 +33,7 @@ from rotordrop_bench.faults import FAULTS, SIZED, spoiled
 from rotordrop_bench.files import write_drop
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 from rotordrop_bench.rotors import ROTORS, bench_rotor, scaled_rotor
-from rotordrop_bench.sensor_chain import SensorChain
+from rotordrop_bench.sensor_chain import SensorChain, fitted_to
 from rotordrop_bench.violations import Violations
 
 PLAN = resources.files(__package__).joinpath("cases.toml")
@@ -179,8 +179,7 @@ def synthesized(case: Case) -> tuple[SyntheticDrop, Machine]:
             made = _drawn(case, seed)
         except (SimulationError, UsageError):  # an extreme draw that no machine stands
             continue
-        first = [made[0].result.contacts.of_bearing(b).start for b in range(2)]
-        if all(len(start) > 0 and float(np.min(start)) <= 0.5 * made[0].record.time[-1] for start in first):
+        if made[0].reached(0.5 * made[0].record.time[-1]):
             return made
     raise SimulationError(f"{case.name}: no draw of {TRIES} drops within its record")
 
@@ -199,14 +198,8 @@ def _drawn(case: Case, seed: int) -> tuple[SyntheticDrop, Machine]:
         path: sensor_prior(row[path], row[path].described(known.sensors[0]), smallest_gap(known)).sigma
         for path in ("gain", "offset")
     }
-    widest = max(float(bearing.air_gap) for bearing in true.touchdown_bearings)
-    chain = SensorChain(
-        sampling_rate=float(plan["sampling_rate"]),
-        gain_error=sigma["gain"],
-        offset=sigma["offset"],
-        normal=True,
-        full_scale=max(600e-6, 2.0 * widest),
-    )
+    rate = float(plan["sampling_rate"])
+    chain = SensorChain(sampling_rate=rate, gain_error=sigma["gain"], offset=sigma["offset"], normal=True)
     gap = max(float(bearing.air_gap) for bearing in known.touchdown_bearings)
     duration = round(float(plan["falls"]) * math.sqrt(2.0 * gap / float(known.gravity)), 3)
     if "noise" in plan:
@@ -221,7 +214,7 @@ def _drawn(case: Case, seed: int) -> tuple[SyntheticDrop, Machine]:
         hidden,
         speed,
         seed,
-        sensor_chain=chain,
+        sensor_chain=fitted_to(chain, true),
         duration=duration,
         before=max(float(plan["before"]), 4.0 * math.pi / speed),
         tail=case.has_tail,
