@@ -52,11 +52,10 @@ def table_row(bearing: TouchdownBearing, balls: BallsViolation, load: float, nom
 def face_row(bearing: TouchdownBearing, face: FaceViolation) -> Array:
     """Entries of a departure from `THRUST` up to `TABLE_SPEEDS`: a face and the pair of rows behind it."""
     _, constants = _pair(bearing, "a thrust on its face")
-    stiffness, slope = float(face.stiffness), constants.axial_offset / constants.radial_offset
-    row = np.zeros(D.TABLE_SPEEDS)
-    row[[D.THRUST, D.FACE_GAP, D.FACE_STIFFNESS]] = float(face.thrust), float(face.gap), stiffness
-    row[D.FACE_DAMPING] = 2.0 * float(face.damping) * math.sqrt(stiffness * float(bearing.race.mass))
-    row[[D.FACE_FRICTION, D.FACE_ARM]] = float(face.friction), float(face.arm)
+    slope, row = constants.axial_offset / constants.radial_offset, np.zeros(D.TABLE_SPEEDS)
+    face.fill(row)
+    loss = math.sqrt(float(face.stiffness) * float(bearing.race.mass))
+    row[D.FACE_DAMPING] = 2.0 * float(face.damping) * loss
     row[D.ALONG] = 2.0 * slope * slope  # equal dashpots along the lines of contact
     row[[D.RING_BALL, D.RING_GROOVES]] = constants.ball_stiffness, constants.groove_distance
     row[[D.RING_RADIAL, D.RING_AXIAL]] = constants.radial_offset, constants.axial_offset

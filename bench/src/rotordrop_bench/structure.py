@@ -112,24 +112,26 @@ def departures_of(machine: Machine, violations: Violations) -> Array:
 
 def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float) -> Array:
     row = D.no_departure()
-    support, foundation = v.support, v.foundation
+    support, foundation, balls = v.support, v.foundation, bearing.bearing
+    for part in (support, v.gap, v.friction, v.balls, v.sleeve, v.centre):
+        part.fill(row)
     angle = float(support.axes_angle)
     if angle != 0.0:
         row[[D.AXIS_COSINE, D.AXIS_SINE]] = math.cos(angle), math.sin(angle)
     deflection = float(support.hardening_force) / float(bearing.support.stiffness)
     row[D.HARDENING] = float(support.hardening) / deflection**2
     row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
-    pairs: tuple[tuple[list[int], Known | None, Known | None], ...] = (
-        ([D.SLIP_FORCE, D.SLIP_TRAVEL], support.slip_force, support.slip_travel),
-        ([D.RIBBON_STIFFNESS, D.RIBBON_SLIP], support.ribbon_stiffness, support.ribbon_slip),
-        ([D.GAP_DRIFT, D.GAP_DRIFT_TIME], v.gap.drift, v.gap.drift_time),
-        ([D.GAP_CLOSING, D.GAP_HEAT], v.gap.closing, v.gap.heat),
-        ([D.WEAR, D.WEAR_HEAT], v.friction.wear, v.friction.wear_heat),
-    )
-    for columns, given, reach in pairs:
-        if given is not None and reach is not None and float(given) != 0.0:
-            row[columns] = float(given), float(reach)
-    _further(row, bearing, v, load, nominal)
+    stop = math.sqrt(row[D.STOP_STIFFNESS] * float(bearing.support.mass))
+    row[D.STOP_DAMPING] = 2.0 * float(support.stop_damping) * stop
+    if v.balls.tabulated and float(v.face.thrust) > 0.0:
+        raise UsageError(
+            f"{bearing.name}: balls under a thrust have no 'held_preload', 'inertia' or 'seat_play' in "
+            "the bench; leave out those or 'face'"
+        )
+    if float(v.face.thrust) > 0.0:
+        row[D.THRUST : D.TABLE_SPEEDS] = face_row(bearing, v.face)
+    if v.balls.tabulated:
+        row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
     if foundation.mass is not None and foundation.frequency is not None:
         across = foundation.frequency_horizontal or foundation.frequency
         row[D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH] = _mode(
@@ -141,11 +143,7 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
         row[D.TILT_MODE : D.TILT_MODE + D.MODE_WIDTH] = _mode(
             w * w / float(v.race.tilt_stiffness), frequency, frequency, v.race.tilt_damping_ratio
         )
-    row[[D.CENTRE_X, D.CENTRE_Y]] = float(v.centre.x), float(v.centre.y)
-    row[[D.SLEEVE_OFF, D.SLEEVE_OVAL]] = float(v.sleeve.eccentricity), float(v.sleeve.ovality)
-    row[D.SLEEVE_ANGLE] = float(v.sleeve.angle)
     if v.balls.turn:
-        balls = bearing.bearing
         radial = float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
         # turn of the cage per turn of the inner race
         row[D.CAGE_RATIO] = 0.5 * (1.0 - radial / float(balls.pitch_diameter))
@@ -157,26 +155,6 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
         row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, float(bearing.contact.damping))
         row[at + D.LAW_UNTIL] = d2
     return row
-
-
-def _further(
-    row: Array, bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float
-) -> None:
-    """Fill stop, face and table of balls."""
-    gap, stiffness = v.support.stop_gap, v.support.stop_stiffness
-    if gap is not None and stiffness is not None:
-        loss = 2.0 * float(v.support.stop_damping) * math.sqrt(float(stiffness) * float(bearing.support.mass))
-        row[[D.STOP_GAP, D.STOP_STIFFNESS, D.STOP_DAMPING]] = float(gap), float(stiffness), loss
-    row[D.LOOSE_WAY] = float(v.balls.seat_play)
-    if float(v.face.thrust) > 0.0:
-        if v.balls.tabulated:
-            raise UsageError(
-                f"{bearing.name}: balls under a thrust have no 'held_preload', 'inertia' or 'seat_play' in "
-                "the bench; leave out those or 'face'"
-            )
-        row[D.THRUST : D.TABLE_SPEEDS] = face_row(bearing, v.face)
-    if v.balls.tabulated:
-        row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
 
 
 def loosened(model: DropModel) -> DropModel:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from rotordrop.arrays import Array
 from rotordrop.elements.description import Channel, Description, Misfit, Name, Node
 from rotordrop.elements.values import (
     Angle,
@@ -34,22 +35,27 @@ from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.loading import load_description
 from rotordrop.machine.schema import description_schema
+from rotordrop_bench import departure as D
 
 CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
 Lift = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
 ClockError = Annotated[Known, Physical("dimensionless", least=-0.1, most=0.1)]
 AboveOne = Annotated[Known, Physical("dimensionless", above=1.0)]
 Energy = Annotated[Known, Physical("energy", above=0.0)]
-MOST_POINTS = 9
-"""Points of a contact law: the kernel keeps eight pieces, by definition of its columns."""
-NO_CHANGE = "as the machine has it"
+MOST_POINTS = D.MOST_PIECES + 1
+"""Points of a contact law."""
+
+
+def key(value: Any, meaning: str) -> Any:
+    """Give a key the value at which nothing is violated [SI], and what it is."""
+    return default(value, meaning) if isinstance(value, float) else Field(default=value, description=meaning)
 
 
 class Violation(Description):
     """One group of violations; what is left out is as the machine has it."""
 
     together: ClassVar[tuple[tuple[str, ...], ...]] = ()
-    """Keys of which none says anything without the others."""
+    """Keys of which none says anything without the others, nor where the first is zero."""
 
     def check(self) -> None:
         """Refuse half of what belongs together."""
@@ -59,6 +65,13 @@ class Violation(Description):
             if given and missing:
                 words = f"{given[0]!r} needs {missing[0]!r} beside it; add it or leave out both"
                 raise Misfit(words, (given[0],))
+
+    def fill(self, row: Array) -> None:
+        """Write the columns of a departure that are of any effect."""
+        still = [group for group in self.together if float(getattr(self, group[0]) or 0.0) == 0.0]
+        for key, column in self.columns.items():
+            if not any(key in group for group in still):
+                row[column] = float(getattr(self, key))
 
     def values(self) -> dict[str, Any]:
         """What was given, by key [SI]."""
@@ -79,34 +92,20 @@ def _plain(value: Any) -> Any:
 class SupportViolation(Violation):
     """A support that is no spring and damper alike in x and y."""
 
-    axes_angle: Angle = default(0.0, "axes horizontal and vertical")
-    """Angle from horizontal to the first principal axis of stiffness and damping [rad], from x towards y."""
-    stiffness_ratio: Positive = default(1.0, NO_CHANGE)
-    damping_ratio: Positive = default(1.0, NO_CHANGE)
-    """Factors on stiffness and damping along the first axis, which at angle zero is horizontal [1]."""
-    damping: NonNegative = default(1.0, NO_CHANGE)
-    """Factor on the damping along both axes [1]."""
-    hardening: NonNegative = default(0.0, "a linear spring")
-    """How much the spring force exceeds that of the linear spring, at the force below [1]."""
-    hardening_force: PositiveForce = default(1.0, "of no effect without hardening")
-    """Force of the linear spring at which that holds [N]."""
-    hardening_radial: bool = False
-    """Whether the whole deflection hardens both axes, instead of each axis its own."""
-    slip_force: Force = default(0.0, "no friction in the support")
-    """Friction that slips in the support [N]; it makes its force lag the deflection by a hysteresis."""
-    slip_travel: PositiveLength = default(1e-6, "of no effect without slip")
-    """Deflection over which that friction builds up [m]."""
-
-    stop_gap: PositiveLength | None = None
-    """Travel of the support up to a stop [m]."""
-    stop_stiffness: Stiffness | None = None
-    """Stiffness of the stop [N/m]."""
-    stop_damping: NonNegative = default(0.0, "a stop without loss")
-    """Damping ratio of the mass of the support on its stop [1]."""
-    ribbon_stiffness: Stiffness | None = None
-    """Stiffness of a ribbon before it slips [N/m]."""
-    ribbon_slip: PositiveForce | None = None
-    """Force at which all of it slips [N]."""
+    axes_angle: Angle = key(0.0, "from horizontal to the first principal axis, from x towards y [rad]")
+    stiffness_ratio: Positive = key(1.0, "factor on the stiffness along the first axis [1]")
+    damping_ratio: Positive = key(1.0, "factor on the damping along the first axis [1]")
+    damping: NonNegative = key(1.0, "factor on the damping along both axes [1]")
+    hardening: NonNegative = key(0.0, "by how much the spring exceeds a linear one at the force below [1]")
+    hardening_force: PositiveForce = key(1.0, "force of the linear spring at which that holds [N]")
+    hardening_radial: bool = key(False, "the whole deflection hardens both axes, instead of each its own")
+    slip_force: Force = key(0.0, "friction that slips in the support: a hysteresis [N]")
+    slip_travel: PositiveLength = key(1.0, "deflection over which that friction builds up [m]")
+    stop_gap: PositiveLength | None = key(None, "travel of the support up to a stop [m]")
+    stop_stiffness: Stiffness | None = key(None, "stiffness of the stop [N/m]")
+    stop_damping: NonNegative = key(0.0, "damping ratio of the mass of the support on its stop [1]")
+    ribbon_stiffness: Stiffness | None = key(None, "stiffness of a ribbon before it slips [N/m]")
+    ribbon_slip: PositiveForce | None = key(None, "force at which all of the ribbon slips [N]")
 
     together: ClassVar = (
         ("hardening", "hardening_force"),
@@ -114,19 +113,23 @@ class SupportViolation(Violation):
         ("stop_gap", "stop_stiffness"),
         ("ribbon_stiffness", "ribbon_slip"),
     )
+    columns: ClassVar = {
+        "slip_force": D.SLIP_FORCE,
+        "slip_travel": D.SLIP_TRAVEL,
+        "stop_gap": D.STOP_GAP,
+        "stop_stiffness": D.STOP_STIFFNESS,
+        "ribbon_stiffness": D.RIBBON_STIFFNESS,
+        "ribbon_slip": D.RIBBON_SLIP,
+    }
 
 
 class FoundationViolation(Violation):
     """A mode of the foundation on which the support stands."""
 
-    mass: PositiveMass | None = None
-    """Modal mass at the support [kg]."""
-    frequency: PositiveFrequency | None = None
-    """Vertical natural frequency without support [Hz]."""
-    frequency_horizontal: PositiveFrequency | None = None
-    """Horizontal natural frequency without support [Hz]; the vertical one when left out."""
-    damping_ratio: NonNegative = default(0.03, "a bolted steel frame")
-    """Damping ratio of the mode [1]."""
+    mass: PositiveMass | None = key(None, "modal mass at the support [kg]")
+    frequency: PositiveFrequency | None = key(None, "vertical natural frequency without support [Hz]")
+    frequency_horizontal: PositiveFrequency | None = key(None, "the same horizontally; as vertically [Hz]")
+    damping_ratio: NonNegative = key(0.03, "damping ratio of the mode; of a bolted steel frame [1]")
 
     together: ClassVar = (("mass", "frequency"),)
 
@@ -140,22 +143,19 @@ class FoundationViolation(Violation):
 class LawPoint(Violation):
     """A point of a contact law."""
 
-    depth: PositiveLength
-    """Indentation [m]."""
-    force: PositiveForce
-    """Normal force at rest [N]."""
+    depth: PositiveLength = key(..., "indentation [m]")
+    force: PositiveForce = key(..., "normal force at rest [N]")
 
 
 class ContactViolation(Violation):
     """Another contact of rotor and race."""
 
-    stiffness: Positive = default(1.0, NO_CHANGE)
-    damping: NonNegative = default(1.0, NO_CHANGE)
-    """Factors on contact stiffness and contact damping [1]."""
-    exponent: ContactExponent | None = None
-    """Another exponent [1]; equally deep at five times the mean load of a bearing."""
-    law: tuple[LawPoint, ...] = ()
-    """A law through these points, straight between them where both scales are logarithmic."""
+    stiffness: Positive = key(1.0, "factor on the contact stiffness [1]")
+    damping: NonNegative = key(1.0, "factor on the contact damping [1]")
+    exponent: ContactExponent | None = key(
+        None, "another exponent, equally deep at five times the mean load [1]"
+    )
+    law: tuple[LawPoint, ...] = key((), "points of a law, straight between them where both scales are log")
 
     def check(self) -> None:
         """Refuse a law that falls, has too few or too many points, or a second law beside it."""
@@ -179,16 +179,13 @@ class ContactViolation(Violation):
 class RaceViolation(Violation):
     """Another race, or one that tilts under the contact force."""
 
-    mass: Positive = default(1.0, NO_CHANGE)
-    """Factor on its mass, and on its inertia with it, as of a carrier that turns along [1]."""
-    inertia: Positive = default(1.0, NO_CHANGE)
-    """Factor on its polar moment of inertia [1]."""
-    tilt_stiffness: Stiffness | None = None
-    """Stiffness of the tilt where the rotor touches, in series with the contact [N/m]."""
-    tilt_frequency: PositiveFrequency | None = None
-    """Natural frequency of the tilt [Hz]."""
-    tilt_damping_ratio: NonNegative = default(0.02, "steel on balls")
-    """Damping ratio of the tilt [1]."""
+    mass: Positive = key(1.0, "factor on its mass and inertia, as of a carrier that turns along [1]")
+    inertia: Positive = key(1.0, "factor on its polar moment of inertia [1]")
+    tilt_stiffness: Stiffness | None = key(
+        None, "stiffness of the tilt where the rotor touches, in series with the contact [N/m]"
+    )
+    tilt_frequency: PositiveFrequency | None = key(None, "natural frequency of the tilt [Hz]")
+    tilt_damping_ratio: NonNegative = key(0.02, "damping ratio of the tilt; of steel on balls [1]")
 
     together: ClassVar = (("tilt_stiffness", "tilt_frequency"),)
 
@@ -196,47 +193,43 @@ class RaceViolation(Violation):
 class FrictionViolation(Violation):
     """Friction outside the range the owner states, or of another shape."""
 
-    dynamic: Positive | None = None
-    """Dynamic coefficient [1]; the static one keeps its ratio to it."""
-    static: Positive = default(1.0, NO_CHANGE)
-    stribeck_speed: Positive = default(1.0, NO_CHANGE)
-    """Factors on static coefficient and Stribeck speed [1]."""
-    wear: Share = default(0.0, "no wear")
-    """Share of the friction that is lost as the surfaces run in [1]."""
-    wear_heat: Energy = default(1.0, "of no effect without wear")
-    """Heat of friction at which 63 % of that is lost [J]."""
+    dynamic: Positive | None = key(None, "dynamic coefficient; the static one keeps its ratio to it [1]")
+    static: Positive = key(1.0, "factor on the static coefficient [1]")
+    stribeck_speed: Positive = key(1.0, "factor on the Stribeck speed [1]")
+    wear: Share = key(0.0, "share of the friction that is lost as the surfaces run in [1]")
+    wear_heat: Energy = key(1.0, "heat of friction at which 63 % of that is lost [J]")
 
     together: ClassVar = (("wear", "wear_heat"),)
+    columns: ClassVar = {"wear": D.WEAR, "wear_heat": D.WEAR_HEAT}
 
 
 class GapViolation(Violation):
     """An air gap that changes during the drop."""
 
-    drift: Length = default(0.0, "a gap that stays")
-    """Change of the gap that stays [m], at an even rate within the time below."""
-    drift_time: PositiveTime = default(1.0, "of no effect without drift")
-    """Time it takes [s]."""
-    closing: Length = default(0.0, "no growth by heat")
-    """Largest closing by the heat of friction [m]; gone when all is cold again."""
-    heat: Energy = default(1.0, "of no effect without closing")
-    """Heat of friction that closes 63 % of it [J]."""
+    drift: Length = key(0.0, "change of the gap that stays, at an even rate within the time below [m]")
+    drift_time: PositiveTime = key(1.0, "time it takes [s]")
+    closing: Length = key(0.0, "largest closing by the heat of friction, gone when all is cold again [m]")
+    heat: Energy = key(1.0, "heat of friction that closes 63 % of it [J]")
 
     together: ClassVar = (("drift", "drift_time"), ("closing", "heat"))
+    columns: ClassVar = {
+        "drift": D.GAP_DRIFT,
+        "drift_time": D.GAP_DRIFT_TIME,
+        "closing": D.GAP_CLOSING,
+        "heat": D.GAP_HEAT,
+    }
 
 
 class BallsViolation(Violation):
     """Balls that stand elsewhere, or move on."""
 
-    first_ball_angle: Angle | None = None
-    """Where the first ball stands [rad]."""
-    turn: bool = False
-    """Whether the balls turn with the cage as the race spins up."""
-    held_preload: bool = False
-    """Whether the preload is a force that holds whatever the race does, as that of long springs."""
-    inertia: bool = False
-    """Whether the centrifugal force of the balls acts."""
-    seat_play: Length = default(0.0, "no play")
-    """Way of the bearing in its seat, from the middle, before the seat holds it [m]."""
+    first_ball_angle: Angle | None = key(None, "where the first ball stands [rad]")
+    turn: bool = key(False, "the balls turn with the cage as the race spins up")
+    held_preload: bool = key(False, "the preload holds whatever the race does, as that of long springs")
+    inertia: bool = key(False, "the centrifugal force of the balls acts")
+    seat_play: Length = key(0.0, "way of the bearing in its seat, from the middle, before it holds [m]")
+
+    columns: ClassVar = {"seat_play": D.LOOSE_WAY}
 
     @property
     def tabulated(self) -> int:
@@ -253,39 +246,40 @@ class BallsViolation(Violation):
 class FaceViolation(Violation):
     """An axial force that no magnet holds after power-off, and the face that the rotor lands on."""
 
-    thrust: Force = default(0.0, "none")
-    """Axial force on the rotor from power-off on [N]."""
-    gap: Length = default(0.0, "of no effect without thrust")
-    """Way of the rotor before it lands [m]."""
-    arm: PositiveLength = default(1.0, "of no effect without thrust")
-    """Radius at which the face rubs [m]."""
-    stiffness: Stiffness = default(1e9, "a steel shoulder on a ring, chosen")
-    """Stiffness of the face [N/m]."""
-    damping: NonNegative = default(0.05, "steel on steel, chosen")
-    """Damping ratio of the race on it [1]."""
-    friction: NonNegative = default(0.1, "as between rotor and race")
-    """Friction coefficient of the face [1]."""
+    thrust: Force = key(0.0, "axial force on the rotor from power-off on [N]")
+    gap: Length = key(0.0, "way of the rotor before it lands [m]")
+    arm: PositiveLength = key(1.0, "radius at which the face rubs [m]")
+    stiffness: Stiffness = key(1e9, "stiffness of the face; of a steel shoulder on a ring, chosen [N/m]")
+    damping: NonNegative = key(0.05, "damping ratio of the race on it; of steel on steel, chosen [1]")
+    friction: NonNegative = key(0.1, "friction coefficient of the face [1]")
 
     together: ClassVar = (("thrust", "gap", "arm"),)
+    columns: ClassVar = {
+        "thrust": D.THRUST,
+        "gap": D.FACE_GAP,
+        "arm": D.FACE_ARM,
+        "stiffness": D.FACE_STIFFNESS,
+        "friction": D.FACE_FRICTION,
+    }
 
 
 class SleeveViolation(Violation):
     """A landing sleeve on the rotor that is not round and centred."""
 
-    eccentricity: Length = default(0.0, "centred")
-    """Its centre off the axis of the rotor [m]."""
-    ovality: Length = default(0.0, "round")
-    """Amplitude of its radius twice per turn [m]."""
-    angle: Angle = default(0.0, "as any other")
-    """Angle of both from +x at rotor angle zero [rad]."""
+    eccentricity: Length = key(0.0, "its centre off the axis of the rotor [m]")
+    ovality: Length = key(0.0, "amplitude of its radius twice per turn [m]")
+    angle: Angle = key(0.0, "of both from +x at rotor angle zero [rad]")
+
+    columns: ClassVar = {"eccentricity": D.SLEEVE_OFF, "ovality": D.SLEEVE_OVAL, "angle": D.SLEEVE_ANGLE}
 
 
 class CentreViolation(Violation):
     """A bearing that does not stand in the line of the magnets."""
 
-    x: Length = default(0.0, "in line")
-    y: Length = default(0.0, "in line")
-    """Its centre in the axes of magnets and sensors [m]."""
+    x: Length = key(0.0, "its centre in the axes of magnets and sensors [m]")
+    y: Length = key(0.0, "its centre in the axes of magnets and sensors [m]")
+
+    columns: ClassVar = {"x": D.CENTRE_X, "y": D.CENTRE_Y}
 
 
 class BearingViolations(Violation):
@@ -306,19 +300,16 @@ class BearingViolations(Violation):
 class SensorViolation(Violation):
     """What is violated at a sensor."""
 
-    time_constant: Time = default(0.0, "at once")
-    """Time constant of first order with which the reading follows the shaft [s]."""
-    cross_axis: CrossAxis = default(0.0, "none")
-    """Reading per motion across the sensor, a quarter turn ahead of its direction [1]. For all sensors at
-    once: its size, drawn between half and all of it with either sign."""
-    plane_shift: Length = default(0.0, "where it is stated")
-    """How much nearer to the middle of the rotor the sensor stands than stated [m]."""
-    follows_housing: Share = default(0.0, "a bracket on the ground")
-    """Share of the motion of the bearing's housing that the bracket of the sensor follows [1]."""
-    curvature: Share = default(0.0, "a straight line")
-    """Share by which it reads too little at the displacement below; it grows with the square [1]."""
-    curvature_at: PositiveLength = default(1.0, "of no effect without curvature")
-    """That displacement [m]."""
+    time_constant: Time = key(0.0, "time constant of first order with which it follows the shaft [s]")
+    cross_axis: CrossAxis = key(
+        0.0,
+        "reading per motion a quarter turn ahead of its direction [1]; of all sensors at once the size, "
+        "drawn between half and all of it with either sign",
+    )
+    plane_shift: Length = key(0.0, "how much nearer to the middle of the rotor it stands than stated [m]")
+    follows_housing: Share = key(0.0, "share of the motion of the housing that its bracket follows [1]")
+    curvature: Share = key(0.0, "share by which it reads too little at the displacement below, squared [1]")
+    curvature_at: PositiveLength = key(1.0, "that displacement [m]")
 
     together: ClassVar = (("curvature", "curvature_at"),)
 
@@ -326,30 +317,22 @@ class SensorViolation(Violation):
 class ChainViolation(SensorViolation):
     """What is violated at all sensors."""
 
-    anti_alias_frequency: PositiveFrequency | None = None
-    """Corner of a filter before the sampling that nobody mentions [Hz]."""
-    flicker: Length = default(0.0, "white noise alone")
-    """Noise with a power that falls as one over the frequency, beside the white one [m rms]."""
-    clock_error: ClockError = default(0.0, "right")
-    """How much longer the seconds of the recorder are than true ones [1]."""
-    speed_delay: Time = default(0.0, "at once")
-    """How late the speed signal is [s]."""
+    anti_alias_frequency: PositiveFrequency | None = key(
+        None, "corner of a filter before the sampling that nobody mentions [Hz]"
+    )
+    flicker: Length = key(0.0, "noise whose power falls as one over the frequency, beside the white [m rms]")
+    clock_error: ClockError = key(0.0, "how much longer seconds of the recorder are than true ones [1]")
+    speed_delay: Time = key(0.0, "how late the speed signal is [s]")
 
 
 class MagnetViolation(Violation):
     """What the magnets do after power-off."""
 
-    remanence_time: PositiveTime | None = None
-    """Time constant of the remanent lift [s]."""
-    remanent_lift: Lift | None = None
-    """Vertical remanent lift of every magnet over its share of the weight [1]."""
-    pull: Lift = default(0.0, "none")
-    """Horizontal pull of every magnet at power-off, over its share of the weight, beside what remains [1]."""
-    pull_time: PositiveTime = default(1.0, "of no effect without pull")
-    """Time constant with which that decays [s]."""
-
-    stays_on: tuple[Name, ...] = ()
-    """Magnets that hold on while the others let go: a drop of one end, of which there is no tail."""
+    remanence_time: PositiveTime | None = key(None, "time constant of the remanent lift [s]")
+    remanent_lift: Lift | None = key(None, "vertical remanent lift of all over their share of the weight [1]")
+    pull: Lift = key(0.0, "horizontal pull of all at power-off over their share of the weight, besides [1]")
+    pull_time: PositiveTime = key(1.0, "time constant with which that decays [s]")
+    stays_on: tuple[Name, ...] = key((), "magnets that hold on: a drop of one end, of which there is no tail")
 
     together: ClassVar = (("pull", "pull_time"),)
 
@@ -357,15 +340,12 @@ class MagnetViolation(Violation):
 class RotorViolation(Violation):
     """A rotor that differs from its drawing."""
 
-    youngs_modulus: Positive = default(1.0, NO_CHANGE)
-    """Factor on Young's modulus of every section [1]."""
-    unbalance: Positive = default(1.0, NO_CHANGE)
-    """Factor on the drawn unbalances, which may leave the grade [1]."""
-    bow: Length = default(0.0, "straight")
-    """How far the middle of the shaft stands off the line of its ends [m], towards +x at rotor angle zero."""
-    bow_speed: PositiveFrequency = default(1.0, "of no effect without bow")
-    """Speed [Hz] at which it bends as a bowed shaft does. It goes with the square of the speed, as an
-    unbalance, so that it is exact there only."""
+    youngs_modulus: Positive = key(1.0, "factor on Young's modulus of every section [1]")
+    unbalance: Positive = key(1.0, "factor on the drawn unbalances, which may leave the grade [1]")
+    bow: Length = key(0.0, "middle of the shaft off the line of its ends, towards +x at rotor angle zero [m]")
+    bow_speed: PositiveFrequency = key(
+        1.0, "speed at which it bends as a bowed shaft does; elsewhere it goes as an unbalance [Hz]"
+    )
 
     together: ClassVar = (("bow", "bow_speed"),)
 
@@ -373,23 +353,17 @@ class RotorViolation(Violation):
 class StandViolation(Violation):
     """How the machine stands."""
 
-    tilt: Angle = default(0.0, "level")
-    """Angle by which it is turned about its axis [rad]: gravity has a part towards +x."""
+    tilt: Angle = key(0.0, "by which it is turned about its axis: gravity has a part towards +x [rad]")
 
 
 class SideForce(Violation):
     """A force on the rotor that stays, as of a belt or of the pressure round an impeller."""
 
-    node: Node
-    """Node it acts at, counted from 1."""
-    force: Force
-    """Force [N]."""
-    direction: Angle = default(0.0, "horizontal")
-    """Its direction, from +x towards y [rad]."""
-    growth: Share = default(0.0, "a force that stays")
-    """Share by which it grows at an even rate from power-off on [1]."""
-    growth_time: PositiveTime = default(1.0, "of no effect without growth")
-    """Time it takes [s]."""
+    node: Node = key(..., "node it acts at, counted from 1")
+    force: Force = key(..., "force [N]")
+    direction: Angle = key(0.0, "its direction, from +x towards y [rad]")
+    growth: Share = key(0.0, "share by which it grows at an even rate from power-off on [1]")
+    growth_time: PositiveTime = key(1.0, "time it takes [s]")
 
     together: ClassVar = (("growth", "growth_time"),)
 
@@ -397,35 +371,26 @@ class SideForce(Violation):
 class Seal(Violation):
     """A seal that the rotor rubs on."""
 
-    node: Node
-    """Node it sits at, counted from 1."""
-    gap: AboveOne
-    """Its gap over the widest air gap of the touchdown bearings [1]."""
-    stiffness: Stiffness
-    """Stiffness of its housing [N/m]."""
+    node: Node = key(..., "node it sits at, counted from 1")
+    gap: AboveOne = key(..., "its gap over the widest air gap of the touchdown bearings [1]")
+    stiffness: Stiffness = key(..., "stiffness of its housing [N/m]")
 
 
 class UnbalanceJump(Violation):
     """Something comes off the rotor during the drop."""
 
-    node: Node
-    """Node of the new unbalance, counted from 1."""
-    amount: Unbalance
-    """Amount [kg m]."""
-    phase: Angle = default(0.0, "as any other")
-    """Phase, counted from +y at rotor angle zero [rad]."""
-    time: Time | None = None
-    """When, from power-off [s]; at the first contact when left out."""
+    node: Node = key(..., "node of the new unbalance, counted from 1")
+    amount: Unbalance = key(..., "amount [kg m]")
+    phase: Angle = key(0.0, "phase, counted from +y at rotor angle zero [rad]")
+    time: Time | None = key(None, "when, from power-off; at the first contact when left out [s]")
 
 
 class Violations(BearingViolations):
     """What is true of the hidden machine and unknown to the estimator."""
 
-    bearing: dict[Name, BearingViolations] = Field(default_factory=dict)
-    """At one touchdown bearing, before what is said for all."""
+    bearing: dict[Name, BearingViolations] = key({}, "at one touchdown bearing, before what all have")
     sensors: ChainViolation = ChainViolation()
-    sensor: dict[Channel, SensorViolation] = Field(default_factory=dict)
-    """At one sensor, before what is said for all."""
+    sensor: dict[Channel, SensorViolation] = key({}, "at one sensor, before what all have")
     magnets: MagnetViolation = MagnetViolation()
     rotor: RotorViolation = RotorViolation()
     stand: StandViolation = StandViolation()
