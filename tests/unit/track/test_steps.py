@@ -77,51 +77,37 @@ def test_damping_holds_the_parameters_to_the_pass_before(impacts):
 
 
 @pytest.mark.parametrize(
-    ("scores", "passes"),
+    ("scores", "passes", "lost"),
     [
-        ([-100.0, -120.0, -121.0], 3),  # it has come to rest
-        ([-100.0, -60.0, -150.0, -154.0], 4),  # a fall is no rest
-        ([10.0 * (-1.0) ** k for k in range(9)], MOST_REPEATS),  # it swings for ever
+        ([-100.0, -120.0, -121.0], 3, None),  # it has come to rest
+        ([-100.0, -60.0, -150.0, -154.0], 4, None),  # a fall is no rest
+        ([10.0 * (-1.0) ** k for k in range(9)], MOST_REPEATS, None),  # it swings for ever
+        ([-100.0, -50.0, -20.0, -20.0], 4, 1),  # a pass that lost a drop gives no middle to begin at
     ],
 )
-def test_passes_go_on_while_the_likelihood_changes(monkeypatch, scores, passes):
+def test_passes_go_on_while_the_likelihood_changes(monkeypatch, scores, passes, lost):
     seen: list[Any] = []
 
     def one_pass(_problems, _stages, *, references, noise_factor, progress, **_):
-        seen.append((references[0][0, 0], noise_factor))
+        ends = (3, 2 if len(seen) == lost else 3)
+        seen.append((references[1][0, 0], len(references[1]), noise_factor))
         progress("fitting", 0.0)
-        ended = [np.full((3, 1), float(len(seen)))]
+        ended = [np.full((end, 1), float(len(seen))) for end in ends]
         return SimpleNamespace(negative_log_likelihood=scores[len(seen) - 1], trajectories=ended)
 
     monkeypatch.setattr(calibration, "track", one_pass)
     stage = Stage(until=0.2, force=0.07, share=0.01, passes=2)
     shares: list[float] = []
-    converged([], stage, [np.zeros((4, 1))], noise_factor=0.5, progress=lambda _, share: shares.append(share))
-    place, begins = 0.0, []
+    begun = [np.zeros((4, 1))] * 2
+    converged([], stage, begun, noise_factor=0.5, progress=lambda _, share: shares.append(share))
+    place, length, begins = 0.0, 4, []
     for k in range(passes):
-        begins.append((place, 0.5))
-        fell = k > 0 and scores[k] > scores[k - 1]
+        begins.append((place, length, 0.5))
+        before, length = length, 2 if k == lost else 3
+        fell = k > 0 and scores[k] > scores[k - 1] and length == before
         place = 0.5 * (place + k + 1.0) if fell else k + 1.0
     assert seen == begins
     assert shares == [k / MOST_REPEATS for k in range(passes)]
-
-
-def test_a_pass_that_lost_a_drop_gives_no_middle_to_begin_at(monkeypatch):
-    begun: list[list[int]] = []
-    ends = [(30, 30), (30, 12), (30, 30), (30, 30)]
-
-    def one_pass(_problems, _stages, *, references, **_):
-        begun.append([len(one) for one in references])
-        number = len(begun) - 1
-        reached = [np.zeros((end, 1)) for end in ends[number]]
-        return SimpleNamespace(
-            negative_log_likelihood=[-100.0, -50.0, -20.0, -20.0][number], trajectories=reached
-        )
-
-    monkeypatch.setattr(calibration, "track", one_pass)
-    stage = Stage(until=0.2, force=0.07, share=0.01, passes=1)
-    converged([], stage, [np.zeros((20, 1))] * 2)
-    assert begun == [[20, 20], [30, 30], [30, 12], [30, 30]]
 
 
 STAGE = Stage(until=0.012, force=0.07, share=0.01, passes=1)
