@@ -67,7 +67,8 @@ class Known:
 
     def __repr__(self) -> str:
         known = ((one.name, getattr(self, one.name)) for one in fields(self))
-        return f"Known({', '.join(f'{name}={value!r}' for name, value in known if value not in (None, ''))})"
+        said = (f"{name}={value!r}" for name, value in known if repr(value) not in ("None", "''"))
+        return f"Known({', '.join(said)})"
 
     @property
     def low(self) -> float:

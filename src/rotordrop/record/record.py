@@ -93,7 +93,7 @@ class Record:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", each(self.sensors, "sensors", Sensor))
-        numbers(self.sampling_rate, "sampling_rate", ())
+        object.__setattr__(self, "sampling_rate", float(numbers(self.sampling_rate, "sampling_rate", ())))
         require(self.speed_by_hand, "speed_by_hand", bool)
         require(self.path, "path", Path, none=True)
         require(self.sha256, "sha256", str)
