@@ -272,10 +272,12 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
 
 def _calmed(path: Array, rate: float) -> Array:
     """Running mean along the first axis over `SMOOTHING`: a fall stays as it is, noise hardly does."""
-    from scipy.ndimage import uniform_filter1d
-
-    window = 2 * int(0.5 * SMOOTHING * rate) + 1
-    mean: Array = uniform_filter1d(path, window, axis=0, mode="nearest")
+    half, mean = int(0.5 * SMOOTHING * rate), np.empty_like(path)
+    for at in np.ndindex(path.shape[1:]):  # one after the other: a minute of them together fills memory
+        column = path[:, *at]
+        ends = np.full(half + 1, column[0]), np.full(half, column[-1])
+        sums = np.cumsum(np.concatenate([ends[0], column, ends[1]]))
+        mean[:, *at] = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
     return mean
 
 
