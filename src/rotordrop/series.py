@@ -48,6 +48,13 @@ def median_of_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), here))
 
 
+def running_mean(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Mean of every ``count`` neighbours along the first axis, shape (N − count + 1, ...)."""
+    sums = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
+    mean: NDArray[np.float64] = (sums[count:] - sums[:-count]) / count
+    return mean
+
+
 def curvature(values: NDArray[np.float64], rate: float, samples: int) -> NDArray[np.float64]:
     """Second derivative by a cubic through an odd number of samples around each, shape of the values.
 

@@ -19,7 +19,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import USUAL_GAP
 from rotordrop.physics.whirl_spells import FOLLOWED_TURNS, WhirlSpell, whirl_spells
 from rotordrop.record.record import Record
-from rotordrop.series import MANY, noise_by_differences, runs_of, stride_of
+from rotordrop.series import MANY, noise_by_differences, running_mean, runs_of, stride_of
 from rotordrop.units import GRAVITY, fall_time
 
 SLOWEST_FALL = 0.2
@@ -257,8 +257,7 @@ def _first_fall(raw: Array, rate: float) -> tuple[int, int, tuple[float, ...]]:
         )
     window, largest = round(_LASTS * rate), np.percentile(away, 99.9, axis=0)
     if len(away) - sunk > window:
-        summed = np.cumsum(np.pad(away, ((1, 0), (0, 0))), axis=0)
-        stays = np.max(summed[window:] - summed[:-window], axis=0) / window
+        stays = np.max(running_mean(away, window), axis=0)
         if np.all(stays < _STAYS * largest) or np.any(reach < _LEAST_FALL):
             raise NothingFallsError(
                 f"the shaft moves away by {1e6 * float(np.max(largest)):.3g} µm and is back within "
@@ -274,10 +273,7 @@ def _calmed(path: Array, rate: float) -> Array:
     """Running mean along the first axis over `SMOOTHING`: a fall stays as it is, noise hardly does."""
     half, mean = int(0.5 * SMOOTHING * rate), np.empty_like(path)
     for at in np.ndindex(path.shape[1:]):  # one after the other: a minute of them together fills memory
-        column = path[:, *at]
-        ends = np.full(half + 1, column[0]), np.full(half, column[-1])
-        sums = np.cumsum(np.concatenate([ends[0], column, ends[1]]))
-        mean[:, *at] = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
+        mean[:, *at] = running_mean(np.pad(path[:, *at], half, mode="edge"), 2 * half + 1)
     return mean
 
 

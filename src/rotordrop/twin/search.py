@@ -556,8 +556,9 @@ class Search:
         machine = extension.added_to(found.machine)
         other = self._again(found, machine)
         if extension.inferred:
-            anew = self.refine(replace(found, machine=machine, fit=self.fit_base(machine)))
-            other = min(other, anew, key=lambda one: one.sized_score)
+            with suppress(IdentificationError):  # lost from guesses: what was found beside the fit stays
+                anew = self.refine(replace(found, machine=machine, fit=self.fit_base(machine)))
+                other = min(other, anew, key=lambda one: one.sized_score)
         return other
 
     def _again(self, found: Candidate, machine: Machine) -> Candidate:
