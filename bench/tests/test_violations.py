@@ -43,9 +43,6 @@ amount = "600 g mm"
 """
 
 
-THRUST = {"thrust": "400 N", "gap": "20 um", "arm": "40 mm"}
-
-
 def violations(**parts):
     return Violations.model_validate(parts)
 
@@ -98,11 +95,6 @@ def test_a_missing_case_file_is_named(tmp_path):
         ({"sensor": {"S1": {"cross_axis": 0.1}}}, "the sensor 'S1', which the machine does not have"),
         ({"unbalance_jump": {"node": 999, "amount": "1 g mm"}}, "at node 999, outside the rotor; its nodes"),
         ({"magnets": {"stays_on": ["A"]}}, "no AMB 'A'"),
-        ({"face": THRUST}, "thrust at NDE and DE; the rotor lands on one face"),
-        (
-            {"bearing": {"DE": {"face": THRUST, "balls": {"held_preload": True}}}},
-            "DE: balls under a thrust have no 'held_preload'",
-        ),
     ],
 )  # fmt: skip
 def test_what_a_machine_does_not_have_or_the_bench_cannot_make_is_refused(known, parts, message):

@@ -21,7 +21,6 @@ from rotordrop.physics._compile import Form, inner_kernel, lean_kernel
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import contact_energy
 from rotordrop.physics.elementary import cube_root
-from rotordrop.physics.spin import race_drag_torque
 from rotordrop.rotor.layout import StateLayout
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate._histories import ball_energy as energy_of_balls
@@ -46,7 +45,6 @@ from rotordrop.simulate._rhs import (
 from rotordrop.simulate._rhs import ball_force as force_of_balls
 from rotordrop.simulate._rhs import race_deflection as deflection_of_race
 from rotordrop.simulate._rhs import race_velocity as velocity_of_race
-from rotordrop.simulate._rhs import rises_with_travel as rises_along
 from rotordrop.simulate._rhs import true_motion as motion_in_bearing
 from rotordrop_bench import departure as D
 
@@ -184,89 +182,33 @@ def race_velocity(b: int, y: Array, p: KernelParameters) -> tuple[float, float]:
     return held * wx, held * wy
 
 
-@inner_kernel
-def rises_with_travel(b: int, p: KernelParameters) -> bool:
-    """Not where a thrust presses on the face of the race."""
-    rises: bool = rises_along(b, p) and p.bearing[b, NUMBERS + D.THRUST] == 0.0
-    return rises
-
-
 @lean_kernel
 def ball_force(b: int, y: Array, p: KernelParameters, work: Scratch) -> tuple[float, float, float]:
-    """Force of balls by a table, of a pair of rows under a thrust, or of those in a cage that has turned."""
+    """Force of balls by a table, or of those in a cage that has turned."""
     s, own = departing_at(b, y, p)
     back = -own[D.CAGE_ANGLE]
     x, z = race_deflection(b, y, p)
     way = math.sqrt(x * x + z * z)
-    if s[D.TABLE_SPEEDS] > 0.0:
-        force = D.from_table(s, D.TABLE_FORCE, way, y[p.bearing_at[b, L.RACE_SPIN]])
-    elif s[D.THRUST] > 0.0:
-        force = D.ring_of_balls(s, way, own[D.AXIAL + 1])[0]
+    if s[D.LOOSE_WAY] > 0.0:
+        rise = D.from_table(s, D.TABLE_FORCE, way) / max(way, 1e-15)
+        F_x, F_y = rise * x, rise * z
     else:
         F_x, F_y, by_spin = force_of_balls(b, y, p, work)
         if p.bearing[b, L.FAST_SPEED_STEP] > 0.0:
             return F_x, F_y, by_spin
-        F_x, F_y = D.turned(back, F_x, F_y)
-        return F_x, F_y, 0.0
-    rise = force / max(way, 1e-15)
-    F_x, F_y = D.turned(back, rise * x, rise * z)
+    F_x, F_y = D.turned(back, F_x, F_y)
     return F_x, F_y, 0.0
 
 
 @inner_kernel
 def race_loads(b: int, y: Array, p: KernelParameters) -> tuple[float, float, float]:
-    """Loads of balls by a table, or under a thrust."""
-    s, own = departing_at(b, y, p)
-    x, z = race_deflection(b, y, p)
-    way = math.sqrt(x * x + z * z)
-    if s[D.TABLE_SPEEDS] > 0.0:
-        spin = y[p.bearing_at[b, L.RACE_SPIN]]
-        load = max(D.from_table(s, D.TABLE_LOAD, way, spin), 0.0)
-    elif s[D.THRUST] > 0.0:
-        load = D.hardest_ball(s, way, own[D.AXIAL + 1])
-    else:
+    """Loads of balls by a table."""
+    s, _ = departing_at(b, y, p)
+    if s[D.LOOSE_WAY] == 0.0:
         return loads_of_race(b, y, p)
-    return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
-
-
-@lean_kernel
-def add_departing_thrust(
-    t: float, b: int, y: Array, p: KernelParameters, dy: Array
-) -> tuple[float, float, float, float, float]:
-    """Add the axial motion of rotor and race that a departing thrust makes, and the friction of the face.
-
-    Returns the torque on the race [N m] and the power that sliding, the face, the balls and drag take [W].
-    """
-    n_q, r, spin = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
-    s, own = departing_at(b, y, p)
-    _, rates = departing_at(b, dy, p)
-    row, shape, at = p.bearing[b], p.bearing_shape[b], D.AXIAL
-    if s[D.THRUST] == 0.0:
-        rates[at : at + 4] = 0.0
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    _, _, sx, sy = modal_parts(y, p)
-    _, _, ax, ay = modal_parts(dy, p)
-    vx, vy = project(shape, sx) - y[n_q + r], project(shape, sy) - y[n_q + r + 1]
-    slip = y[p.rotor_at[L.ROTOR_SPEED]] - y[spin]
-    push, F_x, F_y, torque, sliding, lost = D.landed(s, own, vx, vy, slip)
-    for k in range(shape.shape[0]):
-        ax[k] -= shape[k] * F_x
-        ay[k] -= shape[k] * F_y
-    dy[n_q + r] += F_x / row[L.RACE_MASS]
-    dy[n_q + r + 1] += F_y / row[L.RACE_MASS]
     x, z = race_deflection(b, y, p)
-    held = D.ring_of_balls(s, math.sqrt(x * x + z * z), own[at + 1])[1]
-    drag = race_drag_torque(
-        abs(held), y[spin], row[L.DRAG_COEFFICIENT], row[L.PITCH_DIAMETER], row[L.DRAG_SPEED]
-    )
-    dy[spin] += (torque - drag) / row[L.RACE_INERTIA]
-    thrust = 0.0 if t < p.spin[L.POWER_OFF_DELAY] else s[D.THRUST]
-    damped = s[D.ALONG] * row[L.BEARING_DAMPING] * own[at + 3]
-    rates[at], rates[at + 1] = own[at + 2], own[at + 3]
-    rates[at + 2] = (thrust - push) / p.spin[L.ROTOR_MASS]
-    rates[at + 3] = (push - held - damped) / row[L.RACE_MASS]
-    dy[p.rotor_at[L.WORK_IN]] += thrust * own[at + 2]
-    return torque, sliding, lost, damped * own[at + 3], drag * y[spin]
+    load = max(D.from_table(s, D.TABLE_LOAD, math.sqrt(x * x + z * z)), 0.0)
+    return load, p.bearing[b, L.STRESS_COEFFICIENT] * cube_root(load), 0.0
 
 
 @lean_kernel
@@ -316,7 +258,7 @@ def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, d
 
     Source: principal axes turned by an angle; ``K h (1 + k h²)`` along each, or the gradient of
     ``(1 + k h²/2)`` times the energy of the linear springs, with h the whole deflection; slip of a bristle of
-    Dahl 1968, ``z' = (v - |v| z) / travel``; a stop of spring and dashpot that do not pull. Not validated.
+    Dahl 1968, ``z' = (v - |v| z) / travel``. Not validated.
     """
     n_q, h, row = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing[b]
     s, own = departing_at(b, y, p)
@@ -341,21 +283,11 @@ def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, d
     rates[D.SLIP_X] = (vx - speed * slip_x) / s[D.SLIP_TRAVEL]
     rates[D.SLIP_Y] = (vz - speed * slip_y) / s[D.SLIP_TRAVEL]
     lost = c_x * vx + c_y * vz + slip * speed * (slip_x * slip_x + slip_y * slip_y)
-    stop_x = stop_y = 0.0
-    way = math.sqrt(x * x + z * z)
-    depth = way - s[D.STOP_GAP]
-    by_stop = 0.0
-    if s[D.STOP_STIFFNESS] != 0.0 and depth > 0.0:
-        rate, elastic = (x * vx + z * vz) / way, s[D.STOP_STIFFNESS] * depth
-        force = max(elastic + s[D.STOP_DAMPING] * rate, 0.0)
-        stop_x, stop_y, by_stop = force * x / way, force * z / way, (force - elastic) * rate
-    held_x, held_y, by_ribbon = D.ribbon_force(s, own, rates, vx, vz)
-    k_x = cosine * first - sine * second + slip * slip_x + stop_x + held_x
-    k_y = cosine * second + sine * first + slip * slip_y + stop_y + held_y
+    k_x = cosine * first - sine * second + slip * slip_x
+    k_y = cosine * second + sine * first + slip * slip_y
     dy[n_q + h] = (F_x - c_x - k_x) / row[L.SUPPORT_MASS_X]
     dy[n_q + h + 1] = (F_y - c_y - k_y) / row[L.SUPPORT_MASS_Y]
-    by_foundation = add_mode(b, D.FOUNDATION_MODE, D.FOUNDATION, k_x + c_x, k_y + c_y, y, p, dy)
-    total: float = lost + by_stop + by_ribbon + by_foundation
+    total: float = lost + add_mode(b, D.FOUNDATION_MODE, D.FOUNDATION, k_x + c_x, k_y + c_y, y, p, dy)
     return total
 
 
@@ -363,7 +295,7 @@ def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, d
 def bearing_accelerations(
     t: float, b: int, y: Array, p: KernelParameters, dy: Array, work: Scratch
 ) -> tuple[float, float]:
-    """Forces at one bearing whose race tilts and is pushed along, and whose support departs."""
+    """Forces at one bearing whose race tilts and whose support departs."""
     n_q, h = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT]
     r, spin = n_q + p.bearing_at[b, L.RACE], p.bearing_at[b, L.RACE_SPIN]
     s, _ = departing_at(b, y, p)
@@ -383,18 +315,15 @@ def bearing_accelerations(
         F_x, F_y, by_balls, by_drag = add_race(b, friction, y, p, dy, work)
     else:
         dy[spin] = 0.0
-    by_face, rubbed, by_landing, by_moving, by_rolling = add_departing_thrust(t, b, y, p, dy)
-    by_balls += by_moving
     if p.bearing_at[b, L.RING_STATES] >= 0:
         by_rings, by_fit = add_rings(b, math.sqrt(F_x * F_x + F_y * F_y), y, p, dy, work.balls)
         by_balls += by_rings
     rates[D.HEAT], rates[D.CAGE_ANGLE] = sliding, s[D.CAGE_RATIO] * y[spin]
     by_support = by_tilt + add_support(b, F_x + dy[n_q + h], F_y + dy[n_q + h + 1], y, p, dy) + by_fit
     power = work.power[b]
-    sliding, lost, by_drag = sliding + rubbed, lost + by_landing, by_drag + by_rolling
     power[SLIDING], power[IN_CONTACT] = sliding, lost
     power[BALL_SET], power[SUPPORT], power[DRAG] = by_balls, by_support, by_drag
-    torque = by_sleeve - by_face - friction * p.bearing[b, L.ROTOR_RADIUS]
+    torque = by_sleeve - friction * p.bearing[b, L.ROTOR_RADIUS]
     return torque, by_balls + by_drag + by_support + (sliding + lost)
 
 
@@ -402,32 +331,31 @@ def bearing_accelerations(
 def step_error(
     h: float, y: Array, y_new: Array, k: Array, e: Array, rule: Control, p: KernelParameters, scratch: Array
 ) -> float:
-    """What departs has a norm of its own: at rest it must not loosen the control."""
+    """What departs has a norm of its own: at rest it must not loosen the control.
+
+    A mean over twice as many states as there are, as when the recordings of the lists were first made.
+    """
     n = p.rotor_at[L.WORK_IN] + 1
-    error = error_of_step(h, y, y_new, k, e, rule, p, scratch)
-    scale, tolerance = rule.scale[n:], rule.tolerance
-    return max(error, scaled_error(h, y[n:], y_new[n:], k[:, n:], e, scale, tolerance, scratch))
+    error, total = error_of_step(h, y, y_new, k, e, rule, p, scratch), 0.0
+    scale = rule.scale[n:]
+    scaled_error(h, y[n:], y_new[n:], k[:, n:], e, scale, rule.tolerance, scratch)
+    for i in range(scale.shape[0]):  # squares of what each is off
+        total += scratch[i]
+    return max(error, math.sqrt(total / (2 * scale.shape[0])) / rule.tolerance)
 
 
 @lean_kernel
 def ball_energy(b: int, y: Array, p: KernelParameters) -> float:
-    """Energy of balls by a table, or of a pair of rows under a thrust with what moves axially."""
-    s, own = departing_at(b, y, p)
+    """Energy of balls by a table: Simpson's rule on the force."""
+    s, _ = departing_at(b, y, p)
+    if s[D.LOOSE_WAY] == 0.0:
+        return energy_of_balls(b, y, p)
     x, z = race_deflection(b, y, p)
-    way = math.sqrt(x * x + z * z)
-    if s[D.TABLE_SPEEDS] > 0.0:
-        spin, steps, energy = y[p.bearing_at[b, L.RACE_SPIN]], 64, 0.0
-        for k in range(steps + 1):  # Simpson's rule on the force
-            weight = 1.0 if k in (0, steps) else (4.0 if k % 2 == 1 else 2.0)
-            energy += weight * D.from_table(s, D.TABLE_FORCE, way * k / steps, spin)
-        return energy * way / (3.0 * steps)
-    if s[D.THRUST] > 0.0:
-        rotor, race, v_rotor, v_race = own[D.AXIAL], own[D.AXIAL + 1], own[D.AXIAL + 2], own[D.AXIAL + 3]
-        depth = max(rotor - race - s[D.FACE_GAP], 0.0)
-        energy = p.spin[L.ROTOR_MASS] * v_rotor**2 + p.bearing[b, L.RACE_MASS] * v_race**2
-        energy += s[D.FACE_STIFFNESS] * depth * depth
-        return float(D.ring_of_balls(s, way, race)[2] + 0.5 * energy)
-    return energy_of_balls(b, y, p)
+    way, steps, energy = math.sqrt(x * x + z * z), 64, 0.0
+    for k in range(steps + 1):
+        weight = 1.0 if k in (0, steps) else (4.0 if k % 2 == 1 else 2.0)
+        energy += weight * D.from_table(s, D.TABLE_FORCE, way * k / steps)
+    return energy * way / (3.0 * steps)
 
 
 @lean_kernel
@@ -462,10 +390,6 @@ def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
         energy: float = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
     else:
         energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
-    depth = max(math.sqrt(x * x + z * z) - s[D.STOP_GAP], 0.0)
-    energy += 0.5 * s[D.STOP_STIFFNESS] * depth * depth
-    for i in range(D.STRETCH, D.AXIAL):
-        energy += 0.5 * s[D.RIBBON_STIFFNESS] / D.YIELDS.shape[0] * own[i] * own[i]
     energy += 0.5 * s[D.SLIP_FORCE] * s[D.SLIP_TRAVEL] * (own[D.SLIP_X] ** 2 + own[D.SLIP_Y] ** 2)
     for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
         stored = 0.0
@@ -477,8 +401,8 @@ def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
 
 
 PARTS = (
-    *(true_motion, gap_at, contact_values, race_deflection, race_velocity, rises_with_travel, ball_force),
-    *(race_loads, bearing_accelerations, step_error, ball_energy, touch_energy, spring_energy),
+    *(true_motion, gap_at, contact_values, race_deflection, race_velocity, ball_force, race_loads),
+    *(bearing_accelerations, step_error, ball_energy, touch_energy, spring_energy),
 )
 FORM = Form(
     name="departing", parts={part.__name__: part for part in PARTS}, beside=Path(__file__).resolve().parent

@@ -34,43 +34,18 @@ MOST_PIECES = 8
 # of both from the mark of the rotor [rad]. Share of the friction that wears off, after much more than [J].
 SLEEVE_OFF = LAW + MOST_PIECES * LAW_WIDTH
 SLEEVE_OVAL, SLEEVE_ANGLE, WEAR, WEAR_HEAT = range(SLEEVE_OFF + 1, SLEEVE_OFF + 5)
-# Stop around the support: travel up to it [m], stiffness [N/m], damping [N s/m]. Ribbon: stiffness of its
-# springs before they slip [N/m], force at which all slip [N]. Way of the race within which its bearing is
-# loose in its seat [m]. Balls by a table over the deflection of the race, at speeds of it [rad/s] that are
-# evenly apart: force and largest load of a ball [N].
-STOP_GAP, STOP_STIFFNESS, STOP_DAMPING, RIBBON_STIFFNESS, RIBBON_SLIP = range(SLEEVE_OFF + 5, SLEEVE_OFF + 10)
-LOOSE_WAY = SLEEVE_OFF + 10
-# Axial force on the rotor [N] that no magnet holds after power-off, and the face of the race that it lands
-# on: gap [m], stiffness [N/m], damping [N s/m], friction [1] and its arm [m]. Axial damping of a pair of rows
-# over the radial one [1]; one ball of it [N/m^1.5], distance of its grooves, their radial and their axial
-# offset [m], places in half a ring that stand for the balls of a row, and how many balls each stands for.
-THRUST, FACE_GAP, FACE_STIFFNESS, FACE_DAMPING, FACE_FRICTION, FACE_ARM = range(LOOSE_WAY + 1, LOOSE_WAY + 7)
-ALONG, RING_BALL, RING_GROOVES, RING_RADIAL, RING_AXIAL, RING_PLACES, RING_SHARE = range(
-    LOOSE_WAY + 7, LOOSE_WAY + 14
-)
-TABLE_SPEEDS, TABLE_SPEED_STEP, TABLE_WAY_STEP, TABLE = range(LOOSE_WAY + 14, LOOSE_WAY + 18)
-MOST_SPEEDS, TABLE_POINTS = 6, 128
-TABLE_FORCE, TABLE_LOAD = 0, 1
-N_COLUMNS = TABLE + MOST_SPEEDS * 2 * TABLE_POINTS
-
-FACE_POINTS = 12
-"""Points of the ring at which a shoulder slides on a face [1]: chosen."""
-STANDS = 1e-3
-"""Speed [m/s] below which the friction of a face is smoothed: chosen."""
-YIELDS = np.array([0.25, 0.75, 1.25, 1.75])
-"""Travels at which the springs of a ribbon slip, over their mean [1]: chosen."""
+# Way of the race within which its bearing is loose in its seat [m], and behind it a table over the deflection
+# of the race: force, then largest load of a ball [N].
+LOOSE_WAY, TABLE_WAY_STEP, TABLE = range(SLEEVE_OFF + 5, SLEEVE_OFF + 8)
+TABLE_FORCE, TABLE_LOAD, TABLE_POINTS = 0, 1, 128
+N_COLUMNS = TABLE + 2 * TABLE_POINTS
 
 # States of a departure: displacement, then velocity of foundation and of tilt (x, y), slip over its travel
-# [1], heat rubbed into the contact [J], angle of the cage [rad], stretch of each spring of a ribbon [m],
-# displacement of rotor and race along the axis [m], then their velocities.
-FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, STRETCH = 0, 4, 8, 9, 10, 11, 12
-AXIAL = STRETCH + 2 * len(YIELDS)
-N_STATES = AXIAL + 4
+# [1], heat rubbed into the contact [J], angle of the cage [rad].
+FOUNDATION, TILT, SLIP_X, SLIP_Y, HEAT, CAGE_ANGLE, N_STATES = 0, 4, 8, 9, 10, 11, 12
 KINDS = (
     *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY) * 2,
     *(L.INTERNAL, L.INTERNAL, L.HEAT, L.ANGLE),
-    *(L.INTERNAL,) * (2 * len(YIELDS)),
-    *(L.POSITION, L.POSITION, L.VELOCITY, L.VELOCITY),
 )
 """Kind of each of these states."""
 
@@ -170,111 +145,17 @@ def turned(angle: float, x: float, y: float) -> tuple[float, float]:
 
 
 @lean_kernel
-def ribbon_force(s: Array, own: Array, rates: Array, vx: float, vy: float) -> tuple[float, float, float]:
-    """Force of a ribbon [N] on its support at a velocity [m/s], and the power it takes [W].
+def from_table(s: Array, what: int, way: float) -> float:
+    """Force or largest ball load [N] of a race deflected by a way [m].
 
-    Its springs stick until each is stretched by a travel of its own and slide then. Fills the rates of their
-    stretches [m/s]. Source: Iwan 1966, Jenkins elements in parallel, isotropic in the plane.
-    """
-    count = YIELDS.shape[0]
-    spring = s[RIBBON_STIFFNESS] / count
-    F_x = F_y = lost = 0.0
-    for i in range(count):
-        at = STRETCH + 2 * i
-        zx, zy = own[at], own[at + 1]
-        rates[at], rates[at + 1] = vx, vy
-        if spring == 0.0:
-            rates[at] = rates[at + 1] = 0.0
-            continue
-        stretch, outwards = math.sqrt(zx * zx + zy * zy), zx * vx + zy * vy
-        if outwards > 0.0 and stretch >= YIELDS[i] * s[RIBBON_SLIP] / s[RIBBON_STIFFNESS]:
-            slide = outwards / (stretch * stretch)
-            rates[at], rates[at + 1] = vx - slide * zx, vy - slide * zy
-            lost += spring * outwards
-        F_x += spring * zx
-        F_y += spring * zy
-    return F_x, F_y, lost
-
-
-@lean_kernel
-def from_table(s: Array, what: int, way: float, spin: float) -> float:
-    """Force or largest ball load [N] of a race deflected by a way [m] that turns [rad/s].
-
-    Source: table of the row, by cubics through its points and straight between its speeds.
+    Source: table of the row, by cubics through its points.
     """
     place = way / s[TABLE_WAY_STEP]
     i = min(int(place), TABLE_POINTS - 3)
-    u = place - i
-    speeds = int(s[TABLE_SPEEDS])
-    turn = min(abs(spin) / s[TABLE_SPEED_STEP], speeds - 1.0)
-    j = min(int(turn), max(speeds - 2, 0))
-    found = 0.0
-    for k in range(min(speeds, 2)):
-        share = turn - j if k == 1 else 1.0 - (turn - j)
-        at = TABLE + ((j + k) * 2 + what) * TABLE_POINTS + i
-        b, c, d = s[at], s[at + 1], s[at + 2]
-        # the force of a race that goes the other way has the other sign
-        a = s[at - 1] if i > 0 else (-c if what == TABLE_FORCE else c)
-        bent = 2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)
-        found += share * (b + 0.5 * u * (c - a + u * bent))
+    u, at = place - i, TABLE + what * TABLE_POINTS + i
+    b, c, d = s[at], s[at + 1], s[at + 2]
+    # the force of a race that goes the other way has the other sign
+    a = s[at - 1] if i > 0 else (-c if what == TABLE_FORCE else c)
+    bent = 2.0 * a - 5.0 * b + 4.0 * c - d + u * (3.0 * (b - c) + d - a)
+    found: float = b + 0.5 * u * (c - a + u * bent)
     return found
-
-
-@lean_kernel
-def ring_of_balls(s: Array, way: float, along: float) -> tuple[float, float, float]:
-    """Radial and axial force [N] and energy [J] of a pair of rows whose race has moved by (way, along) [m].
-
-    Source: Hertz's contacts of a smooth ring of balls, summed up over half of it.
-    """
-    places = int(s[RING_PLACES])
-    across = lengthwise = energy = 0.0
-    for i in range(places):
-        _, cosine = sine_cosine(math.pi * (i + 0.5) / places)
-        radial = s[RING_RADIAL] + way * cosine
-        for row in range(2):
-            sense = 1.0 - 2.0 * row
-            axial = s[RING_AXIAL] + sense * along
-            apart = math.sqrt(radial * radial + axial * axial)
-            pressed = apart - s[RING_GROOVES]
-            if pressed > 0.0:
-                load = s[RING_SHARE] * s[RING_BALL] * pressed * math.sqrt(pressed)
-                across += load * radial / apart * cosine
-                lengthwise += sense * load * axial / apart
-                energy += 0.4 * load * pressed
-    return across, lengthwise, energy
-
-
-@lean_kernel
-def hardest_ball(s: Array, way: float, along: float) -> float:
-    """Load [N] of the ball towards which the race has moved by (way, along) [m]. Source: `ring_of_balls`."""
-    radial, axial = s[RING_RADIAL] + way, s[RING_AXIAL] + abs(along)
-    pressed = max(math.sqrt(radial * radial + axial * axial) - s[RING_GROOVES], 0.0)
-    load: float = s[RING_BALL] * pressed * math.sqrt(pressed)
-    return load
-
-
-@lean_kernel
-def landed(
-    s: Array, own: Array, vx: float, vy: float, slip: float
-) -> tuple[float, float, float, float, float, float]:
-    """Force of a shoulder on the face of its race along the axis, x and y [N] and torque on the race [N m].
-
-    ``vx, vy`` is the velocity of the rotor against the race [m/s], ``slip`` what it turns faster [rad/s]. The
-    powers that sliding and the face take [W] come last. Source: spring and dashpot in parallel (Kelvin and
-    Voigt) that do not pull; Coulomb's friction at points of a ring.
-    """
-    depth = own[AXIAL] - own[AXIAL + 1] - s[FACE_GAP]
-    if depth <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    elastic, rate = s[FACE_STIFFNESS] * depth, own[AXIAL + 2] - own[AXIAL + 3]
-    push = max(elastic + s[FACE_DAMPING] * rate, 0.0)
-    F_x = F_y = torque = sliding = 0.0
-    for i in range(FACE_POINTS):
-        sine, cosine = sine_cosine(2.0 * math.pi * (i + 0.5) / FACE_POINTS)
-        tx, ty = vx - slip * s[FACE_ARM] * sine, vy + slip * s[FACE_ARM] * cosine
-        pull = s[FACE_FRICTION] * push / (FACE_POINTS * math.sqrt(tx * tx + ty * ty + STANDS * STANDS))
-        F_x += pull * tx
-        F_y += pull * ty
-        torque += pull * s[FACE_ARM] * (ty * cosine - tx * sine)
-        sliding += pull * (tx * tx + ty * ty)
-    return push, F_x, F_y, torque, sliding, (push - elastic) * rate

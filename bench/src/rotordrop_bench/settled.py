@@ -21,7 +21,6 @@ from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.levitation import rigid_amplitudes
 from rotordrop_bench import departure as D
-from rotordrop_bench.ball_tables import thrust_pair
 from rotordrop_bench.departing import STATES_AT, DepartingParameters, departing, departures_in
 
 MOST_ITERATIONS = 100
@@ -56,11 +55,11 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
     n_q, departs = layout.n_coordinates, len(rows) > 0
     if departs:
         state, parameters = layout.zeros(), _on_one_place_of_sleeves(parameters, angle)
-        at, mass, start, thrust = _departing_start(model)
+        at, mass, start = _departing_start(model)
     else:
         state = model.at_rest()
         state[layout.modal_y] = _guess(model)
-        at, mass, start, thrust = np.arange(n_q), _masses(model), state[:n_q].copy(), np.zeros(n_q)
+        at, mass, start = np.arange(n_q), _masses(model), state[:n_q].copy()
     state[layout.rotor_angle] = angle
     velocities = np.where(at < n_q, at + n_q, at + 2)
     work, form = scratch_of(parameters), parameters.form
@@ -73,7 +72,7 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
 
     def energy_at(place: Array) -> float:
         stands = float(stored(LONG_AFTER, completed(place), parameters, False))
-        return stands - load_potential(model, place) - float(np.dot(thrust, place))
+        return stands - load_potential(model, place)
 
     def force_at(place: Array) -> Array:
         rates = layout.zeros()
@@ -159,25 +158,18 @@ def _on_one_place_of_sleeves(parameters: KernelParameters, angle: float) -> Kern
     return parameters
 
 
-def _departing_start(model: DropModel) -> tuple[Integers, Array, Array, Array]:
-    """Places in the state of what a departing machine comes to rest with, masses, a start and thrusts [N]."""
+def _departing_start(model: DropModel) -> tuple[Integers, Array, Array]:
+    """Places in the state of what a departing machine comes to rest with, masses and a start."""
     p, n_q, rows = model.parameters, model.layout.n_coordinates, departures_in(model)
     found = _on_their_tables(model, settled_coordinates(departing(model, rows[:0])))
-    entries = list(zip(range(n_q), _masses(model), found, [0.0] * n_q, strict=True))
+    entries = list(zip(range(n_q), _masses(model), found, strict=True))
     for b, row in enumerate(rows):
         first = p.bearing_at[b, STATES_AT]
         for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
             if (compliance := row[mode + D.COMPLIANCE]) > 0.0:
-                entries += [(first + place + axis, 1.0 / compliance, 0.0, 0.0) for axis in range(2)]
-        if (push := float(row[D.THRUST])) > 0.0:
-            numbers = numbers_of(model.machine.touchdown_bearings[b])
-            down = numbers.deflection(float(model.load_shares[b]))[0]
-            along = thrust_pair(numbers.constants, down, push)[2]
-            landed = along + row[D.FACE_GAP] + push / row[D.FACE_STIFFNESS]
-            entries.append((first + D.AXIAL, p.spin[L.ROTOR_MASS], landed, push))
-            entries.append((first + D.AXIAL + 1, p.bearing[b, L.RACE_MASS], along, 0.0))
-    at, mass, start, thrust = (np.array(column) for column in zip(*entries, strict=True))
-    return at, mass, start, thrust
+                entries += [(first + place + axis, 1.0 / compliance, 0.0) for axis in range(2)]
+    at, mass, start = (np.array(column) for column in zip(*entries, strict=True))
+    return at, mass, start
 
 
 def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
@@ -189,11 +181,11 @@ def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
     down = np.zeros(len(model.machine.touchdown_bearings))
     ways = (coordinates[layout.support] - coordinates[layout.race])[1::2]
     for b, load in enumerate(model.load_shares):
-        if rows[b, D.TABLE_SPEEDS] > 0.0:
+        if rows[b, D.LOOSE_WAY] > 0.0:
             reach = rows[b, D.TABLE_WAY_STEP] * (D.TABLE_POINTS - 3)
 
             def lacking(way: float, b: int = b, load: float = float(load)) -> float:
-                return float(D.from_table(rows[b], D.TABLE_FORCE, way, 0.0)) - load
+                return float(D.from_table(rows[b], D.TABLE_FORCE, way)) - load
 
             down[b] = max(brentq(lacking, 0.0, reach) - ways[b], 0.0)
     found = coordinates.copy()

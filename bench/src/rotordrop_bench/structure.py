@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.clearance import Clearance
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
@@ -22,7 +23,6 @@ from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop_bench import departure as D
-from rotordrop_bench.ball_tables import face_row, table_row
 from rotordrop_bench.departing import departures_in
 from rotordrop_bench.violations import BearingViolations, Violations
 
@@ -31,6 +31,10 @@ PULL_LASTS, PULL_POINTS = 6.0, 61
 within 0.2 % of the largest; chosen, not measured."""
 TYPICAL_LOADS = 5.0
 """Force over the mean load of a bearing at which a contact with another exponent is as deep as before [1]."""
+LARGEST_LOADS = 60.0
+"""Load over the static load of a bearing up to which its table goes, with room besides [1]; chosen."""
+SMEARED = 4
+"""Places per ball at which the ring of balls is summed up [1]; chosen."""
 
 
 def violated(machine: Machine, violations: Violations) -> Machine:
@@ -98,10 +102,9 @@ def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float)
 
 def departures_of(machine: Machine, violations: Violations) -> Array:
     """Departures of all bearings of a true machine, shape (B, C) [SI]; (0, C) where nothing departs."""
-    nominal = float(machine.speed.nominal)
     rows = np.array(
         [
-            _departure(b, violations.of_bearing(b.name), float(load), nominal)
+            _departure(b, violations.of_bearing(b.name), float(load))
             for b, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True)
         ]
     )
@@ -110,7 +113,7 @@ def departures_of(machine: Machine, violations: Violations) -> Array:
     return rows
 
 
-def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nominal: float) -> Array:
+def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float) -> Array:
     row = D.no_departure()
     support, foundation, balls = v.support, v.foundation, bearing.bearing
     for part in (support, v.gap, v.friction, v.balls, v.sleeve, v.centre):
@@ -121,17 +124,8 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
     deflection = float(support.hardening_force) / float(bearing.support.stiffness)
     row[D.HARDENING] = float(support.hardening) / deflection**2
     row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
-    stop = math.sqrt(row[D.STOP_STIFFNESS] * float(bearing.support.mass))
-    row[D.STOP_DAMPING] = 2.0 * float(support.stop_damping) * stop
-    if v.balls.tabulated and float(v.face.thrust) > 0.0:
-        raise UsageError(
-            f"{bearing.name}: balls under a thrust have no 'held_preload', 'inertia' or 'seat_play' in "
-            "the bench; leave out those or 'face'"
-        )
-    if float(v.face.thrust) > 0.0:
-        row[D.THRUST : D.TABLE_SPEEDS] = face_row(bearing, v.face)
-    if v.balls.tabulated:
-        row[D.TABLE_SPEEDS :] = table_row(bearing, v.balls, load, nominal)
+    if row[D.LOOSE_WAY] > 0.0:
+        row[D.TABLE_WAY_STEP :] = _seat_table(bearing, row[D.LOOSE_WAY], load)
     if foundation.mass is not None and foundation.frequency is not None:
         across = foundation.frequency_horizontal or foundation.frequency
         row[D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH] = _mode(
@@ -155,6 +149,32 @@ def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float, nom
         row[at : at + D.LAW_UNTIL] = contact_law(f1 / d1**exponent, exponent, float(bearing.contact.damping))
         row[at + D.LAW_UNTIL] = d2
     return row
+
+
+def _seat_table(bearing: TouchdownBearing, play: float, load: float) -> Array:
+    """Step of the way [m], then force and largest load of a ball [N] behind a play [m]; (1 + 2 P,).
+
+    ``load`` is the static load of the bearing [N]. A pair of rows is a smooth ring of balls, whose loads
+    follow from where the grooves go.
+    """
+    numbers = numbers_of(bearing)
+    c = numbers.constants
+    if not (c.preloaded and len(c.axial_signs) == 2):
+        raise UsageError(
+            f"{bearing.name}: seat_play of balls needs a preloaded pair of rows, which this bearing is not; "
+            "leave it out of its violations"
+        )
+    free = c.groove_distance * (1.0 - math.cos(c.contact_angle))
+    step = (4.0 * numbers.deflection(LARGEST_LOADS * load)[0] + free) / (D.TABLE_POINTS - 1)
+    places = SMEARED * len(c.ball_angles)
+    cosine = np.cos(2.0 * math.pi * (np.arange(places) + 0.5) / places)
+    found = []
+    for i in range(D.TABLE_POINTS):
+        radial = c.radial_offset + max(step * i - play, 0.0) * cosine
+        apart = np.hypot(radial, c.axial_offset)
+        pressed = c.ball_stiffness * np.maximum(apart - c.groove_distance, 0.0) ** 1.5
+        found.append((2.0 * float((1.0 / SMEARED * pressed / apart) @ (radial * cosine)), max(pressed)))
+    return np.concatenate([[step], *np.array(found).T])
 
 
 def loosened(model: DropModel) -> DropModel:

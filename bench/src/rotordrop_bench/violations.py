@@ -101,26 +101,9 @@ class SupportViolation(Violation):
     hardening_radial: bool = key(False, "the whole deflection hardens both axes, instead of each its own")
     slip_force: Force = key(0.0, "friction that slips in the support: a hysteresis [N]")
     slip_travel: PositiveLength = key(1.0, "deflection over which that friction builds up [m]")
-    stop_gap: PositiveLength | None = key(None, "travel of the support up to a stop [m]")
-    stop_stiffness: Stiffness | None = key(None, "stiffness of the stop [N/m]")
-    stop_damping: NonNegative = key(0.0, "damping ratio of the mass of the support on its stop [1]")
-    ribbon_stiffness: Stiffness | None = key(None, "stiffness of a ribbon before it slips [N/m]")
-    ribbon_slip: PositiveForce | None = key(None, "force at which all of the ribbon slips [N]")
 
-    together: ClassVar = (
-        ("hardening", "hardening_force"),
-        ("slip_force", "slip_travel"),
-        ("stop_gap", "stop_stiffness"),
-        ("ribbon_stiffness", "ribbon_slip"),
-    )
-    columns: ClassVar = {
-        "slip_force": D.SLIP_FORCE,
-        "slip_travel": D.SLIP_TRAVEL,
-        "stop_gap": D.STOP_GAP,
-        "stop_stiffness": D.STOP_STIFFNESS,
-        "ribbon_stiffness": D.RIBBON_STIFFNESS,
-        "ribbon_slip": D.RIBBON_SLIP,
-    }
+    together: ClassVar = (("hardening", "hardening_force"), ("slip_force", "slip_travel"))
+    columns: ClassVar = {"slip_force": D.SLIP_FORCE, "slip_travel": D.SLIP_TRAVEL}
 
 
 class FoundationViolation(Violation):
@@ -225,42 +208,9 @@ class BallsViolation(Violation):
 
     first_ball_angle: Angle | None = key(None, "where the first ball stands [rad]")
     turn: bool = key(False, "the balls turn with the cage as the race spins up")
-    held_preload: bool = key(False, "the preload holds whatever the race does, as that of long springs")
-    inertia: bool = key(False, "the centrifugal force of the balls acts")
     seat_play: Length = key(0.0, "way of the bearing in its seat, from the middle, before it holds [m]")
 
     columns: ClassVar = {"seat_play": D.LOOSE_WAY}
-
-    @property
-    def tabulated(self) -> int:
-        """How many of these give the balls a load of their own over the deflection of the race."""
-        return self.held_preload + self.inertia + (float(self.seat_play) > 0.0)
-
-    def check(self) -> None:
-        """Refuse two of what a table holds one of."""
-        super().check()
-        if self.tabulated > 1:
-            raise Misfit("balls have one of 'held_preload', 'inertia' and 'seat_play'; leave out the others")
-
-
-class FaceViolation(Violation):
-    """An axial force that no magnet holds after power-off, and the face that the rotor lands on."""
-
-    thrust: Force = key(0.0, "axial force on the rotor from power-off on [N]")
-    gap: Length = key(0.0, "way of the rotor before it lands [m]")
-    arm: PositiveLength = key(1.0, "radius at which the face rubs [m]")
-    stiffness: Stiffness = key(1e9, "stiffness of the face; of a steel shoulder on a ring, chosen [N/m]")
-    damping: NonNegative = key(0.05, "damping ratio of the race on it; of steel on steel, chosen [1]")
-    friction: NonNegative = key(0.1, "friction coefficient of the face [1]")
-
-    together: ClassVar = (("thrust", "gap", "arm"),)
-    columns: ClassVar = {
-        "thrust": D.THRUST,
-        "gap": D.FACE_GAP,
-        "arm": D.FACE_ARM,
-        "stiffness": D.FACE_STIFFNESS,
-        "friction": D.FACE_FRICTION,
-    }
 
 
 class SleeveViolation(Violation):
@@ -292,7 +242,6 @@ class BearingViolations(Violation):
     friction: FrictionViolation = FrictionViolation()
     gap: GapViolation = GapViolation()
     balls: BallsViolation = BallsViolation()
-    face: FaceViolation = FaceViolation()
     sleeve: SleeveViolation = SleeveViolation()
     centre: CentreViolation = CentreViolation()
 
@@ -424,12 +373,6 @@ class Violations(BearingViolations):
                     f"the violations name the {what} {missing[0]!r}, which the machine does not have; "
                     f"it has {', '.join(there)}"
                 )
-        landing = [b.name for b in machine.touchdown_bearings if float(self.of_bearing(b.name).face.thrust)]
-        if len(landing) > 1:
-            raise UsageError(
-                f"the violations have a thrust at {' and '.join(landing)}; the rotor lands on one face: give "
-                f"'face' to one of them, as bearing.{landing[0]}.face"
-            )
         nodes = len(machine.rotor.node_positions)
         placed = {
             "unbalance comes": self.unbalance_jump,
