@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rotordrop.estimate.published import FORMAT, Bearing, Consistency, Drop, Value
+from rotordrop.estimate.published import FORMAT, Bearing, Consistency, Drop, LaterMotion, Value
 from rotordrop.severity.statistics import Statistics
 
 NOTHING: dict[str, Any] = {
@@ -50,6 +50,12 @@ def bearing(numbers: Mapping[str, Value]) -> Bearing:
     return Bearing.model_construct(
         numbers=dict(numbers), stress_statistics_Pa=STATISTICS, impacts=[], origin=""
     )
+
+
+def went_on(bearing: str, at: float = 0.25) -> LaterMotion:
+    """A rotor that went 60 µm further out at a bearing, at a time after the estimated part [s]."""
+    within = {"first": 250e-6, "first_time": 0.01, "resolved": 4e-6}
+    return LaterMotion(bearing=bearing, later=310e-6, later_time=at, larger=True, **within)
 
 
 def published(**given: Any) -> Drop:

@@ -160,6 +160,7 @@ def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, w
     several = len({(drop.machine, drop.bearing_set) for drop in found.values()}) > 1
     for number, drop in shown:
         marks = ["simulated"] * drop.simulated + ["not consistent with it"] * (not drop.consistent)
+        marks += ["further out after the estimated part"] * drop.went_on
         day = format_minute(drop.recorded or drop.added)
         lasted = "" if drop.duration is None else f", {drop.duration:.4g} s"
         told = {

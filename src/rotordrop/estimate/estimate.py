@@ -21,7 +21,7 @@ from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.methods import Method
-from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure
+from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure, later_warning
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff
@@ -270,6 +270,11 @@ class Estimate:
     def consistent(self) -> bool:
         """Whether single numbers may be relied on within their intervals."""
         return self.verdict.holds
+
+    @property
+    def later_warning(self) -> str:
+        """That the largest force may lie after the part that was estimated; empty where nothing says so."""
+        return later_warning(self.later, self.until)
 
     @property
     def sentence(self) -> str:

@@ -6,7 +6,7 @@ Times are from power-off, all numbers in SI units, the unit stands in the key.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -231,14 +231,17 @@ class LaterMotion(Document):
     larger: bool
     """Whether the rotor went further out after the estimated part."""
 
-    def sentence(self) -> str:
-        """What this means for the stated peaks."""
-        beyond = 1e6 * (self.later - self.first)
-        return (
-            f"{self.bearing}: the rotor went {beyond:.1f} µm further out at {format_moment(self.later_time)} "
-            "than in the part of the record that was estimated; the largest force of this drop may be there, "
-            "and the stated peak is not it"
-        )
+
+def later_warning(later: Iterable[LaterMotion], until: float) -> str:
+    """What a motion after the estimated part [s] means for the stated peaks; empty where it is no larger."""
+    beyond = ", ".join(
+        f"{one.bearing} went {1e6 * (one.later - one.first):.1f} µm further out at {format_moment(one.later_time)}"
+        for one in later
+        if one.larger
+    )
+    if not beyond:
+        return ""
+    return f"The peaks are of the first {1e3 * until:.0f} ms; {beyond}, where the largest force may be"
 
 
 class Parameter(Document):
@@ -459,6 +462,16 @@ class Drop(Document):
     agreement: Annotated[Agreement, Of("agreement")] = ABSENT
     document_sha256: str = ABSENT
     """Digest of the other values."""
+
+    @property
+    def later_warning(self) -> str:
+        """That the largest force may lie after the part that was estimated; empty where nothing says so."""
+        return later_warning(self.later_motion, self.estimated_until_s)
+
+    @property
+    def went_on(self) -> frozenset[str]:
+        """Bearings where the rotor went further out after the part that was estimated."""
+        return frozenset(one.bearing for one in self.later_motion if one.larger)
 
     @property
     def correlations(self) -> list[Correlation]:

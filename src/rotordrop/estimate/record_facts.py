@@ -33,7 +33,7 @@ class RecordFacts:
 
     def warnings_with(self, *further: str) -> tuple[str, ...]:
         """All warnings, each said once."""
-        return tuple(dict.fromkeys((*self.warnings, *further)))
+        return tuple(dict.fromkeys(filter(None, (*self.warnings, *further))))
 
 
 def facts_of(evidence: Evidence) -> RecordFacts:

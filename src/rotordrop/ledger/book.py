@@ -97,6 +97,8 @@ class LoggedDrop:
     """Whether the model is consistent with the record; else its numbers are ranges."""
     simulated: Annotated[bool, Field(strict=True)] = False
     """Whether the recording is simulated."""
+    went_on: Annotated[bool, Field(strict=True)] = False
+    """Whether the rotor went further out after the part of the record that the numbers are of."""
     version: Text = ""
     fingerprint: Text = ""
     """How the severity was estimated, what the estimate says of itself, by which version, and the numeric
@@ -340,6 +342,7 @@ def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:
         verdict=drop.verdict,
         consistent=drop.consistent,
         simulated=drop.simulated_record,
+        went_on=bool(drop.went_on),
         version=drop.rotordrop_version,
         fingerprint=drop.fingerprint,
         severity=tuple(severity),

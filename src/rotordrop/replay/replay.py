@@ -35,7 +35,7 @@ from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Draws as DrawsMade
-from rotordrop.estimate.published import Drop, Identification, InitialState, Speed
+from rotordrop.estimate.published import Drop, Identification, InitialState, Speed, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
 from rotordrop.evidence.rest import AirGap as IdentifiedGap
@@ -208,10 +208,7 @@ def replay_drop(
         ),
         later=later,
         findings=facts.findings,
-        warnings=facts.warnings_with(
-            *_warnings(evidence, impacts, draws),
-            *(one.sentence() for one in later if one.larger),
-        ),
+        warnings=facts.warnings_with(*_warnings(evidence, impacts, draws), later_warning(later, DURATION)),
         notes=_notes(evidence, gap),
         simulated_record=facts.simulated,
     )

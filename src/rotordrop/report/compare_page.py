@@ -136,8 +136,9 @@ def _verdict(
         places = []
         said.append(Statement("Nothing is ranked: fewer than two drops are left."))
     chance = {key: max(one.worst_drop) for key, one in ranked.items()}
+    went_on = any(one.drop.went_on for one in drops)  # a peak may be larger than the one that is ranked
     for number, bearing in sorted(places, key=lambda place: -chance.get((place[1], place[0].field), 1.0)):
-        sure = chance.get((bearing, number.field), 0.0) >= SURE
+        sure = chance.get((bearing, number.field), 0.0) >= SURE and not went_on
         if (bearing, number.field) in ranked:
             text = f"{ranked[bearing, number.field].statement}."
         else:
@@ -365,18 +366,23 @@ def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tup
     for one in drops:
         for bearing in one.drop.bearings:
             found, who = one.number(bearing, number), f"{one.name} at {bearing}"
-            if one.drop.consistent or not found.ends[0] < limit < found.ends[1]:
-                if (probability := _beyond(found, limit, number)) is not None:
-                    beyond.append((probability, who))
-            else:  # of a range no share is known
+            probability = _beyond(found, limit, number)
+            if not one.drop.consistent and found.ends[0] < limit < found.ends[1]:  # no share is known
                 ranges.append(f"{who}, {found.text}")
+            elif probability is None:
+                continue
+            elif number.only_worsens and bearing in one.drop.went_on and probability < SURE:
+                until = f"{1e3 * one.drop.estimated_until_s:.0f} ms"
+                ranges.append(f"{who}, {found.text} until {until} and further out after that")
+            else:
+                beyond.append((probability, who))
     if not beyond and not ranges:
         return f"{words}: no drop states it with an interval", None
     over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
     if over:
         return f"{words}: passed by {', '.join(over)}", False
     if ranges:
-        return f"{words}: open, known as a range only: {'; '.join(ranges)}", None
+        return f"{words}: open: {'; '.join(ranges)}", None
     worst, who = max(beyond)
     if worst > 1.0 - SURE:
         return f"{words}: open, passed by {who} with a probability of {format_chance(worst)}", None

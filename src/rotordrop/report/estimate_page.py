@@ -183,8 +183,11 @@ def estimate_verdict(estimate: Estimate) -> tuple[Statement, ...]:
     told = {found.message for found in estimate.findings}
     name_of = names_in(estimate)
     worth_knowing = {check.noted(): check.noted(name_of) for check in estimate.checks if check.note}
+    judged = _judgement(estimate)
+    if estimate.later_warning in judged.text:
+        told.add(estimate.later_warning)
     return (
-        _judgement(estimate),
+        judged,
         _part(estimate),
         *serious,
         *(Statement(text, "warning") for text in estimate.warnings if text not in told),
@@ -201,20 +204,20 @@ def _judgement(estimate: Estimate) -> Statement:
         level = "notice"
     elif estimate.consistent and any(check.failed for check in estimate.checks):
         level = "warning"
-    text = estimate.verdict_in(names_in(estimate))
+    said = [estimate.verdict_in(names_in(estimate))]
     if level == "good" and any(not one.agrees and not one.replaced for one in estimate.cross_check):
-        return Statement(f"{text} The independent cross-check disagrees.", "warning")
-    return Statement(text, level)
+        said.append("The independent cross-check disagrees.")
+    if level != "bad" and estimate.later_warning:
+        said.append(f"{estimate.later_warning}.")
+    return Statement(" ".join(said), "warning" if len(said) > 1 else level)
 
 
 def _part(estimate: Estimate) -> Statement:
     """Which part of the record the numbers are of, and what the rest says."""
-    text = f"Peaks: first {1e3 * estimate.until:.0f} ms after power-off"
-    if not estimate.later:
-        return Statement(f"{text}; the record ends there.")
-    if any(one.larger for one in estimate.later):
-        return Statement(f"{text}; the rotor went further out later on.")
-    return Statement(f"{text}; later motion is smaller.")
+    rest = "the record ends there" if not estimate.later else "later motion is smaller"
+    if estimate.later_warning:
+        rest = "the rotor went further out later on"
+    return Statement(f"Peaks: first {1e3 * estimate.until:.0f} ms after power-off; {rest}.")
 
 
 def width_advice(estimate: Estimate) -> Iterator[str]:
@@ -270,14 +273,11 @@ def inspection_section(estimate: Estimate) -> Section:
                 "ten-thousandth of the ball diameter."
             )
             said.append(Statement(text, "warning"))
-    for one in estimate.later:
-        if one.larger:
-            text = (
-                f"{one.bearing}: look at the rest of the record before the next start. The rotor went "
-                f"further out at {one.later_time:.3g} s than in the part that was estimated, so that the "
-                "largest load may not be among these numbers."
-            )
-            said.append(Statement(text, "warning"))
+    if estimate.later_warning:
+        text = (
+            "Look at the rest of the record before the next start: the largest load may not be among these."
+        )
+        said.append(Statement(text, "warning"))
     gaps = ", ".join(
         f"{bearing.name} {1e6 * limits.low:.0f} to {1e6 * limits.high:.0f} µm"
         for bearing in estimate.bearings
@@ -636,13 +636,14 @@ ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displac
 def estimate_screen(estimate: Estimate) -> ReportContent:
     """The first screen of an estimate: what fits, the gravest statement first; the page says the rest."""
     judgement, _part, *others = estimate_verdict(estimate)
-    later = {one.sentence() for one in estimate.later if one.larger}
     static = static_limit_statement(estimate.bearings, certain=estimate.consistent)
     advice = [*width_advice(estimate)]
     elsewhere = {*estimate.assumed, *unseen_in(estimate.notes), static.text, *advice}
     limits = [one for one in others if one.level != "good" and one.text not in elsewhere]
     # what hides a loss first, then what is a warning
-    limits.sort(key=lambda one: (one.text not in later, one.level not in ("bad", "warning")))
+    limits.sort(
+        key=lambda one: (one.text != (estimate.later_warning or None), one.level not in ("bad", "warning"))
+    )
     grave = [one for one in (static, *limits) if one.level in ("bad", "warning")]
     assumed = ", ".join(dict.fromkeys(estimate.assumed.values()))
     remedies = dict.fromkeys("; ".join(_remedies(estimate)).split("; "))

@@ -73,6 +73,8 @@ def _said(card: RestartCard, drop: Drop) -> Iterator[Statement]:
     for name, outcome in card.made.items():
         if outcome == "bad":
             yield Statement(f"{CHECKS[name].label} was bad: {_shown_by(CHECKS[name].shows)}", "warning")
+    if drop.later_warning:
+        yield Statement(drop.later_warning, "warning")
     yield from map(Statement, _of_next_drop(card.foreseen))
     yield from map(Statement, _of_lift(card.foreseen.lift))
     if card.checks:
@@ -149,8 +151,8 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
         for name, force in full.peak_force.items()
     )
     yield (
-        f"Next drop from {format_quantity(full.speed, 'speed')}, {of}: 95 % of {count} simulated ones stay "
-        f"below {peaks}"
+        f"Next drop from {format_quantity(full.speed, 'speed')}, {of}: for "
+        f"{format_quantity(foreseen.duration, 'time')} 95 % of {count} simulated ones stay below {peaks}"
     )
     if full.beyond_limit is not None:
         yield f"It passes the limit, {_limits(foreseen)}, with {_with_ends(full.beyond_limit)}"

@@ -63,6 +63,8 @@ class Foreseen:
     """
 
     drops: tuple[NextDrop, ...] = ()
+    duration: float = 0.0
+    """How much of each drop was simulated [s]."""
     speed_limit: SpeedLimit | None = None
     lift: LiftNow | None = None
     limits: Mapping[str, float] = field(default_factory=dict)

@@ -37,6 +37,9 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 measured."""
 MOST_BEYOND = 0.05
 """Chance that the next drop passes a limit, to which a speed limit brings it down [1]; chosen."""
+DURATION, LONGER = 0.2, 1.25
+"""Time that is simulated of a drop [s]; what is simulated beyond the largest motion of the last drop, where
+that came later, over its time [1]; both chosen."""
 DRAWN_AGAIN = 400
 """Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
 
@@ -100,7 +103,7 @@ def next_drops(
     drop: Drop | None = None,
     shares: Sequence[float] | None = None,
     drops: int = DROPS,
-    duration: float = 0.2,
+    duration: float | None = None,
     seed: int = 1,
     progress: Progress | None = None,
 ) -> Foreseen:
@@ -109,7 +112,11 @@ def next_drops(
     ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]; with them the speed
     is sought up to which they are passed with no more than ``chance`` [1]. The machine is that of ``drop``,
     by its estimate, where there is one; what stays open varies as in `repeat_study`. Damage is not simulated.
+    By default 0.2 s are simulated, or until past where the rotor went further out than that in ``drop`` [s].
     """
+    if duration is None:
+        later = [] if drop is None else [one.later_time for one in drop.later_motion if one.larger]
+        duration = max(DURATION, LONGER * max(later, default=0.0))
     found = None if drop is None else found_machine(machine, drop)
     at, names = found or machine, [bearing.name for bearing in machine.touchdown_bearings]
     shares = shares or (SHARES if limits else SHARES[:1])
@@ -140,7 +147,13 @@ def next_drops(
     if limits and len(shares) > 2:
         fewest = min(map(len, ratios))  # each draw at every speed
         limit = speed_limit(np.array(shares) * speed, np.array([one[:fewest] for one in ratios]), chance)
-    return Foreseen(drops=tuple(made), speed_limit=limit, limits=dict(limits), of_estimate=found is not None)
+    return Foreseen(
+        drops=tuple(made),
+        duration=duration,
+        speed_limit=limit,
+        limits=dict(limits),
+        of_estimate=found is not None,
+    )
 
 
 def lift_now(

@@ -13,6 +13,8 @@ class Number:
     label: str
     kind: str
     more_is_worse: bool = True
+    only_worsens: bool = True
+    """Whether what a drop does after the part that was estimated can only make it worse."""
     places: int | None = None
     """Decimal places of a number that is shown as a share; what lies below them is "< 0.001 %"."""
 
@@ -25,8 +27,8 @@ class Number:
 LOADS = (
     Number("peak_force_N", "peak bearing force", "force"),
     Number("peak_stress_Pa", "peak Hertz stress", "pressure"),
-    Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force"),
-    Number("mean_stress_Pa", "mean Hertz stress", "pressure"),
+    Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force", only_worsens=False),
+    Number("mean_stress_Pa", "mean Hertz stress", "pressure", only_worsens=False),
 )
 """Force and stress, which every estimate states, in the order in which they are shown."""
 
@@ -38,8 +40,10 @@ SEVERITY = (
     Number("severity.static_safety_of_rating", "static safety factor by C0", _PURE, more_is_worse=False),
     Number("severity.impulse_N_s", "impulse of all impacts", "impulse"),
     Number("severity.skid_energy_J", "energy lost in the contact", "energy"),
-    Number("severity.position_index", "position index (mean distance over gap)", _PURE),
-    Number("severity.velocity_index", "velocity index (velocity over speed times gap)", _PURE),
+    Number("severity.position_index", "position index (mean distance over gap)", _PURE, only_worsens=False),
+    Number(
+        "severity.velocity_index", "velocity index (velocity over speed times gap)", _PURE, only_worsens=False
+    ),
     Number("severity.fatigue_by_16281", "share of rating life, ISO/TS 16281", _PURE, places=_PLACES),
 )
 """Severity of a drop at a bearing, in the order in which it is shown."""

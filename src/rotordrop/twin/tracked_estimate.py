@@ -25,7 +25,7 @@ from rotordrop.estimate.estimate import (
 )
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Tracked
-from rotordrop.estimate.published import LaterMotion
+from rotordrop.estimate.published import LaterMotion, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.estimate.unbalance import unbalance_notes
 from rotordrop.known import Known
@@ -98,6 +98,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     drop, check = cross_checked(drop, method)
     problem, evidence = drop.problem, drop.evidence
     judged = _judge(drop, check)
+    until = float(problem.time[-1])
     later = _later(drop, judged)
     advice = _advice(drop, judged)
     unbalance = plane_unbalances(
@@ -120,7 +121,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         record=evidence.record,
         drop_instant=evidence.power_off,
         speed=float(problem.mean[problem.model.layout.rotor_speed]),
-        until=float(problem.time[-1]),
+        until=until,
         verdict=judged.verdict,
         bearings=_bearings(drop, judged),
         parameters=judged.parameters,
@@ -140,9 +141,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
         advice=advice,
         later=later,
         findings=facts.findings,
-        warnings=facts.warnings_with(
-            *evidence.power_off.notes, *(one.sentence() for one in later if one.larger)
-        ),
+        warnings=facts.warnings_with(*evidence.power_off.notes, later_warning(later, until)),
         notes=(
             *twin_assumptions(evidence, problem),
             *assumed,

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 from tests.no_file import on_posix
-from tests.published import bearing, published, value
+from tests.published import bearing, published, value, went_on
 
 from rotordrop.cli.app import run
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
@@ -300,7 +300,9 @@ def test_a_drop_from_the_document_of_an_estimate():
     drop = drop_of_estimate(published(bearings={"NDE": bearing(numbers)}, **told), "2026", cause="test")
     assert drop.severity == (PEAK,)
     assert drop.speed == pytest.approx(376.991, abs=1e-3)
-    assert drop.simulated and drop.cause == "test"
+    assert drop.simulated and drop.cause == "test" and not drop.went_on
+    later = published(bearings={"NDE": bearing(numbers)}, later_motion=[went_on("NDE")], **told)
+    assert drop_of_estimate(later, "2026").went_on
 
 
 WRITER = """

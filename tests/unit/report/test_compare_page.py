@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
-from tests.published import bearing, published, value
+from tests.published import bearing, published, value, went_on
 
 from rotordrop.cli.app import run
 from rotordrop.errors import UsageError
@@ -220,6 +220,27 @@ STRESSED = (stressed("a", 1.9e9, 2e7), stressed("b", 2.0e9, 2e7, safety=2.0))
 def test_limits_are_kept_passed_open_or_not_given(limits, level, text):
     said = limit_statement(STRESSED, read_limits(limits))
     assert said.level == level and text in said.text and "passed by a" not in said.text
+
+
+@pytest.mark.parametrize(
+    ("limit", "level", "text"),
+    [
+        (
+            "peak_stress=2.2 GPa",
+            "warning",
+            "MPa until 200 ms and further out after that",
+        ),
+        ("peak_stress=1.5 GPa", "bad", "passed by a at NDE"),
+        ("mean_stress=2.2 GPa", "good", "kept by all drops"),
+    ],
+)
+def test_no_limit_is_kept_where_the_rotor_went_further_out_after_the_estimate(limit, level, text):
+    numbers = {"mean_stress_Pa": value(1.2e9, 1.1e9, 1.3e9), **STRESSED[0].drop.bearings["NDE"].numbers}
+    gone = another(STRESSED[0], bearings={"NDE": bearing(numbers)}, later_motion=[went_on("NDE")])
+    judged = limit_statement([gone], read_limits([limit]))
+    assert judged.level == level and text in judged.text
+    ranked = compare_page((gone, STRESSED[1])).verdict
+    assert not any(one.level == "good" for one in ranked)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
-from rotordrop.estimate.published import LaterMotion, drop_of
+from rotordrop.estimate.published import LaterMotion, drop_of, later_warning
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, estimate_screen
@@ -114,7 +114,7 @@ def test_what_gave_way_is_not_compared_with_itself(estimate):
 def test_a_later_and_larger_motion_is_a_warning_in_page_and_document(estimate):
     times = {"first_time": 0.009, "later_time": 0.559}
     later = LaterMotion(bearing="DE", first=310e-6, later=333e-6, resolved=2e-6, larger=True, **times)
-    told = replace(estimate, later=(later,), warnings=(later.sentence(),))
+    told = replace(estimate, later=(later,), warnings=(later_warning((later,), estimate.until),))
     said = [one.text for one in estimate_page(told).verdict if one.level == "warning"]
     assert any("23.0 µm further out at 559 ms" in text for text in said)
     (entry,) = estimate_document(told)["later_motion"]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from tests.published import bearing, published, value
+from tests.published import bearing, published, value, went_on
 from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import build_drop_model, example_machine, read_document, save_machine
@@ -276,6 +276,13 @@ def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell(
     assert shown.columns[-2] == "passes peak Hertz stress of 2500 MPa"
     assert shown.rows[0][-2] == "< 1 % (90 %: < 1 % to 22 %)"
     assert re.search(r"\([^()]* or more\)", shown.rows[0][1])
+
+
+def test_a_drop_that_went_on_is_said_and_the_next_are_simulated_past_it():
+    gone = drop(later_motion=[went_on("DE", at=0.2)])
+    assert any("DE went 60.0 µm further out at 200 ms" in text for text in said(restart_card(gone), gone))
+    after = next_drops(example_machine("small"), 100.0, {}, drop=gone, drops=2)
+    assert after.duration == pytest.approx(0.25)
 
 
 def test_json_says_what_the_card_holds():
