@@ -590,7 +590,7 @@ def test_a_single_sensor_is_refused_in_words(drop, machine):
 
 @pytest.mark.parametrize(
     ("factor", "kind", "severity"),
-    [(1.0, "beyond the air gap", "warning"), (25.4, "wrong air gap", "stop")],
+    [(1.0, "beyond the air gap", "warning"), (25.4, "wrong unit factor", "stop")],
 )
 def test_a_whirl_beyond_the_gap_is_told_from_a_wrong_unit_by_its_fall(
     whole_drop, machine, factor, kind, severity

@@ -36,6 +36,9 @@ _FACTORS = {
     1e-3: "mm taken for µm, or µm for nm",
     1e-6: "m taken for µm, or the like",
 }
+_ORBITS = 4.0
+"""Range of the second half of a record over that of its beginning from which a rotor whirls [1] (chosen)."""
+
 _NO_FALL = 7.0
 """Acceleration of all planes over gravity from which on what is seen is no fall in the unit as read [1]:
 orbits made it 0.4 to 4.2 in 29 drops, and 25.4 times that where mil and µm are mixed up."""
@@ -105,7 +108,7 @@ def check_units(
     every = (bearing.air_gap for bearing in machine.touchdown_bearings)
     estimated = next((gap for gap in every if gap.status == "estimated"), None)
     ratios = [ratio for one in suspects.values() for _, ratio in one]
-    motion = moved() if ratios and not any(map(_nearest, ratios)) else None
+    motion = moved() if ratios and not any(map(_explaining, ratios)) else None
     if motion is not None:
         gaps = check_gaps(motion, record, machine)
         whirls = [whirl for drop in drops_of(motion) for whirl in whirls_of(motion, drop)]
@@ -124,20 +127,19 @@ def _unit_finding(
 ) -> Finding:
     """Readings and machine file contradict each other: the unit of the one, or the gap of the other."""
     ratio = float(np.median([value for _, value in suspects]))
-    factor = _nearest(ratio)
-    words = f"a unit factor of {factor:.4g} ({_FACTORS[factor]}) would explain" if factor else ""
+    words = " or ".join(f"{factor:.4g} ({_FACTORS[factor]})" for factor in _explaining(ratio))
     gaps = (f"{1e6 * float(b.air_gap):.0f} µm" for b in machine.touchdown_bearings)
     return found(
         "estimated-gap" if source else "unit",
         channel=(name for name, _ in suspects),
-        kind=None if factor and not source else "wrong air gap",
+        kind=None if words and not source else "wrong air gap",
         record=record.name,
         span=np.median([np.ptp(record.reading(name)) for name, _ in suspects]),
         ratio=ratio,
         sizes=", ".join(dict.fromkeys(gaps)),
         file=machine.source_path.name if machine.source_path else "the machine file",
         source=source,
-        guess=f"{words or 'no unit factor explains'} it",
+        guess=f"a unit factor of {words} would explain it" if words else "no unit factor explains it",
     )
 
 
@@ -146,13 +148,17 @@ def _sinks(record: Record) -> bool:
     count = max(len(record.time) // 20, 8)
     first, second = record.signals[:count], record.signals[len(record.time) // 2 :]
     shift = np.abs(np.mean(second, axis=0) - np.mean(first, axis=0))
-    return float(np.median(shift / np.maximum(np.ptp(first, axis=0), 1e-15))) > 1.0
+    left = np.maximum(shift, np.ptp(second, axis=0) / _ORBITS)  # or it whirls about where it began
+    return float(np.median(left / np.maximum(np.ptp(first, axis=0), 1e-15))) > 1.0
 
 
-def _nearest(ratio: float) -> float | None:
-    """Unit factor that would explain a motion of `ratio` air gaps instead of one to two and a half."""
-    fitting = [factor for factor in _FACTORS if 0.7 <= ratio / factor <= 2.7]
-    return min(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5))) if fitting else None
+def _explaining(ratio: float) -> list[float]:
+    """Unit factors that would explain a motion of `ratio` air gaps, the likeliest first.
+
+    A drop spans one to two and a half gaps, a whirl up to seven.
+    """
+    fitting = [factor for factor in _FACTORS if 0.7 <= ratio / factor <= 7.0]
+    return sorted(fitting, key=lambda factor: abs(math.log(ratio / factor / 1.5)))
 
 
 def check_gaps(motion: Motion, record: Record, machine: Machine) -> list[Finding]:
