@@ -235,7 +235,8 @@ class LaterMotion(Document):
 def later_warning(later: Iterable[LaterMotion], until: float) -> str:
     """What a motion after the estimated part [s] means for the stated peaks; empty where it is no larger."""
     beyond = ", ".join(
-        f"{one.bearing} went {1e6 * (one.later - one.first):.1f} µm further out at {format_moment(one.later_time)}"
+        f"{one.bearing} went {1e6 * (one.later - one.first):.1f} µm further out "
+        f"at {format_moment(one.later_time)}"
         for one in later
         if one.larger
     )
