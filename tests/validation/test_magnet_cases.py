@@ -60,10 +60,10 @@ def pd_roots(v):
 
 def pid_margins(v):
     by_current, by_way = magnet_of(v).slopes
-    gains = (proportional_of(v), v["integral"], v["derivative"])
+    gains, cutoff = (proportional_of(v), v["integral"], v["derivative"]), 2.0 * math.pi * v["filter"]
 
     def opened(w):
-        response = loop.pid_response(w, gains, 2.0 * math.pi * v["filter"])
+        response = gains[0] + gains[1] / (1j * w) + gains[2] * 1j * w / (1.0 + 1j * w / cutoff)
         lag = 1.0 + 1j * w / (2.0 * math.pi * v["bandwidth"])
         return by_current * response / lag / (-v["mass"] * w * w - by_way)
 

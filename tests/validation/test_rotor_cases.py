@@ -71,7 +71,7 @@ def damped_disc_rotor(inputs):
     numbers = {}
     for speed, modes in at_speeds(inputs).items():
         for k in range(6 if speed == "0 rpm" else 5):
-            numbers[f"|lambda| mode {k + 1} at {speed}"] = modes.natural_frequency[k]
+            numbers[f"|lambda| mode {k + 1} at {speed}"] = abs(modes.eigenvalue[k]) / (2.0 * np.pi)
             numbers[f"damped frequency mode {k + 1} at {speed}"] = modes.frequency[k]
     return numbers
 

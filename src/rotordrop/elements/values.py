@@ -220,7 +220,6 @@ def _exact_si(text: str, kind: str) -> float | None:
 Length = Annotated[Known, Physical("length")]
 PositiveLength = Annotated[Known, Physical("length", above=0.0)]
 NonNegativeLength = Annotated[Known, Physical("length", least=0.0)]
-Mass = Annotated[Known, Physical("mass", least=0.0)]
 PositiveMass = Annotated[Known, Physical("mass", above=0.0)]
 Inertia = Annotated[Known, Physical("inertia", least=0.0)]
 PositiveInertia = Annotated[Known, Physical("inertia", above=0.0)]

@@ -61,8 +61,6 @@ class FirstForce:
     """When the force sets in, in record time [s]."""
     end: float | None
     """When it has gone; None when it lasts beyond the forces known [s]."""
-    time_error: float
-    """Standard uncertainty of both [s]."""
     peak_force: float
     peak_error: float
     """Largest force and its standard error [N]."""
@@ -192,7 +190,6 @@ def _first(forces: EarlyForces, index: int) -> FirstForce | None:
         bearing=forces.bearings[index],
         start=_zero_crossing(forces.time, size, first, peak),
         end=_zero_crossing(forces.time, size, last, peak) if ended else None,
-        time_error=_KNOTS / 2,
         peak_force=float(size[peak]),
         peak_error=float(sigma[peak]),
         azimuth=float(np.arctan2(forces.force[peak, index, 1], forces.force[peak, index, 0])),

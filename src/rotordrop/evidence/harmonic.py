@@ -30,8 +30,6 @@ class HalfContact:
 
     begin: float
     """When it touches, in samples before the deepest point (negative)."""
-    begin_error: float
-    """Standard error [samples]."""
     velocity: float
     """Velocity with which it touches [m/s], positive towards the race."""
     velocity_error: float
@@ -98,7 +96,6 @@ def half_contact(outward: Array, rate: float, noise: float) -> HalfContact | Non
     spreads = spread * np.sqrt(np.diag(np.linalg.pinv((slopes / size).T @ (slopes / size)))) / size
     return HalfContact(
         begin=begin * rate,
-        begin_error=float(spreads[3]) * rate,
         velocity=float(found[1]),
         velocity_error=float(spreads[1]),
         pull=float(found[2]),

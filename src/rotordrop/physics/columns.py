@@ -79,7 +79,6 @@ LANDING_SLEEVE = THERMAL_END
 LANDING_SLEEVE_END = LANDING_SLEEVE + landing_sleeve.N_ENTRIES
 NOT_ROUND = LANDING_SLEEVE + landing_sleeve.PRESENT
 N_BEARING_COLUMNS = LANDING_SLEEVE_END
-FOUNDATION_STATES = 4
 
 # Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns, what holds it along its axis
 # and what pushes it sideways.

@@ -89,8 +89,6 @@ class BallState:
     """Force on the inner race [N], against its displacement."""
     radial_stiffness: Array
     """Slope of the radial force by the radial place of the groove [N/m]."""
-    by_centrifugal: Array
-    """Slope of the radial force by F_c [1]."""
     inner_slope: Array
     outer_slope: Array
     """Slopes of both loads by the radial place of the groove [N/m]."""
@@ -259,7 +257,6 @@ def _state(balls: FastBalls, A1: Array, A2: Array, X1: Array, X2: Array, F: Arra
         radial_force=s.Q_i * s.i2,
         axial_force=s.Q_i * s.i1,
         radial_stiffness=np.where(held, c22 - c11 * y1 - c22 * y2, 0.0),
-        by_centrifugal=np.where(held, -y2, 0.0),
         inner_slope=np.where(held, s.k_i * (s.i2 - s.i1 * y1 - s.i2 * y2), 0.0),
         outer_slope=np.where(held, s.k_o * (s.o1 * y1 + s.o2 * y2), 0.0),
     )

@@ -26,20 +26,10 @@ class SampledController(NamedTuple):
     """G, shape (n,)."""
 
 
-def pid_response(omega: float, gains: tuple[float, float, float], cutoff: float) -> complex:
-    """Response [A/m] of a PID controller in continuous time at a frequency [rad/s].
-
-    ``gains`` P [A/m], I [A/(m s)] and D [A s/m], the derivative filtered up to ``cutoff`` [rad/s]. Source:
-    the usual law ``P + I/s + D s / (1 + s/ω_f)``.
-    """
-    s, (proportional, integral, derivative) = 1j * omega, gains
-    return proportional + (integral / s if integral else 0.0) + derivative * s / (1.0 + s / cutoff)
-
-
 def sampled_pid(
     gains: tuple[float, float, float], cutoff: float, sample_time: float, tracking: float
 ) -> SampledController:
-    """The same PID in discrete time, by the trapezoidal rule.
+    """A PID controller in discrete time, by the trapezoidal rule: ``P + I/s + D s / (1 + s/ω_f)``.
 
     Parameters
     ----------

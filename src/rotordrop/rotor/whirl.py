@@ -41,11 +41,6 @@ class WhirlModes:
         return np.asarray(self.eigenvalue.imag / (2.0 * np.pi))
 
     @property
-    def natural_frequency(self) -> Array:
-        """Magnitudes ``|λ| / 2π`` [Hz], shape (K,)."""
-        return np.asarray(np.abs(self.eigenvalue) / (2.0 * np.pi))
-
-    @property
     def damping_ratio(self) -> Array:
         """Damping ratios ``−Re λ / |λ|`` [1], shape (K,)."""
         return np.asarray(-self.eigenvalue.real / np.abs(self.eigenvalue))

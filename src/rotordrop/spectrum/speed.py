@@ -40,11 +40,6 @@ class FrequencyPath:
         return 2.0 * math.pi * np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def steady_path(frequency: float) -> FrequencyPath:
-    """Path of a line that does not wander, at a frequency [Hz]."""
-    return FrequencyPath(time=np.array([0.0]), frequency=np.array([frequency]))
-
-
 LOG_TIME_UNIT = 0.3
 """Time [s] after power-off below which the speed may bend fast (the races spin up); later it bends ever
 slower."""

@@ -142,9 +142,8 @@ class ForceHistory:
     """Largest Hertz stress at the inner race and standard deviation [Pa], shape (N, B)."""
     indentation: Array
     contact_force: Array
-    friction_force: Array
     contact_power: Array
-    """Indentation [m], normal and friction force [N], power lost in the contact [W], shape (N, B)."""
+    """Indentation [m], normal force [N], power lost in the contact [W], shape (N, B)."""
     indentation_sigma: Array
     """Standard deviation of the indentation [m], that of a bearing centre left out, shape (N, B)."""
     azimuth: Array
@@ -193,7 +192,6 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
         stress_sigma=sigma[..., STRESS],
         indentation=contacts[..., 0],
         contact_force=contacts[..., 1],
-        friction_force=contacts[..., 2],
         contact_power=contacts[..., 5],
         indentation_sigma=_indentation_sigma(problem, smoothed),
         azimuth=np.where(touching, np.arctan2(contacts[..., 4], contacts[..., 3]), np.nan),

@@ -172,8 +172,6 @@ def test_force_is_the_gradient_of_the_energy(inert_balls, force):
     assert ball.axial_force == pytest.approx(slope, rel=1e-6, abs=1e-4)
     slope = (at(radial=step).radial_force - at(radial=-step).radial_force) / (2.0 * step)
     assert ball.radial_stiffness == pytest.approx(slope, rel=1e-4, abs=1e2)
-    slope = (at(more=1e-3).radial_force - at(more=-1e-3).radial_force) / 2e-3
-    assert ball.by_centrifugal == pytest.approx(slope, rel=1e-3, abs=1e-4)
     slope = (at(more=1e-3).energy - at(more=-1e-3).energy) / 2e-3
     assert -ball.radial == pytest.approx(slope, rel=1e-6)
 

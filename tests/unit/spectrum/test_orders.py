@@ -8,7 +8,7 @@ from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.candidates import mains_candidates, mode_candidate
 from rotordrop.spectrum.orders import TrackingSettings, track_orders, tracking_for
 from rotordrop.spectrum.resonances import find_resonances
-from rotordrop.spectrum.speed import FrequencyPath, exact_speed_profile, steady_path
+from rotordrop.spectrum.speed import FrequencyPath, exact_speed_profile
 from rotordrop.spectrum.waterfall import waterfalls
 
 
@@ -23,6 +23,10 @@ def chirp(**options):
     down.xy += np.column_stack([a * np.cos(down.angle + 0.3), 0.7 * a * np.sin(down.angle + 0.5)])
     down.xy += 1e-6 * np.column_stack([np.cos(2.0 * down.angle), np.sin(2.0 * down.angle)])
     return down, amplitude
+
+
+def steady(frequency):
+    return FrequencyPath(time=np.zeros(1), frequency=np.array([frequency]))
 
 
 def off(track, amplitude):
@@ -66,7 +70,7 @@ def test_tracking_has_phase_and_direction_and_no_smear():
 def test_steady_lines_are_explained_and_followed():
     down, amplitude = chirp(noise=0.0)
     down.xy[:, 0] += 80e-6 * np.cos(TURN * 29.03 * down.time)
-    known = down.tracked(orders=(1.0,), steady_lines=[steady_path(29.03)])
+    known = down.tracked(orders=(1.0,), steady_lines=[steady(29.03)])
     error = off(known, amplitude)
     apart = known.separable[:, 0]
     assert 0.5 < apart.mean() < 1.0
@@ -88,7 +92,7 @@ def test_a_steady_line_on_an_order_counts_with_it():
     down = CoastDown(duration=20.0, first_speed=30.0, time_constant=1e9, noise=0.05e-6)
     down.xy += 5e-6 * np.column_stack([np.cos(down.angle), np.sin(down.angle)])
     down.xy += 3e-6 * np.cos(TURN * 30.0 * down.time)[:, None]
-    lines = [steady_path(30.0)]
+    lines = [steady(30.0)]
     track = down.tracked(orders=(1.0,), steady_lines=lines)
     assert not track.separable.any()
     assert np.abs(track.amplitude[:, 0, 0]) == pytest.approx(np.full(len(track.time), 8e-6), rel=0.01)
@@ -191,7 +195,7 @@ def test_runout_unbalance_and_a_strong_steady_line_are_no_resonance():
     down = CoastDown(duration=30.0)
     down.add_order(1.0, 0.5e-6)
     down.xy[:, 0] += 80e-6 * np.cos(TURN * 29.0 * down.time)
-    track = down.tracked(down.recorded(), steady_lines=[steady_path(29.0)])
+    track = down.tracked(down.recorded(), steady_lines=[steady(29.0)])
     assert not track.separable.all()
     assert find_resonances(track, "DE", candidates=MODES) == ()
 
@@ -199,7 +203,7 @@ def test_runout_unbalance_and_a_strong_steady_line_are_no_resonance():
 def test_a_resonance_whose_top_is_hidden_is_uncertain():
     down = passing(natural=29.0, damping=0.15)
     down.xy[:, 0] += 80e-6 * np.cos(TURN * 29.0 * down.time)
-    track = down.tracked(down.recorded(), orders=(1.0,), steady_lines=[steady_path(29.0)])
+    track = down.tracked(down.recorded(), orders=(1.0,), steady_lines=[steady(29.0)])
     found = find_resonances(track, "DE", candidates=MODES, least_rise=1.2)
     assert len(found) == 1
     assert not found[0].certain
