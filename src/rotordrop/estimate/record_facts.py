@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.evidence import Evidence, Missing
-from rotordrop.evidence.quality import Finding, checked, found, refuse_unusable
+from rotordrop.evidence.quality import Finding, checked, found, refuse_unusable, sentences
 
 NO_TAIL = (
     "no settled tail: the air gap rests on its prior and on the contacts; give the readings at standstill"
@@ -50,7 +50,7 @@ def facts_of(evidence: Evidence) -> RecordFacts:
     except RecordError as error:  # a lost sensor keeps the gate from looking, but not the twin from following
         findings = (found("not-looked-at", why=error),)
     refuse_unusable(findings, name)
-    warnings = [finding.message for finding in findings if finding.severity == "warning"]
+    warnings = [text for text, severity in sentences(findings) if severity == "warning"]
     if evidence.tail is None and isinstance(evidence.still, Missing) and not evidence.held:
         warnings.append(NO_TAIL)
     origin = evidence.machine.calibration

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -24,7 +23,7 @@ from rotordrop.estimate.bearing_drop import (
 from rotordrop.estimate.estimate import SensorMotion
 from rotordrop.evidence.impacts import HOP, shortest_flight
 from rotordrop.evidence.quality import NO_CHECK_SEES
-from rotordrop.evidence.quality.finding import Finding
+from rotordrop.evidence.quality.finding import Finding, sentences
 from rotordrop.report.content import (
     Card,
     Column,
@@ -369,23 +368,8 @@ def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:
 
 
 def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:
-    """The findings as sentences, the serious ones first; what would stop an estimate with its way out.
-
-    A kind that several channels have is told of the first.
-    """
-    order, count = list(LEVELS), Counter[tuple[str, str | None]]()
-    alike: dict[tuple[str, bool, int], list[Finding]] = {}
-    for found in sorted(findings, key=lambda found: order.index(found.severity)):
-        count[found.kind, found.channel] += 1
-        which = (found.kind, bool(found.channel), count[found.kind, found.channel])
-        alike.setdefault(which, []).append(found)
-    said = []
-    for first, *others in alike.values():
-        where = f"Channel {first.channel}: " if first.channel else ""
-        also = f" (likewise {', '.join(str(one.channel) for one in others)})" if others else ""
-        way_out = f"; {first.remedy}" if first.severity == "stop" else ""
-        said.append(Statement(f"{where}{first.message}{also}{way_out}", LEVELS[first.severity]))
-    return tuple(said)
+    """The findings as sentences, the serious ones first."""
+    return tuple(Statement(text, LEVELS[severity]) for text, severity in sentences(findings))
 
 
 LISTED = 12

@@ -35,6 +35,7 @@ from rotordrop.evidence.quality.finding import (
     found,
     ranked,
     refuse_unusable,
+    sentences,
     standing,
     stops,
 )
@@ -343,6 +344,7 @@ __all__ = [
     "not_seen",
     "ranked",
     "refuse_unusable",
+    "sentences",
     "standing",
     "stops",
 ]

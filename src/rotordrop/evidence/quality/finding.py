@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import string
 import tomllib
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -102,6 +103,25 @@ def standing(findings: Iterable[Finding]) -> list[Finding]:
 def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Order findings by severity, the worst first, otherwise as found."""
     return tuple(sorted(findings, key=lambda finding: _ORDER.index(finding.severity)))
+
+
+def sentences(findings: Iterable[Finding]) -> tuple[tuple[str, Severity], ...]:
+    """What the findings say, the gravest first; what forbids to go on with its way out.
+
+    A kind that several channels have is told of the first, and the others are named.
+    """
+    count = Counter[tuple[str, str | None]]()
+    alike: dict[tuple[str, bool, int], list[Finding]] = {}
+    for one in ranked(findings):
+        count[one.kind, one.channel] += 1
+        alike.setdefault((one.kind, bool(one.channel), count[one.kind, one.channel]), []).append(one)
+    told: list[tuple[str, Severity]] = []
+    for first, *others in alike.values():
+        where = f"Channel {first.channel}: " if first.channel else ""
+        also = f" (likewise {', '.join(str(one.channel) for one in others)})" if others else ""
+        way_out = f"; {first.remedy}" if first.severity == "stop" else ""
+        told.append((f"{where}{first.message}{also}{way_out}", first.severity))
+    return tuple(told)
 
 
 def stops(findings: Iterable[Finding]) -> bool:
