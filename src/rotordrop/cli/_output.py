@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import wraps
 from pathlib import Path
@@ -56,20 +56,22 @@ def console(stream: TextIO | None = None) -> Console:
 def deliver(
     content: Any,
     json_file: Path | None,
-    summary: ReportContent | Callable[[Console], None],
+    summary: ReportContent | Sequence[ReportContent] | Callable[[Console], None],
     *,
     report: Path | None = None,
-    output: Path | None = None,
+    written: Sequence[Path | None] = (),
+    whole: bool = False,
 ) -> None:
-    """Write page and JSON where they were asked for, and print the summary.
+    """Write page and JSON where they were asked for, and print the summary, what fits a screen or the whole.
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
-    in place of the summary, which is a page or a function that prints on the console it is given; a report
-    needs a page. The output was written before and is named.
+    in place of the summary: a page, several, or a function that prints on the console it is given. A report
+    needs one page. What was written before is named.
     """
-    if not callable(summary) and report is not None:
+    if report is not None:
         from rotordrop.report.page import write_page
 
+        assert not callable(summary) and not isinstance(summary, Sequence)
         write_page(summary, report)
     if json_file == STANDARD_OUTPUT:
         sealed = with_digest(content) if isinstance(content, dict) else content
@@ -84,13 +86,10 @@ def deliver(
     else:
         from rotordrop.report.terminal import print_summary
 
-        print_summary(summary, out)
-        if report is not None:
-            out.print(f"Report: {report}")
-    if json_file is not None:
-        out.print(f"JSON: {json_file}")
-    if output is not None:
-        out.print(f"Written: {output}")
+        for page in summary if isinstance(summary, Sequence) else (summary,):
+            print_summary(page, out, whole=whole)
+    if files := [str(file) for file in (report, *written, json_file) if file is not None]:
+        out.print(f"Written: {', '.join(files)}")
 
 
 def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
-    from rotordrop.report.content import ReportContent
 
 
 Method = StrEnum("Method", ["tracked", "replay"])
@@ -105,23 +104,13 @@ def estimate(
         made.save(place)
     for page, place in zip(pages, reports, strict=False):
         write_page(page, place)
-    written = ", ".join(map(str, (*reports, *outputs)))
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
-    deliver(numbers, json, lambda out: _summarise(screens, written, out))
+    deliver(numbers, json, screens, written=[*reports, *outputs], whole=everything)
     inconsistent = [made for made in estimates if not made.consistent]
     if inconsistent:
         names = ", ".join(made.name for made in inconsistent)
         raise ConsistencyError(f"{names}: {inconsistent[0].sentence}")
-
-
-def _summarise(pages: Sequence[ReportContent], written: str, out: Console) -> None:
-    from rotordrop.report.terminal import print_summary
-
-    for page in pages:
-        print_summary(page, out)
-    if written:
-        out.print(f"Written: {written}")
 
 
 def _read(

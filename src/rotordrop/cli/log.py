@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from rotordrop.ledger.book import LoggedDrop
     from rotordrop.report.content import ReportContent
 
-LATEST = 8
-"""Drops on the first screen; chosen, not measured."""
 LARGEST = (("force, 90 %", "peak_force_N", 1.0, "N"), ("stress, 90 %", "peak_stress_Pa", 1e-6, "MPa"))
 WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
 WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
@@ -96,7 +94,7 @@ def log(
         "statement": book.STATEMENT,
     }
     said = [*(share.sentence() for share in shares), *(one.sentence() for one in rising)]
-    deliver(content, json, _page(where, found, [*said, book.STATEMENT], whole=everything))
+    deliver(content, json, _page(where, found, [*said, book.STATEMENT]), whole=everything)
 
 
 def _allow(
@@ -152,20 +150,21 @@ def _export(found: Mapping[int, LoggedDrop], file: str | None) -> None:
     console().print(f"Table: {file}")
 
 
-def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, whole: bool) -> ReportContent:
-    """What is used, and the drops: the latest ones, or all of them."""
+def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str]) -> ReportContent:
+    """What is used, and the drops, the latest first."""
     from rotordrop.report.content import ReportContent, Statement, Table
 
-    shown, rows = [*found.items()][0 if whole else -LATEST :], []
-    several = len({(drop.machine, drop.bearing_set) for drop in found.values()}) > 1
-    for number, drop in shown:
+    rows = []
+    owners = {"machine": "machine", "bearings": "bearing_set"}
+    several = [head for head, name in owners.items() if len({getattr(o, name) for o in found.values()}) > 1]
+    for number, drop in sorted(found.items(), reverse=True):
         marks = ["simulated"] * drop.simulated + ["not consistent with it"] * (not drop.consistent)
         marks += ["further out after the estimated part"] * drop.went_on
         day = format_minute(drop.recorded or drop.added)
         lasted = "" if drop.duration is None else f", {drop.duration:.4g} s"
         told = {
             "drop": str(number),
-            **({"machine, bearings": f"{drop.machine}, {drop.bearing_set}"} if several else {}),
+            **{head: getattr(drop, owners[head]) for head in several},
             "date": day if drop.recorded else f"logged {day}",
             "record": drop.record + (f" ({', '.join(marks)})" if marks else ""),
             "speed": f"{format_quantity(drop.speed / (2.0 * math.pi), 'frequency')}{lasted}",
@@ -177,9 +176,9 @@ def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str], *, w
             told[head] = "" if worst is None else f"{worst.bearing} {ends}"
         rows.append(told)
     table = Table(tuple(rows[0]) if rows else ("drop",), tuple(tuple(row.values()) for row in rows))
-    left = [f"{len(found) - len(shown)} earlier drops: --all"] if len(shown) < len(found) else []
     return ReportContent(
         title=f"Log of drops: {where}",
-        verdict=tuple(map(Statement, [*said, *left])),
+        verdict=tuple(map(Statement, said)),
+        rest="--all",
         summary=(table,),
     )

@@ -187,7 +187,7 @@ def check(
     if report is not None:
         write_page(machine_page(described, summary, warnings), report)
     page = machine_content(described, summary, warnings, brief=not everything)
-    deliver(machine_json(described, summary, warnings), json, page)
+    deliver(machine_json(described, summary, warnings), json, page, written=[report], whole=everything)
 
 
 def bearings(
@@ -209,8 +209,8 @@ def bearings(
     except LookupError as error:
         raise UsageError(str(error)) from None
     found = search_bearings(designation)
-    content = bearing_content(designation, found, whole=everything)
-    deliver([bearing_json(bearing) for bearing in found], json, content)
+    content = bearing_content(designation, found)
+    deliver([bearing_json(bearing) for bearing in found], json, content, whole=everything)
 
 
 def _schema_text(document: Document) -> str:

@@ -74,7 +74,7 @@ def look(
     seen = look_at(record, machine=described, gap=gap, speed=speed, mapping=mapping or (), profile=profile)
     if report is not None:
         write_page(look_page(seen), report)
-    deliver(seen.as_json(), json, look_page(seen, drawn=False))
+    deliver(seen.as_json(), json, look_page(seen, drawn=False), written=[report])
 
 
 def _loaded(machine: Path | None) -> Machine | None:
@@ -322,4 +322,4 @@ def waterfall(
     if output is not None:
         write_findings(found, output)
     content = {"simulated_record": bool(simulated), **found.as_json()}
-    deliver(content, json, page, report=report)
+    deliver(content, json, page, report=report, written=[output])

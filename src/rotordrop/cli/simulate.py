@@ -146,7 +146,7 @@ def simulate(
         from rotordrop.report.simulate_page import simulate_page
 
         said = simulate_page(result, described)
-    deliver(simulation_numbers(result, described), json, said, report=report, output=output)
+    deliver(simulation_numbers(result, described), json, said, report=report, written=[output])
     result.check_finished()
 
 
@@ -298,5 +298,6 @@ def coast_down(
         numbers["frequencies"] = None if analysis is None else analysis.as_json()
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
-    deliver(numbers, json, coast_down_page(result, described, certificate=certificate), output=output)
+    page = coast_down_page(result, described, certificate=certificate)
+    deliver(numbers, json, page, written=[report, output])
     result.check_finished()

@@ -120,7 +120,7 @@ def _deliver_results(
     if output is not None:
         save_results(results, output)
     page = study_page(results, by, limits)
-    deliver(study_numbers(results, by, limits), json, page, report=report)
+    deliver(study_numbers(results, by, limits), json, page, report=report, written=[output])
 
 
 def study_repeat(

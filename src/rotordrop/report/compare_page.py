@@ -56,7 +56,7 @@ def compare_page(
         verdict=(judged, *said) if limits else (*said, judged),
         screen=_screen(drops, bearings),
         facts=(("rotordrop", __version__),),
-        sections=(_severity_section(drops, bearings, ranked),),
+        sections=(_severity_section(drops, bearings),),
     )
 
 
@@ -148,9 +148,13 @@ def _verdict(
             )
         texts.setdefault((text, "good" if sure else "warning"), []).append(f"{bearing} {number.label}")
     said += [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in texts.items()]
+    of_drops: dict[str, list[str]] = {}
+    for one in drops:
+        for text in one.drop.warnings:
+            of_drops.setdefault(text, []).append(one.name)
+    said += [Statement(f"{', '.join(names)}: {text}", "warning") for text, names in of_drops.items()]
     if any(one.drop_scatter is None for one in ranked.values()):
         said.append(Statement(UNKNOWN_SCATTER))
-    said += [Statement(f"{one.name}: {text}", "warning") for one in drops for text in one.drop.warnings]
     return tuple(said)
 
 
@@ -193,8 +197,8 @@ def _severity_table(drops: Sequence[ComparedDrop], bearing: str) -> Table:
     )
 
 
-def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ranked: Rankings) -> Section:
-    figures, tables = [], [_severity_table(drops, bearing) for bearing in bearings]
+def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str]) -> Section:
+    figures, tables = [], tuple(_severity_table(drops, bearing) for bearing in bearings)
     stated = {field for one in drops for bearing in bearings for field in one.drop.bearings[bearing].numbers}
     for number in NUMBERS:
         if number.field in stated and number.field in _DRAWN:
@@ -202,31 +206,7 @@ def _severity_section(drops: Sequence[ComparedDrop], bearings: Sequence[str], ra
             caption = f"{number.label[0].upper()}{number.label[1:]} of every drop with its 90 % interval."
             chart = comparison_figure([one.name for one in drops], values, number.label)
             figures.append(Figure(chart, caption))
-        tables += [
-            _ranking_table(f"{bearing}: ranking by {number.label}", ranked[bearing, number.field], number)
-            for bearing in bearings
-            if (bearing, number.field) in ranked
-        ]
-    return Section("Severity", figures=tuple(figures), tables=tuple(tables))
-
-
-def _ranking_table(caption: str, ranking: Ranking, number: Number) -> Table:
-    def of(values: Sequence[float], k: int) -> float | None:
-        return values[k] if k < len(values) else None
-
-    columns = (
-        Column("drop, worst first", lambda k: ranking.names[k]),
-        Column("value", lambda k: ranking.values[k], number.kind),
-        Column("was the worst drop", lambda k: ranking.worst_drop[k], "probability"),
-        Column("was worse than the next", lambda k: of(ranking.worse_than_next, k), "probability"),
-        Column("has the worst conditions", lambda k: of(ranking.worst_condition or (), k), "probability"),
-    )
-    scatter = UNKNOWN_SCATTER
-    if ranking.drop_scatter is not None:
-        spread = shown(ranking.drop_scatter, number.kind)
-        scatter = f"Scatter between equal drops: {spread} (standard deviation)."
-    note = f"Probabilities follow from the intervals of the drops. {scatter}"
-    return table(range(len(ranking.names)), columns, caption, note)
+    return Section("Severity", figures=tuple(figures), tables=tables)
 
 
 def comparison_figure(drops: Sequence[str], values: Mapping[str, Sequence[Quantity]], name: str) -> go.Figure:

@@ -226,6 +226,8 @@ class ReportContent:
     """Headline numbers per bearing."""
     screen: Table | None = None
     """What a terminal shows in place of the cards, one line a number."""
+    rest: str = "--report"
+    """The option that shows what a terminal has no room for."""
     summary: tuple[Table, ...] = ()
     """Tables that belong beside the verdict and into the terminal."""
     sections: tuple[Section, ...] = ()

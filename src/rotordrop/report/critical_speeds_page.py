@@ -62,12 +62,6 @@ HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
 ON_CARD = 6
 """Critical speeds on a card; all stand in the table."""
-AT_LINES = {
-    "tangent": "bearings' tangent stiffness, supports without mass",
-    "simple": "simple formula, supports without mass",
-    "with contact": "tangent stiffness and contact, supports without mass",
-    "with support mass": "tangent stiffness, supports with mass",
-}
 _WHIRL_WORDS = {
     "standstill": "natural frequencies at standstill",
     "forward": "forward critical speeds",
@@ -275,21 +269,6 @@ def stiffness_table(found: CriticalSpeedMap) -> Table:
     return table(found.lines, columns, "Stiffness that holds the rotor where it rests in its bearings")
 
 
-def line_table(found: CriticalSpeedMap) -> Table:
-    """Frequencies with every bearing at its own stiffness, by every way to reckon it."""
-
-    def line(k: int) -> Column:
-        def text(name: str) -> str:
-            value = found.at_lines[name][k]
-            return f"{value:.1f}" if np.isfinite(value) else "–"
-
-        return Column(f"line {k + 1} [Hz]", text)
-
-    count = len(found.at_lines["tangent"])
-    columns = (Column("every bearing at its own stiffness", AT_LINES.get), *(line(k) for k in range(count)))
-    return table(AT_LINES, columns, f"Where the map meets the machine: {_WHIRL_WORDS[found.whirl]}")
-
-
 def crossing_table(machine: Machine, diagrams: Mapping[str, CampbellDiagram], margins: Margins) -> Table:
     """Critical speeds with damping and amplification factor, and with their margins where there are some."""
     rows = [
@@ -323,9 +302,7 @@ def _map_section(found: CriticalSpeedMap) -> Section:
         "ball forces with preload, dashed by the simple formula."
     )
     figure = Figure(critical_speed_figure(found), caption)
-    return Section(
-        f"Critical speed map: {words}", (WITH_MASS,), figures=(figure,), tables=(line_table(found),)
-    )
+    return Section(f"Critical speed map: {words}", (WITH_MASS,), figures=(figure,))
 
 
 def _campbell_section(machine: Machine, diagram: CampbellDiagram) -> Section:

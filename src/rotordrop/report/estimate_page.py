@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from textwrap import shorten, wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -59,7 +58,7 @@ from rotordrop.report.drop_sections import (
 )
 from rotordrop.report.machine_content import drawing_section, not_given, weight_shares
 from rotordrop.report.origin import Origin
-from rotordrop.report.quantity import NO_INTERVAL, THIN_SPACE, Quantity, shown, with_interval, written
+from rotordrop.report.quantity import NO_INTERVAL, Quantity, shown, with_interval, written
 from rotordrop.report.style import (
     LIMIT,
     MICRO,
@@ -180,7 +179,7 @@ def names_in(estimate: Estimate) -> Callable[[str], str]:
 def estimate_verdict(estimate: Estimate) -> tuple[Statement, ...]:
     """What model and record say of each other first, then warnings, notes and limits."""
     serious = [s for s in quality_statements(estimate.findings) if s.level in ("bad", "warning")]
-    told = {found.message for found in estimate.findings}
+    told = {one.text for one in serious}
     name_of = names_in(estimate)
     worth_knowing = {check.noted(): check.noted(name_of) for check in estimate.checks if check.note}
     judged = _judgement(estimate)
@@ -622,11 +621,6 @@ def _other(check: CrossCheck) -> Quantity:
     return Quantity.of(check.check, KINDS[check.estimate.unit], 3)
 
 
-LONGEST_VERDICT, LONGEST = 270, 185
-"""Characters of the verdict and of another statement: three lines and two of a terminal."""
-LINES, WIDTH = 16, 100
-"""Of a terminal; two more say what was written."""
-MORE = " … (--all)"
 _WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
 MEAN = "mean_force_0p15_0p2_N"
 ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement")
@@ -634,7 +628,7 @@ ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displac
 
 
 def estimate_screen(estimate: Estimate) -> ReportContent:
-    """The first screen of an estimate: what fits, the gravest statement first; the page says the rest."""
+    """The first screen of an estimate, the gravest statement first."""
     judgement, _part, *others = estimate_verdict(estimate)
     static = static_limit_statement(estimate.bearings, certain=estimate.consistent)
     advice = [*width_advice(estimate)]
@@ -654,38 +648,18 @@ def estimate_screen(estimate: Estimate) -> ReportContent:
         f"assumed: {assumed}" if assumed else "",
     )
     calm = [*(Statement(text) for text in told if text), *(one for one in limits if one not in grave)]
-    loads, verdict = _loads(estimate), _short(judgement, LONGEST_VERDICT)
-    said: list[Statement] = []
-    left = LINES - 4 - len(loads.rows) - _lines(verdict)
     # a way out comes first: what the record itself says of the failure, then what to do
     seen = [one for one in grave if one in quality_statements(estimate.findings)]
     ranked = [*seen, *calm[:1], *(one for one in grave if one not in seen), *calm[1:]]
     if not told[0]:
         ranked = [*grave, *calm]
-    for one in ranked:
-        room = left - (len(said) + 1 < len(ranked))
-        whole = _short(one, LONGEST)
-        fitting = (
-            whole if _lines(whole) <= room or one not in grave else _short(one, WIDTH - len("warning: "))
-        )
-        if _lines(fitting) <= room:
-            said.append(fitting)
-            left -= _lines(fitting)
-    if hidden := len(ranked) - len(said):
-        warnings = sum(one in grave for one in ranked) - sum(one.level in ("bad", "warning") for one in said)
-        some = f" ({warnings} warning{'s' * (warnings > 1)})" if warnings else ""
-        said.append(Statement(f"{hidden} more with --all{some}"))
     return ReportContent(
         title=f"{estimate.machine.name}, {estimate.name}, dropped from {shown(estimate.speed, 'speed')}",
         simulated=SIMULATED_RECORD if estimate.simulated_record else "",
-        verdict=(verdict, *said),
-        screen=loads,
+        verdict=(judgement, *ranked),
+        screen=_loads(estimate),
+        rest="--all",
     )
-
-
-def _lines(one: Statement) -> int:
-    """Lines of a statement in a terminal, behind its level."""
-    return len(wrap(f"{one.level}: {one.sentence}", WIDTH))
 
 
 def _remedies(estimate: Estimate) -> Iterator[str]:
@@ -696,11 +670,6 @@ def _remedies(estimate: Estimate) -> Iterator[str]:
         return
     name_of = names_in(estimate)
     yield from (check.advised(name_of) for check in estimate.checks if check.failed and check.remedy)
-
-
-def _short(one: Statement, longest: int) -> Statement:
-    plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
-    return Statement(shorten(plainly, longest, placeholder=MORE), one.level)
 
 
 def _loads(estimate: Estimate) -> Table:

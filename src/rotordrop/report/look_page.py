@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
+FEW = 2
+"""Lines of a channel that a terminal has room for."""
 ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
 RELEASE = "the release"
@@ -117,14 +119,14 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
         Column("r.m.s. about it", lambda row: f"{_scale(row)[0] * row.rms:.3g}"),
         Column("peak to peak", lambda row: f"{_scale(row)[0] * row.peak_to_peak:.3g}"),
         Column(
-            "lines above the noise [Hz] (amplitude, zero to peak), strongest first",
-            _lines,
+            "lines [Hz] (amplitude), strongest first",
+            lambda row: _lines(row, len(row.lines) if drawn else FEW),
         ),
     )
     stands_out = (
         f"A line is at least {LINE_ABOVE:g} times the median of the spectrum within {LINE_AROUND} points to "
-        f"either side (chosen), from {LEAST_PERIODS} periods in a stretch on: below, a step looks "
-        "like a tone. Its frequency is known to half the spacing of the points (±)."
+        f"either side (chosen), from {LEAST_PERIODS} periods in a stretch on: below, a step looks like a "
+        "tone. Amplitudes are zero to peak; the frequency is known to half the spacing of the points (±)."
     )
     unit = "as it was read, which is doubted" if doubted else "of each channel"
     summary = [table(seen.levels, levels, f"Levels, in the unit {unit}", stands_out)]
@@ -173,11 +175,11 @@ def _scale(level: Level) -> tuple[float, str]:
     return (1e6, "µm") if level.unit == "m" else (1.0, level.unit or "?")
 
 
-def _lines(level: Level) -> str:
+def _lines(level: Level, count: int) -> str:
     """The lines of a channel: frequency with as many places as its error, and amplitude."""
     places = max(1 - floor(log10(level.resolution)), 0)
     known = f" ± {level.resolution:.{places}f}"
-    lines = (f"{at:.{places}f}{known} ({_scale(level)[0] * size:.3g})" for at, size in level.lines)
+    lines = (f"{at:.{places}f}{known} ({_scale(level)[0] * size:.3g})" for at, size in level.lines[:count])
     return ", ".join(lines) or "–"
 
 

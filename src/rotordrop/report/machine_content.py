@@ -522,8 +522,8 @@ def _supported(imported: ImportedRotor, axis: int) -> list[float]:
     return [float(f) for f in np.sqrt(np.maximum(values[:SHOWN], 0.0)) / (2.0 * np.pi)]
 
 
-def bearing_content(written: str, found: Sequence[CatalogueBearing], *, whole: bool) -> ReportContent:
-    """The bearing that a designation means most likely; the whole is also the listed ones of its size."""
+def bearing_content(written: str, found: Sequence[CatalogueBearing]) -> ReportContent:
+    """The bearing that a designation means most likely, and the listed ones of its size."""
     others = found if found[0].listed else found[1:]
     columns = (
         Column("listed bearings of this size", lambda one: f"{one.maker} {one.designation}"),
@@ -532,13 +532,11 @@ def bearing_content(written: str, found: Sequence[CatalogueBearing], *, whole: b
         Column("preload light / medium / heavy", _forces),
         Column("balls are", lambda one: "published" if one.maker == "GMN" else "reconstructed"),
     )
-    said = _statements(written, found[0])
-    if others and not whole:
-        said.append(Statement(f"--all: {len(others)} listed of this size"))
     return ReportContent(
         title=f"Bearings: {written}",
-        verdict=tuple(said),
-        summary=(_meant(found[0]), *((table(others, columns),) if others and whole else ())),
+        verdict=tuple(_statements(written, found[0])),
+        summary=(_meant(found[0]), *((table(others, columns),) if others else ())),
+        rest="--all",
     )
 
 

@@ -56,7 +56,7 @@ PLACES_OF_SCIENCE = (-4, 7)
 NO_INTERVAL = "–"
 """In place of an estimated number whose interval is not known."""
 FIXED_PLACES = {"count": 0, "probability": 1}
-BEYOND_GAP = "Beyond the air gap, support included"
+BEYOND_GAP = "Beyond the air gap"
 THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
 _OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
 

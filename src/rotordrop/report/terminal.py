@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from io import StringIO
+from textwrap import shorten
 from typing import IO, TYPE_CHECKING
 from unicodedata import category
 
@@ -27,23 +29,29 @@ MARKS: dict[Level, tuple[str, str]] = {
     "warning": ("warning", "yellow"),
     "bad": ("problem", "bold red"),
 }
+GRAVE = ("bad", "warning")
+LINES, WIDTH = 17, 100
+"""Of what a verb shows first; one more line names the files that it wrote."""
+FIRST, OTHERS = 3, 2
+"""Lines of the first statement and of another one where not all fit."""
 
 
-def print_summary(content: ReportContent, console: Console | None = None) -> None:
+def print_summary(content: ReportContent, console: Console | None = None, *, whole: bool = False) -> None:
     """Print title, verdict, headline numbers and summary tables of a report, by default on standard output.
 
-    Colours follow the terminal: none with ``NO_COLOR`` set or when the output is not a terminal. Names from
-    files cannot switch colours on.
+    What does not fit a screen is shortened or counted, unless the whole is wanted. Colours follow the
+    terminal: none with ``NO_COLOR`` set or when the output is not a terminal. Names from files cannot switch
+    colours on.
     """
     console = console or summary_console()
-    for part in _parts(content):
+    for part in _parts(content, whole=whole):
         console.print(part)
 
 
 def summary_text(content: ReportContent) -> str:
     """The same as text, 100 columns wide."""
     console = summary_console(out := StringIO())
-    console.width = 100
+    console.width = WIDTH
     print_summary(content, console)
     return out.getvalue()
 
@@ -55,23 +63,79 @@ def summary_console(file: IO[str] | None = None) -> Console:
     return Console(file=file, highlight=False, markup=False, emoji=False)
 
 
-def _parts(content: ReportContent) -> list[RenderableType]:
+def _parts(content: ReportContent, *, whole: bool) -> list[RenderableType]:
     from rich.text import Text
 
     parts: list[RenderableType] = [Text(_safe(content.title), style="bold")]
     if content.subtitle or content.simulated:
         below = f"{content.subtitle}. " if content.subtitle and content.simulated else content.subtitle
         parts.append(Text.assemble((_safe(below), "dim"), (_safe(content.simulated), "yellow")))
-    first = [s for s in content.verdict[:1] if s.level != "bad"]
-    first += [s for s in content.verdict if s.level == "bad"]
-    parts.extend(_statement(statement) for statement in first)
-    if content.screen is not None:
-        parts.append(_table(content.screen))
-    elif content.cards:
-        parts.append(_table(card_table(content.cards, _told)))
-    parts.extend(_statement(statement) for statement in content.verdict if statement not in first)
-    parts.extend(_table(table) for table in content.summary)
+    numbers = [content.screen] if content.screen is not None else []
+    if content.cards and not numbers:
+        numbers = [card_table(content.cards, _told)]
+    verdict, tables = content.verdict, (*numbers, *content.summary)
+    if not whole:
+        verdict, tables = _fitting(verdict, tables, LINES - sum(map(_height, parts)), content.rest)
+    first = [one for k, one in enumerate(verdict) if k == 0 or one.level == "bad"]
+    parts.extend(_statement(one) for one in first)
+    parts.extend(_table(one) for one in tables[: len(numbers)])
+    parts.extend(_statement(one) for one in verdict if one not in first)
+    parts.extend(_table(one) for one in tables[len(numbers) :])
     return parts
+
+
+def _fitting(
+    verdict: tuple[Statement, ...], tables: tuple[Table, ...], room: int, rest: str
+) -> tuple[tuple[Statement, ...], tuple[Table, ...]]:
+    """What of statements and tables fits so many lines, in its order; the last statement counts the rest."""
+    every = (*map(_statement, verdict), *map(_table, tables))
+    if sum(map(_height, every)) <= room:
+        return verdict, tables
+    said = [_short(one, FIRST, rest) for one in verdict[:1]]
+    others = verdict[len(said) :]
+    room -= sum(_height(_statement(one)) for one in said)
+    kept = max(1 + sum(one.level in GRAVE for one in others), min(len(others), OTHERS))
+    cut: list[Table] = []
+    for of_all in tables:
+        shown = replace(of_all, rows=of_all.rows[: max(room, 1)])
+        while _height(_table(shown)) > room - kept and len(shown.rows) > (not cut):
+            shown = replace(shown, rows=shown.rows[:-1])
+        if shown.rows:
+            room -= _height(_table(shown))
+            cut.append(shown)
+    rows = sum(len(one.rows) for one in tables) - sum(len(one.rows) for one in cut)
+    hidden: list[Statement] = []
+    for k, one in enumerate(others, start=1):
+        last = k == len(others) and not (hidden or rows)
+        left = room - (not last)
+        tries = (left if last else OTHERS, *((1,) if one.level in GRAVE else ()))
+        shorter = (_short(one, lines, rest) for lines in tries)
+        fits = next((short for short in shorter if _height(_statement(short)) <= left), None)
+        if fits is None:
+            hidden.append(one)
+        else:
+            said.append(fits)
+            room -= _height(_statement(fits))
+    if hidden or rows:
+        warnings = sum(one.level in GRAVE for one in hidden)
+        some = f" ({warnings} warning{'s' * (warnings > 1)})" if warnings else ""
+        of_rows = f"{rows} row{'s' * (rows > 1)} more"
+        counted = [f"{len(hidden)} more{some}"] * bool(hidden) + [of_rows] * bool(rows)
+        said.append(Statement(f"{' and '.join(counted)} with {rest}"))
+    return tuple(said), tuple(cut)
+
+
+def _short(one: Statement, lines: int, rest: str) -> Statement:
+    plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
+    longest = lines * (WIDTH - len("warning: "))
+    return Statement(shorten(plainly, longest, placeholder=f" … ({rest})"), one.level)
+
+
+def _height(part: RenderableType) -> int:
+    """Lines of a terminal."""
+    from rich.console import Console
+
+    return len(Console(width=WIDTH, file=StringIO()).render_lines(part, pad=False))
 
 
 def _told(figure: KeyFigure) -> str:

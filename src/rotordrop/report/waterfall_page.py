@@ -97,7 +97,7 @@ POLAR = (
 )
 LINES = "Lines"
 NO_LINE = "No line stands out: a short record is too short for one."
-SAID = 5
+SAID = 3
 """Lines that are named in the verdict (chosen)."""
 _IN_WHOLE_SECONDS = 10.0
 """Time from which on whole seconds say when a line was seen [s] (chosen)."""
@@ -769,15 +769,6 @@ def _said_of_run(
         "chaotic: compare statistics, not histories."
     )
     said.append(Statement(text))
-    settled = result.windows.settled
-    if np.any(settled[:, 0] > 0.0):
-        text = (
-            f"{100 * float(np.mean(settled[:, 0] > 0.0)):.0f} % of the seconds were done with the scheme for "
-            f"settled rotors; over the first 2 ms of each it stayed within "
-            f"{1e9 * float(np.max(settled[:, 1])):.2g} nm and {float(np.max(settled[:, 2])):.2g} N of the "
-            "Runge–Kutta pair."
-        )
-        said.append(Statement(text))
     if certificate is not None:
         said.append(Statement(certificate.sentence(), "good" if certificate.agrees else "warning"))
     return tuple(said)

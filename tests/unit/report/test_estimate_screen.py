@@ -1,4 +1,4 @@
-"""The first screen of an estimate: what an engineer looks for, in 25 lines of 100 columns."""
+"""The first screen of an estimate: what an engineer looks for, in 17 lines of 100 columns."""
 
 import io
 import re

@@ -1,6 +1,7 @@
 """The terminal summary: plain text where colours are not wanted, and no control characters from names."""
 
 import io
+from dataclasses import replace
 
 from rich.console import Console
 
@@ -39,6 +40,25 @@ def test_all_numbers_with_unit_and_interval_are_printed():
     text = printed(content())
     for number in ("3333 N", "(3180 to 3490 N)", "1805 MPa", "270.0 µm"):
         assert number in text
+
+
+def test_a_screen_holds_17_lines_and_counts_what_it_leaves_out():
+    many = replace(
+        content(),
+        verdict=tuple(Statement(f"{k} {'word ' * 50}", "warning" if k % 2 else "notice") for k in range(9)),
+        summary=(Table(("row",), tuple((f"row {k}",) for k in range(40))),),
+    )
+    stream = io.StringIO()
+    print_summary(many, Console(file=stream, width=100))
+    lines = stream.getvalue().splitlines()
+    assert len(lines) == 17
+    warnings, others, rows = (sum(one in line for line in lines) for one in ("warning:", "note:", "row "))
+    *_, counted = (line for line in lines if "with --report" in line)
+    said = 9 - (warnings + others - 1), 4 - warnings, 40 - (rows - 1)  # the count and the head apart
+    assert counted == "note: {} more ({} warnings) and {} rows more with --report.".format(*said)
+    whole = io.StringIO()
+    print_summary(many, Console(file=whole, width=100), whole=True)
+    assert all(f"row {k}" in whole.getvalue() for k in range(40))
 
 
 def test_there_is_no_ansi_when_the_output_is_not_a_terminal(monkeypatch):
