@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -36,8 +35,8 @@ from rotordrop.report.content import (
     folded,
     table,
 )
-from rotordrop.report.quantity import Quantity, one_line, places_of, round_steps, shown, with_interval
-from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table
+from rotordrop.report.quantity import Quantity, one_line, places_of, shown, with_interval
+from rotordrop.report.stress_box import stress_box_figure, stress_table
 from rotordrop.report.style import (
     GRID,
     INK,
@@ -50,7 +49,6 @@ from rotordrop.report.style import (
     Panel,
     add_gap_limits,
     add_history,
-    axis_title,
     colour_of_time,
     compared_style,
     curve,
@@ -136,7 +134,6 @@ def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = T
 def drop_sections(
     bearings: Sequence[BearingDrop],
     origin: str,
-    speed: float,
     static_loads: Mapping[str, float] | None = None,
     *,
     contact_tables: tuple[Table, ...] = (),
@@ -145,9 +142,8 @@ def drop_sections(
 ) -> tuple[Section, ...]:
     """Force, orbit, impacts with the first contact, motion and stress of a drop, in this order.
 
-    The origin says what is drawn, as "measured and estimated"; the speed at power-off [rad/s] names the
-    drop; static loads are the share of the weight by bearing [N]. Where single numbers are not certain,
-    ranges alone are stated.
+    The origin says what is drawn, as "measured and estimated"; static loads are the share of the weight by
+    bearing [N]. Where single numbers are not certain, ranges alone are stated.
     """
     contact = Figure(
         first_contact_figure(bearings),
@@ -165,7 +161,7 @@ def drop_sections(
             printed=True,
         ),
         folded("Displacement", motion_section(bearings, origin, at_sensors=at_sensors), *radial),
-        _stress(bearings, speed, certain=certain),
+        _stress(bearings, certain=certain),
     )
 
 
@@ -207,21 +203,19 @@ def _force(bearings: Sequence[BearingDrop], loads: Mapping[str, float], *, certa
     return Section("Bearing force", figures=(Figure(chart, caption),))
 
 
-def _stress(bearings: Sequence[BearingDrop], speed: float, *, certain: bool) -> Section:
+def _stress(bearings: Sequence[BearingDrop], *, certain: bool) -> Section:
     history = Figure(
         time_panels([[stress_panel(bearing, certain=certain)] for bearing in bearings], MEGA, "MPa"),
         "Largest Hertz stress of all balls at the inner race, instantaneous.",
     )
     if not certain:
         return Section("Hertz stress", (), (Statement(NO_DISTRIBUTION),), (history,))
-    label = shown(speed / TURN, "frequency", 3)
-    boxes = [stress_box(label, one.name, one.stress.values, one.statistics) for one in bearings]
     box = Figure(
-        stress_box_figure(boxes),
+        stress_box_figure(bearings),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
     )
     # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
-    tables = () if any(one.stress_band for one in bearings) else (stress_table(boxes),)
+    tables = () if any(one.stress_band for one in bearings) else (stress_table(bearings),)
     return Section("Hertz stress", figures=(history, box), tables=tables)
 
 
@@ -234,13 +228,7 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
     hit = [bearing for bearing in bearings if bearing.impacts]
     if not hit:
         return Section("Impacts", statements=reasons or (Statement(NO_IMPACT),))
-    force = hit[0].impact_force
-    figure = Figure(
-        impact_figure(hit, force=force),
-        f"Peak {force} of every impact where it hit the race, seen from {bearings[-1].name}; −90° is "
-        "the bottom, the distance from the centre is the force, the bar its 90 % interval.",
-    )
-    return Section("Impacts", (), reasons, (figure,), (impact_table(hit, force=force),))
+    return Section("Impacts", (), reasons, tables=(impact_table(hit, force=hit[0].impact_force),))
 
 
 def motion_section(
@@ -374,7 +362,6 @@ def quality_statements(findings: Sequence[Finding]) -> tuple[Statement, ...]:
 
 LISTED = 12
 AZIMUTH = "Azimuth counter-clockwise from +x, −90° is the bottom. "
-INTERVAL, RING = "#5b6875", "#cbd4dc"
 NUMBERED = 3
 """Contacts of a bearing that an orbit numbers."""
 
@@ -441,78 +428,6 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         columns,
         f"Contacts ({len(strongest)} of {len(impacts)}), {count} of them impacts",
         f"{AZIMUTH if exact else ''}{impact_rule(gaps)}{rest}",
-    )
-
-
-def impact_figure(bearings: Sequence[BearingDrop], *, force: str) -> go.Figure:
-    """Draw the peak force of every impact round the race as it was hit, with known intervals.
-
-    The distance from the centre is the force, on the same scale for all bearings; the earlier the darker.
-    """
-    figure = panels([bearing.name for bearing in bearings], height=420, spacing=0.1)
-    impacts = [impact for bearing in bearings for impact in bearing.impacts]
-    latest = max(impact.peak_time for impact in impacts)
-    rings = round_steps(max(impact.peak_force.high for impact in impacts))
-    for column, bearing in enumerate(bearings, start=1):
-        _add_rings(figure, rings, column)
-        _add_impacts(figure, bearing.impacts, column)
-        square(figure, column, 1.12 * rings[-1])
-    bare = {"showticklabels": False, "ticks": "", "showgrid": False, "showline": False}
-    figure.update_xaxes(title_text=axis_title(f"peak {force}, from the centre", "N"), **bare)
-    figure.update_yaxes(**bare)
-    colour_of_time(figure, 0.0, 1e3 * latest)
-    return figure
-
-
-def _add_rings(figure: go.Figure, rings: Sequence[float], column: int) -> None:
-    """Rings of equal force with their numbers, and azimuths every 45 degrees."""
-    axes = {"xref": "x" if column == 1 else f"x{column}", "yref": "y" if column == 1 else f"y{column}"}
-    words: dict[str, Any] = {"showarrow": False}
-    line: dict[str, Any] = {"line": {"color": RING, "width": 1}, "layer": "below"}
-    at = math.radians(67.5)  # between two azimuths, where no number stands
-    for force in rings:
-        ends = {"x0": -force, "x1": force, "y0": -force, "y1": force}
-        figure.add_shape(type="circle", **ends, **line, **axes)
-        place = {"x": force * math.cos(at), "y": force * math.sin(at), "font": {"size": 11, "color": MUTED}}
-        figure.add_annotation(text=f"{force:,.6g}".replace(",", "\u202f"), **place, **words, **axes)
-    for degrees in range(0, 360, 45):
-        x, y = rings[-1] * math.cos(math.radians(degrees)), rings[-1] * math.sin(math.radians(degrees))
-        figure.add_shape(type="line", x0=0, y0=0, x1=x, y1=y, **line, **axes)
-        text = f"{degrees if degrees <= 180 else degrees - 360}°".replace("-", "−")
-        figure.add_annotation(x=1.06 * x, y=1.06 * y, text=text, font={"size": 11}, **words, **axes)
-
-
-def _add_impacts(figure: go.Figure, impacts: Sequence[Impact], column: int) -> None:
-    force = np.array([impact.peak_force.value for impact in impacts])
-    azimuth = np.array([impact.azimuth for impact in impacts])
-    time = np.array([1e3 * impact.peak_time for impact in impacts])
-    bars: list[list[float]] = []
-    for impact in impacts:
-        if impact.peak_force.interval_90 is not None:
-            bars += [[limit, impact.azimuth] for limit in impact.peak_force.interval_90]
-            bars.append([math.nan, math.nan])
-    if bars:
-        limit, at = np.array(bars).T
-        x, y = limit * np.cos(at), limit * np.sin(at)
-        grey: dict[str, Any] = {"colour": INTERVAL, "width": 1.4, "legend": False, "hover": None}
-        curve(figure, x, y, "90 % interval", column=column, **grey)
-    marker = {
-        "color": time.astype(np.float32),
-        "coloraxis": "coloraxis",
-        "size": 8,
-        "line": {"color": "#ffffff", "width": 0.6},
-    }
-    curve(
-        figure,
-        force * np.cos(azimuth),
-        force * np.sin(azimuth),
-        "impacts",
-        column=column,
-        mode="markers",
-        marker=marker,
-        customdata=np.stack([force, np.degrees(azimuth), time], axis=1).astype(np.float32),
-        legend=False,
-        hover="%{customdata[0]:.0f} N at %{customdata[1]:.0f}°, %{customdata[2]:.2f} ms",
     )
 
 

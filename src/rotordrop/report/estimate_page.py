@@ -340,7 +340,6 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
     force, orbit, impacts, motion, stress = drop_sections(
         estimate.bearings,
         origin,
-        estimate.speed,
         weight_shares(estimate.machine),
         contact_tables=tables,
         at_sensors=at_sensors,

@@ -298,10 +298,3 @@ def with_error(value: float, error: float | None, unit: str) -> str:
 def _magnitude(value: float) -> int:
     """Power of ten of the first significant digit; 0 for zero."""
     return 0 if value == 0.0 or not math.isfinite(value) else math.floor(math.log10(abs(value)))
-
-
-def round_steps(highest: float) -> list[float]:
-    """Three to five round numbers at equal distances, the last above the highest value."""
-    step = 10.0 ** math.floor(math.log10(highest))
-    step = next(size * step for size in (0.2, 0.5, 1.0, 2.0, 5.0) if highest <= 5.0 * size * step)
-    return [step * number for number in range(1, math.ceil(highest / step) + 1)]

@@ -105,7 +105,7 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     turning = Figure(
         speed_figure(rotor, races), "Speed of the rotor and of the inner races, which friction spins up."
     )
-    force, orbit, *rest = drop_sections(bearings, "simulated", result.initial_speed, weight_shares(machine))
+    force, orbit, *rest = drop_sections(bearings, "simulated", weight_shares(machine))
     return replace(
         simulate_summary(result, machine),
         sections=(

@@ -90,7 +90,7 @@ def bearings(gap=None):
 def charts(*drops, loads=None):
     """Figures of a drop by a word of their caption."""
     found = {}
-    for section in drop_sections(drops or bearings(), "simulated", 377.0, loads):
+    for section in drop_sections(drops or bearings(), "simulated", loads):
         for figure in section.figures:
             for word in ("ball force", "Hertz stress of all", "zoom together", "Radial"):
                 if word in figure.caption:
@@ -284,7 +284,7 @@ def test_where_single_numbers_do_not_hold_peaks_are_ranges_and_no_distribution_i
     force = highest(history(), "N", Origin.CROSS_CHECK)
     ranged = replace(force, known=replace(force.known, interval_90=(1500.0, 2300.0)))
     for certain in (True, False):
-        sections = drop_sections((drop("NDE", peak_force=ranged),), "", 377.0, certain=certain)
+        sections = drop_sections((drop("NDE", peak_force=ranged),), "", certain=certain)
         told = [note.text for one in sections for f in one.figures for note in f.chart.layout.annotations]
         (peak,) = (text for text in told if "N" in text and text.startswith("peak") and "MPa" not in text)
         stress = next(section for section in sections if section.heading == "Hertz stress")

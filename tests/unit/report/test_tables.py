@@ -6,25 +6,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rotordrop.estimate.bearing_drop import simulated_bearings
+from rotordrop.estimate.bearing_drop import History, Origin, highest, simulated_bearings
 from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.known import Known
 from rotordrop.report.content import Column, Table, table
-from rotordrop.report.drop_sections import (
-    impact_figure,
-    impact_table,
-    record_quality_section,
-)
+from rotordrop.report.drop_sections import impact_table, record_quality_section
 from rotordrop.report.estimate_page import (
     ParameterRow,
     cross_check_statements,
     cross_check_table,
     parameter_table,
 )
-from rotordrop.report.quantity import Quantity, round_steps
-from rotordrop.report.stress_box import stress_box, stress_box_figure, stress_table, thinned
-from rotordrop.severity.statistics import stress_statistics
+from rotordrop.report.quantity import Quantity
+from rotordrop.report.stress_box import stress_box_figure, stress_table, thinned
 
 
 def texts(row):
@@ -74,37 +69,6 @@ def test_the_weakest_impacts_are_left_out_and_counted(drop_result):
     table = impact_table(simulated_bearings(drop_result), force="contact force", listed=2)
     assert [texts(row)[1] for row in table.rows] == ["7.900 ms", "9.200 ms"]
     assert table.caption == "Contacts (2 of 3), 3 of them impacts"
-
-
-def test_impacts_are_drawn_round_the_race_with_their_interval(drop_result):
-    nde, de = simulated_bearings(drop_result)
-    force = Known(value=2644.0, interval_90=(2600.0, 2750.0), unit="N")
-    known = replace(nde, impacts=(replace(nde.impacts[0], peak_force=force),))
-    drawn = impact_figure([known, de], force="contact force")
-    bar, first, second = drawn.data
-    assert_allclose(np.hypot(bar.x[:2], bar.y[:2]), [2600.0, 2750.0], rtol=1e-6)
-    assert_allclose(np.degrees(np.arctan2(bar.y[:2], bar.x[:2])), -90.0, rtol=1e-6)
-    assert_allclose(np.hypot(first.x, first.y), [2644.0], rtol=1e-6)
-    assert_allclose(np.hypot(second.x, second.y), [4660.0, 900.0], rtol=1e-6)
-    assert_allclose(np.degrees(np.arctan2(second.y, second.x)), [-95.0, -110.0], rtol=1e-6)
-    assert drawn.layout.xaxis.range == drawn.layout.xaxis2.range
-    assert drawn.layout.yaxis.scaleanchor == "x"
-
-
-@pytest.mark.parametrize(
-    ("highest", "rings"),
-    [
-        (900.0, [200, 400, 600, 800, 1000]),
-        (4660.0, [1000, 2000, 3000, 4000, 5000]),
-        (1.0, [0.2, 0.4, 0.6, 0.8, 1.0]),
-    ],
-)
-def test_round_steps_reach_beyond_the_highest_force(highest, rings):
-    assert_allclose(round_steps(highest), rings)
-    for force in np.geomspace(0.3, 3e6, 200):
-        found = round_steps(force)
-        assert 2 <= len(found) <= 5
-        assert found[-1] >= force > found[-1] - (found[1] - found[0])
 
 
 def row(name, prior, estimate, interval):
@@ -157,36 +121,49 @@ def test_findings_tell_channel_time_and_remedy_the_serious_ones_first():
 STRESS = 993e6 + 2e8 * np.random.default_rng(6).exponential(size=4001)
 
 
-def box(label, bearing, stress, preload=None):
-    return stress_box(label, bearing, stress, stress_statistics(stress, preload_stress=preload))
+@pytest.fixture
+def stressed(drop_result):
+    """Two bearings, the second with twice the stress; the preload alone does 993 MPa."""
+    time = np.linspace(0.0, 0.2, len(STRESS))
+    bearings = zip(simulated_bearings(drop_result), (STRESS, 2.0 * STRESS), strict=True)
+    return [
+        replace(
+            one,
+            stress=(drawn := History(label="simulated", time=time, values=stress)),
+            peak_stress=highest(drawn, "Pa", Origin.SIMULATION),
+            preload_stress=993e6,
+        )
+        for one, stress in bearings
+    ]
 
 
-def test_the_box_plot_draws_the_numbers_of_the_statistics():
-    told = stress_statistics(STRESS)
-    drawn = stress_box_figure([box("60 Hz", "NDE", STRESS), box("150 Hz", "NDE", 2 * STRESS)])
+def test_the_box_plot_draws_the_numbers_of_the_statistics(stressed):
+    told = stressed[0].statistics
+    drawn = stress_box_figure(stressed)
     first, outliers = drawn.data[0], drawn.data[1]
     shown = (first.lowerfence, first.q1, first.median, first.mean, first.q3, first.upperfence)
     quartiles = (told.lower_quartile, told.median, told.mean, told.upper_quartile)
     expected = (told.lower_whisker, *quartiles, told.upper_whisker)
     assert_allclose(np.ravel(shown), 1e-6 * np.array(expected))
     assert len(outliers.y) == told.beyond_whiskers
-    assert max(outliers.y) == pytest.approx(1e-6 * told.maximum, rel=1e-6)
+    assert max(outliers.y) == pytest.approx(1e-6 * STRESS.max(), rel=1e-6)
     assert min(outliers.y) > 1e-6 * told.upper_whisker
-    assert (list(first.x), list(drawn.data[2].x)) == (["60 Hz"], ["150 Hz"])
+    assert (list(first.x), list(drawn.data[2].x)) == (["NDE"], ["DE"])
     assert "[MPa]" in drawn.layout.yaxis.title.text
 
 
-def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload():
-    told = stress_statistics(STRESS, preload_stress=993e6)
-    table = stress_table([box("60 Hz", name, STRESS, 993e6) for name in ("NDE", "DE")])
-    rows = {cells[0]: [cell.value for cell in cells[1:]] for cells in table.rows}
+def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload(stressed):
+    table = stress_table(stressed)
     names = "mean,median,lower quartile,upper quartile,lower whisker,upper whisker,standard deviation,maximum"
-    expected = {name: getattr(told, name.replace(" ", "_")) for name in names.split(",")}
-    expected["samples beyond the whiskers"] = told.beyond_whiskers
-    expected["samples above mean + 3 σ"] = told.above_three_sigma
-    expected["preload's share of the mean"] = 993e6 / told.mean
-    for name, value in expected.items():
-        assert rows[name] == [value, value], name
+    for column, bearing in enumerate(stressed, start=1):
+        told = bearing.statistics
+        rows = {cells[0]: cells[column].value for cells in table.rows}
+        expected = {name: getattr(told, name.replace(" ", "_")) for name in names.split(",")}
+        expected["samples beyond the whiskers"] = told.beyond_whiskers
+        expected["samples above mean + 3 σ"] = told.above_three_sigma
+        expected["preload's share of the mean"] = 993e6 / told.mean
+        for name, value in expected.items():
+            assert rows[name] == value, name
 
 
 def test_thinned_outliers_keep_both_ends_and_leave_no_gap():

@@ -123,7 +123,7 @@ def test_a_later_and_larger_motion_is_a_warning_in_page_and_document(estimate):
 
 def test_no_colour_is_a_row_of_numbers_and_no_axis_matches_itself(estimate):
     """A browser would complain of either and draw something else."""
-    sections = drop_sections(estimate.bearings, "", estimate.speed)
+    sections = drop_sections(estimate.bearings, "")
     for figure in (figure for one in sections for figure in one.figures):
         described = json.loads(figure.chart.to_json())
         bars = [one["error_y"] for one in described["data"] if one.get("error_y", {}).get("visible")]
