@@ -155,7 +155,7 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
         f"{format_quantity(foreseen.duration, 'time')} 95 % of {count} simulated ones stay below {peaks}"
     )
     if full.beyond_limit is not None:
-        yield f"It passes the limit, {_limits(foreseen)}, with {_with_ends(full.beyond_limit)}"
+        yield f"By these alone it passes the limit, {_limits(foreseen)}, with {_with_ends(full.beyond_limit)}"
     if foreseen.speed_limit is not None:
         yield _of_speed_limit(foreseen.speed_limit, full.beyond_limit)
 
@@ -176,14 +176,12 @@ def _of_speed_limit(limit: SpeedLimit, beyond: Known | None) -> str:
         return f"No speed limit down to {lowest} brings the chance to pass the limit down to {allowed}"
     speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
     if not limit.needed:
-        ends = None if beyond is None else beyond.interval_90
-        most = 1.0 if ends is None else ends[1]
-        chance = f"{allowed} at most"
-        if most > limit.chance:
-            chance = f"about {allowed} at most, and these drops cannot rule out {format_chance(most)}"
+        ends = f" (90 %: {low} at least); take the lower end to be sure"
+        if limit.interval_90[0] >= limit.tried[1]:
+            ends = "" if beyond and beyond.value > limit.chance else ": no speed limit is needed"
         return (
-            f"No speed limit was found necessary: by {limit.drops} simulated drops up to {speed} the limit "
-            f"is passed with {chance}"
+            f"By all {limit.drops} simulated drops, of lower speeds too, the chance is {allowed} at most up "
+            f"to {speed}{ends}"
         )
     return (
         f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings that chance "

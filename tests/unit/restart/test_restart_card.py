@@ -270,6 +270,7 @@ def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell(
     limit = replace(LIMIT, speed=400.0, interval_90=(300.0, 400.0), drops=60)
     after = foreseen(limit, beyond=(0.0, 0.0))
     card = restart_card(drop(), foreseen=after)
+    assert any("47.7 Hz" in text and "63.7 Hz" in text for text in said(card, drop()))
     (shown,) = restart_page(card, drop()).sections[-1].tables
     assert "24" not in shown.note
     assert [row[-1] for row in shown.rows] == ["24", "12"]
