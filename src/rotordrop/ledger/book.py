@@ -199,11 +199,11 @@ def add_drop(where: str | Path, drop: LoggedDrop) -> int:
 
     def made(found: Rows) -> tuple[str, str]:
         for number, other in _log(found, where).drops.items():
-            same = (other.machine, other.bearing_set) == (drop.machine, drop.bearing_set)
-            if same and drop.sha256 and other.sha256 == drop.sha256:
+            if other.machine == drop.machine and drop.sha256 and other.sha256 == drop.sha256:
                 raise LoggedAlreadyError(
                     f"{drop.record} is in the log already, as drop {number} of {drop.machine} with bearings "
-                    f"{drop.bearing_set}; a recording counts once. Remove that entry first to replace it",
+                    f"{other.bearing_set}; a recording counts once. 'rotordrop log remove LOG {number}' "
+                    "takes that entry out, and this one can be added",
                     number,
                 )
         return DROP, content

@@ -71,11 +71,12 @@ def test_one_recording_counts_once(log):
     add_drop(log, DROP)
     with pytest.raises(UsageError, match=r"drop_060\.h5 is in the log already, as drop 1 of LP-400"):
         add_drop(log, replace(DROP, cause="another"))
-    assert len(logged_drops(log)) == 1
-    add_drop(log, replace(DROP, bearing_set="2027"))
+    with pytest.raises(UsageError, match=r"drop 1 of LP-400 with bearings 2026; .* 'rotordrop log remove"):
+        add_drop(log, replace(DROP, bearing_set="2027"))
+    add_drop(log, replace(DROP, machine="a second one in this recording"))
     remove_drop(log, 1)
-    assert [drop.bearing_set for drop in logged_drops(log).values()] == ["2027"]
-    add_drop(log, DROP)
+    add_drop(log, replace(DROP, bearing_set="2027"))
+    assert [drop.bearing_set for drop in logged_drops(log).values()] == ["2026", "2027"]
     for number in (99, 2**70, -1, 1.0, True):
         with pytest.raises(UsageError, match=f"the log has no drop {number}"):
             remove_drop(log, number)
