@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop.arrays import Array
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.quantity import Quantity
 from rotordrop.report.style import SERIES, axis_title, curve, panels, plain
 
 MEGA = 1e-6
-DRAWN_OUTLIERS = 300
 STATED = (
     ("mean", "mean", "pressure"),
     ("median", "median", "pressure"),
@@ -53,25 +51,14 @@ def stress_box_figure(bearings: Sequence[BearingDrop]) -> go.Figure:
         look: dict[str, Any] = {"boxpoints": False, "width": 0.45, "line": {"color": colour, "width": 1.6}}
         numbers = {key: [MEGA * value] for key, value in stated.items()}
         figure.add_trace(go.Box(x=[name], name=name, showlegend=False, **numbers, **look))
-        outliers = thinned(MEGA * stress[(stress < box.lower_whisker) | (stress > box.upper_whisker)])
+        beyond = stress[(stress < box.lower_whisker) | (stress > box.upper_whisker)]
+        outliers = np.unique(np.round(MEGA * beyond))  # none that would be drawn on another
         cross = {"symbol": "cross-thin-open", "size": 5, "color": colour, "line": {"width": 0.8}}
         at, label = [name] * len(outliers), f"{bearing.name}: outliers"
         curve(figure, at, outliers, label, mode="markers", marker=cross, legend=False, hover="%{y:.0f} MPa")
     figure.update_yaxes(title_text=axis_title("max. Hertz stress", "MPa"))
     figure.update_xaxes(title_text="touchdown bearing", type="category", showgrid=False)
     return figure
-
-
-def thinned(values: Array) -> Array:
-    """Outliers to draw: the lowest, the highest and no two that would be drawn on each other."""
-    values = np.sort(np.asarray(values, dtype=np.float64))
-    if len(values) <= DRAWN_OUTLIERS:
-        return values
-    step = (values[-1] - values[0]) / DRAWN_OUTLIERS or 1.0
-    cells = np.floor((values - values[0]) / step)
-    first_of_cell = np.concatenate([[True], np.diff(cells) > 0])
-    first_of_cell[-1] = True
-    return np.asarray(values[first_of_cell])
 
 
 def stress_table(bearings: Sequence[BearingDrop]) -> Table:

@@ -19,7 +19,7 @@ from rotordrop.report.estimate_page import (
     parameter_table,
 )
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.stress_box import stress_box_figure, stress_table, thinned
+from rotordrop.report.stress_box import stress_box_figure, stress_table
 
 
 def texts(row):
@@ -164,12 +164,3 @@ def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload(
         expected["preload's share of the mean"] = 993e6 / told.mean
         for name, value in expected.items():
             assert rows[name] == value, name
-
-
-def test_thinned_outliers_keep_both_ends_and_leave_no_gap():
-    values = np.random.default_rng(5).exponential(size=50_000)
-    kept = thinned(values)
-    assert len(kept) <= 302
-    assert (kept[0], kept[-1]) == (values.min(), values.max())
-    distance = np.min(np.abs(values[:2000, None] - kept[None, :]), axis=1)
-    assert distance.max() <= (values.max() - values.min()) / 300
