@@ -50,8 +50,10 @@ def median_of_five(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def running_mean(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Mean of every ``count`` neighbours along the first axis, shape (N − count + 1, ...)."""
-    sums = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
-    mean: NDArray[np.float64] = (sums[count:] - sums[:-count]) / count
+    sums = np.zeros((len(values) + 1, *values.shape[1:]))
+    np.cumsum(values, axis=0, out=sums[1:])
+    mean: NDArray[np.float64] = sums[count:] - sums[:-count]
+    mean /= count
     return mean
 
 

@@ -165,8 +165,8 @@ def _turns_of(radius: Array, speed: Array, rate: float, gap: float, noise: float
         begin = found[-1].at if found else max(at - round(_LONGEST_FALL * rate), 0)
         fastest = begin + int(np.argmax(speed[begin : at + 1]))
         left = begin + int(np.argmin(speed[begin : fastest + 1])) if found else begin
-        first = at - _until_turned(-speed[at::-1], beside)
-        last = at + _until_turned(speed[at:], beside)
+        first = at - _until_turned(speed[at::-1], -1.0, beside)
+        last = at + _until_turned(speed[at:], 1.0, beside)
         lasts = (last - first) / rate
         rebound = float(-np.min(speed[at : at + reach + 1]))
         turned = max(float(speed[first]), 0.0) + max(float(-speed[last]), 0.0)
@@ -185,12 +185,12 @@ def _turns_of(radius: Array, speed: Array, rate: float, gap: float, noise: float
     return found
 
 
-def _until_turned(values: Array, beside: int) -> int:
-    """Where values that fall from the first on are lowest before they rise for `beside` samples."""
+def _until_turned(values: Array, sign: float, beside: int) -> int:
+    """Where signed values that fall from the first on are lowest before they rise for `beside` samples."""
     at = 0
     while at + 1 < len(values):
-        ahead = at + 1 + int(np.argmin(values[at + 1 : at + 1 + beside]))
-        if values[ahead] >= values[at]:
+        ahead = at + 1 + int(np.argmin(sign * values[at + 1 : at + 1 + beside]))
+        if sign * values[ahead] >= sign * values[at]:
             break
         at = ahead
     return at
