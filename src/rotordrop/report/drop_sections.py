@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import (
     BearingDrop,
@@ -58,6 +59,7 @@ from rotordrop.report.style import (
     square,
     time_panels,
     upright,
+    words,
 )
 from rotordrop.series import peak_indices
 from rotordrop.severity.numbers import LOADS
@@ -78,6 +80,7 @@ NO_DISTRIBUTION = (
 NO_IMPACT = "The rotor did not touch a bearing in this window."
 LEVELS: dict[str, Level] = {"stop": "bad", "warning": "warning", "note": "notice"}
 """Levels by severity of a finding, the gravest first."""
+TURNING = "Speed of the rotor and of the inner races, which friction spins up."
 SOUND = "The plausibility checks found nothing wrong with the record."
 
 
@@ -331,6 +334,13 @@ def speed_figure(rotor: Sequence[History], races: Sequence[History] = ()) -> obj
     return time_panels([row], 1.0 / TURN, "Hz", height=250)
 
 
+def turning_section(time: Array, rotor: Array, races: Mapping[str, Array]) -> Section:
+    """Speed of a simulated rotor and of the inner races by name of the bearing [rad/s], each (T,)."""
+    turning = [History(label=f"{name} race", time=time, values=values) for name, values in races.items()]
+    chart = speed_figure([History(label="rotor", time=time, values=rotor)], turning)
+    return Section("Speed", figures=(Figure(chart, TURNING),))
+
+
 def record_quality_section(findings: Sequence[Finding], *unseen: str) -> Section:
     """Tell what the gate found, with channel, time and remedy, or that it found nothing; what it cannot."""
     limits = tuple(map(Statement, unseen))
@@ -558,32 +568,12 @@ def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, 
     figure.add_vrect(x0=start, x1=end, fillcolor=CONTACT_FILL, line_width=0, row=1, col=column)
     for value in (start, end):
         upright(figure, value, MUTED, "dot", row=1, col=column)
-    figure.add_annotation(
-        x=end,
-        y=1.0,
-        yref="y domain" if column == 1 else f"y{column} domain",
-        text=f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂",
-        showarrow=False,
-        xanchor="left",
-        yanchor="top",
-        xshift=3,
-        font={"size": 11.5, "color": INK},
-        row=1,
-        col=column,
-    )
+    times = f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂"
+    top = "y domain" if column == 1 else f"y{column} domain"
+    left: dict[str, Any] = {"column": column, "size": 11.5, "xanchor": "left"}
+    words(figure, end, 1.0, times, yref=top, yanchor="top", xshift=3, **left)
     drawn = bearing.motions[0].vertical
     depth = float(np.interp(contact.deepest_time, drawn.time, drawn.values))
-    figure.add_annotation(
-        x=MILLI * contact.deepest_time,
-        y=MICRO * depth,
-        text=f"indentation {' to '.join(f'{one:.1f}' for one in depths)} µm",
-        showarrow=True,
-        arrowhead=2,
-        arrowcolor=LIMIT,
-        ax=70,
-        ay=-4,
-        xanchor="left",
-        font={"size": 11.5, "color": INK},
-        row=1,
-        col=column,
-    )
+    text = f"indentation {' to '.join(f'{one:.1f}' for one in depths)} µm"
+    arrow: dict[str, Any] = {"showarrow": True, "arrowhead": 2, "arrowcolor": LIMIT, "ax": 70, "ay": -4}
+    words(figure, MILLI * contact.deepest_time, MICRO * depth, text, **left, **arrow)

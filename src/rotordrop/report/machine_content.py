@@ -27,6 +27,7 @@ from rotordrop.report.content import (
     Statement,
     Table,
     fact,
+    folded,
     table,
 )
 from rotordrop.report.quantity import Quantity
@@ -285,9 +286,10 @@ FRICTION = "Friction between rotor and race; a cubic replaces the jump at zero s
 
 
 def machine_sections(machine: Machine) -> tuple[Section, ...]:
-    """Friction law, and the values that were not given."""
-    figure = Figure(friction_curve_figure(machine), FRICTION)
-    return (Section("Friction law", figures=(figure,)), *defaults_section(machine))
+    """The machine of a simulation in one folded part: drawing, friction law, what was not given."""
+    law = Figure(friction_curve_figure(machine), FRICTION)
+    rest = Section("", figures=(law,), tables=not_given(machine))
+    return (folded("Machine", drawing_section(machine), rest),)
 
 
 def friction_curve_figure(machine: Machine) -> go.Figure:

@@ -21,7 +21,6 @@ from rotordrop.machine.plausibility import doubts_of_speed
 from rotordrop.report.content import (
     SIMULATED_MACHINE,
     Card,
-    Column,
     Figure,
     Level,
     ReportContent,
@@ -29,9 +28,13 @@ from rotordrop.report.content import (
     Statement,
     appendix,
     fact,
-    table,
 )
-from rotordrop.report.drop_sections import drop_sections, headline_card, speed_figure, static_limit_statement
+from rotordrop.report.drop_sections import (
+    drop_sections,
+    headline_card,
+    static_limit_statement,
+    turning_section,
+)
 from rotordrop.report.machine_content import machine_sections, weight_shares
 from rotordrop.report.quantity import BEYOND_GAP, shown
 from rotordrop.report.style import (
@@ -53,40 +56,6 @@ from rotordrop.units import percent
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
 
-CLEARANCES = (
-    Column("clearance", lambda use: f"{use.name}, stop of the mount" if use.stop else use.name),
-    Column("node", lambda use: str(use.node)),
-    Column("gap", "gap", "length"),
-    Column("largest travel", "travel", "length"),
-    Column("travel over gap", "share", "dimensionless", 3),
-    Column("at", "time", "time", 3),
-    Column("contacts", lambda use: "no force acts" if use.count is None else str(use.count)),
-    Column("largest force", "peak_force", "force"),
-)
-
-RIBBONS = (
-    Column("ribbon of the mount", "name"),
-    Column("slip force", "slip_force", "force"),
-    Column("largest force", "peak_force", "force"),
-    Column("at", "peak_time", "time", 3),
-    Column("slipped for", "slipped", "time", 3),
-    Column("energy taken", "dissipated", "energy", 3),
-)
-
-
-LANDINGS = (
-    Column("bearing", "name"),
-    Column("axial gap", "gap", "length"),
-    Column("travel of the rotor", "rotor_travel", "length"),
-    Column("against the race", "travel", "length"),
-    Column("landings", lambda one: str(landing_count(one))),
-    Column("largest axial force", lambda one: one.contacts.peak[0], "force"),
-    Column("at", lambda one: one.contacts.peak[1], "time", 3),
-    Column("contact angle", "contact_angle", "angle"),
-    Column("edge of the contact", "edge_angle", "angle"),
-    Column("shoulder", lambda one: one.climb.shoulder, "angle"),
-)
-
 
 def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportContent:
     """Build the report on one simulated drop.
@@ -94,17 +63,8 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
     The machine gives weight shares, the friction law and the defaults in use.
     """
     bearings = simulated_bearings(result)
-    uses = () if machine is None else clearance_uses(machine, result)
     landed = () if machine is None else landings(machine, result)
-    ribbons = () if machine is None else ribbon_uses(machine, result)
-    rotor = (History(label="rotor", time=result.time, values=result.speed),)
-    races = tuple(
-        History(label=f"{name} race", time=result.time, values=result.race_speed[:, index])
-        for index, name in enumerate(result.bearing_names)
-    )
-    turning = Figure(
-        speed_figure(rotor, races), "Speed of the rotor and of the inner races, which friction spins up."
-    )
+    races = dict(zip(result.bearing_names, result.race_speed.T, strict=True))
     force, orbit, *rest = drop_sections(bearings, "simulated", weight_shares(machine))
     return replace(
         simulate_summary(result, machine),
@@ -112,24 +72,19 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
             force,
             orbit,
             *appendix(rest),
-            *((Section("Clearances", tables=(table(uses, CLEARANCES),)),) if uses else ()),
-            *((Section("Ribbons", tables=(table(ribbons, RIBBONS),)),) if ribbons else ()),
             *((_landing(result, landed),) if landed else ()),
             *((_magnets(result, result.magnets),) if result.magnets is not None else ()),
             *heat_sections(result.heat, result.bearing_names),
-            Section("Speed", figures=(turning,)),
-            *(() if machine is None else appendix(machine_sections(machine))),
+            turning_section(result.time, result.speed, races),
+            *(() if machine is None else machine_sections(machine)),
         ),
         lead=2,
         ends=(bearings[0].name, bearings[-1].name),
     )
 
 
-EVENTS = (Column("magnets", lambda row: row[0]), Column("at", lambda row: row[1], "time", 3))
-
-
 def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
-    """Force of every magnet and the currents of its coils against time, and what happened to them."""
+    """Force of every magnet and the currents of its coils against time, and what happened when."""
     forces, currents = [], []
     for a, name in enumerate(magnets.names):
         force = tuple(
@@ -150,28 +105,24 @@ def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
             "Currents of the coils that pull towards + and − of each axis.",
         ),
     )
-    times = [time if np.isfinite(time) else None for time in magnets.event_time.tolist()]
-    events = table(list(zip(magnets.events, times, strict=True)), EVENTS)
-    return Section("Magnets", figures=figures, tables=(events,) if magnets.events else ())
+    happened = zip(magnets.events, magnets.event_time, strict=True)
+    facts = tuple((what, f"at {shown(time, 'time', 3)}") for what, time in happened if np.isfinite(time))
+    return Section("Magnets", figures=figures, facts=facts)
 
 
 def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
-    """Force on the faces against time, and what each landing came to."""
+    """Force on the faces against time."""
     assert result.face_force is not None
     rows = []
     for one in landed:
         force = result.face_force[:, result.index_of(one.name)]
         simulated = History(label="simulated", time=result.time, values=force)
         rows.append([Panel(title=one.name, axis="axial force", histories=(simulated,))])
-    caption = "Axial force of the rotor on the face of the race, positive towards higher nodes."
-    figure = Figure(time_panels(rows, 1.0, "N"), caption)
-    note = (
-        "Travel of the rotor is from the middle between its axial magnets and counts for impellers; against "
-        "the race it is longer than the gap by what shoulder and face give way. Contacts without a hop of "
-        f"{percent(HOP)} of the gap between them are one landing. The edge of the contact is how far up its "
-        "groove the contact of a ball reaches; the groove ends at the shoulder."
+    caption = (
+        "Axial force of the rotor on the face of the race, positive towards higher nodes. Contacts without a "
+        f"hop of {percent(HOP)} of the gap between them are one landing."
     )
-    return Section("Axial landing", figures=(figure,), tables=(table(landed, LANDINGS, note=note),))
+    return Section("Axial landing", figures=(Figure(time_panels(rows, 1.0, "N"), caption),))
 
 
 TRUSTED_CHANGE = 5e-3
@@ -459,21 +410,8 @@ def _landed_faces(one: Landing) -> dict[str, Any]:
     return entry | ({"first_contact_s": float(one.contacts.start[0])} if len(one.contacts) else {})
 
 
-WARMTHS = (
-    Column("bearing", lambda row: row["name"]),
-    Column("race", lambda row: row["race_K"]["largest"], "temperature", 3),
-    Column("at", lambda row: row["race_K"]["time_s"], "duration", 3),
-    Column("preload", lambda row: row["preload_N"]["start"], "force"),
-    Column("largest", lambda row: row["preload_N"]["largest"], "force"),
-    Column("at the end", lambda row: row["preload_N"]["end"], "force"),
-    Column("air gap then", lambda row: row["air_gap_end_m"], "length", 4),
-    Column("heat", lambda row: row["heat_J"]["taken"], "energy", 3),
-    Column("gone outwards", lambda row: row["heat_J"]["gone"], "energy", 3),
-)
-
-
 def heat_sections(heat: Heat | None, names: tuple[str, ...]) -> tuple[Section, ...]:
-    """Temperatures, preload and where the heat went, of a machine whose bearings warm."""
+    """Temperatures and preload of a machine whose bearings warm."""
     if heat is None:
         return ()
     figure = Figure(
@@ -481,8 +419,7 @@ def heat_sections(heat: Heat | None, names: tuple[str, ...]) -> tuple[Section, .
         "Temperatures above the start, and the axial force of a row of balls with the race in the middle. "
         "Capacities and conductances are values by size unless the machine file gives them.",
     )
-    rows = [{"name": name} | one for name, one in heat.as_json(names).items()]
-    return (Section("Heat", figures=(figure,), tables=(table(rows, WARMTHS),)),)
+    return (Section("Heat", figures=(figure,)),)
 
 
 def heat_figure(heat: Heat, names: tuple[str, ...]) -> go.Figure:

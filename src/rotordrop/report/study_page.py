@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 import plotly.graph_objects as go
@@ -27,7 +27,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.quantity import Quantity as Shown
-from rotordrop.report.quantity import display_unit
+from rotordrop.report.quantity import display_unit, one_line, shown
 from rotordrop.report.simulate_page import EQUAL, SYMMETRIC
 from rotordrop.report.style import (
     MUTED,
@@ -40,6 +40,7 @@ from rotordrop.report.style import (
     panels,
     plain,
     upright,
+    words,
 )
 from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.simulate.used import share_column, stopped
@@ -56,10 +57,10 @@ BELOW = 115.0
 MAPPED = ("peak_force", "peak_stress", "settling_time")
 """Quantities of a bearing whose quantiles are drawn against what varies."""
 MATTERS = ("peak_force", "peak_stress")
-"""Quantities of a bearing for which it is said which varied values matter."""
+"""Quantities of a bearing that stand beside the verdict, are drawn, and have their influences said."""
 WHIRL = {"backward_whirl": 0.0}
-HEADLINES = ("peak_force", "peak_stress")
-"""Quantities of a bearing that stand beside the verdict."""
+Marks: TypeAlias = Sequence[tuple[str, float, float]]
+"""Values that are marked in a distribution: text, value [SI], share of the drops below it [1]."""
 SCOPE = "Simulated: the spread is that of the values that vary here, not of all that is unknown."
 SENSITIVITY = (
     "Drops of one block differ in one value each: intervals of quantiles, which take drops as independent, "
@@ -87,11 +88,17 @@ def study_page(
     ``"peak_stress"``, ask for the probability to exceed them.
     """
     study = results.study
+    columns = [f"{one.name}.{quantity}" for quantity in MATTERS for one in study.machine.touchdown_bearings]
+    quantiles: dict[str, Marks] = {
+        name: [(f"{100 * share:g} %", results.quantile(name, share).value, share) for share in SHARES]
+        for name in columns
+    }
+    below = ", ".join(f"{100 * share:g}" for share in SHARES)
     return ReportContent(
         title=f"{len(results)} simulated drops: {study.name}",
         subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
         verdict=tuple(_verdict(results, limits or {})),
-        summary=(_table(results, SHARES, only=HEADLINES),),
+        summary=(_table(results, SHARES, only=MATTERS),),
         facts=(
             ("machine", study.machine.name),
             ("design", f"{study.design}, seed {study.seed}, shards of {study.shard}"),
@@ -100,7 +107,7 @@ def study_page(
         ),
         sections=(
             *_influence_section(results),
-            _distribution_section(results),
+            _distribution_section(results, columns, quantiles, f"{below} % of the drops lie below"),
             *(_map_section(results, name, limits or {}) for name in by),
             *appendix([Section("All quantiles", (QUANTILES,), tables=(_table(results, (0.05, *SHARES)),))]),
         ),
@@ -164,60 +171,45 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
     return [*said, Statement(SCOPE)]
 
 
-def _distribution_section(results: StudyResults) -> Section:
-    """How the numbers that matter are spread: counts of drops, and the share below a value."""
-    caption = (
-        "Above: share of the drops by {words}. Below: share of the drops below a value; dotted: "
-        f"{', '.join(f'{100 * share:g}' for share in SHARES)} % of the drops lie below."
-    )
+def _distribution_section(
+    results: StudyResults, columns: Sequence[str], marks: Mapping[str, Marks], marked: str
+) -> Section:
+    """How columns are spread: the share of the drops below a value, and values that are marked in it."""
+    quantities = dict.fromkeys(column.partition(".")[2] for column in columns)
     figures = tuple(
-        Figure(_distribution_figure(results, quantity), caption.format(words=words))
-        for quantity in MATTERS
-        if (words := quantity.replace("_", " "))
+        Figure(
+            _distribution_figure(results, [one for one in columns if one.endswith(f".{quantity}")], marks),
+            f"Share of the drops below a value of the {_in_words(quantity)}; dotted: {marked}.",
+        )
+        for quantity in quantities
     )
     return Section("Distribution", figures=figures)
 
 
-def _distribution_figure(results: StudyResults, quantity: str) -> go.Figure:
-    """Draw a histogram and the cumulative distribution of a quantity, a column for each bearing."""
-    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
-    count = len(bearings)
-    figure = panels([*bearings, *[""] * count], rows=2, columns=count, height=220)
-    for column, bearing in enumerate(bearings, start=1):
-        shown = _quantity(results, bearing, quantity)
-        size, unit = display_unit(shown.kind)
-        values = np.sort(results.numbers[shown.name])
+def _distribution_figure(
+    results: StudyResults, columns: Sequence[str], marks: Mapping[str, Marks]
+) -> go.Figure:
+    """Draw the cumulative distribution of a quantity, a panel for each bearing."""
+    figure = panels([name.partition(".")[0] for name in columns])
+    for column, name in enumerate(columns, start=1):
+        size, unit = display_unit(_kind(results, name))
+        values = np.sort(results.column(name))
         values = values[np.isfinite(values)] / size
-        if not len(values):
-            continue
-        counted, edges = np.histogram(values, bins="auto" if len(values) > 1 else 1)
-        shares = 100.0 * counted / len(values)
-        steps: dict[str, Any] = {"line": {"color": SERIES[0], "width": 1.2, "shape": "hv"}, "fill": "tozeroy"}
-        drawn: dict[str, Any] = {"column": column, "legend": False}
-        bounds = np.append(shares, shares[-1])
-        curve(figure, edges, bounds, "drops", **drawn, **steps, hover="from %{x:.4~g}: %{y:.3~g} %")
         below = 100.0 * (np.arange(len(values)) + 0.5) / len(values)
         step = {"color": SERIES[0], "width": 1.6, "shape": "hv"}
-        curve(figure, values, below, "drops below", row=2, **drawn, line=step, hover="%{x:.4~g}: %{y:.3~g} %")
-        for share in SHARES:
-            at = results.quantile(shown.name, share).value / size
+        hover = "%{x:.4~g}: %{y:.3~g} %"
+        curve(figure, values, below, "drops below", column=column, legend=False, line=step, hover=hover)
+        for text, at, share in marks[name]:
             if math.isnan(at):  # fewer drops than that
                 continue
-            upright(figure, at, SERIES[1], "dot", row=2, col=column)
+            upright(figure, at / size, SERIES[1], "dot", row=1, col=column)
             # at the height of its share, above the curve: at one height the labels of 90 and 99 % collide
-            label = {
-                "text": f"{100 * share:g} %",
-                "showarrow": False,
-                "xanchor": "right",
-                "yanchor": "bottom",
-            }
-            figure.add_annotation(x=at, y=100.0 * share, row=2, col=column, bgcolor=OVER, **label)
-        words = quantity.replace("_", " ")
-        figure.update_xaxes(title_text=axis_title(words, unit), row=2, col=column)
-    figure.update_yaxes(title_text=axis_title("drops", "%"), rangemode="tozero", row=1, col=1)
-    figure.update_yaxes(range=[0.0, BELOW], row=2)
-    figure.update_yaxes(title_text="drops below [%]", row=2, col=1)
-    return finished(figure)
+            above: dict[str, Any] = {"xanchor": "right", "yanchor": "bottom", "bgcolor": OVER}
+            words(figure, at / size, 100.0 * share, text, column=column, **above)
+        title = _in_words(name.partition(".")[2])
+        figure.update_xaxes(title_text=axis_title(title, unit), col=column)
+    figure.update_yaxes(range=[0.0, BELOW])
+    return finished(figure, y="drops below [%]")
 
 
 def _table(results: StudyResults, shares: Sequence[float], only: Sequence[str] = ()) -> Table:
@@ -373,7 +365,7 @@ def study_numbers(
     def cells(key: str, name: str, **asked: Any) -> list[dict[str, Any]]:
         shown = {"quantile": asked["share"]} if "share" in asked else {}
         return [
-            {"from": cell["from"], "to": cell["to"], **shown, **ends(cell["known"])}
+            {"from": cell["from"], "to": cell["to"], **shown, **(ends(cell["known"]) or {})}
             for cell in results.map(key, name, **asked)
         ]
 
@@ -406,17 +398,10 @@ def study_numbers(
         },
         "maps": {name: mapped(name) for name in by},
         "influences": {
-            column: [
-                {"name": one.name, "alone": _bounded(one.alone), "total": _bounded(one.total)}
-                for one in every
-            ]
+            column: [{"name": one.name, "alone": ends(one.alone), "total": ends(one.total)} for one in every]
             for column, every in _influences(results).items()
         },
     }
-
-
-def _bounded(known: Known | None) -> dict[str, float] | None:
-    return None if known is None else {"value": known.value, "lower": known.low, "upper": known.high}
 
 
 def _influences(results: StudyResults) -> dict[str, tuple[Influence, ...]]:
@@ -440,13 +425,16 @@ NOTE = (
     "Worst of so many: half of such sets have a worst drop below it. Intervals say how well the number of "
     "simulated drops determines a number."
 )
-SHARE_BELOW = "Share of the simulated drops below a value; dashed: the recorded drop."
 
 
 def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent:
     """Build the report on a virtual repeat."""
     study = results.study
-    figures = (_figure(results, found, name) for name in ("peak_force", "peak_stress"))
+    columns = [one.column for one in found if one.column.partition(".")[2] in MATTERS]
+    recorded: dict[str, Marks] = {
+        one.column: [("recorded", one.recorded.value, one.place.value)] if one.recorded and one.place else []
+        for one in found
+    }
     return ReportContent(
         title=f"{len(results)} virtual repeats at {format_quantity(study.speed, 'speed')}",
         subtitle=f"{study.machine.name}, {1e3 * study.duration:g} ms each",
@@ -458,7 +446,7 @@ def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent
             ("digest", study.digest),
             ("rotordrop", __version__),
         ),
-        sections=(Section("Distribution", figures=tuple(Figure(figure, SHARE_BELOW) for figure in figures)),),
+        sections=(_distribution_section(results, columns, recorded, "the recorded drop"),),
     )
 
 
@@ -473,75 +461,52 @@ def _repeat_verdict(results: StudyResults, found: Sequence[Repeat]) -> tuple[Sta
         if one.recorded is None or one.place is None:
             continue
         odd = one.place.high < FEW or one.place.low > 1.0 - FEW
-        kind = _kind(results, one)
+        kind = _kind(results, one.column)
         text = (
-            f"{one.column.replace('_', ' ')}: {percent(one.place)} of the drops that could have happened "
-            f"were milder than the recorded {in_words(one.recorded.value, kind)}; the worst of {one.of} "
-            f"would typically have {spread(one.worst, kind)}."
+            f"{_in_words(one.column)}: {percent(one.place)} of the drops that could have happened were "
+            f"milder than the recorded {shown(one.recorded.value, kind)}; the worst of {one.of} would "
+            f"typically have {one_line(Shown.of(one.worst, kind, 3))}."
         )
         said.append(Statement(text, "warning" if odd else "notice"))
     return (*said, Statement(REPEAT_SCOPE))
 
 
-def _kind(results: StudyResults, one: Repeat) -> str:
-    return next(q.kind for q in results.columns if q.name == one.column)
+def _kind(results: StudyResults, name: str) -> str:
+    return next(q.kind for q in results.columns if q.name == name)
 
 
 def _repeat_table(results: StudyResults, found: Sequence[Repeat]) -> Table:
-    def known(of: Known | None, one: Repeat) -> str:
-        return "–" if of is None else spread(of, _kind(results, one))
+    def number(field: str) -> Callable[[Repeat], Shown]:
+        return lambda one: Shown.of(getattr(one, field), _kind(results, one.column), 3)
 
-    def most(one: Repeat) -> str:
-        return " to ".join(in_words(end.value, _kind(results, one)) for end in (one.low, one.high))
+    def most(one: Repeat) -> Shown:
+        between = (one.low.value, one.high.value)
+        kind = _kind(results, one.column)
+        return Shown(value=one.median.value, kind=kind, interval_90=between, range_only=True)
 
     columns = (
-        Column("quantity", lambda one: one.column.replace("_", " ")),
-        Column("recorded (90 %)", lambda one: known(one.recorded, one)),
-        Column("milder drops", lambda one: "–" if one.place is None else percent(one.place)),
-        Column("median (90 %)", lambda one: known(one.median, one)),
+        Column("quantity", lambda one: _in_words(one.column)),
+        Column("recorded", number("recorded")),
+        Column("milder drops", lambda one: Shown.of(one.place, "share")),
+        Column("median", number("median")),
         Column("nine of ten drops", most),
-        Column(f"worst of {found[0].of} (90 %)", lambda one: known(one.worst, one)),
+        Column(f"worst of {found[0].of}", number("worst")),
     )
-    return table(found, columns, "The recorded drop among those that could have happened", NOTE)
-
-
-def _figure(results: StudyResults, found: Sequence[Repeat], name: str) -> go.Figure:
-    shown = [one for one in found if one.column.endswith(f".{name}")]
-    figure = panels([one.column.partition(".")[0] for one in shown])
-    for column, one in enumerate(shown, start=1):
-        size, unit = display_unit(_kind(results, one))
-        values = sorted(value for value in results.column(one.column).tolist() if math.isfinite(value))
-        curve(
-            figure,
-            [value / size for value in values],
-            [100.0 * (k + 0.5) / len(values) for k in range(len(values))],
-            "simulated drops",
-            column=column,
-            legend=column == 1,
-            line={"color": SERIES[0], "width": 1.6, "shape": "hv"},
-        )
-        if one.recorded is not None:
-            upright(figure, one.recorded.value / size, SERIES[1], row=1, col=column)
-        figure.update_xaxes(title_text=axis_title(name.replace("_", " "), unit), col=column)
-    return finished(figure, y="drops below [%]")
+    return table(found, columns, "The recorded drop among those that could have happened (90 %)", NOTE)
 
 
 def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, Any]:
     """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
 
-    def counted(known: Known | None) -> dict[str, Any] | None:
-        found: dict[str, Any] | None = _bounded(known)
-        return found and found | {"drops": known and known.drops}
-
     def quantity(one: Repeat) -> dict[str, Any]:
         made: dict[str, Any] = finite(
             {
                 "column": one.column,
-                **{name: counted(getattr(one, name)) for name in ("median", "low", "high", "worst")},
+                **{name: ends(getattr(one, name)) for name in ("median", "low", "high", "worst")},
                 "of": one.of,
                 "recorded": one.recorded
                 and {"value": one.recorded.value, "interval": one.recorded.interval_90},
-                "place": counted(one.place),
+                "place": ends(one.place),
             }
         )
         return made
@@ -555,24 +520,15 @@ def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, 
     }
 
 
-def spread(known: Known, kind: str) -> str:
-    """A number with its 90 % interval in words; an end that needs more drops is open."""
-    value, low, high = (in_words(number, kind) for number in (known.value, known.low, known.high))
-    return f"{value} ({low} to {high})"
-
-
-def in_words(value: float, kind: str) -> str:
-    """A number in words; what needs more drops is open."""
-    return format_quantity(value, kind) if math.isfinite(value) else "open"
-
-
 def percent(share: Known, form: str = "{:.3g} % (90 %: {:.3g} to {:.3g} %)") -> str:
     """A share of the drops with its 90 % interval in words."""
     return form.format(*(100 * number for number in (share.value, share.low, share.high)))
 
 
-def ends(known: Known) -> dict[str, Any]:
+def ends(known: Known | None) -> dict[str, Any] | None:
     """A number with its interval, ready for JSON."""
+    if known is None:
+        return None
     found = {"value": known.value, "interval_90": [known.low, known.high], "drops": known.drops}
     made: dict[str, Any] = finite(found)
     return made

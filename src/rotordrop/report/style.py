@@ -226,6 +226,23 @@ def upright(figure: go.Figure, x: float, colour: str = LIMIT, dash: str = "dash"
     figure.add_vline(x=x, line={"color": colour, "width": width, "dash": dash}, **more)
 
 
+def words(
+    figure: go.Figure,
+    x: float,
+    y: float,
+    text: str,
+    *,
+    row: int = 1,
+    column: int = 1,
+    size: float = 11.0,
+    colour: str = INK,
+    **more: Any,
+) -> None:
+    """Write words of a size [px] into a panel; ``more`` goes to plotly as it is."""
+    look: dict[str, Any] = {"showarrow": False, "font": {"size": size, "color": colour}} | more
+    figure.add_annotation(x=x, y=y, text=text, row=row, col=column, **look)
+
+
 def bars(ends: Sequence[tuple[float, float, float]], size: float, **style: Any) -> dict[str, Any]:
     """Error bars from value, lower and upper end [SI] in a unit of some size; an open end has none."""
 
@@ -456,19 +473,7 @@ def _mark(
         said.append(f"{'' if certain else 'peak, '}90 %: {low} to {high} {unit}")
     if not said:
         return
-    figure.add_annotation(
-        x=MILLI * peak.time,
-        y=scale * peak.value,
-        text="<br>".join(said),
-        showarrow=True,
-        arrowhead=2,
-        arrowcolor=MUTED,
-        ax=20,
-        ay=10,
-        xanchor="left",
-        align="left",
-        bgcolor=OVER,
-        font={"size": 11, "color": INK},
-        row=row,
-        col=column,
-    )
+    arrow = {"showarrow": True, "arrowhead": 2, "arrowcolor": MUTED, "ax": 20, "ay": 10}
+    beside: dict[str, Any] = {"xanchor": "left", "align": "left", "bgcolor": OVER, **arrow}
+    at = (MILLI * peak.time, scale * peak.value)
+    words(figure, *at, "<br>".join(said), row=row, column=column, **beside)

@@ -32,6 +32,7 @@ from rotordrop.report.content import (
     table,
     verdict_column,
 )
+from rotordrop.report.drop_sections import turning_section
 from rotordrop.report.machine_content import machine_sections
 from rotordrop.report.quantity import BEYOND_GAP, NO_BREAK, Quantity, shown, with_error, written
 from rotordrop.report.simulate_page import heat_sections
@@ -39,7 +40,6 @@ from rotordrop.report.style import (
     BAND_FILL,
     COLOURS,
     FROM_POWER_OFF,
-    INK,
     LOG_LABELS,
     MICRO,
     SERIES,
@@ -52,7 +52,7 @@ from rotordrop.report.style import (
     plain,
     single,
     square,
-    upright,
+    words,
 )
 from rotordrop.simulate.coast_down_result import (
     QUANTILES,
@@ -101,11 +101,6 @@ SAID = 3
 """Lines that are named in the verdict (chosen)."""
 _IN_WHOLE_SECONDS = 10.0
 """Time from which on whole seconds say when a line was seen [s] (chosen)."""
-_COMPONENTS = {
-    "x": "horizontal",
-    "y": "vertical",
-    "full": "forward (right) and backward (left) parts",
-}
 
 
 def waterfall_page(
@@ -278,7 +273,7 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float
         lines = [line for line in analysis.lines if name in line.forward and line.named]
         for fall in plane.waterfalls:
             caption = (
-                f"{name}, {_COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of frames of "
+                f"{name}, {COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of frames of "
                 f"{fall.settings.points} points, Hann window, {100 * fall.settings.overlap:.0f} % overlap, "
                 f"lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed smears the "
                 "orders here; their true amplitude is below."
@@ -364,25 +359,17 @@ def law_table(law: SpeedLaw) -> Table:
         ("standstill", law.standstill, 1.0, "s"),
     )
 
-    def places(known: Known, scale: float) -> int:
-        half = max(0.5 * scale * (known.high - known.low), 1e-4)
-        return 2 if known.interval_90 is None else max(0, 1 - int(np.floor(np.log10(half))))
-
     def value(row: tuple[str, Known, float, str]) -> str:
         _, known, scale, unit = row
-        return f"{written(scale * known.value, places(known, scale))} {unit}"
-
-    def interval(row: tuple[str, Known, float, str]) -> str:
-        _, known, scale, unit = row
         if known.interval_90 is None:
-            return "–"
-        low, high = (written(scale * end, places(known, scale)) for end in known.interval_90)
-        return f"{low} to {high} {unit}"
+            return f"{written(scale * known.value, 2)} {unit}"
+        places = max(0, 1 - math.floor(math.log10(max(0.5 * scale * (known.high - known.low), 1e-4))))
+        number, low, high = (written(scale * end, places) for end in (known.value, known.low, known.high))
+        return f"{number} ({low} to {high}) {unit}"
 
     columns = (
         Column("quantity", lambda row: row[0]),
-        Column("value", value),
-        Column("90 % interval", interval),
+        Column("value (90 %)", value),
         verdict_column(lambda row: row[1].status),
     )
     return table(rows, columns, "Speed law")
@@ -405,7 +392,11 @@ LOWEST_SHARE = 1e-5
 """Amplitudes below this share of the largest [1], or below the median, take the darkest colour."""
 LEAST_DISTANCE = 0.03
 """Distance of two marked lines as a share of the width [1]; of closer ones only the stronger is marked."""
-COMPONENT_TITLES = {"x": "horizontal, x", "y": "vertical, y", "full": "full spectrum of x + jy"}
+COMPONENTS = {
+    "x": "horizontal, x",
+    "y": "vertical, y",
+    "full": "full spectrum of x + jy, forward to the right, backward to the left",
+}
 TITLE_SHIFT = 40
 """Room above a waterfall [px] for the frequencies of the lines, below its title."""
 DRAWN_ORDERS = (0.5, 1.0, 2.0, 3.0)
@@ -449,7 +440,7 @@ def waterfall_figure(
     if highest is not None:
         kept = np.abs(fall.frequency) <= highest
         fall = replace(fall, frequency=fall.frequency[kept], amplitude=fall.amplitude[:, kept])
-    figure = panels((f"{plane}: {COMPONENT_TITLES[fall.component]}",), height=380)
+    figure = panels((f"{plane}: {COMPONENTS[fall.component]}",), height=380)
     frequency, amplitude = _thinned(fall)
     order = np.arange(len(fall.time))
     if against == "speed" and fall.speed is not None:
@@ -512,15 +503,9 @@ def _mark_orders(figure: go.Figure, fall: Waterfall, level: Array, rows: NDArray
         first = int(np.flatnonzero(inside)[np.argmax(turning[inside])])
         begins = float(k * turning[first])
         at_edge = fall.frequency[-1] - begins < LEAST_DISTANCE * (fall.frequency[-1] - fall.frequency[0])
-        figure.add_annotation(
-            x=begins,
-            y=float(level[first]),
-            text=plain(f"{k:g}X".replace("-", "\N{MINUS SIGN}")),
-            showarrow=False,
-            xanchor="right" if at_edge else "left",
-            yanchor="bottom",
-            font={"size": 11, "color": WHITE},
-        )
+        beside: dict[str, Any] = {"xanchor": "right" if at_edge else "left", "yanchor": "bottom"}
+        name = f"{k:g}X".replace("-", "\N{MINUS SIGN}")
+        words(figure, begins, float(level[first]), name, colour=WHITE, **beside)
 
 
 def _mark_lines(figure: go.Figure, fall: Waterfall, lines: Sequence[Line]) -> None:
@@ -538,17 +523,8 @@ def _mark_lines(figure: go.Figure, fall: Waterfall, lines: Sequence[Line]) -> No
         marked.append(line.frequency)
         dots = {"color": WHITE, "width": 0.8, "dash": "dot"}
         figure.add_vline(x=line.frequency, line=dots, opacity=0.6)
-        figure.add_annotation(
-            x=line.frequency,
-            y=1.0,
-            yref="paper",
-            text=plain(f"{line.frequency:.1f}"),
-            textangle=-60,
-            showarrow=False,
-            yanchor="bottom",
-            xanchor="left",
-            font={"size": 10.5, "color": INK},
-        )
+        above: dict[str, Any] = {"yref": "y domain", "yanchor": "bottom", "xanchor": "left"}
+        words(figure, line.frequency, 1.0, f"{line.frequency:.1f}", size=10.5, textangle=-60, **above)
 
 
 def order_figure(track: OrderTrack, plane: str) -> go.Figure:
@@ -695,10 +671,6 @@ def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.
     return finished(figure, FROM_POWER_OFF, row=2)
 
 
-LARGEST_NOTE = (
-    "The largest value is taken at the integrator's own steps, later ones on the output grid; their time is "
-    "the middle of the second in which they came."
-)
 _MEDIAN, _LOW, _HIGH = (QUANTILES.index(share) for share in (0.5, 0.05, 0.95))
 _DRAWN = ((0, "indentation", MICRO, "µm"), (1, "bearing force", 1.0, "N"), (2, "Hertz stress", 1e-6, "MPa"))
 
@@ -723,9 +695,12 @@ def coast_down_page(
         "Indentation, force and stress second by second; the first point stands for the first 0.2 s. "
         "An indentation below zero is the distance to the race in flight.",
     )
-    turning = Figure(
-        coast_down_speed_figure(result),
-        "Speed of rotor and races at the end of every second; dashed: standstill.",
+    windows = result.windows
+    spun = np.vstack([np.zeros(len(result.bearing_names)), windows.race_speed])
+    turning = turning_section(
+        np.append(0.0, windows.end),
+        np.append(result.initial_speed, windows.speed),
+        dict(zip(result.bearing_names, spun.T, strict=True)),
     )
     return ReportContent(
         title=f"Simulated coast-down of {result.machine_name}",
@@ -742,8 +717,8 @@ def coast_down_page(
             *samples,
         ),
         sections=(
-            Section("Second by second", figures=(seconds,), tables=(maxima_table(result),)),
-            Section("Speed", figures=(turning,)),
+            Section("Second by second", figures=(seconds,)),
+            turning,
             *heat_sections(result.heat, result.bearing_names),
             *(() if analysis is None else frequency_sections(analysis)),
             *(() if machine is None else machine_sections(machine)),
@@ -796,21 +771,6 @@ def _card_of_run(result: CoastDownResult, index: int) -> Card:
     return Card(f"{name} touchdown bearing", figures)
 
 
-def maxima_table(result: CoastDownResult) -> Table:
-    """Does 0.2 s hold the maximum? When the largest value of each quantity came, and what came after."""
-    columns = (
-        Column("bearing", lambda row: row[1].bearing),
-        Column("quantity", lambda row: row[1].quantity),
-        Column("largest", lambda row: Quantity.of(row[1].value, row[0])),
-        Column("when", lambda row: row[1].time, "time"),
-        Column("in 0.2 s", lambda row: "yes" if row[1].in_first_window else "no"),
-        Column("largest later", lambda row: Quantity.of(row[1].later, row[0], 3)),
-        Column("then", lambda row: row[1].later_time, "duration", 3),
-    )
-    rows = [(QUANTITIES[maximum.quantity][0], maximum) for maximum in result.maxima()]
-    return table(rows, columns, "Does 0.2 s hold the maximum? (Neisi 2020, section 5.4)", LARGEST_NOTE)
-
-
 def statistics_figure(result: CoastDownResult) -> go.Figure:
     """Draw median, 5 to 95 % and largest indentation, force and stress of every second and bearing."""
     names = result.bearing_names
@@ -837,23 +797,3 @@ def statistics_figure(result: CoastDownResult) -> go.Figure:
             figure.update_yaxes(type="log", row=row, **LOG_LABELS)
         figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
     return finished(figure, FROM_POWER_OFF, row=len(_DRAWN))
-
-
-def coast_down_speed_figure(result: CoastDownResult) -> go.Figure:
-    """Draw the speed of rotor and races at the end of every second.
-
-    The axis is logarithmic: the dry drag that stops the rotor bends the curve down at the end.
-    """
-    figure = panels(("rotor and races",), height=280)
-    time = np.concatenate([[0.0], result.windows.end])
-    speeds = [("rotor", np.concatenate([[result.initial_speed], result.windows.speed]), COLOURS["simulated"])]
-    for b, name in enumerate(result.bearing_names):
-        race = np.concatenate([[0.0], result.windows.race_speed[:, b]])
-        speeds.append((f"{name} race", race, SERIES[2 + b]))
-    for label, speed, colour in speeds:
-        turning = np.where(np.abs(speed) > 1e-3, np.abs(speed) / TURN, np.nan)
-        curve(figure, time, turning, label, colour=colour)
-    if result.standstill_time is not None:
-        upright(figure, result.standstill_time, SERIES[4])
-    figure.update_yaxes(type="log", **LOG_LABELS)
-    return finished(figure, FROM_POWER_OFF, "speed [Hz]")

@@ -7,7 +7,12 @@ import pytest
 
 from rotordrop.estimate.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
-from rotordrop.report.machine_content import defaults_section, machine_sections, spoken_key, weight_shares
+from rotordrop.report.machine_content import (
+    defaults_section,
+    friction_curve_figure,
+    spoken_key,
+    weight_shares,
+)
 from rotordrop.report.simulate_page import simulate_page
 
 
@@ -65,9 +70,9 @@ def test_a_page_with_the_machine_shows_weight_and_defaults():
 
 def test_equal_friction_laws_share_a_curve():
     machine = example_machine("paper")
-    assert len(machine_sections(machine)[0].figures[0].chart.data) == 2
+    assert len(friction_curve_figure(machine).data) == 2
     changed = machine.with_values({"NDE.friction.dynamic": 0.05})
-    assert len(machine_sections(changed)[0].figures[0].chart.data) == 4
+    assert len(friction_curve_figure(changed).data) == 4
 
 
 def test_balls_thrown_outwards_at_both_ends_are_one_warning(drop_result):
