@@ -186,7 +186,7 @@ def check(
 
     if report is not None:
         write_page(machine_page(described, summary, warnings), report)
-    page = machine_content(described, summary, warnings, brief=not everything)
+    page = machine_content(described, summary, warnings)
     deliver(machine_json(described, summary, warnings), json, page, written=[report], whole=everything)
 
 

@@ -17,7 +17,6 @@ from rotordrop.report.content import (
     Card,
     Column,
     Figure,
-    KeyFigure,
     ReportContent,
     Section,
     Statement,
@@ -27,7 +26,7 @@ from rotordrop.report.content import (
     fact,
     table,
 )
-from rotordrop.report.machine_content import defaults_section, drawing_section, machine_content
+from rotordrop.report.machine_content import defaults_section, drawing_section, machine_content, rotor_tables
 from rotordrop.report.quantity import NO_BREAK
 from rotordrop.report.style import (
     INK,
@@ -51,7 +50,7 @@ from rotordrop.rotor.campbell import (
     speed_grid,
 )
 from rotordrop.rotor.critical_speeds import CriticalSpeedMap, critical_speed_map
-from rotordrop.units import format_quantity, percent
+from rotordrop.units import percent
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -61,7 +60,7 @@ if TYPE_CHECKING:
 HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
 ON_CARD = 6
-"""Critical speeds on a card; all stand in the table."""
+"""Critical speeds on a screen; all stand in the table."""
 _WHIRL_WORDS = {
     "standstill": "natural frequencies at standstill",
     "forward": "forward critical speeds",
@@ -107,13 +106,7 @@ def critical_speeds_page(
             Section("Damped critical speeds", tables=(crossing_table(machine, diagrams, margins),)),
             _map_section(first),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
-            *appendix(
-                [
-                    Section("Stiffness of the bearings", tables=(stiffness_table(first),)),
-                    *map(_map_section, others),
-                    *defaults_section(machine),
-                ]
-            ),
+            *appendix([*map(_map_section, others), *defaults_section(machine)]),
         ),
         lead=2,
     )
@@ -129,10 +122,6 @@ def machine_page(
     speeds = critical_speeds_page(machine, {"standstill": critical_speed_map(machine)}, diagrams)
     told = machine_content(machine, summary, warnings)
 
-    def lowest(diagram: CampbellDiagram) -> Iterator[KeyFigure]:
-        for one in sorted(diagram.crossings, key=lambda one: one.speed)[:4]:
-            yield fact(f"critical speed, {one.direction}", one.speed / TURN, "frequency")
-
     rotor = (
         fact("mass", summary.fe.total_mass, "mass"),
         fact("centre of gravity from node 1", summary.fe.centre_of_gravity, "dimension"),
@@ -140,13 +129,10 @@ def machine_page(
     return replace(
         told,
         verdict=(told.verdict[0], *speeds.verdict),
-        cards=(
-            Card("Rotor", rotor),
-            *(Card(_held(machine, name), tuple(lowest(one))) for name, one in diagrams.items()),
-        ),
+        cards=(Card("Rotor", rotor),),
         summary=(),
         sections=(
-            replace(drawing_section(machine), tables=told.summary[:2]),
+            replace(drawing_section(machine), tables=rotor_tables(summary)),
             *speeds.sections[:-1],
             Section(
                 "Bearings and AMBs at rest",
@@ -197,23 +183,12 @@ def _verdict(
 
 
 def _followed(found: CriticalSpeedMap) -> Iterator[Statement]:
-    """What mounts that relax make of the lines."""
-    if not found.followed:
-        return
-    lines = [hertz for hertz in found.at_lines["with support mass"][:2] if np.isfinite(hertz)]
-    for part in found.lines:
-        if part.branches:
-            at = [
-                f"{format_quantity(stiffness.real, 'stiffness')} (loss factor "
-                f"{stiffness.imag / stiffness.real:.2g}) at {hertz:.1f} Hz"
-                for hertz in lines
-                for stiffness in [part.dynamic(hertz)]
-            ]
-            yield Statement(
-                f"{part.bearing}: the mount relaxes, so its stiffness goes with the frequency: "
-                f"{format_quantity(part.support, 'stiffness')} at rest, {', '.join(at)}. Every line of the "
-                "machine is taken at the stiffness of its own frequency, and so are the damped modes."
-            )
+    """How mounts that relax are taken; the JSON has their stiffness at every line."""
+    if relaxing := [part.bearing for part in found.lines if part.branches]:
+        yield Statement(
+            f"{', '.join(relaxing)}: the mount relaxes; every line and damped mode of the machine is taken "
+            "at the stiffness of its own frequency."
+        )
 
 
 def _too_near(crossing: Crossing, one: Separation, nominal: float) -> Statement:
@@ -255,27 +230,14 @@ def _screen(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Table:
     return table(rows, columns, "Critical speeds, direction, damping ratio")
 
 
-def stiffness_table(found: CriticalSpeedMap) -> Table:
-    """Static load, stiffness and its parts at every bearing."""
-    columns = (
-        Column("touchdown bearing", "bearing"),
-        Column("static load", "load", "force"),
-        Column("ball bearing, tangent", "tangent", "stiffness"),
-        Column("ball bearing, simple formula", "simple", "stiffness"),
-        Column("support", "support", "stiffness"),
-        Column("equivalent, tangent", lambda part: part.equivalent("tangent"), "stiffness"),
-        Column("equivalent, simple formula", lambda part: part.equivalent("simple"), "stiffness"),
-    )
-    return table(found.lines, columns, "Stiffness that holds the rotor where it rests in its bearings")
-
-
 def crossing_table(machine: Machine, diagrams: Mapping[str, CampbellDiagram], margins: Margins) -> Table:
-    """Critical speeds with damping and amplification factor, and with their margins where there are some."""
+    """Critical speeds, the lowest first, with damping, amplification and margins where there are some."""
     rows = [
         (name, crossing, margins.get(crossing) if name == "AMBs" else None)
         for name, diagram in diagrams.items()
         for crossing in diagram.crossings
     ]
+    rows.sort(key=lambda row: row[1].speed)
     columns = (
         Column("rotor", lambda row: _held(machine, row[0])),
         Column("critical speed", lambda row: row[1].speed, "speed"),

@@ -613,7 +613,7 @@ def cross_check_table(checks: Sequence[CrossCheck]) -> Table:
 
 
 def _own(check: CrossCheck) -> Quantity:
-    return replace(Quantity.of(check.estimate, KINDS[check.estimate.unit], 3), allowance_90=None)
+    return Quantity.of(check.estimate, KINDS[check.estimate.unit], 3)
 
 
 def _other(check: CrossCheck) -> Quantity:

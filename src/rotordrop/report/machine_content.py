@@ -21,7 +21,7 @@ from rotordrop.report.content import (
     Card,
     Column,
     Figure,
-    KeyFigure,
+    Level,
     ReportContent,
     Section,
     Statement,
@@ -30,14 +30,13 @@ from rotordrop.report.content import (
     folded,
     table,
 )
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, finished, panels, plain
 from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rotor_fe
 from rotordrop.rotor.suspension import Support, link
 from rotordrop.rotor.whirl import matrices_of
 
 if TYPE_CHECKING:
-    from rotordrop.elements.bearing_numbers import BearingFigure
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
     from rotordrop.machine import Machine
     from rotordrop.rotor.assembly import RotorFE
@@ -46,71 +45,40 @@ if TYPE_CHECKING:
 
 ALL_RIGHT = "Machine file OK; the drop model leaves out nothing known of it."
 ON_SPRINGS = "force_on_springs"
+"""Of another machine: what the peak force would be if springs pressed on the rings."""
 FREE, RESTING = "free-free", "in touchdown bearings, massless supports"
 
 
 def machine_content(
-    machine: Machine,
-    summary: MachineSummary,
-    warnings: tuple[MachineWarning, ...],
-    *,
-    brief: bool = False,
+    machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
 ) -> ReportContent:
-    """Put what is known about a machine into a report: what it amounts to, what to know before trusting it.
-
-    For one screen it is ``brief``: where the drop model ends is named only, and defaults are counted only.
-    """
-    open_values = () if brief else defaults_section(machine)
-    rotor, sag = rotor_values(summary.fe, 4), summary.levitated_sag
-    if sag is not None:
-        span = float(max(sag) - min(sag))
-        rotor.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
-    modes = (
-        (FREE, summary.free_free),
-        (RESTING, summary.settled),
-    )
+    """What a machine amounts to, and what to know before trusting its description."""
     return ReportContent(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
         verdict=(
             _verdict(warnings),
+            _rotor(summary),
             *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
-            *_remarks(machine, warnings, brief),
-            *((_rotor(rotor, modes),) if brief else ()),
+            *_remarks(warnings),
         ),
         cards=(
-            *(_card(machine, rest, brief) for rest in summary.bearings),
+            *(_card(machine, rest) for rest in summary.bearings),
             *(_magnet_card(one, summary.loop) for one in summary.magnets),
         ),
-        summary=()
-        if brief
-        else (
-            named_values("rotor", rotor),
-            mode_table(modes, "bending or support"),
-            *(one for section in open_values for one in section.tables),
-        ),
+        rest="--all",
+        summary=not_given(machine),
     )
 
 
 def _verdict(warnings: tuple[MachineWarning, ...]) -> Statement:
     """One line: may this description be worked with?"""
-    doubtful = [warning for warning in warnings if warning.doubtful]
+    doubtful = dict.fromkeys(f"{one.kind} ({one.bearing})" for one in warnings if one.doubtful)
     if doubtful:
         count = "one value looks" if len(doubtful) == 1 else f"{len(doubtful)} values look"
-        return Statement(f"{count} wrong: {', '.join(_named(doubtful))}.", "warning")
+        return Statement(f"{count} wrong: {', '.join(doubtful)}.", "warning")
     return Statement("Machine file OK." if warnings else ALL_RIGHT, "good")
-
-
-def _named(warnings: Iterable[MachineWarning]) -> list[str]:
-    """Kinds of warning with the places they were found at, those of the same places together."""
-    places: dict[str, dict[str, None]] = {}
-    for warning in warnings:
-        places.setdefault(warning.kind, {})[warning.bearing] = None
-    kinds: dict[str, list[str]] = {}
-    for kind, found in places.items():
-        kinds.setdefault(", ".join(found), []).append(kind)
-    return [f"{', '.join(of)} ({found})" for found, of in kinds.items()]
 
 
 def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]:
@@ -123,55 +91,44 @@ def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]
         yield Statement(f"{bearing.name} has {', '.join(parts)}{held}.")
 
 
-def _remarks(machine: Machine, warnings: tuple[MachineWarning, ...], brief: bool) -> list[Statement]:
-    ends: dict[str, list[str]] = {}
-    for one in warnings:
-        if one.doubtful or not brief:
-            ends.setdefault(one.message.removeprefix(f"{one.bearing}: "), []).append(one.bearing)
-    said = [Statement(f"{', '.join(of)}: {text}", "warning") for text, of in ends.items()]
-    if not brief:
-        return said
-    limits = _named(warning for warning in warnings if not warning.doubtful)
-    if limits:
-        said.append(
-            Statement(f"Limits of the model here: {', '.join(limits)}; --all says why, with numbers.")
-        )
-    return said
+def _remarks(warnings: tuple[MachineWarning, ...]) -> list[Statement]:
+    """What looks wrong as a warning, where the drop model ends as a note; the same of several in one."""
+    said: dict[tuple[str, Level], list[str]] = {}
+    for one in sorted(warnings, key=lambda one: not one.doubtful):
+        level: Level = "warning" if one.doubtful else "notice"
+        said.setdefault((one.message.removeprefix(f"{one.bearing}: "), level), []).append(one.bearing)
+    return [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in said.items()]
 
 
-def _rotor(values: Iterable[tuple[str, object]], modes: Iterable[tuple[str, Iterable[float]]]) -> Statement:
-    """Mass and lowest modes of a rotor in a sentence."""
-    mass, centre, *sag = (one.text for _, one in values if isinstance(one, Quantity))
-    said = [
-        f"mass {mass}",
-        f"centre of gravity {centre} from node 1",
-        *(f"levitated sag {one}" for one in sag),
+def _card(machine: Machine, rest: BearingSummary) -> Card:
+    figures = [
+        fact(one.label, one.value if one.described is None else one.described, one.kind, note=one.note)
+        for one in rest.figures
+        if one.field != ON_SPRINGS
     ]
-    said += [f"{name} {', '.join(f'{one:.4g}' for one in list(found)[:4])} Hz" for name, found in modes]
+    load = fact("share of the weight", rest.load, "force")
+    gap = fact("air gap", machine.bearing(rest.name).air_gap, "length")
+    tangent = fact("tangent stiffness at rest", rest.tangent_stiffness, "stiffness")
+    return Card(rest.name, (load, gap, *figures, tangent))
+
+
+def _rotor(summary: MachineSummary) -> Statement:
+    """Mass, centre of gravity and lowest modes of a rotor in a sentence."""
+    centre = shown(summary.fe.centre_of_gravity, "dimension")
+    said = [f"mass {shown(summary.fe.total_mass, 'mass')}", f"centre of gravity {centre} from node 1"]
+    for held, found in ((FREE, summary.free_free), (RESTING, summary.settled)):
+        said.append(f"{held} {', '.join(f'{one:.4g}' for one in list(found)[:4])} Hz")
     return Statement(f"Rotor: {'; '.join(said)}.")
 
 
-def _card(machine: Machine, rest: BearingSummary, brief: bool) -> Card:
-    def stated(figure: BearingFigure) -> KeyFigure:
-        known = figure.value if figure.described is None else figure.described
-        digits = 2 if figure.field == ON_SPRINGS else 4  # of one push, no estimate
-        return fact(figure.label, known, figure.kind, digits, note=figure.note)
-
-    more = (
-        fact("pressure of rotor on race at rest", rest.contact_pressure, "pressure"),
-        fact("in series with the support", rest.equivalent_stiffness, "stiffness"),
-        fact("support by itself", rest.support_frequency, "frequency"),
-    )
-    return Card(
-        rest.name,
-        (
-            fact("share of the weight", rest.load, "force"),
-            fact("air gap", machine.bearing(rest.name).air_gap, "length"),
-            *(stated(one) for one in rest.figures if not (brief and one.field == ON_SPRINGS)),
-            fact("tangent stiffness at rest", rest.tangent_stiffness, "stiffness"),
-            *(() if brief else more),
-        ),
-    )
+def rotor_tables(summary: MachineSummary) -> tuple[Table, ...]:
+    """Mass, centre of gravity, inertias and sag of a rotor, and its lowest modes by what holds it."""
+    rotor = rotor_values(summary.fe, 4)
+    if (sag := summary.levitated_sag) is not None:
+        span = float(max(sag) - min(sag))
+        rotor.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
+    modes = ((FREE, summary.free_free), (RESTING, summary.settled))
+    return named_values("rotor", rotor), mode_table(modes, "bending or support")
 
 
 def _magnet_card(one: MagnetSummary, loop: LoopStability | None) -> Card:
@@ -280,7 +237,6 @@ def inertias_json(fe: RotorFE) -> dict[str, object]:
 
 POINTS = 801
 NOT_GIVEN = "These values were not in the machine file. Give them there if they are known."
-NOT_GIVEN_WHY = "The report on the machine (check) says why each was taken."
 DRAWN = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
 FRICTION = "Friction between rotor and race; a cubic replaces the jump at zero speed (Neisi 2020, Fig. 2)."
 
@@ -332,33 +288,23 @@ def drawing_section(machine: Machine) -> Section:
 
 def defaults_section(machine: Machine) -> tuple[Section, ...]:
     """Values of the machine that were defaulted or inferred, with the reason; empty where all were given."""
-    columns = (
-        Column("value of the machine", lambda row: spoken_key(row[0])),
-        Column("used", lambda row: row[1]),
-        Column("why", lambda row: row[2]),
-    )
-    tables = tuple(
-        table(found, columns, caption)
-        for caption, found in (("Defaults in use", machine.defaults_in_use), ("Inferred", machine.inferred))
-        if found
-    )
+    tables = not_given(machine)
     return (Section("Values that were not given", (NOT_GIVEN,), tables=tables),) if tables else ()
 
 
 def not_given(machine: Machine) -> tuple[Table, ...]:
-    """What was defaulted or inferred, by whose it is; the report on the machine says why."""
-    owners: dict[str, list[str]] = {}
-    for key, used, _why in (*machine.defaults_in_use, *machine.inferred):
+    """What was defaulted or inferred, and why; equal values of several owners in one line."""
+    owners: dict[tuple[str, str, str], list[str]] = {}
+    for key, used, why in (*machine.defaults_in_use, *machine.inferred):
         owner, _, rest = spoken_key(key).partition(", ")
-        owners.setdefault(f"{rest} {used}", []).append(owner)
-    shared: dict[str, list[str]] = {}
-    for value, of in owners.items():
-        shared.setdefault(", ".join(of), []).append(value)
+        owners.setdefault((rest, used, why), []).append(owner)
     columns = (
-        Column("not in the machine file", lambda row: row[0]),
-        Column("used", lambda row: "; ".join(row[1])),
+        Column("not in the machine file", lambda row: row[0][0]),
+        Column("of", lambda row: ", ".join(row[1])),
+        Column("used", lambda row: row[0][1]),
+        Column("why", lambda row: row[0][2]),
     )
-    return (table(shared.items(), columns, note=NOT_GIVEN_WHY),) if shared else ()
+    return (table(owners.items(), columns),) if owners else ()
 
 
 def spoken_key(key: str) -> str:
@@ -595,10 +541,10 @@ def _meant(bearing: CatalogueBearing) -> Table:
             f"{bearing.kind}, bore × outside × width",
             f"{1e3 * bearing.bore:g} × {1e3 * bearing.outside_diameter:g}{width} mm",
         ),
-        ("balls per row", _with_range(balls.ball_count, balls.count_range, "")),
-        ("ball diameter", _with_range(1e3 * balls.ball_diameter, _scaled(balls.diameter_range, 1e3), " mm")),
+        ("balls per row", _with_range(balls.ball_count, balls.count_range)),
+        ("ball diameter", _with_range(balls.ball_diameter, balls.diameter_range, " mm", 1e-3)),
         ("pitch diameter", f"{1e3 * balls.pitch_diameter:.4g} mm"),
-        ("conformity", _with_range(balls.conformity, balls.conformity_range, "")),
+        ("conformity", _with_range(balls.conformity, balls.conformity_range)),
         ("ball material", bearing.ball_material),
     ]
     if bearing.kind == "angular contact":
@@ -609,19 +555,15 @@ def _meant(bearing: CatalogueBearing) -> Table:
     return named_values(bearing.designation, rows)
 
 
-def _with_range(value: float, bounds: tuple[float, float] | None, unit: str) -> str:
-    known = "" if bounds is None else f" (inferred, 90 %: {bounds[0]:.4g} to {bounds[1]:.4g})"
-    return f"{value:.4g}{unit}{known}"
-
-
-def _scaled(bounds: tuple[float, float] | None, factor: float) -> tuple[float, float] | None:
-    return None if bounds is None else (factor * bounds[0], factor * bounds[1])
+def _with_range(value: float, ends: tuple[float, float] | None, unit: str = "", size: float = 1.0) -> str:
+    """A number in a unit of some size [SI], and between what it lies where it was inferred."""
+    known = "" if ends is None else f" (inferred, 90 %: {ends[0] / size:.4g} to {ends[1] / size:.4g})"
+    return f"{value / size:.4g}{unit}{known}"
 
 
 def _angle(bearing: CatalogueBearing) -> str:
-    bounds = _scaled(bearing.contact_angle_range, 180.0 / math.pi)
-    known = "" if bounds is None else f" (not said; {bounds[0]:.0f}° to {bounds[1]:.0f}°)"
-    return f"{math.degrees(bearing.contact_angle):.0f}°{known}"
+    ends = " to ".join(f"{math.degrees(angle):.0f}°" for angle in bearing.contact_angle_range or ())
+    return f"{math.degrees(bearing.contact_angle):.0f}°" + (f" (not said; {ends})" if ends else "")
 
 
 def _forces(bearing: CatalogueBearing) -> str:

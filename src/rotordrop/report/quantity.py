@@ -50,15 +50,13 @@ IN_OTHER_UNITS: dict[str, tuple[float, str]] = {
 }
 """The same for readers who think in mil, rpm and lbf."""
 
-ALL_OF_IT = 0.01
-"""Part of a half width below which the record has none of it [1]."""
 PLACES_OF_SCIENCE = (-4, 7)
 NO_INTERVAL = "–"
 """In place of an estimated number whose interval is not known."""
 FIXED_PLACES = {"count": 0, "probability": 1}
 BEYOND_GAP = "Beyond the air gap"
 THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
-_OF_KNOWN = ("value", "interval_90", "allowance_90", "standard_error", "lower", "upper", "status")
+_OF_KNOWN = ("value", "interval_90", "standard_error", "lower", "upper", "status")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +69,6 @@ class Quantity:
     """Kind of quantity, a key of `DISPLAY` or of `rotordrop.units.KINDS`."""
     interval_90: tuple[float, float] | None = None
     """Interval that holds the true value with 90 % probability."""
-    allowance_90: float | None = None
-    """Half width of the interval by what the model leaves out alone, in the SI unit of the kind."""
     standard_error: float | None = None
     """Standard error."""
     lower: float | None = None
@@ -157,18 +153,6 @@ class Quantity:
         if self.standard_error is not None:
             return f"± {self._with_unit(self._at(self.standard_error))} (standard error)"
         return ""
-
-    @property
-    def parts_text(self) -> str:
-        """Half widths by the record and by what the model leaves out; empty where only the whole is known."""
-        if self.range_only or self.interval_90 is None or not self.allowance_90:
-            return ""
-        whole = 0.5 * (self.interval_90[1] - self.interval_90[0])
-        record = math.sqrt(max(whole**2 - self.allowance_90**2, 0.0))
-        if record < ALL_OF_IT * whole:
-            return "all of it allowance"
-        parts = f"record ± {self._at(record)}, allowance ± {self._at(self.allowance_90)}"
-        return self._with_unit(parts)
 
     def _range(self) -> str:
         """The interval; one without an end goes on."""

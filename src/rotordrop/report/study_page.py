@@ -138,8 +138,8 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
     for name in names:
         for quantity, limit in limits.items():
             over = results.exceedance(f"{name}.{quantity}", limit)
-            shown = format_quantity(limit, _quantity(results, name, quantity).kind)
-            text = f"{name}: {percent(over)} of the drops exceed {quantity.replace('_', ' ')} {shown}."
+            ceiling = format_quantity(limit, _kind(results, f"{name}.{quantity}"))
+            text = f"{name}: {percent(over)} of the drops exceed {_in_words(quantity)} {ceiling}."
             said.append(Statement(text, "notice" if over.high < 0.5 else "warning"))
     if len(results) < results.study.drops:
         said.append(Statement(_what_is_missing(results)))
@@ -235,12 +235,13 @@ def _in_words(name: str) -> str:
     return name.replace(".", " ").replace("_", " ")
 
 
-def _quantity(results: StudyResults, bearing: str, quantity: str) -> Quantity:
-    wanted = LIFT if quantity == LIFT else f"{bearing}.{quantity}"
-    names = {q.name: q for q in results.columns}
-    if wanted not in names:
-        raise UsageError(unknown_key(quantity, tuple(name.partition(".")[2] for name in names)))
-    return names[wanted]
+def _kind(results: StudyResults, name: str) -> str:
+    """Kind of a column; of a quantity that no bearing has it is said which there are."""
+    kinds = {q.name: q.kind for q in results.columns}
+    if name not in kinds:
+        known = tuple(one.partition(".")[2] for one in kinds)
+        raise UsageError(unknown_key(name.partition(".")[2], known))
+    return kinds[name]
 
 
 def _influence_section(results: StudyResults) -> tuple[Section, ...]:
@@ -283,77 +284,67 @@ def spoken_value(machine: Machine, name: str) -> str:
 
 
 def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
+    """Quantiles of what counts, and probabilities of what happened, against a varied value."""
     machine = results.study.machine
-    kind = case_kind(machine, name)
-    if kind is None:
-        kind = kind_of_path(machine, name.replace("*", machine.touchdown_bearings[0].name, 1))
-    asked: list[tuple[str, float | None]] = [(quantity, None) for quantity in MAPPED]
-    seen = {
-        quantity: limit
-        for quantity, limit in (WHIRL | dict(limits)).items()
-        # what happened in no drop is said in the verdict: its figure would be a line at zero
-        if any(
-            results.exceedance(f"{bearing.name}.{quantity}", limit).value > 0.0
-            for bearing in machine.touchdown_bearings
+    bearings = [bearing.name for bearing in machine.touchdown_bearings]
+    figures = [
+        Figure(
+            _map_figure(results, name, [f"{bearing}.{quantity}" for bearing in bearings]),
+            "Every drop, and quantiles of drops with neighbouring values; bars: 90 % intervals.",
         )
-    }
-    asked += seen.items()
-    figures = []
-    for quantity, limit in asked:
-        what = "Every drop, and quantiles of" if limit is None else "Probability among"
-        caption = f"{what} drops with neighbouring values; bars: 90 % intervals."
-        figures.append(Figure(_map_figure(results, name, kind, quantity, limit), caption))
-    if results.study.looped:
-        caption = "Probability that the magnets lift the rotor again; bars: 90 % intervals."
-        figures.append(Figure(_map_figure(results, name, kind, LIFT, 0.5), caption))
+        for quantity in MAPPED
+    ]
+    limited = [
+        ([f"{bearing}.{quantity}" for bearing in bearings], limit)
+        for quantity, limit in (WHIRL | dict(limits)).items()
+    ]
+    for columns, limit in [*limited, *([([LIFT], 0.5)] if results.study.looped else [])]:
+        # what happened in no drop is said in the verdict: its figure would be a line at zero
+        if columns == [LIFT] or any(results.exceedance(one, limit).value > 0.0 for one in columns):
+            caption = "Probability among drops with neighbouring values; bars: 90 % intervals."
+            figures.append(Figure(_map_figure(results, name, columns, limit), caption))
     return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
 
 
 def _map_figure(
-    results: StudyResults, name: str, kind: str, quantity: str, limit: float | None = None
+    results: StudyResults, name: str, columns: Sequence[str], limit: float | None = None
 ) -> go.Figure:
+    """Draw quantiles of columns, or their probability to exceed a limit [SI], against a varied value."""
     machine = results.study.machine
-    bearings = [LIFT] if quantity == LIFT else [bearing.name for bearing in machine.touchdown_bearings]
-    figure = panels(bearings)
+    kind = case_kind(machine, name)
+    if kind is None:
+        kind = kind_of_path(machine, name.replace("*", machine.touchdown_bearings[0].name, 1))
     factor, unit = display_unit(kind)
-    for column, bearing in enumerate(bearings, start=1):
-        shown = _quantity(results, bearing, quantity)
-        size, size_unit = display_unit(shown.kind) if limit is None else (1.0, "")
+    of_columns = _kind(results, columns[0])
+    size, size_unit = display_unit(of_columns) if limit is None else (1.0, "")
+    figure = panels([column.partition(".")[0] for column in columns])
+    for number, column in enumerate(columns, start=1):
+        place: dict[str, Any] = {"column": number, "legend": number == 1}
         if limit is None:
             some = slice(None, None, -(-len(results) // DRAWN_DROPS))
-            curve(
-                figure,
-                results.column(name)[some] / factor,
-                results.column(shown.name)[some] / size,
-                "a drop",
-                column=column,
-                mode="markers",
-                marker={"color": MUTED, "size": 4, "opacity": 0.45},
-                legend=column == 1,
-            )
+            x, y = results.column(name)[some] / factor, results.column(column)[some] / size
+            marker = {"color": MUTED, "size": 4, "opacity": 0.45}
+            curve(figure, x, y, "a drop", mode="markers", marker=marker, **place)
         for k, share in enumerate(SHARES if limit is None else SHARES[:1]):
-            cells = results.map(shown.name, name, share=share, above=limit)
+            cells = results.map(column, name, share=share, above=limit)
             known: list[Known] = [cell["known"] for cell in cells]
             curve(
                 figure,
                 [0.5 * (cell["from"] + cell["to"]) / factor for cell in cells],
                 [one.value / size for one in known],
                 f"{100 * share:g} % of drops below" if limit is None else "probability",
-                column=column,
                 mode="lines+markers",
                 colour=SERIES[k],
                 width=1.6,
-                legend=column == 1,
                 error_y=bars([(one.value, one.low, one.high) for one in known], size),
+                **place,
             )
-        title = plain(spoken_value(machine, name))
-        figure.update_xaxes(title_text=axis_title(title, unit), col=column)
-    words = quantity.replace("_", " ")
-    if quantity == LIFT:
-        words, size_unit = "P(lift)", "1"
-    elif limit is not None:
-        words = f"P({words} > {format_quantity(limit, shown.kind)})" if limit else f"P({words})"
-    return finished(figure, y=axis_title(words, size_unit))
+    quantity = _in_words(columns[0].partition(".")[2] or columns[0])
+    if limit is not None:
+        above = f" > {format_quantity(limit, of_columns)}" if limit and columns != [LIFT] else ""
+        quantity = f"P({quantity}{above})"
+    x_title = axis_title(plain(spoken_value(machine, name)), unit)
+    return finished(figure, x_title, axis_title(quantity, size_unit))
 
 
 def study_numbers(
@@ -469,10 +460,6 @@ def _repeat_verdict(results: StudyResults, found: Sequence[Repeat]) -> tuple[Sta
         )
         said.append(Statement(text, "warning" if odd else "notice"))
     return (*said, Statement(REPEAT_SCOPE))
-
-
-def _kind(results: StudyResults, name: str) -> str:
-    return next(q.kind for q in results.columns if q.name == name)
 
 
 def _repeat_table(results: StudyResults, found: Sequence[Repeat]) -> Table:

@@ -178,8 +178,7 @@ def _cell(cell: Cell) -> str:
     value, interval = _safe(cell.levelled), _safe(cell.interval_text)
     if not interval:
         return value
-    lines = [value, f"{'90 %: ' if cell.interval_90 else ''}{interval}", _safe(cell.parts_text)]
-    return "\n".join(line for line in lines if line)
+    return f"{value}\n{'90 %: ' if cell.interval_90 else ''}{interval}"
 
 
 def _safe(text: str) -> str:

@@ -80,16 +80,6 @@ def test_a_number_has_the_digits_of_its_error(value, error, text):
     assert with_error(value, error, "Hz") == text
 
 
-def test_what_the_record_leaves_open_stands_apart_from_the_allowance():
-    """Independent parts: 30 and 40 of a half width of 50."""
-    known = Known(value=1000.0, status="determined", interval_90=(950.0, 1050.0), allowance_90=40.0, unit="N")
-    shown = Quantity.of(known, "force")
-    assert shown.parts_text == "record ± 30, allowance ± 40 N"
-    assert Quantity.of(known, "force", range_only=True).parts_text == ""
-    assert Quantity.of(replace(known, allowance_90=None), "force").parts_text == ""
-    assert Quantity.of(replace(known, allowance_90=50.0), "force").parts_text == "all of it allowance"
-
-
 def test_a_range_that_stands_for_its_number_has_its_level():
     known = Known(value=2.0, interval_90=(1.0, 3.0))
     assert Quantity.of(known, "force", range_only=True).levelled == "90 %: 1.0 to 3.0 N"

@@ -61,7 +61,9 @@ def test_the_gap_and_the_first_contacts_come_from_the_result(drop_result):
 def test_a_page_with_the_machine_shows_weight_and_defaults():
     machine = example_machine("paper")
     (section,) = defaults_section(machine)
-    listed = {row[0] for table in section.tables for row in table.rows}
+    listed = {
+        f"{owner}, {row[0]}" for table in section.tables for row in table.rows for owner in row[1].split(", ")
+    }
     assert listed == {spoken_key(entry[0]) for entry in (*machine.defaults_in_use, *machine.inferred)}
     shares = weight_shares(machine)
     assert shares["NDE"] == pytest.approx(174.6, abs=0.1)

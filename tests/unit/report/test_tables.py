@@ -11,7 +11,12 @@ from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.known import Known
 from rotordrop.report.content import Column, Table, table
-from rotordrop.report.drop_sections import impact_table, record_quality_section
+from rotordrop.report.drop_sections import (
+    impact_table,
+    record_quality_section,
+    stress_box_figure,
+    stress_table,
+)
 from rotordrop.report.estimate_page import (
     ParameterRow,
     cross_check_statements,
@@ -19,7 +24,6 @@ from rotordrop.report.estimate_page import (
     parameter_table,
 )
 from rotordrop.report.quantity import Quantity
-from rotordrop.report.stress_box import stress_box_figure, stress_table
 
 
 def texts(row):
