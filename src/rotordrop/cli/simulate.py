@@ -248,8 +248,8 @@ def coast_down(
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
     from rotordrop.report.page import write_page
+    from rotordrop.report.simulate_page import coast_down_page
     from rotordrop.report.terminal import summary_console
-    from rotordrop.report.waterfall_page import coast_down_page
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate.case import CentredStart, CoastDownCase, LevitatedStart
     from rotordrop.simulate.coast_down import MOST_STEPS_PER_WINDOW, simulate_coast_down

@@ -261,7 +261,6 @@ class ComparedDrop:
             places=number.places,
             interval_90=found.interval,
             standard_error=found.standard_error,
-            status=found.status or "",
             range_only=not self.drop.consistent,
         )
 

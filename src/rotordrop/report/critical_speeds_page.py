@@ -136,7 +136,7 @@ def machine_page(
             *speeds.sections[:-1],
             Section(
                 "Bearings and AMBs at rest",
-                statements=told.verdict[1:],
+                statements=told.verdict[2:],
                 tables=(card_table(told.cards, lambda figure: figure.value),),
             ),
             *speeds.sections[-1:],

@@ -355,11 +355,7 @@ def record_quality_section(findings: Sequence[Finding], *unseen: str) -> Section
         Column("what was seen", "message"),
         Column("remedy", "remedy"),
     )
-    return Section(
-        "Data quality",
-        statements=(*quality_statements(findings), *limits),
-        tables=(table(findings, columns),),
-    )
+    return Section("Data quality", statements=limits, tables=(table(findings, columns),))
 
 
 def unseen_in(notes: Sequence[str]) -> tuple[str, ...]:

@@ -819,9 +819,10 @@ def speed_section(estimate: Estimate, steps: ReplaySteps) -> Section:
         time = np.asarray(record.time) - estimate.drop_instant.value
         measured = History(label="measured", time=time, values=np.asarray(record.speed), role="measured")
         histories.insert(0, measured.between(0.0, float(steps.speed_time[-1])))
-    constant = Quantity.of(steps.speed.aero_time_constant, "duration")
+    known = steps.speed.aero_time_constant
+    constant = Quantity.of(known, "duration")
     text = (
-        f"Aerodynamic time constant {constant.text} ({constant.interval_text or constant.status}); "
+        f"Aerodynamic time constant {constant.text} ({constant.interval_text or known.status}); "
         "a plain exponential through the record, friction included, has "
         f"{shown(steps.speed.profile_time_constant, 'duration', 3)}."
     )

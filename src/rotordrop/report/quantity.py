@@ -56,7 +56,7 @@ NO_INTERVAL = "–"
 FIXED_PLACES = {"count": 0, "probability": 1}
 BEYOND_GAP = "Beyond the air gap"
 THIN_SPACE, NO_BREAK = "\u202f", "\u00a0"
-_OF_KNOWN = ("value", "interval_90", "standard_error", "lower", "upper", "status")
+_OF_KNOWN = ("value", "interval_90", "standard_error", "lower", "upper")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +74,6 @@ class Quantity:
     lower: float | None = None
     upper: float | None = None
     """Limits set by the record itself, for example of the air gap."""
-    status: str = ""
-    """Verdict or reason, for example why there is no interval."""
     digits: int = 4
     """Significant digits when no interval says how many are meant."""
     range_only: bool = False

@@ -1,4 +1,4 @@
-"""The report on one simulated drop: summary, page, numbers for JSON, and how bearings warmed."""
+"""The reports on one simulated drop or coast-down: summary, page, numbers for JSON."""
 
 from __future__ import annotations
 
@@ -36,16 +36,28 @@ from rotordrop.report.drop_sections import (
     turning_section,
 )
 from rotordrop.report.machine_content import machine_sections, weight_shares
-from rotordrop.report.quantity import BEYOND_GAP, shown
+from rotordrop.report.quantity import BEYOND_GAP, shown, written
 from rotordrop.report.style import (
+    BAND_FILL,
+    COLOURS,
     FROM_POWER_OFF,
+    LOG_LABELS,
+    MICRO,
     SERIES,
     Panel,
     axis_title,
     curve,
     finished,
     panels,
+    plain,
     time_panels,
+)
+from rotordrop.report.waterfall_page import frequency_sections
+from rotordrop.simulate.coast_down_result import (
+    QUANTILES,
+    QUANTITIES,
+    CoastDownResult,
+    first_window_sentence,
 )
 from rotordrop.simulate.heat import NODES, Heat
 from rotordrop.simulate.magnets import MagnetHistory
@@ -55,6 +67,8 @@ from rotordrop.units import percent
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
+    from rotordrop.simulate.coast_down_certificate import CoastDownCertificate
+    from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 
 def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportContent:
@@ -148,13 +162,21 @@ def simulate_summary(result: DropResult, machine: Machine | None = None) -> Repo
         verdict=_verdict(result, bearings, machine, uses),
         cards=tuple(_card(result, bearing) for bearing in bearings),
         facts=(
-            ("machine", result.machine_name if path is None else f"{result.machine_name} ({path.name})"),
-            ("rotor basis", result.reduction),
-            ("tolerance", f"{result.tolerance:g}"),
-            ("steps", f"{result.steps} taken, {result.rejected_steps} rejected"),
+            *_facts(result, "" if path is None else f" ({path.name})"),
             ("numerical error", _certificate(result).text.removeprefix(NUMERICAL)),
-            ("rotordrop", __version__),
         ),
+    )
+
+
+def _facts(result: DropResult | CoastDownResult, source: str = "") -> tuple[tuple[str, str], ...]:
+    """How a simulation was made; the source is the file of its machine."""
+    steps = f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected"
+    return (
+        ("machine", f"{result.machine_name}{source}"),
+        ("rotor basis", result.reduction),
+        ("tolerance", f"{result.tolerance:g}"),
+        ("steps", steps),
+        ("rotordrop", __version__),
     )
 
 
@@ -437,3 +459,119 @@ def heat_figure(heat: Heat, names: tuple[str, ...]) -> go.Figure:
     figure.update_yaxes(rangemode="tozero")
     figure.update_xaxes(range=[0.0, float(np.max(heat.time))], row=2)
     return finished(figure, FROM_POWER_OFF, row=2)
+
+
+_MEDIAN, _LOW, _HIGH = (QUANTILES.index(share) for share in (0.5, 0.05, 0.95))
+_DRAWN = ((0, "indentation", MICRO, "µm"), (1, "bearing force", 1.0, "N"), (2, "Hertz stress", 1e-6, "MPa"))
+
+
+def coast_down_page(
+    result: CoastDownResult,
+    machine: Machine | None = None,
+    analysis: CoastDownAnalysis | None = None,
+    certificate: CoastDownCertificate | None = None,
+) -> ReportContent:
+    """Build the report on one simulated coast-down.
+
+    The machine gives the friction law and the defaults in use, the analysis waterfalls, lines and resonances
+    of the samples, the certificate how the statistics moved at a tighter tolerance.
+    """
+    speed, end = shown(result.initial_speed, "speed"), shown(result.end_time, "duration")
+    missing, scale = shown(result.energy_residual, "energy", 3), shown(abs(result.energy_scale), "energy", 3)
+    step = f"every {1e6 * result.output_step:g} µs"
+    samples = () if result.path is None else (("samples", f"{result.path.name}, {step}"),)
+    seconds = Figure(
+        statistics_figure(result),
+        "Indentation, force and stress second by second; the first point stands for the first 0.2 s. "
+        "An indentation below zero is the distance to the race in flight.",
+    )
+    windows = result.windows
+    spun = np.vstack([np.zeros(len(result.bearing_names)), windows.race_speed])
+    turning = turning_section(
+        np.append(0.0, windows.end),
+        np.append(result.initial_speed, windows.speed),
+        dict(zip(result.bearing_names, spun.T, strict=True)),
+    )
+    return ReportContent(
+        title=f"Simulated coast-down of {result.machine_name}",
+        subtitle=f"from {speed}, {end} after power-off",
+        simulated=SIMULATED_MACHINE,
+        verdict=_said_of_run(result, analysis, certificate),
+        cards=tuple(_card_of_run(result, index) for index in range(len(result.bearing_names))),
+        facts=(*_facts(result), ("numerical error", f"energy balanced to {missing} of {scale}"), *samples),
+        sections=(
+            Section("Second by second", figures=(seconds,)),
+            turning,
+            *heat_sections(result.heat, result.bearing_names),
+            *(() if analysis is None else frequency_sections(analysis)),
+            *(() if machine is None else machine_sections(machine)),
+        ),
+        ends=(result.bearing_names[0], result.bearing_names[-1]),
+    )
+
+
+def _said_of_run(
+    result: CoastDownResult, analysis: CoastDownAnalysis | None, certificate: CoastDownCertificate | None
+) -> tuple[Statement, ...]:
+    said = [Statement(result.outcome, "good" if result.finished else "bad")]
+    maxima = result.maxima()
+    held = all(maximum.in_first_window for maximum in maxima)
+    if result.finished or not held:
+        text = first_window_sentence(maximum.as_json() for maximum in maxima)
+        said.append(Statement(text, "good" if held else "warning"))
+    if result.heat is not None:
+        said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
+    said.append(Statement(NO_INTERVAL))
+    if certificate is not None:
+        said.append(Statement(certificate.sentence(), "good" if certificate.agrees else "warning"))
+    return tuple(said)
+
+
+def _card_of_run(result: CoastDownResult, index: int) -> Card:
+    name, (forward, backward) = result.bearing_names[index], result.whirl_time[index]
+    largest = (
+        fact(
+            f"Largest {maximum.quantity}{' into the race' * (maximum.quantity == 'indentation')}",
+            maximum.value,
+            QUANTITIES[maximum.quantity][0],
+            note=f"at {shown(maximum.time, 'time')}",
+        )
+        for maximum in result.maxima()
+        if maximum.bearing == name
+    )
+    figures = (
+        *largest,
+        fact("Contacts", result.contacts[index], "count"),
+        fact("Energy lost in contact", result.contact_energy[index], "energy", 3),
+        fact("Forward whirl", forward, "duration", 3),
+        fact("Backward whirl", backward, "duration", 3),
+    )
+    return Card(f"{name} touchdown bearing", figures)
+
+
+def statistics_figure(result: CoastDownResult) -> go.Figure:
+    """Draw median, 5 to 95 % and largest indentation, force and stress of every second and bearing."""
+    names = result.bearing_names
+    titles = [f"{name}: {label}" for _, label, _, _ in _DRAWN for name in names]
+    figure = panels(titles, rows=len(_DRAWN), columns=len(names), height=215, spacing=0.1)
+    time = 0.5 * (result.windows.start + result.windows.end)
+    hidden: dict[str, Any] = {"line": {"width": 0}}
+    for row, (column, label, scale, unit) in enumerate(_DRAWN, start=1):
+        for b in range(len(names)):
+            levels = scale * result.windows.quantile[:, b, column]
+            peak = scale * result.windows.peak[:, b, column]
+            place: dict[str, Any] = {"row": row, "column": b + 1}
+            named = place | {"legend": row == 1 and b == 0}
+            share, filled = "5 to 95 % of the time", hidden | {"fill": "tonexty", "fillcolor": BAND_FILL}
+            curve(figure, time, levels[:, _LOW], hover=None, **place, **hidden)
+            curve(figure, time, levels[:, _HIGH], share, **named, **filled)
+            curve(figure, time, levels[:, _MEDIAN], "median", **named, colour=COLOURS["simulated"])
+            marker = {"color": SERIES[4], "size": 3.5}
+            curve(figure, time, peak, "largest", **named, mode="markers", marker=marker)
+        if column == 0:
+            top = scale * float(np.max(result.windows.peak[..., 0]))
+            figure.update_yaxes(range=[-0.15 * top, 1.1 * top], row=row)
+        else:
+            figure.update_yaxes(type="log", row=row, **LOG_LABELS)
+        figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
+    return finished(figure, FROM_POWER_OFF, row=len(_DRAWN))

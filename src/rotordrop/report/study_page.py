@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -283,27 +283,30 @@ def spoken_value(machine: Machine, name: str) -> str:
     return f"{label}, {'every bearing' if owner == '*' else owner}"
 
 
+def _asked(results: StudyResults, limits: Mapping[str, float]) -> Iterator[tuple[list[str], float | None]]:
+    """Columns that are shown against a varied value, with the limit [SI] that they may exceed."""
+    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
+    wanted: dict[str, float | None] = dict.fromkeys(MAPPED)
+    for quantity, limit in (*wanted.items(), *(WHIRL | dict(limits)).items()):
+        yield [f"{bearing}.{quantity}" for bearing in bearings], limit
+    if results.study.looped:
+        yield [LIFT], 0.5
+
+
 def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
     """Quantiles of what counts, and probabilities of what happened, against a varied value."""
-    machine = results.study.machine
-    bearings = [bearing.name for bearing in machine.touchdown_bearings]
-    figures = [
-        Figure(
-            _map_figure(results, name, [f"{bearing}.{quantity}" for bearing in bearings]),
-            "Every drop, and quantiles of drops with neighbouring values; bars: 90 % intervals.",
-        )
-        for quantity in MAPPED
-    ]
-    limited = [
-        ([f"{bearing}.{quantity}" for bearing in bearings], limit)
-        for quantity, limit in (WHIRL | dict(limits)).items()
-    ]
-    for columns, limit in [*limited, *([([LIFT], 0.5)] if results.study.looped else [])]:
+    figures = []
+    for columns, limit in _asked(results, limits):
         # what happened in no drop is said in the verdict: its figure would be a line at zero
-        if columns == [LIFT] or any(results.exceedance(one, limit).value > 0.0 for one in columns):
-            caption = "Probability among drops with neighbouring values; bars: 90 % intervals."
+        if (
+            limit is None
+            or columns == [LIFT]
+            or any(results.exceedance(one, limit).value > 0.0 for one in columns)
+        ):
+            what = "Every drop, and quantiles of" if limit is None else "Probability among"
+            caption = f"{what} drops with neighbouring values; bars: 90 % intervals."
             figures.append(Figure(_map_figure(results, name, columns, limit), caption))
-    return Section(f"Against {spoken_value(machine, name)}", figures=tuple(figures))
+    return Section(f"Against {spoken_value(results.study.machine, name)}", figures=tuple(figures))
 
 
 def _map_figure(
@@ -351,31 +354,24 @@ def study_numbers(
     results: StudyResults, by: Sequence[str] = (), limits: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
     """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
-    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
 
-    def cells(key: str, name: str, **asked: Any) -> list[dict[str, Any]]:
-        shown = {"quantile": asked["share"]} if "share" in asked else {}
+    def mapped(name: str, column: str, limit: float | None) -> list[dict[str, Any]]:
         return [
-            {"from": cell["from"], "to": cell["to"], **shown, **(ends(cell["known"]) or {})}
-            for cell in results.map(key, name, **asked)
+            {
+                "from": cell["from"],
+                "to": cell["to"],
+                **({"quantile": share} if limit is None else {}),
+                **(ends(cell["known"]) or {}),
+            }
+            for share in (SHARES if limit is None else SHARES[:1])
+            for cell in results.map(column, name, share=share, above=limit)
         ]
 
-    def mapped(name: str) -> dict[str, Any]:
-        found = {
-            f"{bearing}.{quantity}": [
-                cell for share in SHARES for cell in cells(f"{bearing}.{quantity}", name, share=share)
-            ]
-            for bearing in bearings
-            for quantity in MAPPED
-        }
-        if results.study.looped:
-            found["lift > 0.5"] = cells(LIFT, name, above=0.5)
-        return found | {
-            f"{bearing}.{quantity} > {limit:g}": cells(f"{bearing}.{quantity}", name, above=limit)
-            for bearing in bearings
-            for quantity, limit in (WHIRL | dict(limits or {})).items()
-        }
-
+    asked = {
+        column if limit is None else f"{column} > {limit:g}": (column, limit)
+        for columns, limit in _asked(results, limits or {})
+        for column in columns
+    }
     return study_numbers_of(results.study) | {
         "drops": len(results),
         "failed": dict(results.failed),
@@ -387,7 +383,7 @@ def study_numbers(
             }
             for q in results.columns
         },
-        "maps": {name: mapped(name) for name in by},
+        "maps": {name: {key: mapped(name, *one) for key, one in asked.items()} for name in by},
         "influences": {
             column: [{"name": one.name, "alone": ends(one.alone), "total": ends(one.total)} for one in every]
             for column, every in _influences(results).items()

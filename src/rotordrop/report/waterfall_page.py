@@ -1,4 +1,4 @@
-"""The reports on coast-downs: the frequencies of any, and a simulated one second by second."""
+"""The report on the frequencies of a coast-down, recorded or simulated."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from rotordrop._version import __version__
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
-from rotordrop.estimate.bearing_drop import AirGap
+from rotordrop.estimate.bearing_drop import AirGap, History
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.known import NINETY, Known
 from rotordrop.report.content import (
-    SIMULATED_MACHINE,
     Card,
     Column,
     Figure,
@@ -28,19 +27,14 @@ from rotordrop.report.content import (
     Section,
     Statement,
     Table,
-    fact,
     table,
     verdict_column,
 )
-from rotordrop.report.drop_sections import turning_section
-from rotordrop.report.machine_content import machine_sections
+from rotordrop.report.drop_sections import speed_figure
 from rotordrop.report.quantity import BEYOND_GAP, NO_BREAK, Quantity, shown, with_error, written
-from rotordrop.report.simulate_page import heat_sections
 from rotordrop.report.style import (
-    BAND_FILL,
     COLOURS,
     FROM_POWER_OFF,
-    LOG_LABELS,
     MICRO,
     SERIES,
     TURN,
@@ -49,16 +43,9 @@ from rotordrop.report.style import (
     curve,
     finished,
     panels,
-    plain,
     single,
     square,
     words,
-)
-from rotordrop.simulate.coast_down_result import (
-    QUANTILES,
-    QUANTITIES,
-    CoastDownResult,
-    first_window_sentence,
 )
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
 from rotordrop.spectrum.indentation import DisplacementHistory, held_clearly, held_maximum
@@ -67,8 +54,6 @@ from rotordrop.spectrum.orders import LEAST_APART, STANDARD_SETTINGS, STEADY_APA
 from rotordrop.spectrum.waterfall import Waterfall
 
 if TYPE_CHECKING:
-    from rotordrop.machine import Machine
-    from rotordrop.simulate.coast_down_certificate import CoastDownCertificate
     from rotordrop.spectrum.coast_down import CoastDownAnalysis
 
 NO_SPEED = (
@@ -99,8 +84,6 @@ LINES = "Lines"
 NO_LINE = "No line stands out: a short record is too short for one."
 SAID = 3
 """Lines that are named in the verdict (chosen)."""
-_IN_WHOLE_SECONDS = 10.0
-"""Time from which on whole seconds say when a line was seen [s] (chosen)."""
 
 
 def waterfall_page(
@@ -169,7 +152,7 @@ def frequency_sections(
         _waterfall_section(analysis, against, highest),
         Section(LINES, reasons if lines else (NO_LINE,), tables=(line_table(analysis),) if lines else ()),
         *((_order_section(analysis),) if tracked else ()),
-        *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law, role),)),
+        *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law),)),
     )
 
 
@@ -232,22 +215,19 @@ def _standstill(stop: Known) -> str:
     )
 
 
-def seen_of(line: Line, lines: Sequence[Line]) -> str:
-    """From when to when a line was seen; in whole seconds where any of the lines was seen for long."""
-    longest = max((one.last_seen for one in lines), default=0.0)
-    places = 0 if longest >= _IN_WHOLE_SECONDS else 2
-    return f"{line.first_seen:.{places}f} to {line.last_seen:.{places}f} s"
-
-
 def line_table(analysis: CoastDownAnalysis) -> Table:
-    """Every line with frequency or order, amplitude, width, confidence and the reason for its name."""
+    """Every line with frequency or order, amplitude, width and confidence."""
+
+    def seen(line: Line) -> str:
+        return f"{line.first_seen:.3g} to {line.last_seen:.3g} s".replace(" ", NO_BREAK)
+
     columns = (
         Column("name", "label"),
         Column("where", where_of),
         Column("amplitude, zero-to-peak", "amplitude", "length", 3),
         Column("× floor", lambda line: f"{line.ratio:.0f}"),
         Column("width", lambda line: f"{line.width:.2f} Hz" if line.width else "below resolution"),
-        Column("seen", lambda line: seen_of(line, analysis.lines).replace(" ", NO_BREAK)),
+        Column("seen", seen),
         Column("confidence", lambda line: line.confidence if line.named else None, "probability"),
     )
     return table(analysis.lines, columns, "Lines found, strongest first", LINES_NOTE)
@@ -286,28 +266,27 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:
-    heading, figures = "Orders and resonances", []
-    for name, plane in analysis.planes.items():
-        if plane.track is not None:
-            caption = (
-                f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor really "
-                f"turned through, over windows of {plane.track.revolutions:g} turns. Gaps: a steady line "
-                "lies too close to tell it from the order."
-            )
-            chart = order_figure(plane.track, name)
-            figures.append(Figure(chart, caption + ("" if analysis.signal.recorded else AS_READ)))
-            if analysis.signal.recorded and vectors_of(plane.track):
-                figures.append(Figure(bode_figure(plane.track, name), f"{name}: {BODE}"))
-                figures.append(Figure(polar_figure(plane.track, name), f"{name}: {POLAR}"))
-    tracked = [(name, plane) for name, plane in analysis.planes.items() if plane.track is not None]
-    found = [(name, resonance) for name, plane in tracked for resonance in plane.resonances]
+    tracks = {name: plane.track for name, plane in analysis.planes.items() if plane.track is not None}
+    figures = []
+    for name, track in tracks.items():
+        caption = (
+            f"{name}: amplitude of the orders, zero-to-peak, tracked in the angle the rotor really turned "
+            f"through, over windows of {track.revolutions:g} turns. Gaps: a steady line lies too close to "
+            "tell it from the order."
+        )
+        recorded = analysis.signal.recorded
+        figures.append(Figure(order_figure(track, name), caption + ("" if recorded else AS_READ)))
+        if recorded and vectors_of(track):
+            figures.append(Figure(bode_figure(track, name), f"{name}: {BODE}"))
+            figures.append(Figure(polar_figure(track, name), f"{name}: {POLAR}"))
+    found = [(name, resonance) for name in tracks for resonance in analysis.planes[name].resonances]
     rows = [row for row in found if row[1].certain]
-    crossed = len(found) - len(rows)
-    short = next((_short(plane.track) for _, plane in tracked if plane.track is not None), ())
+    said = list(_short(next(iter(tracks.values()))))
+    if crossed := len(found) - len(rows):
+        text = f"{crossed} rises are left out: a steady line crosses the order there and makes part of them."
+        said.append(Statement(text))
     if not rows:
-        but = f", but where it crosses a steady line ({crossed} times)" if crossed else ""
-        none = Statement(f"No order rises above its surroundings on the way down{but}.")
-        return Section(heading, statements=(*short, none), figures=tuple(figures))
+        said.append(Statement("No order rises above its surroundings on the way down."))
     columns = (
         Column("plane", lambda row: row[0]),
         Column("order", lambda row: f"{row[1].order:g}X"),
@@ -317,17 +296,8 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
         Column("rise", lambda row: f"{row[1].rise:.1f}"),
         Column("mode", lambda row: row[1].name.label),
     )
-    passed = table(rows, columns, "Resonances passed on the way down")
-    left_out = (
-        f"{crossed} more rises are left out: a steady line crosses the order there and makes part of them."
-    )
-    return Section(
-        heading,
-        (left_out,) if crossed else (),
-        statements=short,
-        figures=tuple(figures),
-        tables=(passed,),
-    )
+    passed = (table(rows, columns, "Resonances passed on the way down"),) if rows else ()
+    return Section("Orders and resonances", (), tuple(said), tuple(figures), passed)
 
 
 def _short(track: OrderTrack) -> tuple[Statement, ...]:
@@ -375,15 +345,19 @@ def law_table(law: SpeedLaw) -> Table:
     return table(rows, columns, "Speed law")
 
 
-def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw, role: str) -> Section:
+def _law_section(analysis: CoastDownAnalysis, law: SpeedLaw) -> Section:
     time, speed = analysis.signal.speed_time, analysis.signal.speed
     assert time is not None and speed is not None
-    figure = Figure(
-        speed_law_figure(time, speed, law, role),
-        "Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag; "
-        "below what each leaves over.",
+    fitted = time[time >= law.exponential.start]
+    one, drag = law.exponential.speed_at(fitted), law.drag.speed_at(fitted)
+    histories = (
+        History(label="as it was", time=time, values=speed, role="measured"),
+        History(label="one time constant", time=fitted, values=one, role="cross-check"),
+        History(label="dry, linear and quadratic drag", time=fitted, values=drag, role="estimated"),
     )
+    caption = "Speed with the exponential fit of the paper and a fit of dry, linear and quadratic drag."
     text = (law.exponential.statement, law.drag.statement)
+    figure = Figure(speed_figure(histories), caption)
     return Section("Speed law", text, figures=(figure,), tables=(law_table(law),))
 
 
@@ -651,149 +625,3 @@ def displacement_history_figure(histories: Mapping[str, DisplacementHistory], ro
         figure.update_yaxes(range=near.tolist(), row=row, col=2)
     figure.update_yaxes(rangemode="tozero", col=1)
     return finished(figure, FROM_POWER_OFF, "displacement [µm]", row=len(histories))
-
-
-def speed_law_figure(time: Array, speed: Array, law: SpeedLaw, role: str) -> go.Figure:
-    """Draw the speed [rad/s] in Hz with the exponential and the drag fit, below what each leaves over."""
-    figure = panels(("speed", "residual"), rows=2, columns=1, height=230)
-    every = max(1, len(time) // 2000)
-    inside = time >= law.exponential.start
-    t, fitted_to = time[inside][::every], speed[inside][::every]
-    curve(figure, time[::every], speed[::every] / TURN, role, colour=COLOURS["measured"], width=1.1)
-    for name, fitted, colour in (
-        ("one time constant", law.exponential.speed_at(t), SERIES[1]),
-        ("dry, linear and quadratic drag", law.drag.speed_at(t), SERIES[0]),
-    ):
-        curve(figure, t, fitted / TURN, name, colour=colour, width=1.4)
-        curve(figure, t, (fitted_to - fitted) / TURN, name, row=2, colour=colour, width=1.4, legend=False)
-    figure.update_yaxes(title_text="speed [Hz]", row=1)
-    figure.update_yaxes(title_text="residual [Hz]", row=2)
-    return finished(figure, FROM_POWER_OFF, row=2)
-
-
-_MEDIAN, _LOW, _HIGH = (QUANTILES.index(share) for share in (0.5, 0.05, 0.95))
-_DRAWN = ((0, "indentation", MICRO, "µm"), (1, "bearing force", 1.0, "N"), (2, "Hertz stress", 1e-6, "MPa"))
-
-
-def coast_down_page(
-    result: CoastDownResult,
-    machine: Machine | None = None,
-    analysis: CoastDownAnalysis | None = None,
-    certificate: CoastDownCertificate | None = None,
-) -> ReportContent:
-    """Build the report on one simulated coast-down.
-
-    The machine gives the friction law and the defaults in use, the analysis waterfalls, lines and resonances
-    of the samples, the certificate how the statistics moved at a tighter tolerance.
-    """
-    speed, end = shown(result.initial_speed, "speed"), shown(result.end_time, "duration")
-    steps = f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected"
-    step = f"every {1e6 * result.output_step:g} µs"
-    samples = () if result.path is None else (("samples", f"{result.path.name}, {step}"),)
-    seconds = Figure(
-        statistics_figure(result),
-        "Indentation, force and stress second by second; the first point stands for the first 0.2 s. "
-        "An indentation below zero is the distance to the race in flight.",
-    )
-    windows = result.windows
-    spun = np.vstack([np.zeros(len(result.bearing_names)), windows.race_speed])
-    turning = turning_section(
-        np.append(0.0, windows.end),
-        np.append(result.initial_speed, windows.speed),
-        dict(zip(result.bearing_names, spun.T, strict=True)),
-    )
-    return ReportContent(
-        title=f"Simulated coast-down of {result.machine_name}",
-        subtitle=f"from {speed}, {end} after power-off",
-        simulated=SIMULATED_MACHINE,
-        verdict=_said_of_run(result, analysis, certificate),
-        cards=tuple(_card_of_run(result, index) for index in range(len(result.bearing_names))),
-        facts=(
-            ("machine", result.machine_name),
-            ("rotor basis", result.reduction),
-            ("tolerance", f"{result.tolerance:g}"),
-            ("Runge–Kutta steps", steps),
-            ("rotordrop", __version__),
-            *samples,
-        ),
-        sections=(
-            Section("Second by second", figures=(seconds,)),
-            turning,
-            *heat_sections(result.heat, result.bearing_names),
-            *(() if analysis is None else frequency_sections(analysis)),
-            *(() if machine is None else machine_sections(machine)),
-        ),
-        ends=(result.bearing_names[0], result.bearing_names[-1]),
-    )
-
-
-def _said_of_run(
-    result: CoastDownResult, analysis: CoastDownAnalysis | None, certificate: CoastDownCertificate | None
-) -> tuple[Statement, ...]:
-    said = [Statement(result.outcome, "good" if result.finished else "bad")]
-    maxima = result.maxima()
-    held = all(maximum.in_first_window for maximum in maxima)
-    if result.finished or not held:
-        text = first_window_sentence(maximum.as_json() for maximum in maxima)
-        said.append(Statement(text, "good" if held else "warning"))
-    if result.heat is not None:
-        said += [Statement(*one) for one in result.heat.sentences(result.bearing_names)]
-    missing, scale = shown(result.energy_residual, "energy", 3), shown(abs(result.energy_scale), "energy", 3)
-    text = (
-        f"Energy balanced to {missing} of {scale} over the whole coast-down. After about 50 ms a drop is "
-        "chaotic: compare statistics, not histories."
-    )
-    said.append(Statement(text))
-    if certificate is not None:
-        said.append(Statement(certificate.sentence(), "good" if certificate.agrees else "warning"))
-    return tuple(said)
-
-
-def _card_of_run(result: CoastDownResult, index: int) -> Card:
-    name, (forward, backward) = result.bearing_names[index], result.whirl_time[index]
-    largest = (
-        fact(
-            f"Largest {maximum.quantity}{' into the race' * (maximum.quantity == 'indentation')}",
-            maximum.value,
-            QUANTITIES[maximum.quantity][0],
-            note=f"at {shown(maximum.time, 'time')}",
-        )
-        for maximum in result.maxima()
-        if maximum.bearing == name
-    )
-    figures = (
-        *largest,
-        fact("Contacts", result.contacts[index], "count"),
-        fact("Energy lost in contact", result.contact_energy[index], "energy", 3),
-        fact("Forward whirl", forward, "duration", 3),
-        fact("Backward whirl", backward, "duration", 3),
-    )
-    return Card(f"{name} touchdown bearing", figures)
-
-
-def statistics_figure(result: CoastDownResult) -> go.Figure:
-    """Draw median, 5 to 95 % and largest indentation, force and stress of every second and bearing."""
-    names = result.bearing_names
-    titles = [f"{name}: {label}" for _, label, _, _ in _DRAWN for name in names]
-    figure = panels(titles, rows=len(_DRAWN), columns=len(names), height=215, spacing=0.1)
-    time = 0.5 * (result.windows.start + result.windows.end)
-    hidden: dict[str, Any] = {"line": {"width": 0}}
-    for row, (column, label, scale, unit) in enumerate(_DRAWN, start=1):
-        for b in range(len(names)):
-            levels = scale * result.windows.quantile[:, b, column]
-            peak = scale * result.windows.peak[:, b, column]
-            place: dict[str, Any] = {"row": row, "column": b + 1}
-            named = place | {"legend": row == 1 and b == 0}
-            share, filled = "5 to 95 % of the time", hidden | {"fill": "tonexty", "fillcolor": BAND_FILL}
-            curve(figure, time, levels[:, _LOW], hover=None, **place, **hidden)
-            curve(figure, time, levels[:, _HIGH], share, **named, **filled)
-            curve(figure, time, levels[:, _MEDIAN], "median", **named, colour=COLOURS["simulated"])
-            marker = {"color": SERIES[4], "size": 3.5}
-            curve(figure, time, peak, "largest", **named, mode="markers", marker=marker)
-        if column == 0:
-            top = scale * float(np.max(result.windows.peak[..., 0]))
-            figure.update_yaxes(range=[-0.15 * top, 1.1 * top], row=row)
-        else:
-            figure.update_yaxes(type="log", row=row, **LOG_LABELS)
-        figure.update_yaxes(title_text=axis_title(plain(label), unit), row=row, col=1)
-    return finished(figure, FROM_POWER_OFF, row=len(_DRAWN))

@@ -13,6 +13,7 @@ from rotordrop.known import Known
 from rotordrop.report.content import Column, Table, table
 from rotordrop.report.drop_sections import (
     impact_table,
+    quality_statements,
     record_quality_section,
     stress_box_figure,
     stress_table,
@@ -113,11 +114,9 @@ def test_a_disagreeing_cross_check_is_a_warning_with_both_numbers():
 def test_findings_tell_channel_time_and_remedy_the_serious_ones_first():
     hum = {"kind": "hum", "channel": "S_DE_B", "message": "50 Hz hum of 1.2 µm peak", "remedy": "ground it"}
     cut = {"kind": "clipping", "channel": "S_NDE_A", "message": "clipped at 500 µm", "remedy": "widen it"}
-    section = record_quality_section(
-        [Finding(**hum, severity="warning"), Finding(**cut, severity="stop", time=0.0082)]
-    )
-    assert [one.level for one in section.statements] == ["bad", "warning"]
-    assert section.tables[0].rows[1][2] == "8.200 ms"
+    found = [Finding(**hum, severity="warning"), Finding(**cut, severity="stop", time=0.0082)]
+    assert [one.level for one in quality_statements(found)] == ["bad", "warning"]
+    assert record_quality_section(found).tables[0].rows[1][2] == "8.200 ms"
     (sound,) = record_quality_section([]).statements
     assert sound.level == "good"
 
