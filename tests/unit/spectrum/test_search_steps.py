@@ -49,22 +49,6 @@ def test_no_line_is_looked_for_where_one_was_taken_out(length, kind, widths):
     assert np.array_equal(free[0], free[1]) and not free[0][place < SETTINGS.lowest_frequency].any()
 
 
-def test_another_kind_of_line_is_better_only_if_it_holds_more_power():
-    """The rival has 1.35 times the amplitude half of the time: nine tenths of the power."""
-    down = CoastDown(duration=4.0, time_constant=40.0)
-    seeker = search(down.xy, down.sampling_rate, down.exact())
-    count = len(seeker._clock.time)
-    spoken = np.ones(count, dtype=np.bool_)
-    own, half = np.ones((count, 1), dtype=complex), np.arange(count) % 2 == 0
-    assert 1.35**2 / 2.0 < 1.0 < 1.5**2 / 2.0
-    for amplitude, better in ((1.35, False), (1.5, True)):
-        rival = SimpleNamespace(value=np.where(half[:, None], amplitude, 0.0).astype(complex))
-        seeker._clock.extract = lambda *_, given=rival: given
-        view = SimpleNamespace(of_orders=False)
-        envelope = SimpleNamespace(value=own)
-        assert seeker._better_otherwise(envelope, view, 0.5, spoken) == better
-
-
 def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is():
     down = CoastDown(duration=20.0, noise=0.1e-6)
     down.xy[:, 0] += 2e-6 * np.cos(TURN * 134.2 * down.time)

@@ -91,15 +91,6 @@ def test_spreads_are_those_of_intervals_above_zero(problem, covariance):
     assert np.all(np.isfinite(spread_of(problem, mean, covariance, known).matrix))
 
 
-def test_correlations_are_those_of_the_fit(problem, covariance, spread):
-    i, j = (place(problem, f"NDE.support.{name}") for name in ("stiffness", "mass"))
-    a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "mass"))
-    matrix = spread.matrix
-    found = matrix[a, b] / np.sqrt(matrix[a, a] * matrix[b, b])
-    whole = covariance[3:, 3:]
-    assert found == pytest.approx(whole[i, j] / np.sqrt(whole[i, i] * whole[j, j]))
-
-
 def test_correlations_follow_the_fit_and_what_goes_with_it(problem, covariance, spread):
     assert "NDE.support.anisotropy" not in spread.paths
     a, b = (spread.paths.index(f"NDE.support.{name}") for name in ("stiffness", "stiffness_horizontal"))
