@@ -15,14 +15,11 @@ from rotordrop._version import __version__
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.errors import UsageError
 from rotordrop.estimate.bearing_drop import AirGap, History
-from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.known import NINETY, Known
 from rotordrop.report.content import (
-    Card,
     Column,
     Figure,
-    KeyFigure,
     ReportContent,
     Section,
     Statement,
@@ -31,7 +28,7 @@ from rotordrop.report.content import (
     verdict_column,
 )
 from rotordrop.report.drop_sections import speed_figure
-from rotordrop.report.quantity import BEYOND_GAP, NO_BREAK, Quantity, shown, with_error, written
+from rotordrop.report.quantity import NO_BREAK, shown, with_error, written
 from rotordrop.report.style import (
     COLOURS,
     FROM_POWER_OFF,
@@ -101,33 +98,11 @@ def waterfall_page(
     Waterfalls go upwards with the time or the speed (``against``), as far as anything happens, or up to a
     ``highest`` frequency [Hz].
     """
-    cards = []
-    for name, plane in analysis.planes.items():
-        history, settled = plane.history, plane.settling
-        at = f"at {shown(history.largest_time, 'duration', 3)}"
-        last = math.nan if settled.contact_from is None else settled.contact_from
-        beyond = (history.largest_indentation, "length", history.largest_indentation_interval_90)
-        told = [
-            ("Largest displacement", history.largest, "length", history.largest_interval_90, at),
-            (BEYOND_GAP, *beyond, ""),
-        ]
-        if analysis.signal.recorded:  # a simulation knows its contacts, and need not guess them
-            between = (settled.count_interval_90, settled.contact_from_interval_90)
-            told += [
-                ("Impacts", len(settled.touched), "count", between[0], "by the displacement alone"),
-                (CONTACT_FROM.capitalize(), last, "duration", between[1], "from power-off"),
-            ]
-        figures = (
-            KeyFigure(label, Quantity(value=value, kind=kind, interval_90=ends, digits=3), note)
-            for label, value, kind, ends, note in told
-        )
-        cards.append(Card(f"{name} plane", tuple(figures)))
     return ReportContent(
         title=title,
         subtitle="times count from power-off",
         simulated=simulated,
         verdict=_verdict(analysis),
-        cards=tuple(cards),
         facts=(*facts, ("rotordrop", __version__)),
         sections=frequency_sections(analysis, against, highest) if drawn else (),
     )
@@ -193,7 +168,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     largest = ", ".join(
         f"{line.label} {where_of(line)} ({shown(line.amplitude, 'length', 3)})" for line in named[:SAID]
     )
-    count = f"{len(analysis.lines)} lines, {len(named)} named"
+    count = f"{len(analysis.lines)} line{'s' * (len(analysis.lines) > 1)}, {len(named)} named"
     more = f"{count}; the strongest: {largest}." if named else f"{count}."
     said.append(Statement(more if analysis.lines else NO_LINE))
     if analysis.signal.profile is None:

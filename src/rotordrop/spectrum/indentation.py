@@ -15,7 +15,7 @@ from rotordrop.evidence.impacts import AFTER_LAST, Settling, find_impacts
 from rotordrop.known import NINETY
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
-from rotordrop.units import format_moment
+from rotordrop.units import format_moment, percent
 
 BLOCK = 65536
 LONGEST_FLIGHT = 0.1
@@ -131,7 +131,7 @@ def displacement_history(
         window=window,
         noise=spread,
         statement=_window_statement(
-            (float(largest), largest_time), (later, later_time), air_gap, window, spread, half
+            (early[0], start_time + early[1] / sampling_rate), (late[0], later_time), window, spread
         ),
     )
 
@@ -219,29 +219,20 @@ def _peak(radius: Array, start: int) -> tuple[float, int]:
 
 
 def _window_statement(
-    maximum: tuple[float, float],
-    after: tuple[float, float],
-    air_gap: float,
-    window: float,
-    noise: float,
-    half: float | None,
+    early: tuple[float, float], late: tuple[float, float], window: float, noise: float
 ) -> str:
-    (largest, time), (later, later_time) = maximum, after
-
-    def size(value: float, wide: float = 1.0, sign: str = "") -> str:
-        if half is None:
-            return f"{value * 1e6:{sign}.1f} µm"
-        return f"{value * 1e6:{sign}.0f} ± {wide * half * 1e6:.0f} µm"
-
-    beyond = size(largest - air_gap, math.sqrt(2.0), "+")
-    first = f"largest displacement {size(largest)} ({beyond} beyond the air gap) at {format_moment(time)}"
-    if not np.isfinite(later):
+    """When the largest displacement came, and what share of it stood in the other part."""
+    held = early[0] >= late[0]
+    (largest, time), (other, then) = (early, late) if held else (late, early)
+    first = f"largest displacement at {format_moment(time)}"
+    if not np.isfinite(other):
         return f"{first}; the signal ends within {window:g} s"
-    second = f"later than {window:g} s at most {size(later)} (at {format_moment(later_time)})"
-    if abs(largest - later) <= 2.0 * noise and time <= window:
+    part = "later than" if held else "until"
+    second = f"{part} {window:g} s at most {percent(other / largest)} of it (at {format_moment(then)})"
+    if held and largest - other <= 2.0 * noise:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
-    held = "held" if time <= window else "did not hold"
-    return f"{first}; {second}: the first {window:g} s {held} the largest displacement"
+    did = "held" if held else "did not hold"
+    return f"{first}; {second}: the first {window:g} s {did} the largest displacement"
 
 
 def held_maximum(history: DisplacementHistory) -> bool:

@@ -123,7 +123,8 @@ def test_maxima_are_found_early_and_late_and_told():
     xy[30000] = [200e-6, -260e-6]
     found = displacement_history(xy, FS, air_gap=GAP, start_time=0.01, error=4e-6)
     assert found.largest_time == pytest.approx(6.01)
-    assert "328 ± 7 µm (+48 ± 9 µm beyond the air gap) at 6.01 s" in found.statement
+    assert found.largest_interval_90 == pytest.approx((321.4e-6, 334.6e-6), abs=0.1e-6)
+    assert "at 6.01 s; until 0.2 s at most 85 % of it" in found.statement
     assert not held_maximum(found)
 
 
