@@ -35,12 +35,14 @@ from rotordrop.evidence.paths import (
     with_impacts,
 )
 from rotordrop.evidence.quality import Finding, gate, not_seen, stops
-from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone
+from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone, check_senses
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import found, ranked
 from rotordrop.evidence.quality.motion import (
+    LOUD,
     check_fall,
     check_given_gap,
+    check_noise,
     check_rotation_line,
     check_slow_fall,
 )
@@ -92,7 +94,9 @@ class PlaneLook:
     gap_interval_90: tuple[float, float] | None
     """Interval that holds it with 90 % probability [m]; None where it was given."""
     gap_determined: bool
-    """False where the record leaves it open."""
+    """False where the record, or its noise, leaves it open."""
+    noise: float
+    """Scatter of a position before the drop [m]."""
     touch: float | None
     """When the shaft first touches its race [s]; None where the record does not show it."""
     touch_interval_90: tuple[float, float] | None
@@ -291,9 +295,10 @@ def look(
     stated = arrangement is None or arrangement.angles_known
     try:
         motion = motion_of(fell, gaps=gaps, angles_known=stated, machine=machine)
-        if evidence is None and stated:
+        if evidence is None:
             turning = _speed_at(read, float(motion.time[int(np.argmin(motion.floats))]))
-            findings = ranked([*findings, *check_alone(fell, motion, turning)])
+            wiring = check_alone(fell, motion, turning) if stated else check_senses(fell, motion)
+            findings = ranked([*findings, *wiring, *check_noise(motion, fell)])
         drops = tuple(with_impacts(motion, drop) for drop in drops_of(motion))
         if not drops:
             raise NothingFallsError(
@@ -541,7 +546,8 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
         radius = np.where(during, path.radius, 0.0)
         at = int(np.argmax(radius))
         velocity = np.hypot(*slope(path.position[window], motion.rate).T)
-        index = float(np.sqrt(np.mean(velocity**2))) / (speed * path.gap) if speed else None
+        rms = float(np.sqrt(np.mean(velocity**2)))
+        index = rms / (speed * path.gap) if speed and path.noise <= LOUD else None
         wall, touch = path.wall, path.wall.touch
         narrow, wide = wall.interval_90 if wall.gap_error > 0.0 else (path.gap, path.gap)
         distance, doubt = float(np.mean(path.radius[window])), NINETY * float(wall.centre_error.max())
@@ -553,7 +559,8 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
                 plane=path.name,
                 gap=path.gap,
                 gap_interval_90=wall.interval_90 if wall.gap_error > 0.0 else None,
-                gap_determined=wall.determined,
+                gap_determined=path.gap_determined,
+                noise=path.noise,
                 touch=touched,
                 touch_interval_90=(
                     None

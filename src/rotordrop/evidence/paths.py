@@ -40,6 +40,10 @@ _RELEASED, _ORBIT, _LEAVES = 2e-3, 0.05, 1.1
 """Half width to which a fall from rest dates the release, length of the levitated motion whose orbit counts
 [s], and how far outside that orbit, over its radius, a rotor has left it [1] (chosen)."""
 
+DROWNED = 9e-6
+"""Noise from which on the air gap and the largest distance are not stated [m]: at 6 µm the latter leaves its
+interval (chosen)."""
+
 _LEAST_FALL = 0.5 * USUAL_GAP[0]
 """A dropped rotor goes at least this far [m] (chosen)."""
 
@@ -70,6 +74,11 @@ class Path:
     def gap(self) -> float:
         """Radius of the clearance circle [m]."""
         return self.wall.gap
+
+    @property
+    def gap_determined(self) -> bool:
+        """Whether the record determines the air gap, and noise does not hide where it touches."""
+        return self.wall.determined and self.noise <= DROWNED
 
     @property
     def radius(self) -> Array:
@@ -166,7 +175,7 @@ def motion_of(
             wall = replace(wall, touch=crossing(radius, begin, rate, wall.gap, wall.gap_error))
         paths[number] = replace(path, wall=wall)
     sought = [path for path, given in zip(paths, gaps, strict=True) if given is None and path.at_bearing]
-    open_ones = ", ".join(path.name for path in sought if not path.wall.determined)
+    open_ones = ", ".join(path.name for path in sought if not path.gap_determined)
     how = f"not determined by this record at {open_ones}" if open_ones else "by where the rotor touched"
     notes = [f"air gap {how}; give it where it is known"] if sought else []
     if not angles_known:

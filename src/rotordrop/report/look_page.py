@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import degrees, floor, log10
+from math import degrees, floor, inf, log10
 from typing import TYPE_CHECKING
 
 from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.impacts import AFTER_LAST
-from rotordrop.evidence.paths import TOO_SLOW
+from rotordrop.evidence.paths import DROWNED, TOO_SLOW
+from rotordrop.evidence.quality.motion import LOUD
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.report.content import (
     SIMULATED_RECORD,
@@ -77,13 +78,13 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *quality_statements(others),
             *(() if drawn else (Statement(" ".join((read, *(note.sentence for note in notes)))),)),
         ),
-        cards=tuple(_card(seen, number) for number in range(len(seen.planes))),
+        cards=tuple(card for plane in seen.planes if (card := _card(seen, plane)).figures),
         counted_from=RELEASE,
         lead=1 if drawn else 0,
         summary=(_timeline(seen),) if drawn else (),
         sections=(
             *figures[:2],
-            Section("Impacts", tables=(_impacts(seen),)),
+            *(() if _loud(seen) else (Section("Impacts", tables=(_impacts(seen),)),)),
             *figures[2:],
             record_quality_section(seen.findings, seen.not_seen),
             Section("What was read and guessed", statements=notes),
@@ -254,6 +255,8 @@ def _verdict(seen: Look) -> list[Statement]:
     release = f"{format_moment(drop.release)} (± {half:.2g} ms)"
     count = len(seen.impacts)
     hits = f"{count} impact{'' if count == 1 else 's'} ({low} to {high})"
+    if _loud(seen):
+        hits, ends = "noise hides its impacts", "."
     touched = " First end: not determined." if len(seen.planes) > 1 else ""
     if seen.first_end is not None:
         at = next(plane.touch for plane in seen.planes if plane.plane == seen.first_end)
@@ -265,7 +268,7 @@ def _verdict(seen: Look) -> list[Statement]:
         f"{' to '.join(shown(end, 'length', 3) for end in plane.excess_interval_90)}) beyond the air gap of "
         f"{shown(plane.gap, 'length', 3)} at {format_moment(plane.largest_time)}, at the sensors."
         for plane in seen.planes
-        if plane.excess > 0 and plane.gap_interval_90 is None
+        if plane.excess > 0 and plane.gap_interval_90 is None and plane.noise <= DROWNED
     ]
     if seen.standstill is not None:
         slow = shown(STANDSTILL, "speed")
@@ -280,19 +283,24 @@ def _verdict(seen: Look) -> list[Statement]:
     return [*map(Statement, said), *(Statement(text, "warning") for text in grave)]
 
 
-def _card(seen: Look, number: int) -> Card:
-    plane = seen.planes[number]
+def _loud(seen: Look) -> bool:
+    """Whether noise makes impacts of its own."""
+    return any(plane.noise > LOUD for plane in seen.planes)
+
+
+def _card(seen: Look, plane: PlaneLook) -> Card:
     note = f"at the sensors, at {format_moment(plane.largest_time)}"
     hits = _found(len(plane.settling.touched), plane.settling.count_interval_90, "count")
-    figures = [
-        KeyFigure("largest distance from the centre", _found(plane.largest, plane.largest_interval_90), note),
-        KeyFigure("impacts", hits, "by the displacement alone"),
-        _gap_figure(plane),
-        KeyFigure(
-            "position index (mean distance over gap)",
-            _found(plane.position_index, plane.position_index_interval_90, "dimensionless"),
-        ),
-    ]
+    largest = _found(plane.largest, plane.largest_interval_90)
+    index = _found(plane.position_index, plane.position_index_interval_90, "dimensionless")
+    gap_up_to = inf if plane.gap_interval_90 is None else DROWNED
+    with_noise = (  # each up to so much of it
+        (DROWNED, KeyFigure("largest distance from the centre", largest, note)),
+        (LOUD, KeyFigure("impacts", hits, "by the displacement alone")),
+        (gap_up_to, _gap_figure(plane)),
+        (DROWNED, KeyFigure("position index (mean distance over gap)", index)),
+    )
+    figures = [figure for most, figure in with_noise if plane.noise <= most]
     if plane.velocity_index is not None:
         label = "velocity index (r.m.s. over speed × gap)"
         velocity = _found(plane.velocity_index, plane.velocity_index_interval_90, "dimensionless")

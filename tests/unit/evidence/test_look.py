@@ -21,6 +21,7 @@ from rotordrop.evidence.look import look, look_schema
 from rotordrop.evidence.quality.motion import check_slow_fall
 from rotordrop.evidence.touch import first_touch
 from rotordrop.machine import example_path, load_machine
+from rotordrop.report.look_page import look_page
 
 RATE = 20_000.0
 GAP = 250e-6
@@ -627,7 +628,8 @@ def test_a_hard_contact_that_rings_is_dated_by_its_first_thrust(first, dip, seco
         ("NDE: NDE_X 180 deg, NDE_Y 90 deg", "DE: DE_X 0 deg, DE_Y 90 deg", ["inverted polarity"]),
         ("NDE: NDE_X 180 deg, NDE_Y 90 deg", "DE: DE_X 180 deg, DE_Y 90 deg", ["swapped axes"]),
         ("NDE: DE_X 0 deg, DE_Y 90 deg", "DE: NDE_X 0 deg, NDE_Y 90 deg", []),
-        ("NDE: NDE_Y, NDE_X", "DE: DE_X, DE_Y", []),
+        ("NDE: NDE_Y, NDE_X", "DE: DE_X, DE_Y", ["inverted polarity"]),
+        ("NDE: NDE_Y, NDE_X", "DE: DE_Y, DE_X", []),
     ],
 )
 def test_stated_angles_are_held_against_the_fall_and_the_spin(near, far, kinds, tmp_path):
@@ -641,3 +643,14 @@ def test_stated_angles_are_held_against_the_fall_and_the_spin(near, far, kinds, 
     assert [one.kind for one in found] == kinds
     assert "exchanged ends" in seen.not_seen
     assert not seen.drops or ("wiring" in seen.not_seen) == ("deg" not in near)
+
+
+@pytest.mark.parametrize(("noise", "rows"), [(0.5e-6, 5), (5e-6, 3), (15e-6, 0)])
+def test_noise_is_named_and_what_it_hides_is_not_stated(noise, rows, tmp_path):
+    time, path, _ = fall_and_bounce()
+    random = np.random.default_rng(2)
+    planes = {name: path + noise * random.standard_normal(path.shape) for name in ("NDE", "DE")}
+    seen = look(written(tmp_path / "drop.csv", time, planes))
+    assert ("noise" in {one.kind for one in seen.findings}) == (rows < 5)
+    assert {len(card.figures) for card in look_page(seen, drawn=False).cards} == ({rows} if rows else set())
+    assert all(plane.gap_determined == (rows > 0) for plane in seen.planes)

@@ -19,6 +19,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.quality.finding import Finding, found
 from rotordrop.evidence.synchronous import FEWEST_TURNS
 from rotordrop.record.axes import Plane, along_sensors
+from rotordrop.series import MANY
 from rotordrop.units import fall_time
 
 if TYPE_CHECKING:
@@ -33,6 +34,10 @@ MOST_TILT = 30.0
 
 CLEAR_ORBIT = 3.0
 """Forward over backward part of the orbit above which its sense is clear [1] (chosen)."""
+
+CLEAR_SENSE = 0.8
+"""Power of the strongest line of an orbit that runs one way round, less what runs back, over both, from which
+its sense is clear without a machine [1] (chosen)."""
 
 BEFORE_RELEASE = 4e-3
 """Distance from a release of which a look knows to 2 ms [s], up to which the rotor surely floats."""
@@ -156,6 +161,25 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
         tone = 2.0 * np.mean((record.signals[first:begins] - level) * waves[:, None], axis=0) * record.gains
     seen = check_planes(record.planes, fall_of(record, level, sunk_at), tone)
     return [one for one in seen if tone.any() or one.kind != "sense of the orbit"]
+
+
+def check_senses(record: Record, motion: Motion) -> list[Finding]:
+    """Compare the ways round in which the levitated orbits of the planes run, where no angle was stated.
+
+    By the strongest line of each, with the share of it that runs against it: 1 of a circle, 0 to and fro.
+    """
+    level = record.resolved()[: int(np.argmin(motion.floats))][-MANY:]
+    moved = (level - np.mean(level, axis=0)) @ np.array([1.0, 1.0j])
+    power = np.abs(np.fft.fft(moved * np.hanning(len(moved))[:, None], axis=0)) ** 2
+    planes = np.arange(len(record.planes))
+    at = np.argmax(power, axis=0)
+    along, against = power[at, planes], power[-at, planes]
+    sense = (along - against) / (along + against + 1e-300) * np.where(2 * at < len(power), 1, -1)
+    if min(sense) > -CLEAR_SENSE or max(sense) < CLEAR_SENSE:
+        return []
+    names = [plane.bearing for plane in record.planes]
+    one, other = (", ".join(np.compress(side * sense > 0.0, names)) for side in (1, -1))
+    return [found("senses", one=one, other=other)]
 
 
 def _corrected(plane: Plane, readings: Array | Tone, change: _Change) -> Tone:

@@ -176,8 +176,8 @@ def _as_described(fall: Fall, machine: Machine) -> list[Finding]:
     surely = np.abs(share - np.mean(_POSSIBLE_LIFT)) - error
     worst = int(np.argmax(surely))
     if surely[worst] > 0.5 * (_POSSIBLE_LIFT[1] - _POSSIBLE_LIFT[0]):
-        force, how = fall.remanent_force[worst, 1], "fast" if share[worst] < 0 else "slowly"
-        return [found("lift", force=force, magnet=machine.ambs[worst].name, share=share[worst], how=how)]
+        how = "fast" if share[worst] < 0 else "slowly"
+        return [found("lift", magnet=machine.ambs[worst].name, how=how)]
     aside, error = _sideways(fall)
     size = np.abs(aside)
     worst = int(np.argmax(size))

@@ -74,7 +74,7 @@ _UNITS_OF_SPEED = {
 
 _LONG_ENOUGH = 0.2
 """Part of a drop that an estimate covers [s]."""
-_LOUD = 3e-6
+LOUD = 3e-6
 """Hum, drift and noise from which on they are worth a word [m] (chosen): 1 % of a usual air gap."""
 
 _SLOW = 0.75
@@ -195,6 +195,15 @@ def _gap_findings(
     )
     names = (name for number in walls for name in record.planes[number].names)
     return [found("air-gap", channel=names, gaps=gaps, way_out=remedy)]
+
+
+def check_noise(motion: Motion, record: Record) -> list[Finding]:
+    """Name noise that hides impacts, where no machine file says what else is in the levitated readings."""
+    return [
+        found("noise", channel=plane.names, size=path.noise)
+        for plane, path in zip(record.planes, motion.paths, strict=True)
+        if path.noise > LOUD
+    ]
 
 
 def check_fall(motion: Motion) -> list[Finding]:
@@ -338,11 +347,11 @@ def check_levitated(levitated: LevitatedModel, record: Record) -> list[Finding]:
     hums = none if hum is None else np.abs(levitated.amplitudes[levitated.tones.index(hum)])
     for index, name in enumerate(record.channel_names):
         noise = float(levitated.noise[index])
-        if hums[index] > _LOUD:
+        if hums[index] > LOUD:
             findings.append(found("hum", channel=name, mains=hum, size=hums[index]))
-        if noise > _LOUD and drifts[index]:
+        if noise > LOUD and drifts[index]:
             findings.append(found("drift", channel=name, size=np.ptp(slow[:, index]), lasts=span))
-        elif noise > _LOUD:
+        elif noise > LOUD:
             findings.append(found("noise", channel=name, size=noise))
     return findings
 
