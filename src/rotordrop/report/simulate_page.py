@@ -141,7 +141,7 @@ def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
 
 TRUSTED_CHANGE = 5e-3
 """Change of a peak at a tighter tolerance beyond which it is a warning [1]; chosen, not measured."""
-NO_INTERVAL = "One run, no interval. A drop is chaotic: after about 50 ms compare statistics (study run)."
+NO_INTERVAL = "One run, no interval. A drop is chaotic: after about 40 ms compare statistics (study run)."
 NUMERICAL = "Numerical error: "
 EQUAL = 1e-6
 """Difference of forces over their peak that is rounding [1]; chosen, not measured."""
@@ -192,11 +192,9 @@ def _card(result: DropResult, bearing: BearingDrop) -> Card:
         if there is not None and len(there):
             force, moment = there.peak
             figures.append(fact(label, force, "force", note=f"at {shown(moment, 'time', 3)}"))
-    lost = sum(impact.dissipated_energy.value for impact in bearing.impacts)
     figures.append(
         fact("Contacts", len(bearing.impacts), "count", note=f"{len(bearing.touched)} of them impacts")
     )
-    figures.append(fact("Energy lost in contact", lost, "energy", 3))
     return Card(card.title, tuple(figures))
 
 
@@ -542,7 +540,6 @@ def _card_of_run(result: CoastDownResult, index: int) -> Card:
     figures = (
         *largest,
         fact("Contacts", result.contacts[index], "count"),
-        fact("Energy lost in contact", result.contact_energy[index], "energy", 3),
         fact("Forward whirl", forward, "duration", 3),
         fact("Backward whirl", backward, "duration", 3),
     )

@@ -25,7 +25,6 @@ from rotordrop.spectrum.indentation import (
     displacement_history,
     find_settling,
     held_maximum,
-    settling_words,
 )
 from rotordrop.spectrum.lines import Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
@@ -143,9 +142,6 @@ class PlaneAnalysis:
 
     waterfalls: tuple[Waterfall, ...]
     history: DisplacementHistory
-    settling: Settling
-    settling_words: str
-    """Its impacts in words, and where it lies in the end."""
     track: OrderTrack | None
     resonances: tuple[PassedResonance, ...]
 
@@ -195,16 +191,16 @@ def analyse_coast_down(
             name: np.asarray(plane[0 : plane.shape[0]]) + SENSOR_NOISE * dice.standard_normal(plane.shape)
             for name, plane in signal.planes.items()
         }
-    settled = {
-        name: signal.settling[name]
+    settled = [
+        signal.settling[name]
         if name in signal.settling
         else find_settling(
             moved, signal.sampling_rate, air_gap=signal.air_gap[name], start_time=signal.start_time
         )
         for name, moved in signal.planes.items()
-    }
+    ]
     # how long the rotor bounces at the beginning; nothing if it does not settle soon
-    last = max((one.contact_from for one in settled.values() if one.contact_from is not None), default=0.0)
+    last = max((one.contact_from for one in settled if one.contact_from is not None), default=0.0)
     duration = next(iter(signal.planes.values())).shape[0] / signal.sampling_rate
     lines = find_lines(
         read,
@@ -218,8 +214,7 @@ def analyse_coast_down(
     )
     tell("orders and waterfalls", 0.5)
     planes = {  # one after the other: side by side they fill the memory of two
-        name: _plane(signal, name, read[name], settled[name], lines, candidates, choice)
-        for name in signal.planes
+        name: _plane(signal, name, read[name], lines, candidates, choice) for name in signal.planes
     }
     tell("speed", 0.95)
     return CoastDownAnalysis(signal=signal, planes=planes, lines=lines, speed_law=_speed_law(signal))
@@ -229,7 +224,6 @@ def _plane(
     signal: CoastDownSignal,
     name: str,
     read: PlanarSignal,
-    settled: Settling,
     lines: Sequence[Line],
     candidates: Sequence[Candidate],
     choice: WaterfallChoice,
@@ -266,8 +260,6 @@ def _plane(
             error=error,
             start_time=start,
         ),
-        settling=settled,
-        settling_words=settling_words(settled, moved, rate, error),
         track=track,
         resonances=resonances,
     )
@@ -325,10 +317,7 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
         **later,
     ) | stated(
         plane,
-        "impacts impacts_interval_90=settling.count_interval_90 contact_from_s=settling.contact_from "
-        "contact_from_interval_90_s=settling.contact_from_interval_90 settling=settling_words resonances "
-        "waterfalls",
-        impacts=len(plane.settling.touched),
+        "resonances waterfalls",
         waterfalls=[
             stated(  # the whole field is in the figure and the record
                 fall,

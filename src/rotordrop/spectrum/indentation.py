@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError
-from rotordrop.evidence.impacts import AFTER_LAST, Settling, find_impacts
+from rotordrop.evidence.impacts import Settling, find_impacts
 from rotordrop.known import NINETY
 from rotordrop.series import noise_by_differences
 from rotordrop.spectrum.waterfall import PlanarSignal
@@ -158,31 +158,6 @@ def find_settling(
     return Settling.of(begun, surely, perhaps, start_time + samples / sampling_rate)
 
 
-def settling_words(
-    found: Settling, displacement: PlanarSignal, sampling_rate: float, error: float | None = None
-) -> str:
-    """The impacts of a coast-down in words, and how far from the centre the rotor is in the end.
-
-    The distance has a standard error [m], where that is known.
-    """
-    touched, between = found.touched, found.contact_from_interval_90
-    if not len(touched):
-        return "no impact: the rotor did not reach the air gap"
-    low, high = found.count_interval_90
-    count = f"{len(touched)} impact{'' if len(touched) == 1 else 's'}"
-    count += f" (90 %: {low} to {high}) by the displacement alone, the last one at "
-    if found.contact_from is None or between is None:
-        return f"{count}{format_moment(float(touched[-1]))}, at the end of the signal: it did not settle"
-    last_second = displacement[max(0, displacement.shape[0] - int(sampling_rate)) : displacement.shape[0]]
-    radius = float(np.median(np.hypot(*np.asarray(last_second, dtype=np.float64).T)))
-    known = "" if error is None else f" ± {NINETY * error * 1e6:.0f}"
-    times = " to ".join(format_moment(one) for one in between)
-    return (
-        f"{count}{format_moment(found.contact_from)} ({times}), {AFTER_LAST}, at "
-        f"{radius * 1e6:.0f}{known} µm from the centre in the end"
-    )
-
-
 class _Envelope:
     """Smallest and largest values per interval, gathered block by block."""
 
@@ -227,8 +202,9 @@ def _window_statement(
     first = f"largest displacement at {format_moment(time)}"
     if not np.isfinite(other):
         return f"{first}; the signal ends within {window:g} s"
+    share = percent(other / (largest or 1.0))
     part = "later than" if held else "until"
-    second = f"{part} {window:g} s at most {percent(other / largest)} of it (at {format_moment(then)})"
+    second = f"{part} {window:g} s at most {share} of it (at {format_moment(then)})"
     if held and largest - other <= 2.0 * noise:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     did = "held" if held else "did not hold"
