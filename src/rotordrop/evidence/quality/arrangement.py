@@ -164,17 +164,12 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
 
 
 def check_senses(record: Record, motion: Motion) -> list[Finding]:
-    """Compare the ways round in which the levitated orbits of the planes run, where no angle was stated.
-
-    By the strongest line of each, with the share of it that runs against it: 1 of a circle, 0 to and fro.
-    """
+    """Compare which way round the levitated orbits run by their strongest line, where no angle was stated."""
     level = record.resolved()[: int(np.argmin(motion.floats))][-MANY:]
     moved = (level - np.mean(level, axis=0)) @ np.array([1.0, 1.0j])
     power = np.abs(np.fft.fft(moved * np.hanning(len(moved))[:, None], axis=0)) ** 2
-    planes = np.arange(len(record.planes))
-    at = np.argmax(power, axis=0)
-    along, against = power[at, planes], power[-at, planes]
-    sense = (along - against) / (along + against + 1e-300) * np.where(2 * at < len(power), 1, -1)
+    forward, backward = power[1 : len(power) // 2].max(axis=0), power[len(power) // 2 :].max(axis=0)
+    sense = (forward - backward) / (forward + backward + 1e-300)
     if min(sense) > -CLEAR_SENSE or max(sense) < CLEAR_SENSE:
         return []
     names = [plane.bearing for plane in record.planes]
