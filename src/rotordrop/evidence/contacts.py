@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 _KNOTS = 1e-4
 """Spacing of the knots between which a force runs straight [s] (chosen): a tenth of a short contact."""
 
+_SPAN = 6e-3
+"""Time from the end of the free fall on in which forces are sought [s]: errors of the fall grow with it."""
+
 _BEND = 0.5
 """Standard deviation of the change of slope at a knot over the weight of the rotor [1 per knot]: about a half
 sine of seven times the weight in 1 ms."""
@@ -68,7 +71,7 @@ class FirstForce:
     """Direction of the push at the peak [rad], counter-clockwise from +x."""
 
 
-def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: float = 6e-3) -> EarlyForces:
+def early_forces(record: Record, machine: Machine, drop: DropInstant) -> EarlyForces:
     """Find the bearing forces from the end of the free fall on.
 
     Parameters
@@ -79,8 +82,6 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
         The machine; its rotor model must be right, sensor positions included.
     drop : DropInstant
         The drop with its fitted fall.
-    span : float
-        Time covered [s]; errors of the fall grow with it.
 
     Raises
     ------
@@ -102,11 +103,11 @@ def early_forces(record: Record, machine: Machine, drop: DropInstant, *, span: f
             "bearings apart"
         )
     begin = drop.fall.end - 2 * _KNOTS
-    keep = (record.time >= begin) & (record.time <= begin + span)
+    keep = (record.time >= begin) & (record.time <= begin + _SPAN)
     time = record.time[keep]
-    knots = np.arange(begin, min(begin + span, float(time[-1])), _KNOTS)
+    knots = np.arange(begin, min(begin + _SPAN, float(time[-1])), _KNOTS)
     deviation = (record.signals[keep] - drop.fall.predicted(time)) * record.gains
-    table = rotor.table(2 * np.pi * drop.levitated.frequency, 0.0, span + 2 * _KNOTS)
+    table = rotor.table(2 * np.pi * drop.levitated.frequency, 0.0, _SPAN + 2 * _KNOTS)
     ramp = np.concatenate(
         [np.zeros_like(table[:1]), np.cumsum(0.5 * GRID * (table[1:] + table[:-1]), axis=0)]
     )
@@ -159,15 +160,12 @@ def _regularised(
     return force, np.max(error, axis=0).T
 
 
-def first_forces(
-    record: Record, machine: Machine, drop: DropInstant, *, span: float = 6e-3
-) -> tuple[FirstForce, ...]:
+def first_forces(record: Record, machine: Machine, drop: DropInstant) -> tuple[FirstForce, ...]:
     """Find the first force at every touchdown bearing from the forces of `early_forces`.
 
-    Bearings not touched within `span` of the end of the free fall are left out. Touches less than 0.3 ms
-    apart count as one.
+    Bearings not touched in their time are left out. Touches less than 0.3 ms apart count as one.
     """
-    forces = early_forces(record, machine, drop, span=span)
+    forces = early_forces(record, machine, drop)
     found = (_first(forces, index) for index in range(len(forces.bearings)))
     return tuple(contact for contact in found if contact is not None)
 

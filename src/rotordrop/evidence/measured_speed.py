@@ -20,8 +20,8 @@ BY_HAND_ERROR = 5e-3
 
 _FEW = 5
 """Readings without which those after the drop count too, and that a straight line needs [1] (chosen)."""
-_AFTER = 0.2
-"""Time after the drop whose readings then count [s] (chosen)."""
+_BEFORE, _AFTER = 0.5, 0.2
+"""Time before the drop whose readings count, and after it where they then do [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,20 +106,11 @@ def rotor_angle(
     )
 
 
-def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtDrop:
-    """Speed at the drop from the readings before it, outliers aside, and how it begins to fall.
+def speed_at_drop(record: Record, drop: float) -> SpeedAtDrop:
+    """Speed at the drop, an instant in record time [s], from the readings before it, outliers aside.
 
     The readings before are taken as constant unless they clearly drift. Those after are left out of the value
     where there are any before: friction changes the speed within milliseconds of the first contact.
-
-    Parameters
-    ----------
-    record : Record
-        The record, with speed.
-    drop : float
-        Drop instant, in record time [s].
-    span : float
-        Readings up to this long before are used, and up to 0.2 s after [s].
 
     Raises
     ------
@@ -132,13 +123,13 @@ def speed_at_drop(record: Record, drop: float, *, span: float = 0.5) -> SpeedAtD
         error = BY_HAND_ERROR * abs(value)
         return SpeedAtDrop(value=value, standard_error=error, slope=0.0, scatter=0.0, readings=0)
     good = np.isfinite(readings)
-    before = good & (time <= drop) & (time >= drop - span)
+    before = good & (time <= drop) & (time >= drop - _BEFORE)
     after = good & (time > drop) & (time <= drop + _AFTER)
     used = before if int(before.sum()) >= _FEW else before | after
     if int(used.sum()) < 2:
         raise RecordError(
-            f"{record.name}: {int(used.sum())} speed readings within {span:g} s of the drop at {drop:.6g} s; "
-            f"the speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
+            f"{record.name}: {int(used.sum())} speed readings within {_BEFORE:g} s of the drop at "
+            f"{drop:.6g} s; the speed was read from {time[0]:.6g} s to {time[-1]:.6g} s"
         )
     when, values = time[used] - drop, readings[used]
     solution, scatter, covariance = _robust(np.ones((len(when), 1)), values)

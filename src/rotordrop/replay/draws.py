@@ -64,7 +64,6 @@ def whole_drop(
     duration: float,
     gap_change: Array | None = None,
     tolerance: float = 1e-6,
-    output_step: float = 1e-5,
 ) -> DropResult:
     """Simulate the whole drop from power-off [s], its air gaps (B,) changed by so much [m]."""
     initial = replace(problem.initial, mean=trial.fall)
@@ -75,7 +74,6 @@ def whole_drop(
     case = DropCase(
         speed=initial.fall.speed,
         duration=duration,
-        output_step=output_step,
         tolerance=tolerance,
         start=StateStart(state=start_state(initial, 0.0, trial.fall)[0]),
     )

@@ -154,25 +154,20 @@ def amb_supports(machine: Machine) -> tuple[Support, ...]:
     return tuple(spring(amb.node, float(amb.stiffness), float(amb.damping)) for amb in machine.ambs)
 
 
-def touchdown_supports(
-    machine: Machine, formula: str = "tangent", loads: Sequence[float] | None = None
-) -> tuple[Support, ...]:
+def touchdown_supports(machine: Machine) -> tuple[Support, ...]:
     """Contact, race, bearing and support under the settled rotor, with their masses and damping.
 
-    The bearing damping of a formula is the machine's damping time times the tangent stiffness.
+    The bearing damping is the machine's damping time times the tangent stiffness.
     Differs from the paper: its critical speed map has neither the contact nor the masses. The contact holds
     the rotor in both directions here; the slow swing along the race is the pendulum's, not a mode.
     """
-    if formula not in FORMULAS:
-        raise UsageError(f"unknown bearing stiffness {formula!r}; choose one of {', '.join(FORMULAS)}")
     supports = []
-    for bearing, parts in zip(machine.touchdown_bearings, equivalent_stiffness(machine, loads), strict=True):
+    for bearing, parts in zip(machine.touchdown_bearings, equivalent_stiffness(machine), strict=True):
         ground = bearing.support
-        race = parts.tangent if formula == "tangent" else parts.simple
         beside, below = _held_by(bearing, parts.load)
         links = (
             *((link(parts.contact),) if parts.contact < math.inf else ()),
-            link(race, numbers_of(bearing).damping(float(bearing.damping_time), parts.load)),
+            link(parts.tangent, numbers_of(bearing).damping(float(bearing.damping_time), parts.load)),
             link(
                 (float(ground.stiffness_horizontal) + beside, float(ground.stiffness) + below),
                 (float(ground.damping_horizontal), float(ground.damping)),

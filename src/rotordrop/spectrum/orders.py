@@ -66,9 +66,7 @@ _FEWEST_CENTRES = 4
 """Amplitudes that are taken along a short signal, about [1] (chosen)."""
 
 
-def tracking_for(
-    turns: float, orders: Sequence[float], settings: TrackingSettings = STANDARD_SETTINGS
-) -> tuple[tuple[float, ...], TrackingSettings]:
+def tracking_for(turns: float, orders: Sequence[float]) -> tuple[tuple[float, ...], TrackingSettings]:
     """Orders and settings for a signal of so many turns of the rotor.
 
     Windows are halved until a short signal holds two, down to the turns that tell the orders apart. A signal
@@ -77,10 +75,10 @@ def tracking_for(
     wanted = tuple(orders)
     if turns < _least_turns(wanted):
         wanted = tuple(order for order in wanted if float(order).is_integer()) or wanted
-    revolutions, least = settings.revolutions, _least_turns(wanted)
+    revolutions, least = STANDARD_SETTINGS.revolutions, _least_turns(wanted)
     while revolutions > least and turns < _FEWEST_WINDOWS * revolutions:
         revolutions = max(0.5 * revolutions, least)
-    return wanted, replace(settings, revolutions=revolutions)
+    return wanted, replace(STANDARD_SETTINGS, revolutions=revolutions)
 
 
 def _least_turns(orders: Sequence[float] | Array) -> float:

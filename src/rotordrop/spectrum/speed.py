@@ -48,6 +48,9 @@ MOST_BLOCKS = 800
 """Blocks of equal logarithmic time, at most, whose means the curve is drawn through: what is left of the
 curvature within a block moves the speed by about 5e-6 of itself."""
 
+OUTLIER = 6.0
+"""Standard deviations [1] off the curve from which a recorded speed is left out (chosen)."""
+
 TURNING_SHARE = 0.02
 """Share of the highest speed [1] above which the rotor counts as turning when the noise is judged
 (chosen)."""
@@ -96,9 +99,7 @@ def exact_speed_profile(time: ArrayLike, speed: ArrayLike) -> SpeedProfile:
     return _profile(t, omega, noise=0.0, rejected=0)
 
 
-def fit_speed_profile(
-    time: ArrayLike, speed: ArrayLike, *, power_off: float | None = None, outlier_limit: float = 6.0
-) -> SpeedProfile:
+def fit_speed_profile(time: ArrayLike, speed: ArrayLike, *, power_off: float | None = None) -> SpeedProfile:
     """Draw a smooth curve through a recorded speed, without following its noise or its steps.
 
     Before power-off the speed is taken as constant. After it a smoothing spline is drawn over logarithmic
@@ -107,7 +108,7 @@ def fit_speed_profile(
     counted.
 
     Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the coast-down starts at power-off [s], the
-    first time if not given; the limit of outliers counts in standard deviations [1].
+    first time if not given.
 
     Source: own method; the error of the speed it leaves is about a tenth of the noise of a speed recorded 20
     times per second.
@@ -121,7 +122,7 @@ def fit_speed_profile(
             f"at least 8 are needed"
         )
     log_time = np.log1p((t[after] - start) / LOG_TIME_UNIT)
-    smooth, noise, rejected = _smooth_without_outliers(log_time, omega[after], outlier_limit)
+    smooth, noise, rejected = _smooth_without_outliers(log_time, omega[after])
     blocks, _, _ = _block_means(log_time, omega[after])
     knots = np.unique(np.concatenate([log_time[:1], blocks, np.linspace(0.0, log_time[-1], 400)]))
     knot_time = start + LOG_TIME_UNIT * np.expm1(knots)
@@ -170,20 +171,20 @@ def _block_means(log_time: Array, speed: Array) -> tuple[Array, Array, Array]:
     return np.add.reduceat(log_time, first) / count, np.add.reduceat(speed, first) / count, count
 
 
-def _smooth_without_outliers(log_time: Array, speed: Array, limit: float) -> tuple[CubicSpline, float, int]:
+def _smooth_without_outliers(log_time: Array, speed: Array) -> tuple[CubicSpline, float, int]:
     # A first look through a running median keeps one missing or double tacho pulse from bending the curve.
     padded = np.pad(speed, 2, mode="edge")
     median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     # Standstill, where a tacho often reads exactly zero, must not make the noise look small.
     turning = np.abs(median) > TURNING_SHARE * float(np.abs(median).max())
     least = 1e-12 * float(np.abs(speed).max())
-    keep = np.abs(speed - median) <= limit * max(_spread((speed - median)[turning]), least)
+    keep = np.abs(speed - median) <= OUTLIER * max(_spread((speed - median)[turning]), least)
     for _ in range(2):
         place, mean, count = _block_means(log_time[keep], speed[keep])
         smooth = make_smoothing_spline(place, mean, w=count)
         residual = speed - smooth(log_time)
         spread = _spread(residual[keep & turning])
-        before, keep = keep, np.abs(residual) <= limit * max(spread, least)
+        before, keep = keep, np.abs(residual) <= OUTLIER * max(spread, least)
         if np.array_equal(before, keep):  # the same curve would be drawn again
             break
     return smooth, spread, int((~keep).sum())
@@ -257,18 +258,15 @@ class DragFit(FittedLaw):
         return _drag_solution(parameters, np.asarray(time, dtype=np.float64) - self.start)
 
 
-def fit_exponential(
-    time: ArrayLike, speed: ArrayLike, *, start: float, end: float | None = None
-) -> ExponentialFit:
+def fit_exponential(time: ArrayLike, speed: ArrayLike, *, start: float) -> ExponentialFit:
     """Fit one time constant to a recorded coast-down and say how far from exponential it is.
 
-    Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the window goes from ``start`` to ``end`` [s]
-    or the end of the record.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s], which is fitted from ``start`` [s] on.
 
     Source: Neisi 2020, eq. (13). The intervals are widened where neighbouring residuals are alike, because a
     wrong law does not scatter like noise.
     """
-    t, omega = _window(time, speed, start, end)
+    t, omega = _window(time, speed, start)
     expected = _reading(t, omega)
     guess = max(_half_time(t, omega, start) / math.log(2.0), 1e-6)
     scale = np.array([max(float(omega[0]), 1e-9), guess])
@@ -290,19 +288,18 @@ def fit_exponential(
     )
 
 
-def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float, end: float | None = None) -> DragFit:
+def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float) -> DragFit:
     """Fit dry, linear and quadratic drag to a recorded coast-down, each with its interval.
 
     Let the window start after the races have spun up (about a second after the drop): until then the rotor
     hands spin to the races, which is no drag.
 
-    Times (K,) [s] rise, with the recorded speed (K,) [rad/s]; the window goes from ``start`` to ``end`` [s]
-    or the end of the record.
+    Times (K,) [s] rise, with the recorded speed (K,) [rad/s], which is fitted from ``start`` [s] on.
 
     Source: drag laws behind Neisi 2020, eq. (13). Differs from the paper: the deceleration is a function of
     speed, with a dry part that the recorded speed contains besides the aerodynamic ones.
     """
-    t, omega = _window(time, speed, start, end)
+    t, omega = _window(time, speed, start)
     expected = _reading(t, omega)
     # each of the three drags alone would stop about half of the rotor's speed in the half time
     half, first = max(_half_time(t, omega, float(t[0])), 1e-6), float(omega[0])
@@ -338,7 +335,7 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
 
     Times (K,) [s] rise, with the recorded speed (K,) [rad/s].
     """
-    t, omega = _window(time, speed, -math.inf, None)
+    t, omega = _window(time, speed, -math.inf)
     turning = np.flatnonzero(omega > share * float(omega.max()))
     t, omega = t[turning[-1] :], omega[turning[-1] :]
     noise = max(neighbour_noise(omega), 1e-9 * float(omega.max()))
@@ -443,15 +440,15 @@ def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> li
     return found
 
 
-def _window(time: ArrayLike, speed: ArrayLike, start: float, end: float | None) -> tuple[Array, Array]:
+def _window(time: ArrayLike, speed: ArrayLike, start: float) -> tuple[Array, Array]:
     t = np.asarray(time, dtype=np.float64)
     omega = np.asarray(speed, dtype=np.float64)
-    inside = (t >= start) & (t <= (math.inf if end is None else end)) & np.isfinite(omega)
+    inside = (t >= start) & np.isfinite(omega)
     t, omega = t[inside], omega[inside]
     if t.size < 8 or float(omega.max()) <= 0.0:
         raise RecordError(
-            f"speed fit: {t.size} recorded speeds between {format_moment(start)} and "
-            f"{'the end' if end is None else format_moment(end)}, at least 8 and a turning rotor are needed"
+            f"speed fit: {t.size} recorded speeds between {format_moment(start)} and the end, at least 8 and "
+            "a turning rotor are needed"
         )
     block = -(-t.size // MOST_VALUES)
     whole = t.size // block * block

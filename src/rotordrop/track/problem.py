@@ -212,14 +212,8 @@ class DropProblem:
         return np.concatenate([self.watched_rows(name) for name in self.model.bearing_names])
 
 
-def build_problem(
-    model: DropModel,
-    drop: RecordedDrop,
-    *,
-    until: float = 0.2,
-    unknowns: tuple[Unknown, ...] | None = None,
-) -> DropProblem:
-    """Put a recorded drop as an estimation problem, up to a time [s]; by default with all unknowns.
+def build_problem(model: DropModel, drop: RecordedDrop, *, until: float = 0.2) -> DropProblem:
+    """Put a recorded drop as an estimation problem, up to a time [s].
 
     The sensors of the model define the channels.
 
@@ -229,7 +223,7 @@ def build_problem(
         If the rotor does not rest on every touchdown bearing.
     """
     _refuse_unloaded(model)
-    unknowns = all_unknowns(model) if unknowns is None else unknowns
+    unknowns = all_unknowns(model)
     inside = (drop.time >= 0.0) & (drop.time <= until)
     readings = drop.readings[inside]
     rows = sensor_rows(model)

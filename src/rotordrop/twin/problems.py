@@ -12,7 +12,6 @@ from rotordrop.machine import Machine
 from rotordrop.record.axes import sees_both_directions
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction, reduction_for_contact
-from rotordrop.rotor.unknowns import Unknown
 from rotordrop.track.calibration import BLIND_SCHEDULE, window_end
 from rotordrop.track.prior import fall_time
 from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
@@ -34,18 +33,13 @@ FALL_SHARE = 1.7e-7
 """Largest impulse of process noise per 50 µs while the rotor falls, over its weight [s]."""
 
 
-def drop_problem(
-    model: DropModel,
-    evidence: Evidence,
-    until: float = WINDOW,
-    unknowns: tuple[Unknown, ...] | None = None,
-) -> DropProblem:
-    """Estimation problem of a record, with all unknowns unless some are named.
+def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) -> DropProblem:
+    """Estimation problem of a record up to a time [s].
 
     Without a tail the gaps, where they are unknown, start where the first forces act.
     """
-    problem = build_problem(model, recorded_drop(evidence, until), until=until, unknowns=unknowns)
-    if unknowns is None and isinstance(evidence.settled_level, Missing):
+    problem = build_problem(model, recorded_drop(evidence, until), until=until)
+    if isinstance(evidence.settled_level, Missing):
         _start_gaps(problem, evidence)
     if model.machine.remanence_time_constant is None:
         return problem
