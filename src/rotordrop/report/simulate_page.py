@@ -14,7 +14,7 @@ from rotordrop._version import __version__
 from rotordrop.document import stated
 from rotordrop.elements.bearing_numbers import THROWN, numbers_of
 from rotordrop.elements.face import UNPRESSED
-from rotordrop.estimate.bearing_drop import BearingDrop, History, simulated_bearings
+from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
 from rotordrop.estimate.published import Bearing
 from rotordrop.evidence.impacts import HOP, after_flights
 from rotordrop.machine.plausibility import doubts_of_speed
@@ -44,13 +44,12 @@ from rotordrop.report.style import (
     LOG_LABELS,
     MICRO,
     SERIES,
-    Panel,
     axis_title,
     curve,
+    drawn_together,
     finished,
     panels,
     plain,
-    time_panels,
 )
 from rotordrop.report.waterfall_page import frequency_sections
 from rotordrop.simulate.coast_down_result import (
@@ -99,25 +98,19 @@ def simulate_page(result: DropResult, machine: Machine | None = None) -> ReportC
 
 def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
     """Force of every magnet and the currents of its coils against time, and what happened when."""
-    forces, currents = [], []
-    for a, name in enumerate(magnets.names):
-        force = tuple(
-            History(label=axis, time=result.time, values=magnets.force[:, a, k])
-            for k, axis in enumerate("xy")
-        )
-        current = tuple(
-            History(label=f"{axis}{sign}", time=result.time, values=magnets.current[:, a, k, j])
-            for k, axis in enumerate("xy")
-            for j, sign in enumerate("+−")
-        )
-        forces.append(Panel(title=name, axis="magnet force", histories=force, series=True))
-        currents.append(Panel(title=name, axis="current", histories=current, series=True))
+    names, coils = magnets.names, [f"{axis}{sign}" for axis in "xy" for sign in "+−"]
+    force, current = np.moveaxis(magnets.force, 0, -1), np.moveaxis(magnets.current, 0, -1)
+    forces = {name: dict(zip("xy", of, strict=True)) for name, of in zip(names, force, strict=True)}
+    currents = {
+        name: dict(zip(coils, of.reshape(len(coils), -1), strict=True))
+        for name, of in zip(names, current, strict=True)
+    }
+    pulled = "Currents of the coils that pull towards + and − of each axis."
     figures = (
-        Figure(time_panels([forces], 1.0, "N"), "Force of the magnets on the rotor."),
         Figure(
-            time_panels([currents], 1.0, "A"),
-            "Currents of the coils that pull towards + and − of each axis.",
+            drawn_together(result.time, forces, "magnet force", "N"), "Force of the magnets on the rotor."
         ),
+        Figure(drawn_together(result.time, currents, "current", "A"), pulled),
     )
     happened = zip(magnets.events, magnets.event_time, strict=True)
     facts = tuple((what, f"at {shown(time, 'time', 3)}") for what, time in happened if np.isfinite(time))
@@ -127,16 +120,14 @@ def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
 def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
     """Force on the faces against time."""
     assert result.face_force is not None
-    rows = []
-    for one in landed:
-        force = result.face_force[:, result.index_of(one.name)]
-        simulated = History(label="simulated", time=result.time, values=force)
-        rows.append([Panel(title=one.name, axis="axial force", histories=(simulated,))])
+    forces = {one.name: {"simulated": result.face_force[:, result.index_of(one.name)]} for one in landed}
     caption = (
         "Axial force of the rotor on the face of the race, positive towards higher nodes. Contacts without a "
         f"hop of {percent(HOP)} of the gap between them are one landing."
     )
-    return Section("Axial landing", figures=(Figure(time_panels(rows, 1.0, "N"), caption),))
+    return Section(
+        "Axial landing", figures=(Figure(drawn_together(result.time, forces, "axial force", "N"), caption),)
+    )
 
 
 TRUSTED_CHANGE = 5e-3
@@ -434,29 +425,20 @@ def heat_sections(heat: Heat | None, names: tuple[str, ...]) -> tuple[Section, .
     """Temperatures and preload of a machine whose bearings warm."""
     if heat is None:
         return ()
-    figure = Figure(
-        heat_figure(heat, names),
-        "Temperatures above the start, and the axial force of a row of balls with the race in the middle. "
-        "Capacities and conductances are values by size unless the machine file gives them.",
+    over = {names[b]: dict(zip(NODES, heat.temperature[:, b].T, strict=True)) for b in heat.warmed}
+    preload = {names[b]: {"preload": heat.preload[:, b]} for b in heat.warmed}
+    figures = (
+        Figure(
+            drawn_together(heat.time, over, "above the start", "K", from_zero=True),
+            "Temperatures above the start. Capacities and conductances are values by size unless the machine "
+            "file gives them.",
+        ),
+        Figure(
+            drawn_together(heat.time, preload, "axial force", "N", from_zero=True),
+            "Axial force of a row of balls with the race in the middle.",
+        ),
     )
-    return (Section("Heat", figures=(figure,)),)
-
-
-def heat_figure(heat: Heat, names: tuple[str, ...]) -> go.Figure:
-    """Draw the temperatures of all nodes and the preload of every bearing that warms."""
-    titles = [f"{names[b]}: {what}" for what in ("temperatures", "preload of a row") for b in heat.warmed]
-    figure = panels(titles, rows=2, columns=len(heat.warmed), height=230)
-    for column, b in enumerate(heat.warmed, start=1):
-        for node, called in enumerate(NODES):
-            colour = SERIES[node % len(SERIES)]
-            over, first = heat.temperature[:, b, node], column == 1
-            curve(figure, heat.time, over, called, column=column, colour=colour, legend=first)
-        curve(figure, heat.time, heat.preload[:, b], row=2, column=column)
-    figure.update_yaxes(title_text=axis_title("above the start", "K"), row=1, col=1)
-    figure.update_yaxes(title_text=axis_title("axial force", "N"), row=2, col=1)
-    figure.update_yaxes(rangemode="tozero")
-    figure.update_xaxes(range=[0.0, float(np.max(heat.time))], row=2)
-    return finished(figure, FROM_POWER_OFF, row=2)
+    return (Section("Heat", figures=figures),)
 
 
 _MEDIAN, _LOW, _HIGH = (QUANTILES.index(share) for share in (0.5, 0.05, 0.95))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -413,7 +413,7 @@ def time_panels(
     columns = len(rows[0])
     titles = [panel.title for row in rows for panel in row]
     figure = panels(titles, rows=len(rows), columns=columns, height=height)
-    legend: set[str] = set()
+    legend: dict[str, int] = {}
     for i, row in enumerate(rows, start=1):
         for j, panel in enumerate(row, start=1):
             _draw(figure, panel, scale, unit, i, j, legend)
@@ -435,24 +435,42 @@ def time_panels(
     return fit_legend(figure)
 
 
+def drawn_together(
+    time: Array, curves: Mapping[str, Mapping[str, Array]], axis: str, unit: str, **more: Any
+) -> go.Figure:
+    """Draw curves of one time (T,) [s] by title of their panel and by name, each (T,) in SI.
+
+    ``more`` goes to `time_panels`.
+    """
+    row = [
+        Panel(
+            title=title,
+            axis=axis,
+            histories=tuple(History(label=name, time=time, values=one) for name, one in named.items()),
+            series=True,
+        )
+        for title, named in curves.items()
+    ]
+    return time_panels([row], 1.0, unit, **more)
+
+
 def _draw(
-    figure: go.Figure, panel: Panel, scale: float, unit: str, row: int, column: int, legend: set[str]
+    figure: go.Figure, panel: Panel, scale: float, unit: str, row: int, column: int, legend: dict[str, int]
 ) -> None:
     def first(name: str) -> bool:
         """Whether a name stands in the legend for the first time."""
         new = name not in legend
-        legend.add(name)
+        legend.setdefault(name, len(legend))
         return new
 
     place: dict[str, Any] = {"row": row, "column": column}
     if panel.band is not None:
         add_band(figure, panel.band, scale, unit, **place, legend=first(panel.band.label))
     compared = len({history.role for history in panel.histories}) > 1
-    ordered = sorted(enumerate(panel.histories), key=lambda entry: compared and entry[1].role == "measured")
-    for index, history in ordered:
+    for history in sorted(panel.histories, key=lambda one: compared and one.role == "measured"):
         look = compared_style(history.role) if compared else line_style(history.role)
         if panel.series:
-            look = line_style(history.role, index + 4 * (column - 1))
+            look = line_style(history.role, legend.get(history.label, len(legend)))
         add_history(figure, history, scale, unit, **place, legend=first(history.label), line=look)
     if panel.air_gap is not None:
         for sign in panel.gap_signs:

@@ -356,8 +356,6 @@ MARKED = 7
 """Speeds that are named along a polar plot, about [1]; chosen, not measured."""
 BEYOND = 1.2
 """How far a waterfall is drawn beyond the last thing in it [1]."""
-NEAR = 0.97
-"""Share of the air gap at which the enlarged panel begins [1]."""
 WHITE = "#fff"
 """On a map, whose colours are the same on dark paper."""
 
@@ -571,32 +569,20 @@ def polar_figure(track: OrderTrack, plane: str) -> go.Figure:
 def displacement_history_figure(histories: Mapping[str, DisplacementHistory], role: str) -> go.Figure:
     """Draw the distance from the centre over the coast-down, from smallest to largest (Neisi 2020, Fig. 17).
 
-    One row a plane, with the air-gap window and enlarged near the air gap.
+    One row a plane, with the air-gap window.
     """
-    titles = [title for name in histories for title in (name, f"{name}: near the air gap")]
-    figure = panels(titles, rows=len(histories), columns=2, height=240, spacing=0.07)
+    figure = panels(list(histories), rows=len(histories), columns=1, height=240)
     edge = {"width": 0.6, "color": COLOURS["measured" if role == "measured" else "simulated"]}
     ring = {"color": SERIES[4], "size": 8, "symbol": "circle-open", "line": {"width": 2}}
     for row, history in enumerate(histories.values(), start=1):
         lowest, highest = MICRO * history.lowest, MICRO * history.highest
-        for column in (1, 2):
-            place: dict[str, Any] = {"row": row, "column": column}
-            named = place | {"legend": row == column == 1}
-            envelope, hover = f"{role}, smallest to largest", "%{x:.2f} s: up to %{y:.4~g} µm"
-            curve(figure, history.time, lowest, hover=None, line=edge, **place)
-            curve(figure, history.time, highest, envelope, hover=hover, line=edge, fill="tonexty", **named)
-            add_gap_limits(figure, AirGap.of(history.air_gap), **named)
-            curve(
-                figure,
-                [history.largest_time],
-                [MICRO * history.largest],
-                "largest",
-                mode="markers",
-                marker=ring,
-                hover="%{y:.4~g} µm at %{x:.4f} s",
-                **named,
-            )
-        near = MICRO * np.array([NEAR * history.air_gap, history.largest + (1.0 - NEAR) * history.air_gap])
-        figure.update_yaxes(range=near.tolist(), row=row, col=2)
-    figure.update_yaxes(rangemode="tozero", col=1)
+        named: dict[str, Any] = {"row": row, "legend": row == 1}
+        envelope, hover = f"{role}, smallest to largest", "%{x:.2f} s: up to %{y:.4~g} µm"
+        curve(figure, history.time, lowest, hover=None, line=edge, row=row)
+        curve(figure, history.time, highest, envelope, hover=hover, line=edge, fill="tonexty", **named)
+        add_gap_limits(figure, AirGap.of(history.air_gap), **named)
+        largest = ([history.largest_time], [MICRO * history.largest])
+        hover = "%{y:.4~g} µm at %{x:.4f} s"
+        curve(figure, *largest, "largest", mode="markers", marker=ring, hover=hover, **named)
+    figure.update_yaxes(rangemode="tozero")
     return finished(figure, FROM_POWER_OFF, "displacement [µm]", row=len(histories))
