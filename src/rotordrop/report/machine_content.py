@@ -68,7 +68,7 @@ def machine_content(
             *(_magnet_card(one, summary.loop) for one in summary.magnets),
         ),
         rest="--all",
-        summary=not_given(machine),
+        summary=(*rotor_tables(summary), *not_given(machine)),
     )
 
 
