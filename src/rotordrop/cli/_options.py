@@ -79,13 +79,6 @@ Reduction = StrEnum("Reduction", ["accurate", "quick", "full"])
 """Presets of the reduction of the rotor."""
 
 
-class Integrator(StrEnum):
-    """Runge–Kutta pairs."""
-
-    tsit5 = "tsit5"
-    dp5 = "dp5"
-
-
 Machine = Annotated[
     Path, Argument(metavar="MACHINE", help="Machine description, a .toml file.", show_default=False)
 ]
@@ -98,7 +91,6 @@ Levitated = Annotated[
 ]
 ReductionChoice = Annotated[Reduction, Option(help="Modes of the rotor.")]
 Tolerance = Annotated[float, Option(min=1e-12, max=1e-3, metavar="NUMBER", help="Accuracy of a step.")]
-IntegratorChoice = Annotated[Integrator, Option(help="Runge–Kutta pair.")]
 Json = Annotated[
     Path | None,
     file_option("--json", "Write the result as JSON to FILE; '-' prints it in place of the summary."),

@@ -262,7 +262,6 @@ def waterfall(
         int | None,
         Option(min=16, metavar="N", help="Samples per frame; the paper's 32768, less in a short record."),
     ] = None,
-    overlap: Annotated[float, Option(min=0.0, max=0.95, metavar="SHARE", help="Share used again.")] = 0.5,
     highest: Annotated[
         float | None,
         measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),
@@ -299,7 +298,6 @@ def waterfall(
         amplitude_kind=amplitude.value,
         highest_frequency=highest or WaterfallChoice().highest_frequency,
         points=points,
-        overlap=overlap,
     )
     with progress_bar("frequencies") as progress:
         found = analyse(described, read, choice, progress=progress)

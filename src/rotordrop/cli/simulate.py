@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
@@ -18,16 +17,12 @@ from rotordrop.errors import UsageError
 from rotordrop.units import parse_quantity
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from rotordrop.simulate.case import MagnetEvent, Start
+    from rotordrop.simulate.case import MagnetEvent
 
 STANDSTILL = "standstill"
 REST_VELOCITY = 5e-3
 """Velocity [m/s] below which a rotor at its touchdown bearings counts as at rest; chosen, that of a fall of a
 micrometre."""
-_EXAMPLES = {"length": "10 um, -20 um", "velocity": "0 mm/s, -5 mm/s", "force": "0 N, 40 N"}
 
 
 class Spin(StrEnum):
@@ -44,25 +39,11 @@ def simulate(
     speed: options.PowerOffSpeed,
     duration: Annotated[float, measured("time", "How long to simulate.", "0.2 s")] = 0.2,
     output_step: Annotated[float, measured("time", "Step of the histories.", "10 us")] = 1e-5,
-    displacement: Annotated[
-        list[str] | None,
-        text_option("PLACE", 'Start displaced: "NDE: 10 um, -20 um" (horizontal, vertical).'),
-    ] = None,
-    velocity: Annotated[
-        list[str] | None, text_option("PLACE", 'Start moving: "NDE: 0 mm/s, -5 mm/s".')
-    ] = None,
     levitated: options.Levitated = False,
-    rotor_angle: Annotated[float, measured("angle", "Levitated: rotor angle.", "0 deg")] = 0.0,
-    delay: Annotated[float, measured("time", "Levitated: magnets hold on.", "0 s")] = 0.0,
     stays_on: Annotated[
         list[str] | None,
         text_option("AMB", 'Magnet that stays on, "NDE" (one end falls).'),
     ] = None,
-    remanent_force: Annotated[
-        list[str] | None,
-        text_option("FORCE", 'Levitated: force left at power-off, "NDE: 0 N, 40 N".'),
-    ] = None,
-    remanence_time: Annotated[float, measured("time", "Levitated: its decay.", "2 ms")] = 2e-3,
     magnets: Annotated[
         list[str] | None,
         text_option(
@@ -76,7 +57,6 @@ def simulate(
     ] = Spin.dynamic,
     reduction: options.ReductionChoice = options.Reduction.accurate,
     tolerance: options.Tolerance = 1e-6,
-    integrator: options.IntegratorChoice = options.Integrator.tsit5,
     certify: Annotated[
         bool, Option("--certify", help="Also measure the numerical error (three times the time).")
     ] = False,
@@ -93,7 +73,7 @@ def simulate(
     from rotordrop.machine import load_machine
     from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
     from rotordrop.report.terminal import summary_console
-    from rotordrop.simulate.case import DropCase, LevitatedStart, PlacedStart
+    from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart
     from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
@@ -103,33 +83,15 @@ def simulate(
             "its control loop; choose one"
         )
     described = load_machine(machine).with_magnets_on(stays_on or ())
-    bearings = [bearing.name for bearing in described.touchdown_bearings]
-    events = tuple(map(magnet_event, magnets)) if magnets else None
-    if levitated:
-        if displacement or velocity:
-            raise UsageError("--levitated cannot go with --displacement or --velocity; choose one start")
-        left = named_pairs(remanent_force or (), "force", [amb.name for amb in described.ambs])
-        start: Start = LevitatedStart(
-            rotor_angle=rotor_angle,
-            delay=delay,
-            remanent_force=left if remanent_force else None,
-            remanence_time_constant=remanence_time,
-        )
-    else:
-        start = PlacedStart(
-            displacement=named_pairs(displacement or (), "length", bearings),
-            velocity=named_pairs(velocity or (), "velocity", bearings),
-        )
     case = DropCase(
         speed=speed,
         duration=duration,
         output_step=output_step,
         tolerance=tolerance,
         reduction=reduction.value,
-        start=start,
+        start=LevitatedStart() if levitated else CentredStart(),
         spin=spin.value,
-        integrator=integrator.value,
-        magnets=events,
+        magnets=tuple(map(magnet_event, magnets)) if magnets else None,
     )
     warning = long_run(described, duration, case.most_steps)
     errors = summary_console(sys.stderr)
@@ -148,32 +110,6 @@ def simulate(
         said = simulate_page(result, described)
     deliver(simulation_numbers(result, described), json, said, report=report, written=[output])
     result.check_finished()
-
-
-def named_pairs(texts: Sequence[str], kind: str, names: Sequence[str]) -> NDArray[np.float64]:
-    """Read entries such as ``"NDE: 10 um, -20 um"`` into SI values, shape (names, 2), zero where not named.
-
-    Examples
-    --------
-    >>> from rotordrop.cli.simulate import named_pairs
-    >>> named_pairs(["DE: 0.5 mm, -0.25 mm"], "length", ["NDE", "DE"]).tolist()
-    [[0.0, 0.0], [0.0005, -0.00025]]
-    """
-    import numpy as np
-
-    if texts and not names:
-        raise UsageError(f"{texts[0]!r} names a part of the machine, which has none of this kind")
-    values = np.zeros((len(names), 2))
-    for text in texts:
-        name, _, pair = text.rpartition(":")
-        parts = pair.split(",")
-        if name.strip() not in names or len(parts) != 2:
-            raise UsageError(
-                f"{text!r} is not 'NAME: horizontal, vertical' with a name out of {', '.join(names)}; "
-                f"write for example '{names[0]}: {_EXAMPLES[kind]}'"
-            )
-        values[list(names).index(name.strip())] = [parse_quantity(part, kind) for part in parts]
-    return values
 
 
 def magnet_event(text: str) -> MagnetEvent:
@@ -212,7 +148,6 @@ def coast_down(
     machine: options.Machine,
     speed: options.PowerOffSpeed,
     until: Annotated[str, Option(metavar="END", help='"standstill", or a time such as "20 s".')] = STANDSTILL,
-    rest: Annotated[float, measured("time", "Go on after standstill.", "0 s")] = 0.0,
     drag_from: Annotated[
         Path | None, text_option("RECORD", "Take the drag from the speed of a recorded coast-down.")
     ] = None,
@@ -220,7 +155,6 @@ def coast_down(
     levitated: options.Levitated = False,
     reduction: options.ReductionChoice = options.Reduction.quick,
     tolerance: options.Tolerance = 1e-6,
-    integrator: options.IntegratorChoice = options.Integrator.tsit5,
     certify: Annotated[
         bool, Option("--certify", help="Also repeat it at a tighter tolerance (five times the time).")
     ] = False,
@@ -265,12 +199,10 @@ def coast_down(
     case = CoastDownCase(
         speed=speed,
         duration=None if until.strip() == STANDSTILL else parse_quantity(until, "time"),
-        rest=rest,
         output_step=output_step,
         tolerance=tolerance,
         reduction=reduction.value,
         start=LevitatedStart() if levitated else CentredStart(),
-        integrator=integrator.value,
     )
     model = build_drop_model(described, case.reduction)
     warning = long_run(described, 1.0, MOST_STEPS_PER_WINDOW)

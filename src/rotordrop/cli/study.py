@@ -133,7 +133,6 @@ def study_repeat(
         float | None, measured("speed", 'Predict at this speed, "210 Hz"; else that of the drop.')
     ] = None,
     drops: Annotated[int, Option(min=20, metavar="N", help="Drops to simulate.")] = 500,
-    worst_of: Annotated[int, Option(min=2, metavar="N", help="Worst of how many drops.")] = 100,
     seed: Annotated[int, Option(min=0, metavar="N", help="Key of the random numbers.")] = 1,
     threads: options.Threads = None,
     report: options.Report = None,
@@ -161,5 +160,5 @@ def study_repeat(
         results = run_study(study, folder, threads=threads, progress=bar)
     # at another speed the recorded drop is none of these
     recorded = {} if drop is None or speed is not None else recorded_numbers(drop)
-    found = repeats(results, recorded, worst_of=worst_of)
+    found = repeats(results, recorded)
     deliver(repeat_numbers(results, found), json, repeat_page(results, found), report=report)
