@@ -192,16 +192,14 @@ def pushed(model: DropModel, violations: Violations) -> DropModel:
     rows: list[tuple[Array, Array, Array]] = []  # entries, course, shape over the modes
     side, tilt, bow = violations.side_force, float(violations.stand.tilt), float(violations.rotor.bow)
 
-    def steady(x: float, y: float, shape: Array, course: Array | None = None) -> None:
+    def steady(x: float, y: float, shape: Array) -> None:
         entries = np.zeros(L.N_LOAD_COLUMNS)
         entries[[L.LOAD_X, L.LOAD_Y]] = x, y
-        rows.append((entries, np.zeros((0, 3)) if course is None else course, shape))
+        rows.append((entries, np.zeros((0, 3)), shape))
 
     if side is not None and float(side.force) > 0.0:
         force, angle = float(side.force), float(side.direction)
-        x, y, grown = force * math.cos(angle), force * math.sin(angle), 1.0 + float(side.growth)
-        course = np.array([[0.0, x, y], [float(side.growth_time), grown * x, grown * y]])
-        steady(x, y, model.basis.node_row(side.node), course if grown > 1.0 else None)
+        steady(force * math.cos(angle), force * math.sin(angle), model.basis.node_row(side.node))
     if tilt != 0.0:  # gravity alone acts along -y
         steady(-math.sin(tilt), math.cos(tilt) - 1.0, p.gravity)
     pull = float(violations.magnets.pull)

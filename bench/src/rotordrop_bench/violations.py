@@ -311,10 +311,6 @@ class SideForce(Violation):
     node: Node = key(..., "node it acts at, counted from 1")
     force: Force = key(..., "force [N]")
     direction: Angle = key(0.0, "its direction, from +x towards y [rad]")
-    growth: Share = key(0.0, "share by which it grows at an even rate from power-off on [1]")
-    growth_time: PositiveTime = key(1.0, "time it takes [s]")
-
-    together: ClassVar = (("growth", "growth_time"),)
 
 
 class Seal(Violation):

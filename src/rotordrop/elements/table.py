@@ -105,14 +105,14 @@ def row_of(path: str) -> Parameter:
     return _BY_PATH.get(("bearing", path)) or _BY_PATH["bearing", rest]
 
 
-def following(owner: Owner = "bearing") -> Iterator[tuple[Parameter, str, Callable[[Any, Known], Known]]]:
-    """Rows whose value follows another of the same part: the row, the path of the other, and how."""
-    return ((row, *row.follows) for row in rows(owner) if row.follows is not None)
+def following() -> Iterator[tuple[Parameter, str, Callable[[Any, Known], Known]]]:
+    """Rows of a bearing whose value follows another: the row, the path of the other, and how."""
+    return ((row, *row.follows) for row in rows("bearing") if row.follows is not None)
 
 
-def keys_of(keys: list[str], owner: Owner = "bearing") -> list[str]:
-    """Keys of a value in the description of its owner, for those of its path."""
-    row = _BY_PATH.get((owner, ".".join(keys)))
+def keys_of(keys: list[str]) -> list[str]:
+    """Keys of a value in the description of a bearing, for those of its path."""
+    row = _BY_PATH.get(("bearing", ".".join(keys)))
     return keys if row is None or not row.stored else row.stored.split(".")
 
 
