@@ -366,7 +366,11 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         folded(
             "Machine",
             drawing_section(estimate.machine),
-            Section("", statements=tuple(map(Statement, ASSUMED)), tables=not_given(estimate.machine)),
+            Section(
+                "",
+                statements=tuple(map(Statement, ASSUMED)),
+                tables=not_given(estimate.machine, reasons=False),
+            ),
         ),
     )
 

@@ -292,7 +292,7 @@ def defaults_section(machine: Machine) -> tuple[Section, ...]:
     return (Section("Values that were not given", (NOT_GIVEN,), tables=tables),) if tables else ()
 
 
-def not_given(machine: Machine) -> tuple[Table, ...]:
+def not_given(machine: Machine, *, reasons: bool = True) -> tuple[Table, ...]:
     """What was defaulted or inferred, and why; equal values of several owners in one line."""
     owners: dict[tuple[str, str, str], list[str]] = {}
     for key, used, why in (*machine.defaults_in_use, *machine.inferred):
@@ -302,7 +302,7 @@ def not_given(machine: Machine) -> tuple[Table, ...]:
         Column("not in the machine file", lambda row: row[0][0]),
         Column("of", lambda row: ", ".join(row[1])),
         Column("used", lambda row: row[0][1]),
-        Column("why", lambda row: row[0][2]),
+        Column("why", lambda row: row[0][2] if reasons else "", optional=True),
     )
     return (table(owners.items(), columns),) if owners else ()
 
