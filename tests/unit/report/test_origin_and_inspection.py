@@ -45,7 +45,7 @@ def test_a_running_title_cannot_leave_its_string():
 def estimate(drop_result, **changes):
     bearings = tuple(replace(one, values={}) for one in simulated_bearings(drop_result))
     told = {"consistent": True, "bearings": bearings, "later": (), "innovations": None, "cross_check": ()}
-    return SimpleNamespace(**{**told, **changes})
+    return SimpleNamespace(**{"later_warning": "", **told, **changes})
 
 
 def stressed(bearing, value, high):
@@ -66,7 +66,8 @@ def test_a_model_that_does_not_fit_is_to_be_settled_before_anything_else(drop_re
     later = LaterMotion(
         bearing="DE", first=2e-4, first_time=0.01, later=3e-4, later_time=1.25, resolved=1e-6, larger=True
     )
-    said = inspection_section(estimate(drop_result, consistent=False, later=(later,))).statements
+    unfit = estimate(drop_result, consistent=False, later=(later,), later_warning="larger later on")
+    said = inspection_section(unfit).statements
     assert [one.level for one in said] == ["bad", "warning", "notice", "notice"]
 
 
