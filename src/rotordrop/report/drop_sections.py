@@ -12,6 +12,7 @@ import plotly.graph_objects as go
 from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.estimate.bearing_drop import (
+    AirGap,
     BearingDrop,
     BearingMotions,
     FirstContact,
@@ -479,7 +480,8 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
                 hover="x %{x:.1f} µm, y %{y:.1f} µm at %{customdata:.2f} ms",
                 **look,
             )
-        _add_circles(figure, bearing, column)
+        if bearing.air_gap is not None:
+            _add_circles(figure, bearing.air_gap, column)
         if isinstance(bearing, BearingDrop) and bearing.impacts:
             _add_numbers(figure, bearing, column)
         radii = [float(np.nanmax(np.abs(motion.displacement))) for motion in bearing.motions]
@@ -488,27 +490,14 @@ def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
     return finished(figure, "displacement x [µm]", "displacement y [µm]")
 
 
-def _add_circles(figure: go.Figure, bearing: BearingMotions | BearingDrop, column: int) -> None:
-    gap = bearing.air_gap
-    if gap is None:
-        return
-    circles = [(gap.upper, "clearance circle", "solid")]
-    if gap.lower < gap.upper:
-        circles = [
-            (gap.upper, "clearance circle, upper limit", "solid"),
-            (gap.lower, "clearance circle, lower limit", "dash"),
-        ]
-    for radius, name, dash in circles:
-        curve(
-            figure,
-            MICRO * radius * np.cos(CIRCLE),
-            MICRO * radius * np.sin(CIRCLE),
-            name,
-            column=column,
-            legend=column == 1,
-            line={"color": LIMIT, "width": 1.2, "dash": dash},
-            hover=f"{MICRO * radius:.1f} µm",
-        )
+def _add_circles(figure: go.Figure, gap: AirGap, column: int) -> None:
+    """The upper limit of the air gap, and the lower one dashed where it differs."""
+    differ = gap.lower < gap.upper
+    for which, dash in (("upper", "solid"), ("lower", "dash"))[: 1 + differ]:
+        radius, line = MICRO * getattr(gap, which), {"color": LIMIT, "width": 1.2, "dash": dash}
+        name = f"clearance circle, {which} limit" if differ else "clearance circle"
+        look: dict[str, Any] = {"legend": column == 1, "line": line, "hover": f"{radius:.1f} µm"}
+        curve(figure, radius * np.cos(CIRCLE), radius * np.sin(CIRCLE), name, column=column, **look)
 
 
 def _add_numbers(figure: go.Figure, bearing: BearingDrop, column: int) -> None:
@@ -516,21 +505,15 @@ def _add_numbers(figure: go.Figure, bearing: BearingDrop, column: int) -> None:
     hits, motion = largest(bearing), bearing.motion
     times = [hit.peak_time for hit in hits]
     x, y = (MICRO * np.interp(times, motion.time, motion.displacement[:, k]) for k in (0, 1))
-    marker = {"size": 16, "color": "#ffffff", "line": {"color": INK, "width": 1}}
-    curve(
-        figure,
-        x,
-        y,
-        "largest contacts",
-        column=column,
-        mode="markers+text",
-        marker=marker,
-        text=[str(k) for k in range(1, len(hits) + 1)],
-        textfont={"size": 11, "color": INK},
-        customdata=[[hit.peak_force.value, MILLI * hit.peak_time] for hit in hits],
-        legend=False,
-        hover="%{customdata[0]:.0f} N at %{customdata[1]:.2f} ms",
-    )
+    known = [[hit.peak_force.value, MILLI * hit.peak_time] for hit in hits]
+    look: dict[str, Any] = {
+        "mode": "markers+text",
+        "marker": {"size": 16, "color": "#ffffff", "line": {"color": INK, "width": 1}},
+        "text": [str(k) for k in range(1, len(hits) + 1)],
+        "textfont": {"size": 11, "color": INK},
+        "hover": "%{customdata[0]:.0f} N at %{customdata[1]:.2f} ms",
+    }
+    curve(figure, x, y, "largest contacts", column=column, legend=False, customdata=known, **look)
 
 
 SHOWN = 0.04
