@@ -30,7 +30,8 @@ _QUESTIONS = {
     "centre": 'centre of mass from its NDE end, "520 mm"',
     "bearings": 'touchdown bearings from the NDE end, "110 mm, 980 mm"',
     "sensors": 'sensor planes from the NDE end, "180 mm, 900 mm"',
-    "sensor_angle": 'angle of the first sensor of a plane, "135 deg" (the second stands 90° before it)',
+    "sensor_angle": 'first sensor of a plane, "135 deg": counter-clockwise from +x, seen from the DE (the '
+    "second stands 90° before it)",
     "designation": 'designation of the touchdown bearings, "7014 ACD/HCP4A"',
     "gap": 'radial air gap, "0.25 mm"',
     "speed": 'nominal speed, "9000 rpm"',

@@ -283,7 +283,7 @@ class Estimate:
 
     def verdict_in(self, name_of: Callable[[str], str]) -> str:
         """The verdict, with what failed and with unknowns by the names that are given for their paths."""
-        failed = "; ".join(check.said(name_of) for check in self.checks if check.failed)
+        failed = "; ".join(dict.fromkeys(check.said(name_of) for check in self.checks if check.failed))
         said = " ".join((self.verdict.value, *(one.sentence for one in self.structure)))
         return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 

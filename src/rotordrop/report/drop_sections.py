@@ -430,6 +430,7 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         number("dissipated energy", "dissipated_energy", "energy"),
         *((lasted,) if exact else ()),
         Column("impact", lambda row: "yes" if row[2] else ""),
+        Column("", lambda row: "goes on: at least this" if row[1].end != row[1].end else "", optional=True),
         Column("in the orbit", lambda row: numbers.get(id(row[1]), "")),
     )
     return table(

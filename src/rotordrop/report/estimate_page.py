@@ -23,7 +23,6 @@ from rotordrop.estimate.estimate import (
     CrossCheck,
     Estimate,
     FittedParameter,
-    FrictionSweep,
     ReplaySteps,
     TimedContact,
 )
@@ -521,19 +520,7 @@ def _parameters(estimate: Estimate) -> Section:
         tables.append(correlation_table(steps.correlations))
     fixed = "" if steps is None else steps.fixed
     text = [f"The supports were taken from {fixed}; this drop did not change them."] if fixed else []
-    if steps is not None and steps.friction is not None:
-        text.append(_of_sweep(steps.friction))
     return Section("Parameters", tuple(text), tables=tuple(tables))
-
-
-def _of_sweep(sweep: FrictionSweep) -> str:
-    """Over which part of the orbit which dynamic friction coefficient follows it best."""
-    value = Quantity.of(sweep.value, "dimensionless", 2)
-    start, end = (shown(t, "time", 3) for t in sweep.window)
-    return (
-        f"Distance of simulated and measured orbit from {start} to {end}; best {value.text} "
-        f"(90 %: {value.interval_text}). A number in place of the paper's eye."
-    )
 
 
 def _checks(estimate: Estimate) -> Section:

@@ -88,9 +88,11 @@ def _fitting(
     verdict: tuple[Statement, ...], tables: tuple[Table, ...], room: int, rest: str
 ) -> tuple[tuple[Statement, ...], tuple[Table, ...]]:
     """What of statements and tables fits so many lines, in its order; the last statement counts the rest."""
-    every = (*map(_statement, verdict), *map(_table, tables))
-    if sum(map(_height, every)) <= room:
-        return verdict, tables
+    numbers = sum(map(_height, map(_table, tables)))
+    for lines in (room, FIRST + 1, FIRST):
+        whole = tuple(_short(one, lines, rest) for one in verdict)
+        if numbers + sum(map(_height, map(_statement, whole))) <= room:
+            return whole, tables
     said = [_short(one, FIRST, rest) for one in verdict[:1]]
     others = verdict[len(said) :]
     room -= sum(_height(_statement(one)) for one in said)
@@ -108,8 +110,7 @@ def _fitting(
     for k, one in enumerate(others, start=1):
         last = k == len(others) and not (hidden or rows)
         left = room - (not last)
-        tries = (left if last else OTHERS, *((1,) if one.level in GRAVE else ()))
-        shorter = (_short(one, lines, rest) for lines in tries)
+        shorter = (_short(one, lines, rest) for lines in (left if last else OTHERS, 1))
         fits = next((short for short in shorter if _height(_statement(short)) <= left), None)
         if fits is None:
             hidden.append(one)

@@ -49,6 +49,8 @@ _GLUED = re.compile(
     r"(?P<pair>D[BFTU]|SU)?(?P<load>EL|L|M|H)?(?:P[2-6]\w?)?G?"
 )
 """How NSK and NTN write angle, cage, pair and preload in one word."""
+_BORE_FIRST, _SERIES_OF = re.compile(r"(?<!\d)(\d{2,3})(BNR|BER)(10|19)(?!\d)"), {"10": "70", "19": "719"}
+"""How NSK writes its spindle bearings of 18° (BNR) and 25°: bore [mm], family, series."""
 _GLUED_ANGLES = {"A5": 25.0, "AD": 25.0, "C": 15.0, "A": 30.0, "B": 40.0}
 _GLUED_LOADS: dict[str, Literal["light", "medium", "heavy"]] = {
     "EL": "light",
@@ -133,6 +135,7 @@ def read_designation(text: str) -> Designation | None:
 
 def _read(text: str) -> Designation | None:
     plain, maker = _without_maker(" ".join(text.upper().replace("_", " ").split()))
+    plain = _BORE_FIRST.sub(lambda found: f"{found[2]}{_SERIES_OF[found[3]]}/{found[1]} ", plain)
     found = _CORE.search(plain)
     if found is None or (found["digit"] and len(found["series"]) != 2):
         return None
@@ -187,6 +190,8 @@ def _contact_angle(suffix: str, series: str, prefix: str) -> float | None:
 
     Only spindle bearings of one maker write a contact angle on a series that begins with 6.
     """
+    if prefix in ("BNR", "BER"):
+        return 18.0 if prefix == "BNR" else 25.0
     tokens = _tokens(suffix)
     first = tokens[0] if tokens else ""
     if series.startswith("6") and (prefix not in _SPINDLE_PREFIXES or first not in ("C", "E")):

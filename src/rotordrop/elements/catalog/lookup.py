@@ -137,6 +137,8 @@ def _nearest(designation: str) -> list[str]:
 
 
 def _unknown(designation: str, nearest: list[str], why: str = "") -> str:
+    if re.match(r"NN|N[UJP]?\s?\d", designation.upper()):
+        return f"{designation!r} names a roller bearing, and the model is one of balls; give another bearing"
     hint = f"did you mean one of {', '.join(nearest)}?" if nearest else "no designation is similar."
     return (
         f"the catalogue holds no bearing {designation!r}{why}; {hint} Else give the geometry: "
