@@ -584,5 +584,4 @@ def displacement_history_figure(histories: Mapping[str, DisplacementHistory], ro
         largest = ([history.largest_time], [MICRO * history.largest])
         hover = "%{y:.4~g} µm at %{x:.4f} s"
         curve(figure, *largest, "largest", mode="markers", marker=ring, hover=hover, **named)
-    figure.update_yaxes(rangemode="tozero")
     return finished(figure, FROM_POWER_OFF, "displacement [µm]", row=len(histories))
