@@ -188,7 +188,7 @@ def stress_panel(bearing: BearingDrop, *, certain: bool = True) -> Panel:
     """The largest Hertz stress with its band and peak, and what the preload alone does."""
     return Panel(
         title=bearing.name,
-        axis="max. Hertz stress",
+        axis="Hertz stress",
         histories=(bearing.stress,),
         band=bearing.stress_band,
         levels=() if bearing.preload_stress is None else (("preload alone", bearing.preload_stress),),
