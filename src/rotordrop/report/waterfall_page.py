@@ -62,7 +62,6 @@ SHORT_SPEED = (
     "speed law."
 )
 AS_READ = f" The simulated motion was given the noise of a usual sensor, {1e6 * SENSOR_NOISE:g} µm rms."
-NO_WATERFALL = "The signal is shorter than one frame; there is no waterfall."
 LINES_NOTE = (
     "Amplitudes are those in the direction and plane where they are largest, root mean square over the time "
     "the line was seen. ± is one standard error, never less than what a line seen that long can be told "
@@ -77,7 +76,6 @@ POLAR = (
     "polar plot of the same vectors; the angle is that of the phase, numbers are shaft speeds [Hz]. Nothing "
     "is taken off for slow roll."
 )
-LINES = "Lines"
 NO_LINE = "No line stands out: a short record is too short for one."
 SAID = 3
 """Lines that are named in the verdict (chosen)."""
@@ -125,7 +123,7 @@ def frequency_sections(
     return (
         Section("Displacement over the coast-down", figures=(displacement,)),
         _waterfall_section(analysis, against, highest),
-        Section(LINES, reasons if lines else (NO_LINE,), tables=(line_table(analysis),) if lines else ()),
+        Section("Lines", reasons if lines else (NO_LINE,), tables=(line_table(analysis),) if lines else ()),
         *((_order_section(analysis),) if tracked else ()),
         *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law),)),
     )
@@ -235,9 +233,8 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float
             )
             chart = waterfall_figure(fall, name, lines, against=against, highest=top)
             figures.append(Figure(chart, caption))
-    if not figures:
-        return Section("Waterfall", statements=(Statement(NO_WATERFALL),))
-    return Section("Waterfall", figures=tuple(figures))
+    text = () if figures else ("The signal is shorter than one frame.",)
+    return Section("Waterfall", text, figures=tuple(figures))
 
 
 def _order_section(analysis: CoastDownAnalysis) -> Section:
