@@ -20,7 +20,7 @@ from rotordrop.evidence.sensing import Sensing
 from rotordrop.evidence.wall import Wall
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
-from rotordrop.record.axes import along_sensors
+from rotordrop.record.axes import along_sensors, end_columns
 from rotordrop.record.record import Record
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
@@ -67,6 +67,9 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap;
     in one that ends before, both are those of a look at it, where it determines them.
     """
+    ends = end_columns(record.sensors, machine.rotor.node_positions)
+    if len(ends) < len(record.sensors):
+        record = record.of_channels(ends)
     # before the rotor model: the paths of a minute and the compiler need not be in memory at once
     walls, falls = _seen(record, machine)
     evidence = read_evidence(build_drop_model(machine), record)

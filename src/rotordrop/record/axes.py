@@ -51,6 +51,19 @@ def sees_both_directions(sensors: Sequence[Sensor]) -> bool:
     return bool(strength[1] >= LEAST_RATIO * strength[0])
 
 
+def end_columns(sensors: Sequence[Sensor], positions: Sequence[float] | Array) -> list[int]:
+    """Columns of the two planes with both directions that lie farthest apart; all where there are not three.
+
+    Between them the rotor bends most. ``positions`` are those of the nodes [m].
+    """
+    of_node = {one.node: [i for i, other in enumerate(sensors) if other.node == one.node] for one in sensors}
+    whole = [node for node, columns in of_node.items() if sees_both_directions([sensors[i] for i in columns])]
+    if len(of_node) <= 2 or len(whole) < 2:
+        return list(range(len(sensors)))
+    whole.sort(key=lambda node: positions[node - 1])
+    return sorted(of_node[whole[0]] + of_node[whole[-1]])
+
+
 def along_sensors(signals: Array, sensors: Sequence[Sensor]) -> Array:
     """True displacement along every sensor [m], shape (N, S): offset taken off, gain applied."""
     offset = np.array([float(sensor.offset) for sensor in sensors])

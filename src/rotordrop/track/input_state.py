@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.physics import columns as L
+from rotordrop.record.axes import end_columns
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.track.forces import stress_at_force
 from rotordrop.track.problem import DropProblem, RecordedDrop, build_problem
@@ -144,7 +145,7 @@ def corrections_by_record(problem: DropProblem) -> SensorCorrections:
 
 
 def at_bearings(problem: DropProblem, along: Array) -> Array:
-    """Rotor at the bearings [m], shape (N, B, 2), on the straight line through its sensors.
+    """Rotor at the bearings [m], shape (N, B, 2), on the straight line through its outer sensor planes.
 
     ``along`` (N, C) is the displacement along every sensor [m], its gain and offset taken out. A sample that
     lacks a channel gives NaN; a channel that is never there is left out.
@@ -152,7 +153,8 @@ def at_bearings(problem: DropProblem, along: Array) -> Array:
     layout, rigid = problem.model.layout, slice(0, problem.model.basis.n_rigid)
     rows = problem.sensor_rows
     design = np.hstack([rows[:, layout.modal_x][:, rigid], rows[:, layout.modal_y][:, rigid]])
-    live = np.isfinite(along).any(axis=0)
+    machine, live = problem.model.machine, np.flatnonzero(np.isfinite(along).any(axis=0))
+    live = live[end_columns([machine.sensors[i] for i in live], machine.rotor.node_positions)]
     amplitudes = along[:, live] @ np.linalg.pinv(design[live]).T
     shapes = problem.model.parameters.bearing_shape[:, rigid]
     half = shapes.shape[1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.machine import Machine
-from rotordrop.record.axes import sees_both_directions
+from rotordrop.record.axes import end_columns
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction, reduction_for_contact
 from rotordrop.track.calibration import BLIND_SCHEDULE, window_end
@@ -90,15 +90,10 @@ def with_end_planes(machine: Machine) -> Machine:
     the first impacts get wrong has to bend the rotor then, and gains run away with it. Once the parameters
     are found, every plane takes part.
     """
-    planes = {
-        sensor.node: [s for s in machine.sensors if s.node == sensor.node] for sensor in machine.sensors
-    }
-    whole = [node for node, sensors in planes.items() if sees_both_directions(sensors)]
-    if len(planes) <= 2 or len(whole) < 2:
+    ends = end_columns(machine.sensors, machine.rotor.node_positions)
+    if len(ends) == len(machine.sensors):
         return machine
-    z = machine.rotor.node_positions
-    ends = {min(whole, key=lambda node: z[node - 1]), max(whole, key=lambda node: z[node - 1])}
-    return machine.model_copy(update={"sensors": tuple(s for s in machine.sensors if s.node in ends)})
+    return machine.model_copy(update={"sensors": tuple(machine.sensors[i] for i in ends)})
 
 
 def with_sensors_of(model: DropModel, evidence: Evidence) -> Evidence:

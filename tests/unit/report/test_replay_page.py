@@ -102,15 +102,6 @@ def test_confounded_parameters_are_called_so():
     ]
 
 
-def test_supports_of_an_earlier_estimate_have_no_friction_sweep(drop):
-    steps = replace(drop.replay, fixed="drop_060.json", friction=None, correlations=())
-    content = estimate_page(replace(drop, replay=steps))
-    without, with_it = (section(page, "Parameters").text for page in (content, estimate_page(drop)))
-    found = Quantity.of(drop.replay.friction.value, "dimensionless", 2)
-    assert not any("best" in text for text in without)
-    assert any(f"best {found.text} (90 %: {found.interval_text})" in text for text in with_it)
-
-
 def test_values_of_an_earlier_estimate_are_called_so(drop):
     taken = Known(value=2e7, status="taken over", unit="N/m")
     undetermined = replace(taken, status="the record does not determine it")
