@@ -18,7 +18,7 @@ Held = StrEnum("Held", {"free_free": "free-free", "ambs": "AMBs", "touchdown_bea
 def critical_speeds(
     machine: options.Machine,
     top_speed: Annotated[
-        float | None, measured("speed", "Highest speed; 1.1 × nominal when left out.")
+        float | None, measured("speed", "Highest speed; 1.3 × nominal when left out.")
     ] = None,
     held: Annotated[
         list[Held] | None, Option(help="What holds the rotor; all that the machine has when left out.")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
@@ -166,7 +167,7 @@ def _reach(one: ComparedDrop) -> str:
 
 
 def _screen(drops: Sequence[ComparedDrop], bearings: Sequence[str]) -> Table:
-    """Peaks of every drop, one line a bearing."""
+    """Peaks of every drop, one line a bearing, the largest force first."""
 
     def stated(number: Number) -> Column:
         return Column(number.label, lambda row: one_line(row[0].number(row[1], number)))
@@ -177,7 +178,9 @@ def _screen(drops: Sequence[ComparedDrop], bearings: Sequence[str]) -> Table:
         Column("bearing", lambda row: row[1]),
         *map(stated, FIRST),
     )
-    return table([(one, bearing) for one in drops for bearing in bearings], columns)
+    rows = [(one, bearing) for one in drops for bearing in bearings]
+    rows.sort(key=lambda row: -np.nan_to_num(row[0].number(row[1], FIRST[0]).ends[1]))
+    return table(rows, columns)
 
 
 def _name(one: ComparedDrop) -> str:

@@ -41,6 +41,8 @@ from rotordrop.report.style import (
     upright,
 )
 from rotordrop.rotor.campbell import (
+    MORE_ABOVE,
+    MOST_MARGIN,
     CampbellDiagram,
     Crossing,
     Separation,
@@ -69,6 +71,10 @@ _WHIRL_WORDS = {
 DIRECTIONS = {"forward": SERIES[0], "backward": SERIES[1], "mixed": SERIES[2]}
 _DASHES = {"tangent": "solid", "simple": "dash"}
 _WORST_FIRST = ("bad", "good", "warning", "notice")
+NOT_SEARCHED = (
+    "In its AMBs: whether a critical speed is nearer to the nominal speed than API 617 asks for is open, as "
+    "the search ends below 1.26 × nominal (--top-speed)."
+)
 CLEAR = "In its AMBs: no critical speed is nearer to the nominal speed than API 617 asks for."
 ASSUMED = (
     "The machine file gives no stiffness and damping of {}: those in the AMBs hold for an assumed rigid-body "
@@ -178,7 +184,8 @@ def _verdict(
     if "AMBs" in diagrams and (assumed := _assumed(machine)):
         said.append(Statement(ASSUMED.format(f"the AMBs {', '.join(assumed)}"), "warning"))
     elif "AMBs" in diagrams and not near:
-        said.append(Statement(CLEAR, "good"))
+        searched = float(diagrams["AMBs"].speed[-1]) >= (1.0 + MOST_MARGIN + MORE_ABOVE) * top
+        said.append(Statement(CLEAR, "good") if searched else Statement(NOT_SEARCHED, "warning"))
     return tuple(sorted([*said, *near], key=lambda one: _WORST_FIRST.index(one.level)))
 
 

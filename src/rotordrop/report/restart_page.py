@@ -173,7 +173,7 @@ def _of_speed_limit(limit: SpeedLimit, beyond: Known | None) -> str:
     allowed = format_chance(limit.chance)
     if limit.speed is None or limit.interval_90 is None:
         lowest = format_quantity(limit.tried[0], "speed")
-        return f"No speed limit down to {lowest} brings the chance to pass the limit down to {allowed}"
+        return f"These drops show no speed down to {lowest} with a chance of {allowed} to pass the limit"
     speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
     if not limit.needed:
         ends = f" (90 %: {low} at least); take the lower end to be sure"

@@ -32,6 +32,8 @@ from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 DROPS = 24
 """Drops behind the prediction at full speed, half as many at each lower one; chosen, not measured: intervals
 say what they tell."""
+FEWEST = 20
+"""Drops below which the 95 % that next drops stay below is not known."""
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 """Speeds at which drops are simulated where a speed limit is sought, over the full one [1]; chosen, not
 measured."""

@@ -20,8 +20,8 @@ from rotordrop.rotor.suspension import Support, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
 
 REDUCTION = Reduction(modes=16, attachment=True)
-BEYOND_NOMINAL = 1.1
-"""Highest speed of a diagram over the nominal one [1]; chosen, not measured."""
+BEYOND_NOMINAL = 1.3
+"""Highest speed of a diagram over the nominal one [1]: past the largest margin that API 617 asks for."""
 SPEEDS = 61
 """Speeds of a diagram; chosen, not measured."""
 _SPARE_MODES = 4
@@ -180,6 +180,8 @@ LEAST_FACTOR = 2.5
 """Amplification factor below which a mode counts as critically damped and needs no margin [1]."""
 MOST_MARGIN = 0.16
 """Most that API 617 asks for below the operating range, reached at an amplification factor of 18.5 [1]."""
+MORE_ABOVE = 0.10
+"""What it asks for above the operating range beyond that [1]."""
 
 
 def amplification_factor(damping_ratio: float) -> float:
@@ -197,7 +199,7 @@ def required_margin(factor: float, *, above: bool) -> float:
     if factor < LEAST_FACTOR:
         return 0.0
     share = min(0.17 * (1.0 - 1.0 / (factor - 1.5)), MOST_MARGIN)
-    return share + 0.10 if above else share
+    return share + MORE_ABOVE if above else share
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -51,6 +51,15 @@ def test_a_mode_further_off_or_against_the_spin_is_none(told):
     assert problems(*told) == []
 
 
+@pytest.mark.parametrize(("ends", "level"), [(1.3, "good"), (1.1, "warning")])
+def test_margins_are_kept_only_as_far_as_was_searched(ends, level):
+    """The search ended at 1.1 × nominal, below the 26 % that API 617 asks for above it, and said "good"."""
+    maps, diagram = drawn()
+    searched = replace(diagram, crossings=(), speed=np.linspace(0.0, ends * NOMINAL, 3))
+    shown = critical_speeds_page(MACHINE, maps, {"AMBs": searched})
+    assert [one.level for one in shown.verdict if "API 617" in one.text] == [level]
+
+
 @pytest.mark.parametrize(
     ("held", "machine"),
     [("free-free", "small"), ("touchdown bearings", "small"), ("AMBs", "lp400")],

@@ -307,12 +307,13 @@ def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
     estimate = written(tmp_path / "drop.json", machine=machine.name, speed_Hz=80.0)
     file, out, page = (tmp_path / name for name in ("m.toml", "card.json", "card.html"))
     save_machine(machine, file)
-    call = ["restart", str(file), estimate, "--drops", "2", "--json", str(out), "--check", "lift=good"]
+    call = ["restart", str(file), estimate, "--drops", "20", "--json", str(out), "--check", "lift=good"]
     assert run([*call, "--report", str(page)]) == 0
     card = read_document(out)
     assert card["foreseen"]["drops"][0]["speed"] == pytest.approx(2 * math.pi * 80.0)
     assert card["made"] == {"lift": "good"}
     assert f"Restart of {machine.name}" in page.read_text()
+    assert run([*call[:3], "--drops", "8"]) == UsageError.exit_code  # too few for 95 %
     save_machine(example_machine("lp400"), file)
     assert run(call) == UsageError.exit_code
 

@@ -58,6 +58,8 @@ _GLUED_LOADS: dict[str, Literal["light", "medium", "heavy"]] = {
     "M": "medium",
     "H": "heavy",
 }
+_OF_ROLLERS = ("NU", "NJ", "NUP", "NF", "NN", "NNU")
+"""Prefixes of cylindrical roller bearings."""
 _SPINDLE_PREFIXES = ("S", "SM", "KH", "HYS", "HYSM", "HYKH")
 _ARRANGEMENTS: dict[str, Literal["X", "O", "tandem"]] = {"DB": "O", "DF": "X", "DT": "tandem"}
 _PRELOADS: dict[str, Literal["light", "medium", "heavy"]] = {
@@ -142,7 +144,7 @@ def _read(text: str) -> Designation | None:
     series, bore = _SERIES.get(found["series"], found["series"]), _bore(found)
     prefix = re.sub(r"[^A-Z0-9]", "", plain[: found.start()])
     suffix = plain[found.end() :]
-    if bore is None or len(prefix) > 6:
+    if bore is None or len(prefix) > 6 or prefix in _OF_ROLLERS:
         return None
     angle = _contact_angle(suffix, found["series"], prefix)
     angular = series.startswith("7") or angle is not None
