@@ -13,6 +13,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -253,6 +254,8 @@ def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
         os.environ.setdefault(variable, number)
     open_streams()
     _print_log()
+    # a search that steps where its model has no value comes back by itself
+    warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"scipy\.optimize")
     with interruptions_kept() as was_pressed:
         try:
             code = run(sys.argv[1:], program, name)
