@@ -21,6 +21,7 @@ from rotordrop.evidence.rest import PUSH, of_few, sag_under, stay
 from rotordrop.known import NINETY
 from rotordrop.record.profile import Profile, rules_of
 from rotordrop.record.record import Record, open_record
+from rotordrop.require import require
 from rotordrop.series import SIGMA_OF_MEDIAN, noise_by_differences
 
 if TYPE_CHECKING:
@@ -156,6 +157,11 @@ def measure_clearance(
     `rotordrop.evidence.rest.PUSH`. Not validated: the weight bends and tilts the shaft between the pushes,
     which is left out.
     """
+    require(record, "record", str, Path, Record)
+    if machine is not None:
+        from rotordrop.machine import Machine as Described  # takes a while to load
+
+        require(machine, "machine", Described)
     rules = rules_of(profile, mapping)
     read = record if isinstance(record, Record) else open_record(record, machine, profile=rules)[0]
     refuse_unusable([*check_clock(read, drop=False), *check_channels(read)], read.name)

@@ -93,7 +93,8 @@ class Record:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", each(self.sensors, "sensors", Sensor))
-        object.__setattr__(self, "sampling_rate", float(numbers(self.sampling_rate, "sampling_rate", ())))
+        rate = float(numbers(self.sampling_rate, "sampling_rate", ()))
+        object.__setattr__(self, "sampling_rate", require(rate, "sampling_rate", float, above=0.0))
         require(self.speed_by_hand, "speed_by_hand", bool)
         require(self.path, "path", Path, none=True)
         require(self.sha256, "sha256", str)
@@ -158,7 +159,7 @@ class Record:
         require(unit, "unit", str, Mapping, hint="Say it, for example unit='um'")
         columns = _columns(signals, names)
         count = len(next(iter(columns.values())))
-        first = in_si(start, "time", "start")
+        first = require(in_si(start, "time", "start"), "start", float)
         if isinstance(time, str):
             rate = require(parse_quantity(time, "frequency"), "the sampling rate in time", float, above=0.0)
             clock = np.asarray(first + np.arange(count) / rate)
@@ -551,7 +552,7 @@ def _record_of_channels(
 ) -> Record:
     """A record of channels in memory, with the speed given by hand or as readings."""
     if isinstance(speed, str | int | float):
-        constant = f"{in_si(speed, 'speed', 'speed')!r} rad/s"
+        constant = f"{require(in_si(speed, 'speed', 'speed'), 'speed', float)!r} rad/s"
         rules = rules.model_copy(update={"speed": SpeedSource(constant=constant)})
     elif speed is not None:
         if not isinstance(speed, tuple) or len(speed) != 2 or not isinstance(speed[1], str):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rotordrop.estimate.changed import unlike
 from rotordrop.estimate.published import Drop
+from rotordrop.require import each, require
 from rotordrop.restart.damages import AIR_GAP, CHECKS, DAMAGES, Check, Damage, require_check
 from rotordrop.restart.evidence import Indicator, in_order, indicators
 from rotordrop.restart.foreseen import Foreseen
@@ -69,7 +70,10 @@ def restart_card(
     UsageError
         For a check or an outcome that nobody knows, or an earlier drop that was later.
     """
-    made = dict(checks or {})
+    require(drop, "drop", Drop, hint="read_drop(Path('drop.json')) gives one")
+    each(earlier, "earlier", Drop)
+    require(foreseen, "foreseen", Foreseen, none=True, hint="next_drops(machine, speed, {}) gives one")
+    made = dict(require(checks or {}, "checks", Mapping, hint="Write {'lift': 'good'}"))
     for name, outcome in made.items():
         require_check(name, outcome)
     ordered = in_order(drop, earlier)

@@ -26,6 +26,10 @@ class CentredStart:
     """The rotor starts straight, at rest and in the centre of all bearings."""
 
 
+FARTHEST, FASTEST = 0.02, 100.0
+"""Displacement [m] and velocity [m/s] at a start beyond which a unit is mistyped (chosen)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlacedStart:
     """The rotor starts straight, from given positions and velocities at the first and last
@@ -39,8 +43,9 @@ class PlacedStart:
     """Velocity there [m/s], shape (B, 2)."""
 
     def __post_init__(self) -> None:
-        for name in ("displacement", "velocity"):
-            numbers(getattr(self, name), name, finite=True)
+        for name, most in (("displacement", FARTHEST), ("velocity", FASTEST)):
+            largest = np.abs(numbers(getattr(self, name), name, finite=True)).max(initial=0.0)
+            require(float(largest), f"the largest {name}", float, most=most)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ from rotordrop.errors import SimulationError, UsageError
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write
 from rotordrop.physics.hertz import LineContact
-from rotordrop.require import require
+from rotordrop.require import each, require
 from rotordrop.rotor.layout import ROTOR_AXIAL
 from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
@@ -250,7 +250,9 @@ class DropResult(SimulationResult):
         """Rotor displacement [m] at any nodes (numbered from 1), shape (T, len(nodes), 2)."""
         from rotordrop.simulate._histories import node_displacements
 
-        rows = self.shapes[2 * (np.asarray(nodes) - 1)]
+        last = len(self.shapes) // 2
+        chosen = [require(one, "a node", int, least=1, most=last) for one in each(nodes, "nodes", int)]
+        rows = self.shapes[2 * (np.array(chosen, dtype=np.int64) - 1)]
         return node_displacements(self.state, np.ascontiguousarray(rows))
 
     def to_dataframe(self) -> pandas.DataFrame:

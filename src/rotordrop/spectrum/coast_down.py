@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from rotordrop.files import new_hdf5
 from rotordrop.known import Known
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress
+from rotordrop.require import each, require
 from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.indentation import (
@@ -111,6 +112,13 @@ class WaterfallChoice:
     """Samples per frame; the paper's when left out, less for a short signal."""
     overlap: float = 0.5
     """Share of a frame that is used again [1]."""
+
+    def __post_init__(self) -> None:
+        for one in each(self.components, "components", str):
+            require(one, "a component", str, among=get_args(Component))
+        require(self.amplitude_kind, "amplitude_kind", str, among=get_args(AmplitudeKind))
+        require(self.highest_frequency, "highest_frequency", float, above=0.0)
+        require(self.points, "points", int, least=1, none=True)
 
 
 @dataclass(frozen=True, kw_only=True)

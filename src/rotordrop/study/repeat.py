@@ -21,6 +21,7 @@ from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
+from rotordrop.require import require
 from rotordrop.rotor.unknowns import smallest_gap
 from rotordrop.study.distributions import Distribution
 from rotordrop.study.plan import Study
@@ -75,6 +76,9 @@ def repeat_study(
     time and the unbalances are as a filter takes them before it reads a record. Each magnet holds the rotor
     beside its centre, on an orbit of its own.
     """
+    require(machine, "machine", Machine)
+    require(speed, "speed [rad/s]", float)
+    require(duration, "duration [s]", float, above=0.0)
     if not machine.ambs:
         raise UsageError("a virtual repeat starts levitated, but the machine has no AMBs; describe them")
     origin = machine.calibration

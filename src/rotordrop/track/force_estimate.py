@@ -165,6 +165,9 @@ def estimate_force(
     last = len(require(machine, "machine", Machine).rotor.node_positions)
     for sensor in require(record, "record", Record).sensors:  # it may have others than the machine file
         require(sensor.node, f"the node of sensor {sensor.name} of the record", int, least=1, most=last)
+    if not np.isfinite(record.signals).any(axis=0).all():
+        raise RecordError("a channel of the record holds no reading at all; leave its sensor out")
+    require(known_forces, "known_forces", Mapping, none=True, hint="Write {node: force}")
     chosen = _nodes_of(machine, nodes)
     dt = _time_step(record)
     holding = _held_values(machine, held)

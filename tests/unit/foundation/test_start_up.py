@@ -16,6 +16,10 @@ from tests.published import bearing, published, value
 
 import rotordrop as rd
 from rotordrop.errors import RotordropError
+from rotordrop.evidence.clearance import measure_clearance
+from rotordrop.restart.card import restart_card
+from rotordrop.spectrum.coast_down import WaterfallChoice
+from rotordrop.study.repeat import repeat_study
 
 HEAVY = set("scipy scipy.signal numba llvmlite plotly pandas xarray h5py matplotlib pint".split())
 HEAVY |= {"pydantic", "jinja2", "numpy"}
@@ -246,6 +250,32 @@ WRONG = {
         "tail has sensor .* for another machine",
     ),
     "half a node": (lambda: force(nodes=[2.5]), r"nodes\[0\] is 2.5"),
+    "no drop to restart after": (lambda: restart_card(None), "drop is None; expected a Drop"),
+    "one earlier drop": (lambda: restart_card(published(), earlier=published()), r"earlier\[0\] is a tuple"),
+    "names of checks": (lambda: restart_card(published(), checks=["good"]), "checks is a list"),
+    "a number foreseen": (lambda: restart_card(published(), foreseen=5), "foreseen is 5"),
+    "a number for a lift check": (lambda: measure_clearance(5), "record is 5; expected a text or"),
+    "a name for a machine": (
+        lambda: measure_clearance("lift.csv", machine="lp400"),
+        "machine is 'lp400'; expected a Machine",
+    ),
+    "amplitude": (lambda: WaterfallChoice(amplitude_kind="rms"), "amplitude_kind is 'rms'; expected one of"),
+    "direction": (lambda: WaterfallChoice(components=("z",)), "a component is 'z'; expected one of x, y"),
+    "no frequency": (lambda: WaterfallChoice(highest_frequency=np.nan), "highest_frequency is nan"),
+    "start at a million m/s": (
+        lambda: rd.PlacedStart(displacement=np.zeros((2, 2)), velocity=np.full((2, 2), 1e6)),
+        "the largest velocity is 1000000.0; expected a finite number up to 100",
+    ),
+    "repeats at a text": (lambda: repeat_study(MACHINE, "60 Hz", duration=0.2), "speed .* is '60 Hz'"),
+    "repeats of no time": (lambda: repeat_study(MACHINE, 377.0, duration=-1.0), "duration .* is -1.0"),
+    "no speed": (lambda: made(speed=np.nan), "speed is nan"),
+    "an endless start": (lambda: made(time="20 kHz", start=np.inf), "start is inf"),
+    "a rate that is none": (lambda: plain(sampling_rate=np.nan), "sampling_rate is nan"),
+    "no reading at all": (
+        lambda: rd.estimate_force(MACHINE, made(signals=np.nan * SIGNALS), held="free-free"),
+        "holds no reading at all",
+    ),
+    "a force without node": (lambda: force(held="free-free", known_forces=5), "known_forces is 5"),
     "a mask of another shape": (
         lambda: replace(RECORD, missing=np.zeros((3, 4), dtype=bool)),
         r"missing has the shape \(3, 4\); expected \(200, 4\)",
