@@ -27,6 +27,7 @@ from rotordrop.study.summary import StudyResults, exceedance
 from rotordrop.track.prior import fall_time
 from rotordrop.twin.calibrated import as_filed, machine_values
 from rotordrop.twin.joint_covariance import joint_covariance
+from rotordrop.twin.problems import WINDOW
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 
 DROPS = 24
@@ -39,9 +40,8 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 measured."""
 MOST_BEYOND = 0.05
 """Chance that the next drop passes a limit, to which a speed limit brings it down [1]; chosen."""
-DURATION, LONGER = 0.2, 1.25
-"""Time that is simulated of a drop [s]; what is simulated beyond the largest motion of the last drop, where
-that came later, over its time [1]; both chosen."""
+LONGER = 1.25
+"""Time simulated over that of the last drop's largest motion after its estimated part [1]; chosen."""
 DRAWN_AGAIN = 400
 """Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
 
@@ -118,7 +118,7 @@ def next_drops(
     """
     if duration is None:
         later = [] if drop is None else [one.later_time for one in drop.later_motion if one.larger]
-        duration = max(DURATION, LONGER * max(later, default=0.0))
+        duration = max(WINDOW, LONGER * max(later, default=0.0))
     found = None if drop is None else found_machine(machine, drop)
     at, names = found or machine, [bearing.name for bearing in machine.touchdown_bearings]
     shares = shares or (SHARES if limits else SHARES[:1])

@@ -120,7 +120,7 @@ def sweep(
         The machine around which values vary.
     vary : mapping
         Values by path (``"NDE.support.stiffness"``, ``"*.friction.dynamic"`` for all touchdown bearings with
-        one value) or by name of the case (``"speed"``); texts with units, or numbers in SI units.
+        one value) or by name of the case (``"speed"``); texts with units, or pure numbers.
     repeats : int
         Drops of each combination; they differ in what is left to chance, above all the rotor angle.
     folder : path, optional
