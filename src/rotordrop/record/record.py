@@ -372,7 +372,7 @@ class Record:
     def window(self, start: float, end: float) -> Self:
         """Give the samples from `start` to `end` [s], no copies of them; the speed readings stay whole."""
         numbers([start, end], "start and end")
-        slack = 1e-3 / self.sampling_rate if np.isfinite(self.sampling_rate) else 0.0
+        slack = 1e-3 / self.sampling_rate
         inside = np.flatnonzero((self.time >= start - slack) & (self.time <= end + slack))
         if not len(inside):
             reaches = f"the record reaches from {self.time[0]:.6g} s to {self.time[-1]:.6g} s"

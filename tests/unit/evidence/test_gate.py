@@ -407,11 +407,6 @@ class TestClock:
         assert [one.kind for one in check_clock(slow)] == ["slow sampling"]
         assert check_clock(slow, drop=False) == []
 
-    @pytest.mark.parametrize("rate", [float("nan"), 0.0, float("inf")])
-    def test_a_rate_that_is_none(self, drop, machine, rate):
-        found = check_record(replace(drop, sampling_rate=rate), machine)
-        assert [finding.kind for finding in found] == ["wrong sampling rate"]
-
 
 def test_the_fall_has_begun_when_half_of_the_channels_went_a_quarter_of_their_way(drop):
     """Whatever units and polarities: one channel in volts, one inverted, one dead, one late."""

@@ -271,6 +271,7 @@ WRONG = {
     "no speed": (lambda: made(speed=np.nan), "speed is nan"),
     "an endless start": (lambda: made(time="20 kHz", start=np.inf), "start is inf"),
     "a rate that is none": (lambda: plain(sampling_rate=np.nan), "sampling_rate is nan"),
+    "an infinite rate": (lambda: plain(sampling_rate=np.inf), "sampling_rate is inf"),
     "no reading at all": (
         lambda: rd.estimate_force(MACHINE, made(signals=np.nan * SIGNALS), held="free-free"),
         "holds no reading at all",

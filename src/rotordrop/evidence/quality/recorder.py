@@ -46,8 +46,6 @@ _RATE_KEYS = re.compile(r"^(fs|sampl\w*[ _-]*(rate|frequency)|abtast(rate|freque
 def check_clock(record: Record, *, drop: bool = True) -> list[Finding]:
     """Find backward, jittered or wrong clocks and gaps in them."""
     rate, time, steps = record.sampling_rate, record.time, np.diff(record.time)
-    if not 0.0 < rate < np.inf:
-        return [found("no-rate", rate=rate)]
     if drop and rate < NO_FALL:
         lasts = record.duration
         return [found("no-fall-between", rate=rate, lasts=lasts, in_ms=1e3 * rate, lasts_ms=1e-3 * lasts)]
