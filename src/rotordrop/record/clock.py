@@ -79,6 +79,22 @@ def _factor(stamps: NDArray[Any]) -> float:
     return next((factor for least, factor in _COUNTS if abs(first) > least), 1.0)
 
 
+def with_times(recording: Recording, place: str) -> Recording:
+    """The recording without samples whose time is no number; RecordError where a channel has no others."""
+    channels, untimed = [], 0
+    for one in recording.channels:
+        known = np.isfinite(one.time)
+        if len(known) and not known.any():
+            remedy = 'say the step in a profile, [time] step = "50 us"'
+            raise RecordError(
+                f"{place}: none of the {len(known)} times of {one.label!r} is a number; {remedy}"
+            )
+        untimed = max(untimed, int(np.sum(~known)))
+        channels.append(one if known.all() else replace(one, time=one.time[known], values=one.values[known]))
+    words = (f"left out, without a time: {untimed} of the samples",) if untimed else ()
+    return replace(recording, channels=tuple(channels), warnings=(*recording.warnings, *words))
+
+
 def from_first_stamp(recording: Recording) -> Recording:
     """The recording, its times from the first stamp where they count from a date."""
     origin = next((float(one.time[0]) for one in recording.channels if len(one.time)), 0.0)

@@ -27,7 +27,7 @@ from rotordrop.record.axes import (
     sensor_directions,
     sensor_planes,
 )
-from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock
+from rotordrop.record.clock import even, even_clock, from_first_stamp, in_seconds, on_one_clock, with_times
 from rotordrop.record.columns import (
     NO_FILE,
     displacement,
@@ -449,7 +449,7 @@ def record_of(
     place = str(path or NO_FILE)
     if not sensors:
         raise RecordError("the machine has no sensors; describe them in [[sensors]] of the machine file")
-    recording = from_first_stamp(recording)
+    recording = from_first_stamp(with_times(recording, place))
     channels, set_back = gone_on(recording.channels)
     recording = replace(recording, channels=channels)
     matched = [

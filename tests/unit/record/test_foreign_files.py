@@ -19,6 +19,7 @@ from tests.unit.record.exports import (
     universal,
 )
 
+from rotordrop import read_record
 from rotordrop.errors import RecordError
 from rotordrop.record.profile import Profile, TextLayout
 from rotordrop.record.readers import read_recording
@@ -45,6 +46,23 @@ def test_segments_that_do_not_follow_are_told_and_chosen(tmp_path):
     second = read(path, text=TextLayout(first_data_line=line))
     assert second.warnings == ()
     np.testing.assert_allclose(second.channels[0].values, VOLTS[25:, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf])
+def test_samples_without_a_time_are_left_out(tmp_path, time):
+    times = STEP * np.arange(400.0)
+    times[[0, 200, 399]] = time
+    path = tmp_path / "drop.csv"
+    rows = np.column_stack([times, np.sin(np.arange(1600.0)).reshape(400, 4)])
+    np.savetxt(path, rows, delimiter=",", header="time [s],A [um],B [um],C [um],D [um]", comments="")
+    record = read_record(path)
+    assert len(record.time) == 398 and record.missing.sum() == 4
+    assert "left out, without a time: 3 of the samples" in record.warnings
+    path.write_text(re.sub(r"(?m)^[-\d.]+e[^,]*", "nan", path.read_text()))
+    with pytest.raises(
+        RecordError, match="none of the 400 times of 'A' is a number; say the step in a profile"
+    ):
+        read_record(path)
 
 
 def test_damage_to_segments_of_labview_is_told(tmp_path):
