@@ -130,15 +130,9 @@ def _read(
             f"{len(tails)} tails for {len(records)} records; expected one for all, one for each, or none. "
             "Repeat --tail in the order of the records."
         )
+    rules, planes = (tail_profile, ()) if tail_profile else (profile, mapping)
     found: list[Record | None] = [
-        read_record(
-            path,
-            machine,
-            profile=tail_profile or profile,
-            mapping=() if tail_profile else mapping,
-            tail=True,
-        )
-        for path in tails
+        read_record(path, machine, profile=rules, mapping=planes, tail=True) for path in tails
     ]
     return read, found if len(found) == len(read) else (found or [None]) * len(read)
 
@@ -151,10 +145,6 @@ def calibrate(
     mapping: options.Planes = None,
     profile: options.Profile = None,
     tail_profile: options.TailProfile = None,
-    even_if_inconsistent: Annotated[
-        bool,
-        Option("--even-if-inconsistent", help="Write the machine file, marked, although it does not fit."),
-    ] = False,
     json: options.Json = None,
 ) -> None:
     """Calibrate a machine on recorded drops.
@@ -174,8 +164,7 @@ def calibrate(
         refuse_unusable(check_record(record, description, rest), record.name)
     with progress_bar("calibrating") as report:
         result = calibrate_machine(description, read, tails, progress=report)
-    written = result.consistent or even_if_inconsistent
-    if written:
+    if result.consistent:
         save_machine(result.machine, output)
 
     def summarise(out: Console) -> None:
@@ -187,14 +176,13 @@ def calibrate(
         for pair in result.confounded:
             apart = f"(correlation {pair.correlation:.2f}); {pair.way_out}"
             out.print(f"confounded: {pair.first} and {pair.second} {apart}")
-        if written:
+        if result.consistent:
             out.print(f"Calibrated machine, every value with its interval: {output}")
 
     deliver(calibration_json(result), json, summarise)
     if not result.consistent:
-        outcome = f"{output} is marked as such" if written else f"{output} was not written"
         raise ConsistencyError(
-            f"{result.sentence()} {outcome}: air gaps and supports that do not fit would send every later "
-            "estimate the wrong way. Leave out the drop that does not fit, check sensors and bearing nodes, "
-            "or give better guesses; --even-if-inconsistent writes the file all the same."
+            f"{result.sentence()} {output} was not written: air gaps and supports that do not fit would send "
+            "every later estimate the wrong way. Leave out the drop that does not fit, check sensors and "
+            "bearing nodes, or give better guesses."
         )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -17,7 +15,7 @@ from typer import Argument
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, text_option
-from rotordrop.cli._output import console, deliver, require_places
+from rotordrop.cli._output import console, deliver
 from rotordrop.errors import UsageError
 from rotordrop.units import format_minute, format_quantity
 
@@ -27,20 +25,17 @@ if TYPE_CHECKING:
 
 LARGEST = (("force, 90 %", "peak_force_N", 1.0, "N"), ("stress, 90 %", "peak_stress_Pa", 1e-6, "MPa"))
 WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
-WHAT = "add: estimate.json; remove: number of the drop; export: file of the table (.csv)."
+WHAT = "add: estimate.json; remove: number of the drop."
 
 
-Action = StrEnum("Action", ["add", "show", "allow", "remove", "export"])
+Action = StrEnum("Action", ["add", "show", "allow", "remove"])
 """What to do with a log."""
 
 
 def log(
     action: Annotated[
         Action,
-        Argument(
-            metavar="ACTION",
-            help="add an estimate, show, allow, remove a drop, export a table.",
-        ),
+        Argument(metavar="ACTION", help="add an estimate, show, allow, remove a drop."),
     ],
     where: Annotated[str, Argument(metavar="LOG", help="SQLite file, or postgresql://….")],
     what: Annotated[str | None, Argument(metavar="[WHAT]", help=WHAT)] = None,
@@ -65,10 +60,6 @@ def log(
     """
     from rotordrop.ledger import book
 
-    if action is Action.export and what is not None:
-        if Path(what).resolve() == Path(where).resolve():
-            raise UsageError(f"{what} is the log itself; name another file for the table")
-        require_places(Path(what))
     if action is Action.add:
         drop = _drop(what, bearings, recorded, duration, cause)
         number = book.add_drop(where, drop)
@@ -82,9 +73,6 @@ def log(
         _allow(where, machine, bearings, drops, seconds, source)
     log = book.read_log(where)
     found = book.logged_drops(log, machine=machine)
-    if action is Action.export:
-        _export(found, what)
-        return
     shares = [share for share in book.used_shares(log) if machine in (None, share.machine)]
     rising = book.trends(log, machine=machine)
     content = {
@@ -129,25 +117,6 @@ def _drop(what: str | None, bearings: str, recorded: str, duration: float | None
             f"{recorded!r} is not a date; write it as 2026-03-14 or 2026-03-14T15:09:26"
         ) from error
     return drop_of_estimate(drop, bearings, recorded=date, duration=duration, cause=cause)
-
-
-def _export(found: Mapping[int, LoggedDrop], file: str | None) -> None:
-    """Write one row for each number of each drop."""
-    from rotordrop.files import write_text
-    from rotordrop.ledger.book import COLUMNS
-
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["number", *COLUMNS, "bearing", "quantity", "unit", "value", "lower", "upper"])
-    for number, drop in found.items():
-        common = [number, *(getattr(drop, key) for key in COLUMNS)]
-        for one in drop.severity or (None,):
-            table.writerow([*common, *([""] * 6 if one is None else asdict(one).values())])
-    if file is None:
-        typer.echo(text.getvalue(), nl=False)
-        return
-    write_text(file, text.getvalue())
-    console().print(f"Table: {file}")
 
 
 def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str]) -> ReportContent:

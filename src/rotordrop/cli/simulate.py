@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
@@ -25,15 +24,6 @@ REST_VELOCITY = 5e-3
 micrometre."""
 
 
-class Spin(StrEnum):
-    """What makes the speed fall."""
-
-    dynamic = "dynamic"
-    prescribed = "prescribed"
-    coasting = "coasting"
-    constant = "constant"
-
-
 def simulate(
     machine: options.Machine,
     speed: options.PowerOffSpeed,
@@ -52,9 +42,6 @@ def simulate(
             '"0 s: lost NDE x".',
         ),
     ] = None,
-    spin: Annotated[
-        Spin, Option(help="What brakes: drag and friction; a drag profile; friction alone; nothing.")
-    ] = Spin.dynamic,
     reduction: options.ReductionChoice = options.Reduction.accurate,
     tolerance: options.Tolerance = 1e-6,
     certify: Annotated[
@@ -90,7 +77,6 @@ def simulate(
         tolerance=tolerance,
         reduction=reduction.value,
         start=LevitatedStart() if levitated else CentredStart(),
-        spin=spin.value,
         magnets=tuple(map(magnet_event, magnets)) if magnets else None,
     )
     warning = long_run(described, duration, case.most_steps)

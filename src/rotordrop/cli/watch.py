@@ -34,9 +34,6 @@ def watch(
     ] = None,
     quick: Annotated[bool, Option("--quick", help="One pass for machines that are calibrated.")] = False,
     once: Annotated[bool, Option("--once", help="Do what stands there, then end.")] = False,
-    every: Annotated[
-        float, Option("--every", min=0.1, metavar="SECONDS", help="How often the folder is looked at.")
-    ] = 5.0,
 ) -> None:
     """Watch a folder: estimate, log and report every record that arrives in it, once.
 
@@ -57,7 +54,6 @@ def watch(
         log=log,
         hook=hook,
         quick=quick,
-        every=every,
         say=say,
         complain=lambda line: notes.print(f"note: {line}", markup=False, soft_wrap=True),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -120,8 +120,6 @@ class Allowance:
     source: Annotated[str, Field(strict=True, max_length=10_000, pattern=r"\S")] = ""
 
 
-COLUMNS = tuple(item.name for item in fields(LoggedDrop) if item.name != "severity")
-"""What a log keeps of a drop beside its severity."""
 _DROP, _ALLOWANCE = TypeAdapter(LoggedDrop), TypeAdapter(Allowance)
 
 

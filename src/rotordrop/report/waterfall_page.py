@@ -88,13 +88,11 @@ def waterfall_page(
     facts: tuple[tuple[str, str], ...] = (),
     simulated: str = "",
     against: str = "time",
-    highest: float | None = None,
     drawn: bool = True,
 ) -> ReportContent:
     """Build the report on the frequencies of a coast-down, with its sections where they are wanted.
 
-    Waterfalls go upwards with the time or the speed (``against``), as far as anything happens, or up to a
-    ``highest`` frequency [Hz].
+    Waterfalls go upwards with the time or the speed (``against``), as far as anything happens.
     """
     return ReportContent(
         title=title,
@@ -102,13 +100,11 @@ def waterfall_page(
         simulated=simulated,
         verdict=_verdict(analysis),
         facts=(*facts, ("rotordrop", __version__)),
-        sections=frequency_sections(analysis, against, highest) if drawn else (),
+        sections=frequency_sections(analysis, against) if drawn else (),
     )
 
 
-def frequency_sections(
-    analysis: CoastDownAnalysis, against: str = "time", highest: float | None = None
-) -> tuple[Section, ...]:
+def frequency_sections(analysis: CoastDownAnalysis, against: str = "time") -> tuple[Section, ...]:
     """Displacement, waterfalls, lines, orders with the resonances they pass, and the speed law."""
     role = "measured" if analysis.signal.recorded else "simulated"
     histories = {name: plane.history for name, plane in analysis.planes.items()}
@@ -122,7 +118,7 @@ def frequency_sections(
     tracked = any(plane.track is not None for plane in analysis.planes.values())
     return (
         Section("Displacement over the coast-down", figures=(displacement,)),
-        _waterfall_section(analysis, against, highest),
+        _waterfall_section(analysis, against),
         Section("Lines", reasons if lines else (NO_LINE,), tables=(line_table(analysis),) if lines else ()),
         *((_order_section(analysis),) if tracked else ()),
         *(() if analysis.speed_law is None else (_law_section(analysis, analysis.speed_law),)),
@@ -219,9 +215,8 @@ def where_of(line: Line) -> str:
     return with_error(line.order, line.order_error, "X").replace(" ", NO_BREAK)
 
 
-def _waterfall_section(analysis: CoastDownAnalysis, against: str, highest: float | None) -> Section:
-    figures = []
-    top = highest_shown(analysis) if highest is None else highest
+def _waterfall_section(analysis: CoastDownAnalysis, against: str) -> Section:
+    figures, top = [], highest_shown(analysis)
     for name, plane in analysis.planes.items():
         lines = [line for line in analysis.lines if name in line.forward and line.named]
         for fall in plane.waterfalls:

@@ -198,7 +198,6 @@ def test_a_full_disk_is_a_sentence(verb, option, things, tmp_path, monkeypatch, 
         "init {long}.toml --simple",
         "watch {long} --machines {long} --once",
         "log allow l.db --machine M --drops 3 --source s",
-        "log export l.db x.csv",
     ],
 )
 def test_a_name_that_is_too_long_and_a_folder_that_is_gone_are_a_sentence(
