@@ -110,21 +110,13 @@ def profile(
     output: Annotated[Path, file_option("--output", "Profile to write, a .toml file.", "-o")],
     machine: Annotated[Path | None, file_option("--machine", "Machine whose sensors need a channel.")] = None,
     mapping: options.Planes = None,
+    profile: Annotated[Path | None, file_option("--profile", "Profile to begin with.")] = None,
     unit: Annotated[str | None, text_option("TEXT", "Unit of displacements that name none, um.")] = None,
     sensitivity: Annotated[str | None, text_option("TEXT", 'Volts per length, "8 mV/um".')] = None,
     full_scale: Annotated[str | None, text_option("TEXT", 'Full scale of a WAV file, "500 um".')] = None,
     speed: Annotated[str | None, text_option("TEXT", 'Speed by hand, "60 Hz".')] = None,
     speed_channel: Annotated[str | None, text_option("TEXT", "Channel of the shaft speed.")] = None,
-    speed_unit: Annotated[str | None, text_option("TEXT", "Its unit, rpm.")] = None,
     pulses: Annotated[str | None, text_option("TEXT", "Channel of tacho or keyphasor pulses.")] = None,
-    pulses_per_turn: Annotated[int | None, Option(min=1, metavar="N", help="Pulses per turn, 1.")] = None,
-    edge: Annotated[str | None, text_option("TEXT", "Edge that counts, rising or falling.")] = None,
-    time_step: Annotated[str | None, text_option("TEXT", 'Sampling interval, "50 us".')] = None,
-    time_start: Annotated[str | None, text_option("TEXT", 'Time of the first sample, "-0.25 s".')] = None,
-    names: Annotated[str | None, text_option("TEXT", "Names of the columns, commas between them.")] = None,
-    file_format: Annotated[
-        str | None, Option("--format", metavar="SUFFIX", help="Reader, where the suffix lies.")
-    ] = None,
 ) -> None:
     """Make a profile of a recorder: what its files do not say themselves, said once.
 
@@ -134,17 +126,13 @@ def profile(
     from rotordrop.record.profile import profile_of, rules_of, save_profile
     from rotordrop.record.readers import read_recording
 
-    def stated(**entries: object) -> dict[str, Any]:
-        return {name: value for name, value in entries.items() if value is not None}
+    def with_stated(entries: dict[str, Any], **said: object) -> dict[str, Any]:
+        return entries | {name: value for name, value in said.items() if value is not None}
 
-    turning = stated(constant=speed, channel=speed_channel, unit=speed_unit, pulses=pulses, edge=edge)
-    parts = {
-        "text": stated(names=None if names is None else [name.strip() for name in names.split(",")]),
-        "time": stated(step=time_step, start=time_start),
-        "speed": turning | stated(pulses_per_turn=pulses_per_turn),
-    }
-    whole = stated(format=file_format, unit=unit, sensitivity=sensitivity, full_scale=full_scale)
-    given = rules_of(profile_of(whole | parts, "the options"), mapping or [])
+    begun = rules_of(profile).model_dump(exclude_defaults=True)
+    turning = with_stated(begun.get("speed", {}), constant=speed, channel=speed_channel, pulses=pulses)
+    whole = with_stated(begun, unit=unit, sensitivity=sensitivity, full_scale=full_scale, speed=turning)
+    given = rules_of(profile_of(whole, "the options"), mapping or [])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors
@@ -262,10 +250,6 @@ def waterfall(
         int | None,
         Option(min=16, metavar="N", help="Samples per frame; the paper's 32768, less in a short record."),
     ] = None,
-    highest: Annotated[
-        float | None,
-        measured("frequency", "Highest frequency drawn; as far as anything happens when left out."),
-    ] = None,
     mapping: options.Planes = None,
     profile: options.Profile = None,
     output: Annotated[
@@ -296,7 +280,6 @@ def waterfall(
     choice = WaterfallChoice(
         components=tuple(direction.value for direction in component or tuple(Direction)),
         amplitude_kind=amplitude.value,
-        highest_frequency=highest or WaterfallChoice().highest_frequency,
         points=points,
     )
     with progress_bar("frequencies") as progress:
@@ -314,7 +297,6 @@ def waterfall(
         ),
         simulated=simulated,
         against=against.value,
-        highest=highest,
         drawn=report is not None,
     )
     if output is not None:
