@@ -77,6 +77,8 @@ def machine_first(*files: Path) -> list[Path]:
 
 Reduction = StrEnum("Reduction", ["accurate", "quick", "full"])
 """Presets of the reduction of the rotor."""
+FEWEST_DROPS = 20
+"""Drops below which the 95 % that next drops stay below is not known."""
 
 
 Machine = Annotated[

@@ -10,7 +10,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
-from rotordrop.cli._options import file_option, pairs
+from rotordrop.cli._options import FEWEST_DROPS, file_option, pairs
 from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
@@ -49,7 +49,7 @@ def restart(
     from rotordrop.report.restart_page import restart_numbers, restart_page
     from rotordrop.restart.card import restart_card
     from rotordrop.restart.foreseen import Foreseen
-    from rotordrop.restart.next_drop import DROPS, FEWEST, lift_now, next_drops
+    from rotordrop.restart.next_drop import DROPS, lift_now, next_drops
     from rotordrop.study.repeat import COMPARED
 
     described, drop = load_machine(machine), read_drop(estimate)
@@ -67,10 +67,10 @@ def restart(
     restart_card(drop, earlier=earlier, checks=made)  # refuses before anything is simulated
     found = Foreseen()
     count = DROPS if drops is None else drops
-    if 0 < count < FEWEST:
+    if 0 < count < FEWEST_DROPS:
         raise UsageError(
-            f"--drops {count}: so few do not say what 95 % of drops stay below; give {FEWEST} or more, or 0 "
-            "to leave them out"
+            f"--drops {count}: so few do not say what 95 % of drops stay below; give {FEWEST_DROPS} or more, "
+            "or 0 to leave them out"
         )
     if count and described.ambs:
         speed = 2.0 * math.pi * drop.speed_Hz

@@ -132,7 +132,7 @@ def study_repeat(
     speed: Annotated[
         float | None, measured("speed", 'Predict at this speed, "210 Hz"; else that of the drop.')
     ] = None,
-    drops: Annotated[int, Option(min=20, metavar="N", help="Drops to simulate.")] = 500,
+    drops: Annotated[int, Option(min=options.FEWEST_DROPS, metavar="N", help="Drops to simulate.")] = 500,
     seed: Annotated[int, Option(min=0, metavar="N", help="Key of the random numbers.")] = 1,
     threads: options.Threads = None,
     report: options.Report = None,

@@ -26,7 +26,7 @@ from rotordrop.report.style import SERIES, curve, finished, panels
 from rotordrop.restart.card import POSITIVE, RestartCard
 from rotordrop.restart.damages import CHECKS, DAMAGES, Check
 from rotordrop.restart.evidence import Indicator
-from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop, SpeedLimit
+from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop
 from rotordrop.severity.numbers import NUMBERS
 from rotordrop.units import format_amount, format_chance, format_quantity
 
@@ -156,8 +156,7 @@ def _of_next_drop(foreseen: Foreseen) -> Iterator[str]:
     )
     if full.beyond_limit is not None:
         yield f"By these alone it passes the limit, {_limits(foreseen)}, with {_with_ends(full.beyond_limit)}"
-    if foreseen.speed_limit is not None:
-        yield _of_speed_limit(foreseen.speed_limit, full.beyond_limit)
+        yield _of_speed_limit(foreseen)
 
 
 def _limits(foreseen: Foreseen) -> str:
@@ -169,24 +168,20 @@ def _limits(foreseen: Foreseen) -> str:
     )
 
 
-def _of_speed_limit(limit: SpeedLimit, beyond: Known | None) -> str:
-    allowed = format_chance(limit.chance)
-    if limit.speed is None or limit.interval_90 is None:
-        lowest = format_quantity(limit.tried[0], "speed")
-        return f"These drops show no speed down to {lowest} with a chance of {allowed} to pass the limit"
-    speed, low, high = (format_quantity(one, "speed") for one in (limit.speed, *limit.interval_90))
-    if not limit.needed:
-        ends = f" (90 %: {low} at least); take the lower end to be sure"
-        if limit.interval_90[0] >= limit.tried[1]:
-            ends = "" if beyond and beyond.value > limit.chance else ": no speed limit is needed"
-        return (
-            f"By all {limit.drops} simulated drops, of lower speeds too, the chance is {allowed} at most up "
-            f"to {speed}{ends}"
-        )
-    return (
-        f"A speed limit of {speed} (90 %: {low} to {high}, {limit.drops} simulated drops) brings that chance "
-        f"to about {allowed}; take the lower end to be sure"
-    )
+def _of_speed_limit(foreseen: Foreseen) -> str:
+    """Up to which simulated speed it keeps to the limits, and with what the next higher one passes them."""
+    chances = {one.speed: one.beyond_limit for one in foreseen.drops if one.beyond_limit is not None}
+    allowed, limit = format_chance(foreseen.chance), foreseen.speed_limit
+    above = [speed for speed in sorted(chances) if limit is None or speed > limit]
+    next_one = f"{format_quantity(above[0], 'speed')} with {_with_ends(chances[above[0]])}" if above else ""
+    if limit is None:
+        return f"No simulated speed brings that chance to {allowed}: it passes even from {next_one}"
+    most = format_chance(max(one.high for speed, one in chances.items() if speed <= limit))
+    kept = f"{allowed} of the drops at most pass it (90 %: up to {most})"
+    if not above:
+        return f"No speed limit is needed: from each simulated speed {kept}"
+    speed = format_quantity(limit, "speed")
+    return f"Speed limit {speed}: from it and each lower simulated speed {kept}, from {next_one}"
 
 
 def _of_lift(lift: LiftNow | None) -> Iterator[str]:

@@ -22,27 +22,6 @@ class NextDrop:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpeedLimit:
-    """Up to which speed a drop passes a limit with no more than a chance that is allowed."""
-
-    speed: float | None
-    """[rad/s]; None where even the lowest speed tried passes it more often."""
-    interval_90: tuple[float, float] | None
-    """By the number of simulated drops [rad/s]; cut at the lowest and the highest speed tried."""
-    chance: float
-    """That is allowed [1]."""
-    tried: tuple[float, float]
-    """Lowest and highest speed tried [rad/s]."""
-    drops: int
-    """Simulated drops behind it."""
-
-    @property
-    def needed(self) -> bool:
-        """Whether the highest speed tried passes a limit too often."""
-        return self.speed is None or self.speed < self.tried[1]
-
-
-@dataclass(frozen=True, kw_only=True)
 class LiftNow:
     """Whether the magnets lift the rotor from where it rests, by simulated lifts at standstill."""
 
@@ -65,7 +44,11 @@ class Foreseen:
     drops: tuple[NextDrop, ...] = ()
     duration: float = 0.0
     """How much of each drop was simulated [s]."""
-    speed_limit: SpeedLimit | None = None
+    speed_limit: float | None = None
+    """Highest speed of ``drops`` at and below which no more than the allowed share of them passes a limit
+    [rad/s]; None where even the lowest passes it more often, or no limit was given."""
+    chance: float = 0.0
+    """Share of the drops that is allowed to pass a limit [1]."""
     lift: LiftNow | None = None
     limits: Mapping[str, float] = field(default_factory=dict)
     """Limits that were given [SI], by the field of an estimate document."""

@@ -8,13 +8,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from rotordrop.arrays import Array
 from rotordrop.estimate.published import Drop, Parameter
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.progress import Progress
-from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop, SpeedLimit
+from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop
 from rotordrop.rotor.magnet_loop import carrying_currents
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns, smallest_gap
@@ -33,17 +32,13 @@ from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 DROPS = 24
 """Drops behind the prediction at full speed, half as many at each lower one; chosen, not measured: intervals
 say what they tell."""
-FEWEST = 20
-"""Drops below which the 95 % that next drops stay below is not known."""
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25)
 """Speeds at which drops are simulated where a speed limit is sought, over the full one [1]; chosen, not
 measured."""
 MOST_BEYOND = 0.05
-"""Chance that the next drop passes a limit, to which a speed limit brings it down [1]; chosen."""
+"""Share of the simulated drops that may pass a limit at and below a speed limit [1]; chosen."""
 LONGER = 1.25
 """Time simulated over that of the last drop's largest motion after its estimated part [1]; chosen."""
-DRAWN_AGAIN = 400
-"""Sets of drops drawn from those simulated for the interval of a speed limit; chosen, not measured."""
 
 LIFTS = 12
 """Simulated lifts; chosen, not measured: the interval of the share says what they tell."""
@@ -112,8 +107,9 @@ def next_drops(
     """Simulate the drops that could happen next, at a speed [rad/s] and at shares of it.
 
     ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]; with them the speed
-    is sought up to which they are passed with no more than ``chance`` [1]. The machine is that of ``drop``,
-    by its estimate, where there is one; what stays open varies as in `repeat_study`. Damage is not simulated.
+    is sought up to which a share ``chance`` of the drops at most passes them [1]. The machine is that of
+    ``drop``, by its estimate, where there is one; what stays open varies as in `repeat_study`. Damage is not
+    simulated.
     By default 0.2 s are simulated, or until past where the rotor went further out than that in ``drop`` [s].
     """
     if duration is None:
@@ -122,7 +118,7 @@ def next_drops(
     found = None if drop is None else found_machine(machine, drop)
     at, names = found or machine, [bearing.name for bearing in machine.touchdown_bearings]
     shares = shares or (SHARES if limits else SHARES[:1])
-    made, ratios = [], []
+    made = []
     for k, share in enumerate(shares):
         count = drops if k == 0 else max(drops // 2, 2)
         study = repeat_study(at, share * speed, duration=duration, drops=count, seed=seed)
@@ -134,25 +130,21 @@ def next_drops(
             for name in names
         ]
         worst = np.max(beyond, axis=0) if beyond else np.zeros(0)
-        ratios.append(worst)
         made.append(
             NextDrop(
                 speed=share * speed,
                 peak_force={name: _middle_and_high(results, f"{name}.peak_force") for name in names},
                 peak_stress={name: _middle_and_high(results, f"{name}.peak_stress") for name in names},
-                beyond_limit=exceedance(worst, 1.0) if beyond else None,
+                beyond_limit=exceedance(worst[np.isfinite(worst)], 1.0) if beyond else None,
             )
         )
         if progress is not None:
             progress("the next drop", (k + 1) / len(shares))
-    limit = None
-    if limits and len(shares) > 2:
-        fewest = min(map(len, ratios))  # each draw at every speed
-        limit = speed_limit(np.array(shares) * speed, np.array([one[:fewest] for one in ratios]), chance)
     return Foreseen(
         drops=tuple(made),
         duration=duration,
-        speed_limit=limit,
+        speed_limit=speed_limit(made, chance),
+        chance=chance,
         limits=dict(limits),
         of_estimate=found is not None,
     )
@@ -196,42 +188,17 @@ def lift_now(
     )
 
 
-def speed_limit(speeds: Array, ratios: Array, chance: float) -> SpeedLimit | None:
-    """The speed limit by drops at several speeds [rad/s], shape (S,), over their limit [1], shape (S, drops).
+def speed_limit(drops: Sequence[NextDrop], chance: float) -> float | None:
+    """Highest speed of some drops at and below which no more than a share [1] of them passes a limit [rad/s].
 
-    The logarithm of a peak over its limit is a parabola of the logarithm of the speed, with the scatter of
-    all drops about it. The interval is that of drops drawn again from those simulated, each at all speeds.
-    A draw that failed at any speed (NaN) is left out; None where no other is there.
+    None where the lowest speed passes it more often.
     """
-    low, high = float(speeds.min()), float(speeds.max())
-    fine = np.linspace(low, high, 200)
-    basis = np.vander(np.log(speeds / high), 3)
-    logs = np.log(np.maximum(ratios, 1e-9))
-    sound = np.isfinite(logs).all(axis=0)
-    logs = logs[:, sound]
-    if not logs.size:
-        return None
-    random = np.random.default_rng(0)
-
-    def fastest(of: Array) -> float:
-        """Below it no speed passes the limit too often; zero where the lowest does."""
-        course = np.linalg.lstsq(basis, of.mean(axis=1), rcond=None)[0]
-        scatter = np.sort((of - (basis @ course)[:, None]).ravel())
-        middle = np.vander(np.log(fine / high), 3) @ course
-        passed = 1.0 - np.searchsorted(scatter, -middle, side="right") / len(scatter)
-        too_often = np.flatnonzero(passed > chance)
-        return high if not too_often.size else float(fine[too_often[0] - 1]) if too_often[0] else 0.0
-
-    found = fastest(logs)
-    drawn = [fastest(logs[:, random.integers(0, logs.shape[1], logs.shape[1])]) for _ in range(DRAWN_AGAIN)]
-    ends = np.maximum(np.quantile(drawn, (0.05, 0.95)), low)
-    return SpeedLimit(
-        speed=found or None,
-        interval_90=(float(ends[0]), float(ends[1])) if found else None,
-        chance=chance,
-        tried=(low, high),
-        drops=int(logs.size),
-    )
+    found = None
+    for one in sorted(drops, key=lambda one: one.speed):
+        if one.beyond_limit is None or not one.beyond_limit.value <= chance:  # NaN where all drops failed
+            break
+        found = one.speed
+    return found
 
 
 def _middle_and_high(results: StudyResults, column: str) -> tuple[Known, Known]:
