@@ -117,7 +117,7 @@ def stribeck_loaded_inner_race(inputs):
     a, b = contact.semi_axes(inputs["Q"])
     pressure = float(contact.maximum_pressure(inputs["Q"]))
     return {
-        "ellipticity (exact)": float(contact.ellipticity),
+        "ellipticity (exact)": float(contact.semi_major_coefficient / contact.semi_minor_coefficient),
         "semi-major axis (exact)": float(a),
         "semi-minor axis (exact)": float(b),
         "max Hertz stress (exact)": pressure,

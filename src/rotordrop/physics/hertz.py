@@ -30,20 +30,11 @@ class Contact:
     Source: Hertz; Harris, Rolling Bearing Analysis, chapter on contact stress and deformation.
     """
 
-    curvature_sum: ArrayLike
-    """Σρ [1/m]."""
-    curvature_difference: ArrayLike
-    """F(ρ) [1], zero for a circular contact."""
     stiffness: ArrayLike
     """``Q = stiffness · δ^1.5`` [N/m^1.5]."""
     semi_major_coefficient: ArrayLike
     semi_minor_coefficient: ArrayLike
     """``a, b = coefficient · Q^(1/3)`` [m/N^(1/3)]."""
-
-    @property
-    def ellipticity(self) -> ArrayLike:
-        """Ratio of the semi-axes a/b [1]. Source: definition."""
-        return self.semi_major_coefficient / self.semi_minor_coefficient
 
     @property
     def stress_coefficient(self) -> ArrayLike:
@@ -137,8 +128,6 @@ def point_contact(curvature_sum: ArrayLike, curvature_difference: ArrayLike, eta
     scale = cube_root_each(1.5 * eta / curvature_sum)
     approach = 0.5 * delta_star * scale * scale * curvature_sum
     return Contact(
-        curvature_sum=curvature_sum,
-        curvature_difference=curvature_difference,
         stiffness=1.0 / (approach * np.sqrt(approach)),
         semi_major_coefficient=a_star * scale,
         semi_minor_coefficient=b_star * scale,

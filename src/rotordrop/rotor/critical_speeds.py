@@ -57,11 +57,6 @@ class CriticalSpeedMap:
     ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``. A mount that relaxes has in every
     line the storage stiffness of its frequency."""
 
-    @property
-    def followed(self) -> bool:
-        """Whether some mount is stiffer the faster it moves."""
-        return any(part.branches for part in self.lines)
-
 
 @one_thread()
 def critical_speed_map(
@@ -70,12 +65,9 @@ def critical_speed_map(
     *,
     whirl: str = "standstill",
     count: int = 6,
-    loads: Sequence[float] | None = None,
 ) -> CriticalSpeedMap:
     """Critical speed map of a machine on its touchdown bearings, K lines over equivalent stiffnesses [N/m],
-    (S,).
-
-    By default 121 stiffnesses from 1e5 to 1e10 N/m, and static loads [N] that are the shares of the weight.
+    (S,); by default 121 from 1e5 to 1e10 N/m.
     """
     require(machine, "machine", Machine)
     require(count, "count", int, least=1)
@@ -85,10 +77,8 @@ def critical_speed_map(
         raise UsageError("stiffness is no list of numbers [N/m]; give one at least")
     if not np.all(grid > 0.0):
         raise UsageError(f"stiffness must be positive, got {grid.min():g} N/m")
-    if loads is not None:
-        loads = numbers(loads, "loads", (len(machine.touchdown_bearings),), finite=True).tolist()
     fe = build_rotor_fe(machine)
-    parts = equivalent_stiffness(machine, loads)
+    parts = equivalent_stiffness(machine)
     masses = [float(bearing.support.mass) for bearing in machine.touchdown_bearings]
     massless = [_on(fe, [spring(p.node, k) for p in parts], whirl, count) for k in grid]
     massive = [_on(fe, _with_mass(parts, masses, k), whirl, count) for k in grid]

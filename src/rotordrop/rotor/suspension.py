@@ -79,12 +79,9 @@ class EquivalentStiffness:
         return in_series(*parts, *([self.contact] if contact else []))
 
 
-def equivalent_stiffness(
-    machine: Machine, loads: Sequence[float] | None = None
-) -> tuple[EquivalentStiffness, ...]:
-    """Stiffness of each touchdown bearing under loads [N], (B,); the shares of the weight by default."""
-    shares = bearing_load_shares(machine) if loads is None else loads
-    pairs = list(zip(machine.touchdown_bearings, shares, strict=True))
+def equivalent_stiffness(machine: Machine) -> tuple[EquivalentStiffness, ...]:
+    """Stiffness of each touchdown bearing under its share of the weight."""
+    pairs = list(zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True))
     for bearing, load in pairs:
         if load <= 0.0:
             raise UsageError(

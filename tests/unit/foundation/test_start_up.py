@@ -299,10 +299,6 @@ WRONG = {
         lambda: rd.campbell_diagram(MACHINE, ["60 Hz"]),
         "speeds is a list that is no array of real",
     ),
-    "a load too few": (
-        lambda: rd.critical_speed_map(MACHINE, [1e6], loads=[1.0]),
-        r"loads has the shape \(1,\); expected \(2,\)",
-    ),
     # what was given for what
     "a path for a drop": (lambda: rd.changes("a.json", "b.json"), r"drops\[0\] is 'a.json'; expected a Drop"),
     "numbers for drops": (lambda: rd.rank_drops([1.0, 2.0]), r"drops\[0\] is 1.0; expected a DropSeverity"),

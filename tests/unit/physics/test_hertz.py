@@ -47,7 +47,8 @@ def test_contacts_scale_with_size_and_materials():
     hybrid = hertz.point_contact(*curvatures, ETA)
     steel = hertz.point_contact(*curvatures, hertz.compliance(*STEEL, *STEEL))
     ratio = hertz.compliance(*STEEL, *STEEL) / ETA
-    assert hybrid.ellipticity == pytest.approx(steel.ellipticity, rel=1e-14)
+    long_over_wide = [np.divide(*one.semi_axes(1.0)) for one in (hybrid, steel)]
+    assert long_over_wide[0] == pytest.approx(long_over_wide[1], rel=1e-14)
     assert hybrid.stiffness / steel.stiffness == pytest.approx(ratio, rel=1e-13)
     assert hybrid.stress_coefficient / steel.stress_coefficient == pytest.approx(ratio ** (2 / 3), rel=1e-13)
     assert ratio > 1.1

@@ -12,12 +12,13 @@ from tests.scaled_machines import scaled_machine
 from rotordrop import Known, example_machine
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import parameter
-from rotordrop.errors import SimulationError
+from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.timoshenko import round_section
 from rotordrop.rotor.assembly import assemble
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rest_on, settled_sag, weight_vector
+from rotordrop.rotor.suspension import equivalent_stiffness
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +83,8 @@ def test_a_summary_names_what_is_out_of_the_usual(machine):
     (warning,) = warnings_of(tipped, "load direction", 60.0)
     assert warning.bearing == "NDE"
     assert warning.value < 0.0
+    with pytest.raises(UsageError, match=r"'NDE' carries -1.31e.03 N of the rotor's weight"):
+        equivalent_stiffness(tipped)
     # The estimators take the range as it stands, not one about the guess.
     found = warnings_of(example_machine("lp400"), "guess off the middle of its range", 60.0)
     assert [warning.bearing for warning in found] == ["NDE", "DE"]
