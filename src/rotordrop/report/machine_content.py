@@ -113,17 +113,15 @@ def _card(machine: Machine, rest: BearingSummary) -> Card:
 
 
 def _rotor(summary: MachineSummary) -> Statement:
-    """Mass, centre of gravity and lowest modes of a rotor in a sentence."""
-    centre = shown(summary.fe.centre_of_gravity, "dimension")
-    said = [f"mass {shown(summary.fe.total_mass, 'mass')}", f"centre of gravity {centre} from node 1"]
-    for held, found in ((FREE, summary.free_free), (RESTING, summary.settled)):
-        said.append(f"{held} {', '.join(f'{one:.4g}' for one in list(found)[:4])} Hz")
-    return Statement(f"Rotor: {'; '.join(said)}.")
+    """Mass and lowest modes of a rotor in a sentence, short enough for the first screen."""
+    free, resting = (", ".join(f"{one:.4g}" for one in of[:3]) for of in (summary.free_free, summary.settled))
+    mass = shown(summary.fe.total_mass, "mass")
+    return Statement(f"Mass {mass}; free-free {free} Hz; in touchdown bearings {resting} Hz.")
 
 
 def rotor_tables(summary: MachineSummary) -> tuple[Table, ...]:
-    """Mass, centre of gravity, inertias and sag of a rotor, and its lowest modes by what holds it."""
-    rotor = rotor_values(summary.fe, 4)
+    """Centre of gravity, inertias and sag of a rotor, and its lowest modes by what holds it."""
+    rotor = rotor_values(summary.fe, 4)[1:]
     if (sag := summary.levitated_sag) is not None:
         span = float(max(sag) - min(sag))
         rotor.append(("levitated sag, lowest to highest node", Quantity.of(span, "length")))
