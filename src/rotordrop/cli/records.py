@@ -123,7 +123,7 @@ def profile(
     Example: rotordrop profile record.csv
     """
     from rotordrop.evidence.unsaid import guess_profile
-    from rotordrop.record.profile import profile_of, rules_of, save_profile
+    from rotordrop.record.profile import OPTIONS, profile_of, rules_of, save_profile
     from rotordrop.record.readers import read_recording
 
     def with_stated(entries: dict[str, Any], **said: object) -> dict[str, Any]:
@@ -132,7 +132,7 @@ def profile(
     begun = rules_of(profile).model_dump(exclude_defaults=True)
     turning = with_stated(begun.get("speed", {}), constant=speed, channel=speed_channel, pulses=pulses)
     whole = with_stated(begun, unit=unit, sensitivity=sensitivity, full_scale=full_scale, speed=turning)
-    given = rules_of(profile_of(whole, "the options"), mapping or [])
+    given = rules_of(profile_of(whole, OPTIONS), mapping or [])
     described = _loaded(machine)
     guess = guess_profile(
         read_recording(record, given), given, () if described is None else described.sensors

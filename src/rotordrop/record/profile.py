@@ -157,20 +157,22 @@ def load_profile(path: str | Path) -> Profile:
 
 
 def profile_of(content: dict[str, Any], place: str) -> Profile:
-    """Make a profile of the entries of a TOML file, or say which entry is wrong and what belongs there."""
+    """Make a profile of entries of a file or of `OPTIONS`, or say which is wrong and what belongs there."""
     try:
         return Profile.model_validate(content)
     except ValidationError as error:
-        told = "\n  also: ".join(_told(entry) for entry in error.errors())
+        told = "\n  also: ".join(_told(entry, place) for entry in error.errors())
         raise RecordError(f"{place}: {told}") from error
 
 
-def _told(entry: Any) -> str:
+def _told(entry: Any, place: str) -> str:
     """One entry that does not fit, in words."""
     *sections, name = (str(part) for part in entry["loc"])
     section = sections[0] if sections and sections[0] in _SECTIONS else ""
     known = tuple((_SECTIONS[section] if section else Profile).model_fields)
     told = f"{f'[{section}] ' if section else ''}{name} = {entry['input']!r}"
+    if place == OPTIONS:
+        told = f"--{'speed' if name == 'constant' else name} {entry['input']!r}"
     if entry["type"] != "extra_forbidden":
         cause = entry.get("ctx", {}).get("error")
         return f"{told} does not fit: {cause or _EXPECTED.get(name, entry['msg'])}"
@@ -179,6 +181,8 @@ def _told(entry: Any) -> str:
     return f"{told} is not known in {f'the section [{section}]' if section else 'a profile'}; {hint}"
 
 
+OPTIONS = "the options"
+"""The place of entries that stand for options of ``rotordrop profile``."""
 _SECTIONS: dict[str, type[BaseModel]] = {"text": TextLayout, "time": Clock, "speed": SpeedSource}
 _EXPECTED = {
     "channels": 'expected a table, [channels] S_NDE_A = "X1"',

@@ -82,6 +82,12 @@ def test_errors_of_a_profile_are_words(text, told, tmp_path):
         load_profile(tmp_path / "p.toml")
 
 
+def test_a_wrong_entry_is_named_as_it_was_given(capsys):
+    assert run(["profile", RECORD, "-o", "p.toml", "--sensitivity", "8", "--speed", "60"]) == 3
+    said = capsys.readouterr().err
+    assert "--sensitivity '8' does" in said and "--speed '60' does" in said and "[" not in said
+
+
 def test_the_examples_of_the_documentation_are_profiles():
     page = (Path(__file__).parents[3] / "docs" / "recorders.md").read_text(encoding="utf-8")
     examples = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
