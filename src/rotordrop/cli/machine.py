@@ -193,24 +193,25 @@ def check(
 
 def bearings(
     designation: Annotated[
-        str, Argument(metavar="DESIGNATION", help='Such as 71914, "7016 ACD/HCP4A", "6016-2Z/C3".')
+        list[str], Argument(metavar="DESIGNATION", help="Such as 71914, 7016 ACD/HCP4A, 6016-2Z/C3.")
     ],
     everything: Annotated[bool, Option("--all", help="Also the listed bearings of this size.")] = False,
     json: options.Json = None,
 ) -> None:
     """Search bearings by designation: size, angle, balls listed or inferred, clearance, preload.
 
-    Example: rotordrop bearings "7016 ACD/HCP4A"
+    Example: rotordrop bearings 7016 ACD/HCP4A
     """
     from rotordrop.elements.catalog.lookup import find_bearing, search_bearings
     from rotordrop.report.machine_content import bearing_content, bearing_json
 
+    asked = " ".join(designation)
     try:
-        find_bearing(designation)
+        find_bearing(asked)
     except LookupError as error:
         raise UsageError(str(error)) from None
-    found = search_bearings(designation)
-    content = bearing_content(designation, found)
+    found = search_bearings(asked)
+    content = bearing_content(asked, found)
     deliver([bearing_json(bearing) for bearing in found], json, content, whole=everything)
 
 

@@ -162,7 +162,7 @@ CALLS = {
     "coast-down": "coast-down m.toml --speed 0.16Hz --until 0.6s --reduction quick",
     "critical-speeds": "critical-speeds small.toml",
     "check": "check small.toml",
-    "bearings": "bearings 7014",
+    "bearings": "bearings 7016 ACD/HCP4A",
     "convert": "convert small.toml --to ross",
     "doctor": "doctor",
 }
