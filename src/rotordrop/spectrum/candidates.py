@@ -181,7 +181,7 @@ def harmonic_candidates(name: str, frequency: float, error: float, highest: int 
     return tuple(
         Candidate(
             name=f"{name}, harmonic {k}",
-            family=f"{name} harmonic",
+            family=f"harmonic {k}",
             kind="steady",
             value=k * frequency,
             tolerance=k * error,

@@ -1,6 +1,7 @@
 """Steps of the search for lines, each against what is known of its input."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -191,5 +192,9 @@ def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide():
         for hertz in (28.7, 57.4)
     )
     known = (pendulum_candidate("pendulum", 28.3, 29.8),)
-    names = [line.label for line in name_lines([("DE", swing), ("DE", twice)], known, 285e-6, (450.0, 20.0))]
+    bands = (450.0, 20.0)
+    names = [line.label for line in name_lines([("DE", swing), ("DE", twice)], known, 285e-6, bands)]
     assert names == ["pendulum", "pendulum, harmonic 2"]
+    ends = [pendulum_candidate(end, 28.3, 29.8, planes=[end]) for end in ("NDE", "DE")]
+    seen = [("NDE", swing), ("DE", replace(swing, frequency=28.71)), ("DE", twice)]
+    assert name_lines(seen, ends, 285e-6, bands)[2].label == "NDE, harmonic 2 or DE, harmonic 2"
