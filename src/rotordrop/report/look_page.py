@@ -296,7 +296,7 @@ def _card(seen: Look, plane: PlaneLook) -> Card:
     gap_up_to = inf if plane.gap_interval_90 is None else DROWNED
     with_noise = (  # each up to so much of it
         (DROWNED, KeyFigure("largest distance from the centre", largest, note)),
-        (LOUD, KeyFigure("impacts", hits, "by the displacement alone")),
+        (LOUD, KeyFigure("impacts by displacement alone", hits)),
         (gap_up_to, _gap_figure(plane)),
         (DROWNED, KeyFigure("position index (mean distance over gap)", index)),
     )
