@@ -110,7 +110,7 @@ def estimate(
     inconsistent = [made for made in estimates if not made.consistent]
     if inconsistent:
         names = ", ".join(made.name for made in inconsistent)
-        raise ConsistencyError(f"{names}: {inconsistent[0].sentence}")
+        raise ConsistencyError(f"{names}: model and record disagree; of force and stress only ranges hold")
 
 
 def _read(
