@@ -569,7 +569,7 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
                 ),
                 settling=settling,
                 largest=float(radius[at]),
-                largest_interval_90=_largest_between(path, at),
+                largest_interval_90=_largest_between(path, at, int(during.sum())),
                 largest_time=float(motion.time[at]),
                 position_index=distance / path.gap,
                 position_index_interval_90=(
@@ -583,14 +583,19 @@ def _plane_looks(motion: Motion, drop: Drop, speed: float | None) -> list[PlaneL
     return found
 
 
-def _largest_between(path: Path, at: int) -> tuple[float, float]:
-    """Interval of a distance from the centre [m], 90 %: at the sensors, or at the bearing beside them."""
+def _largest_between(path: Path, at: int, count: int) -> tuple[float, float]:
+    """Interval of the largest of so many distances from the centre [m], 90 %: at sensors or bearing beside.
+
+    The largest of noisy readings lies above the largest distance by what the largest noise is at most.
+    """
     here = float(path.radius[at])
     aside = float(np.hypot(*path.bearing_position[at])) - here
     outward = float(np.hypot(*(path.bearing_position[at] - path.position[at])))
     beside = LEVER_DOUBT / max(abs(path.wall.lever), LEVER_DOUBT) * outward
     half = NINETY * math.hypot(path.wall.centre_error.max(), GAIN * here, beside)
-    return here + min(aside, 0.0) - half, here + max(aside, 0.0) + half
+    below = math.hypot(half, path.noise * math.sqrt(2.0 * math.log(count / 0.05)))
+    above = math.hypot(half, NINETY * path.noise)
+    return max(here + min(aside, 0.0) - below, 0.0), here + max(aside, 0.0) + above
 
 
 __all__ = ["Drop", "HeldContact", "Impact", "Level", "Look", "PlaneLook", "Synchronous", "Whirl", "look"]

@@ -41,8 +41,7 @@ _RELEASED, _ORBIT, _LEAVES = 2e-3, 0.05, 1.1
 [s], and how far outside that orbit, over its radius, a rotor has left it [1] (chosen)."""
 
 DROWNED = 9e-6
-"""Noise from which on the air gap and the largest distance are not stated [m]: at 6 µm the latter leaves its
-interval (chosen)."""
+"""Noise from which on an air gap is not stated that only the record shows [m] (chosen)."""
 
 _LEAST_FALL = 0.5 * USUAL_GAP[0]
 """A dropped rotor goes at least this far [m] (chosen)."""

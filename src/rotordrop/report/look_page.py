@@ -78,7 +78,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *quality_statements(others),
             *(() if drawn else (Statement(" ".join((read, *(note.sentence for note in notes)))),)),
         ),
-        cards=tuple(card for plane in seen.planes if (card := _card(seen, plane)).figures),
+        cards=tuple(_card(seen, plane) for plane in seen.planes),
         counted_from=RELEASE,
         lead=1 if drawn else 0,
         summary=(_timeline(seen),) if drawn else (),
@@ -268,7 +268,7 @@ def _verdict(seen: Look) -> list[Statement]:
         f"{' to '.join(shown(end, 'length', 3) for end in plane.excess_interval_90)}) beyond the air gap of "
         f"{shown(plane.gap, 'length', 3)} at {format_moment(plane.largest_time)}, at the sensors."
         for plane in seen.planes
-        if plane.excess > 0 and plane.gap_interval_90 is None and plane.noise <= DROWNED
+        if plane.excess > 0 and plane.gap_interval_90 is None
     ]
     if seen.standstill is not None:
         slow = shown(STANDSTILL, "speed")
@@ -295,10 +295,10 @@ def _card(seen: Look, plane: PlaneLook) -> Card:
     index = _found(plane.position_index, plane.position_index_interval_90, "dimensionless")
     gap_up_to = inf if plane.gap_interval_90 is None else DROWNED
     with_noise = (  # each up to so much of it
-        (DROWNED, KeyFigure("largest distance from the centre", largest, note)),
+        (inf, KeyFigure("largest distance from the centre", largest, note)),
         (LOUD, KeyFigure("impacts by displacement alone", hits)),
         (gap_up_to, _gap_figure(plane)),
-        (DROWNED, KeyFigure("position index (mean distance over gap)", index)),
+        (gap_up_to, KeyFigure("position index (mean distance over gap)", index)),
     )
     figures = [figure for most, figure in with_noise if plane.noise <= most]
     if plane.velocity_index is not None:
