@@ -166,6 +166,8 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
 def check_senses(record: Record, motion: Motion) -> list[Finding]:
     """Compare which way round the levitated orbits run by their strongest line, where no angle was stated."""
     level = record.resolved()[: int(np.argmin(motion.floats))][-MANY:]
+    if not len(level):
+        return []
     moved = (level - np.mean(level, axis=0)) @ np.array([1.0, 1.0j])
     power = np.abs(np.fft.fft(moved * np.hanning(len(moved))[:, None], axis=0)) ** 2
     forward, backward = power[1 : len(power) // 2].max(axis=0), power[len(power) // 2 :].max(axis=0)
