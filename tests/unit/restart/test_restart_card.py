@@ -204,49 +204,17 @@ def test_the_checks_that_are_asked_for_are_those_of_the_package():
     assert tuple(KNOWN_CHECKS) == CHECKS
 
 
-def test_next_drops_are_at_their_speeds_and_pass_limits_as_they_say():
-    machine, speed = example_machine("small"), 2 * math.pi * 100.0
-
-    def simulated(limits, **told):
-        return next_drops(machine, speed, limits, drops=20, duration=0.01, **told).drops
-
-    full, slower = simulated({"peak_force_N": 1.0}, shares=(1.0, 0.7))
-    assert (full.speed, slower.speed) == pytest.approx((speed, 0.7 * speed))
-    for middle, high in full.peak_force.values():
-        assert 0.0 < middle.value <= high.value
-    assert full.beyond_limit.value == 1.0, "a newton is passed by every drop"
-    (none,) = simulated({"peak_force_N": 1e9, "peak_stress_Pa": 1e12}, shares=(1.0,))
-    assert none.beyond_limit.value == 0.0
-    (unasked,) = simulated({})
-    assert unasked.beyond_limit is None
-
-
-def foreseen(*beyond, lowest=280.0, of_estimate=True):
+def foreseen(*beyond, lowest=280.0):
     """Drops from 400 rad/s and from lower speeds down to the lowest, with the chances to pass a limit."""
-
-    def at_both(value, drops, high):
-        return dict.fromkeys(("NDE", "DE"), (Known(value=value, drops=drops), high))
-
-    high = Known(value=4e3, drops=24, interval_90=(3.5e3, math.inf))
-    after = tuple(
-        NextDrop(
-            speed=speed,
-            peak_force=at_both(3e3, count, high),
-            peak_stress=at_both(2e9, count, Known(value=2.2e9)),
-            beyond_limit=Known(value=share, interval_90=(share, max(share, 0.22)), drops=count),
-        )
-        for k, (speed, share) in enumerate(
-            zip(np.linspace(400.0, lowest, len(beyond)).tolist(), beyond, strict=True)
-        )
-        for count in [12 if k else 24]
-    )
+    high, after = Known(value=4e3, drops=24, interval_90=(3.5e3, math.inf)), []
+    for speed, share in zip(np.linspace(400.0, lowest, len(beyond)).tolist(), beyond, strict=True):
+        count = 12 if after else 24
+        peaks = dict.fromkeys(("NDE", "DE"), (Known(value=3e3, drops=count), high))
+        chance = Known(value=share, interval_90=(share, max(share, 0.22)), drops=count)
+        after.append(NextDrop(speed=speed, peak_force=peaks, peak_stress=peaks, beyond_limit=chance))
     limit = speed_limit(after, 0.05)
     return Foreseen(
-        drops=after,
-        speed_limit=limit,
-        chance=0.05,
-        limits={"peak_stress_Pa": 2.5e9},
-        of_estimate=of_estimate,
+        drops=tuple(after), speed_limit=limit, chance=0.05, limits={"peak_stress_Pa": 2.5e9}, of_estimate=True
     )
 
 
@@ -267,16 +235,23 @@ def test_the_speed_limit_is_one_below_which_the_simulated_drops_keep_the_limit(b
     assert any(words in text for text in said(restart_card(drop(), foreseen=after)))
 
 
-def test_a_machine_is_told_the_speeds_at_which_its_simulated_drops_pass():
-    """It whirls at 112 Hz and not below: at 84 Hz each drop stays 10 % below the limit."""
+def test_next_drops_are_at_their_speeds_and_pass_limits_as_they_say():
+    """A machine that whirls at 112 Hz and not below: at 84 Hz each drop stays below the limit."""
     machine, full, shares = example_machine("paper"), 2.0 * math.pi * 140.0, (1.0, 0.8, 0.6, 0.25)
-    told = {"shares": shares, "drops": 8}
-    whirling = next_drops(machine, full, {"peak_force_N": 5200.0}, **told)
+
+    def simulated(force, **told):
+        return next_drops(machine, full, {"peak_force_N": force}, shares=shares, drops=20, **told)
+
+    whirling = simulated(5200.0)
+    always, never = (simulated(force, duration=0.01) for force in (1.0, 1e9))
+    assert [one.speed for one in whirling.drops] == pytest.approx([share * full for share in shares])
+    assert all(0.0 < half.value <= high.value for half, high in whirling.drops[0].peak_force.values())
     assert [one.beyond_limit.value > 0.0 for one in whirling.drops] == [False, True, False, False]
     assert whirling.speed_limit == pytest.approx(0.6 * full)
-    assert next_drops(machine, full, {"peak_force_N": 1.0}, **told).speed_limit is None
-    assert next_drops(machine, full, {"peak_force_N": 1e9}, **told).speed_limit == pytest.approx(full)
-    assert next_drops(machine, full, {}, drops=2, duration=0.01).speed_limit is None
+    assert always.speed_limit is None and always.drops[-1].beyond_limit.value == 1.0
+    assert never.speed_limit == pytest.approx(full)
+    unasked = next_drops(machine, full, {}, drops=2, duration=0.01)
+    assert unasked.speed_limit is None and [one.beyond_limit for one in unasked.drops] == [None]
 
 
 def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell():
