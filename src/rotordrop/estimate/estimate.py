@@ -21,7 +21,7 @@ from rotordrop.elements.parameter import Parameter
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.methods import Method
-from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure, later_warning
+from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure, later_warning, peak_text
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff
@@ -33,7 +33,6 @@ from rotordrop.machine import Machine
 from rotordrop.record.record import Record
 from rotordrop.sketch import sketch
 from rotordrop.track.consistency import Check
-from rotordrop.units import format_quantity
 
 if TYPE_CHECKING:
     import pandas
@@ -366,7 +365,7 @@ class Estimate:
 
     def __repr__(self) -> str:
         """Drop, machine and the peak force of every bearing."""
-        peaks = "; ".join(f"{b.name} {_peak_text(b.peak_force.known)}" for b in self.bearings)
+        peaks = "; ".join(f"{b.name} {peak_text(b.peak_force.known)}" for b in self.bearings)
         return f"<Estimate {self.name} of {self.machine.name}: {peaks}. {self.verdict.value}>"
 
     def summary(self) -> str:
@@ -392,14 +391,6 @@ class Estimates(tuple[Estimate, ...]):
 
     def _repr_html_(self) -> str:
         return "".join(estimate._repr_html_() for estimate in self)
-
-
-def _peak_text(known: Known, kind: str = "force") -> str:
-    text = format_quantity(known.value, kind)
-    if known.interval_90 is None:
-        return text
-    low, high = (format_quantity(value, kind) for value in known.interval_90)
-    return f"{text} (90 %: {low} to {high})"
 
 
 def _above(module: str, name: str) -> Any:

@@ -20,9 +20,11 @@ from pydantic import (
 from rotordrop.document import ABSENT, Document, Of, Pair, Schema, read_json
 from rotordrop.errors import UsageError
 from rotordrop.json_schema import DIALECT, closed
+from rotordrop.known import Known
 from rotordrop.severity.numbers import NUMBERS
 from rotordrop.severity.statistics import Statistics
-from rotordrop.units import format_moment, si_unit
+from rotordrop.sketch import sketch
+from rotordrop.units import format_moment, format_quantity, si_unit
 
 FORMAT = "rotordrop estimate 2"
 MADE_BY = "rotordrop estimate --json"
@@ -60,6 +62,15 @@ class Value(Document):
         """The 90 % interval, where there is one."""
         ends: list[float] | None = self.interval_90
         return None if ends is None else (ends[0], ends[1])
+
+
+def peak_text(peak: Value | Known) -> str:
+    """A force with its interval where there is one."""
+    text = format_quantity(peak.value, "force")
+    if peak.interval_90 is None:
+        return text
+    low, high = (format_quantity(value, "force") for value in peak.interval_90)
+    return f"{text} (90 %: {low} to {high})"
 
 
 class Impact(Document):
@@ -463,6 +474,20 @@ class Drop(Document):
     agreement: Annotated[Agreement, Of("agreement")] = ABSENT
     document_sha256: str = ABSENT
     """Digest of the other values."""
+
+    def __repr__(self) -> str:
+        """Record, machine and the peak force of every bearing."""
+        peaks = (f"{name} {peak_text(one.numbers['peak_force_N'])}" for name, one in self.bearings.items())
+        return f"<Drop {self.record} of {self.machine}: {'; '.join(peaks)}. {self.verdict}>"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        peaks = {
+            name: ([hit.peak_time_s for hit in one.impacts], [hit.peak_force_N.value for hit in one.impacts])
+            for name, one in self.bearings.items()
+        }
+        return sketch(repr(self), "time from power-off [s]", "peak force of contacts [kN]", peaks, 1e-3)
 
     @property
     def later_warning(self) -> str:

@@ -25,6 +25,7 @@ from rotordrop.rotor.suspension import (
     planar_matrices,
     spring,
 )
+from rotordrop.sketch import sketch
 
 WHIRLS = {"standstill": 0, "forward": 1, "backward": -1}
 DEFAULT_STIFFNESS = (1e5, 1e10)
@@ -34,7 +35,7 @@ MOST_ITERATIONS, CONVERGED = 200, 1e-9
 Held = Callable[[Sequence[EquivalentStiffness]], list[Support]]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class CriticalSpeedMap:
     """Undamped map of a machine on its touchdown bearings (Neisi 2020, Fig. 19)."""
 
@@ -56,6 +57,15 @@ class CriticalSpeedMap:
     """Frequencies [Hz], shape (K,), with every bearing at its own equivalent stiffness: ``"tangent"``,
     ``"simple"``, ``"with contact"`` (massless) and ``"with support mass"``. A mount that relaxes has in every
     line the storage stiffness of its frequency."""
+
+    def __repr__(self) -> str:
+        """Machine, whirl and the frequencies on its own bearings."""
+        own = ", ".join(f"{one:.4g}" for one in self.at_lines["tangent"])
+        return f"<CriticalSpeedMap of {self.machine_name}, {self.whirl}: {own} Hz at its own stiffness>"
+
+    def _repr_html_(self) -> str:
+        lines = {str(k): (np.log10(self.stiffness), of) for k, of in enumerate(self.massless.T, 1)}
+        return sketch(repr(self), "log10 of the stiffness [N/m]", "frequency [Hz]", lines)
 
 
 @one_thread()

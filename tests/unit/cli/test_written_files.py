@@ -242,7 +242,9 @@ WRITTEN = {
     "checkpoint": Written(
         ("simulate.checkpoint:save_checkpoint",), _checkpoint, lambda p: load_checkpoint(p.parent, "d" * 64)
     ),
-    "estimate": Written(("estimate.estimate:save",), _into("e.json", _estimate), read_drop),
+    "estimate": Written(
+        ("estimate.estimate:save",), _into("e.json", _estimate), lambda p: read_drop(p).as_json()
+    ),
     "document": Written(("cli._output:deliver",), _document, read_document),
     "log": Written((), _log, read_log),
     "shard": Written((f"{STUDY}publish",), _study("shards/000001.npy"), _numbers),

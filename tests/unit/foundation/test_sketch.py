@@ -5,17 +5,26 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from tests.published import bearing, published, value
 
 import rotordrop as rd
+from rotordrop.estimate.published import Impact
 from rotordrop.sketch import HEIGHT, WIDTH, sketch
 
 LP400, RECORD = rd.example_machine("lp400"), rd.example_record_path("lp400_drop_060")
+HITS = [
+    Impact.model_construct(peak_time_s=at, peak_force_N=value(force))
+    for at, force in ((0.01, 3e3), (0.02, 1e3))
+]
+READ = bearing({"peak_force_N": value(3e3, 2e3, 4e3)}).model_copy(update={"impacts": HITS})
 SHOWN = {
     "machine": (lambda: LP400, 3),
     "record": (lambda: rd.read_record(RECORD, LP400), 4),
     "look": (lambda: rd.look(RECORD), 2),
     "drop": (lambda: rd.simulate_drop(LP400, rd.DropCase(speed="60 Hz", duration="2 ms")), 2),
     "study": (lambda: rd.sweep(LP400, {"speed": ["60 Hz", "90 Hz"]}, duration="2 ms"), 2),
+    "estimate that was read": (lambda: published(bearings={"NDE": READ}), 1),
+    "critical speed map": (lambda: rd.critical_speed_map(LP400, [1e7, 1e8], count=3), 3),
 }
 
 
