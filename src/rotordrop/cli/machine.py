@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json as json_module
-import math
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 from typer import Argument, Option
@@ -17,10 +16,7 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured, pairs, refuse_beside, text_option
 from rotordrop.cli._output import STANDARD_OUTPUT, console, deliver, deliver_text, require_places
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.units import percent, si_unit
-
-if TYPE_CHECKING:
-    from rotordrop.machine.ross_files import Spring
+from rotordrop.units import percent
 
 TEMPLATE_FILE = Path("machine.toml")
 
@@ -38,10 +34,6 @@ _QUESTIONS = {
     "grade": 'balance grade, "G 2.5"',
     "support": 'support of the touchdown bearings: "stiff", "soft", "1e8 N/m", or two: "8e7 N/m, 5e8 N/m"',
 }
-
-MADE_UP = "made up: put yours here"
-"""Remark behind a value of a machine file that nobody gave."""
-
 
 Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
 """Documents with a published schema."""
@@ -262,110 +254,30 @@ def convert(
         refuse_beside("--to ross", others)
         _written_for_ross(source, output or Path("rotor_ross.toml"), json)
         return
-    from rotordrop.machine.ross_files import MAGNETIC, read_rotor
+    from rotordrop.machine.ross_files import read_rotor
     from rotordrop.report.machine_content import imported_content, imported_json
 
     imported = read_rotor(source)
     deliver(imported_json(imported), json, imported_content(imported, source.name))
     if output is None:
         return
-    from rotordrop.machine.saving import machine_text
-    from rotordrop.machine.simple import SimpleMachine, drafted_machine
+    from rotordrop.machine.simple import imported_text
 
-    made_up = {
-        "balance_grade.grade": "balance grade",
-        "rotor.modal_damping": "modal damping",
-        "sensors.node": "planes of the sensors",
-        "sensors.angle": "angles of the sensors",
-    }
-    for given, path, what in (
-        (designation, "touchdown_bearings.bearing.designation", "touchdown bearings"),
-        (designation, "touchdown_bearings.bore_radius", "their bores"),
-        (gap, "touchdown_bearings.air_gap", "air gap"),
-        (speed, "speed.nominal", "nominal speed"),
-        (speed, "balance_grade.at_speed", "speed of the balance grade"),
-    ):
-        if given is None:
-            made_up[path] = what
-    magnets, ends = (
-        sorted({spring.node for spring in imported.springs if spring.kind == kind})
-        for kind in (MAGNETIC, "BearingElement")
-    )
-    last = len(imported.rotor.node_positions)
-    if len(ends) < 2:
-        ends = magnets if len(magnets) > 1 else [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
-        made_up["touchdown_bearings.node"] = "planes of the touchdown bearings"
-    if len(magnets) < 2:
-        magnets = ends
-        made_up["ambs.node"] = "planes of the magnets"
-    nodes = (ends[0], ends[-1])
-    supports = {s.node: _support(s, source.name) for s in imported.springs if s.support is not None}
-    if not set(nodes) <= set(supports):
-        made_up["touchdown_bearings.support"] = "supports"
-    if nodes[0] == nodes[1]:
-        raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")
-    length = imported.rotor.node_positions[-1]
-    known = SimpleMachine(
-        mass=imported.rotor.mass,
-        centre=imported.rotor.centre_of_gravity,
-        length=length,
-        bearings=(0.0, length),
-        sensors=(0.0, length),
-        sensor_angle="135 deg",
-        designation="XCB7013C" if designation is None else designation,
-        gap=250e-6 if gap is None else gap,
-        speed=600.0 * math.pi if speed is None else speed,
-        grade="G 2.5",
-        support="1e8 N/m",
-        name=source.stem,
-    )
-    planes, magnet_planes = ([("NDE", at[0]), ("DE", at[-1])] for at in (nodes, magnets))
-    notes = [f"rotor from {source.name} ({imported.source})", *imported.notes]
-    machine = drafted_machine(
-        rotor=imported.rotor.changed(modal_damping=float(imported.rotor.modal_damping)),
-        bearings=planes,
-        sensors=magnet_planes,
-        known=known,
-        notes=notes,
-        supports=supports,
-    )
-    marked = dict.fromkeys(made_up, MADE_UP) | {
-        f"touchdown_bearings.support.{value}": MADE_UP for value in ("stiffness", "mass")
-    }
-    deliver_text(machine_text(machine, marked), output, overwrite=force)
-    console(sys.stderr).print(
-        f"made up, marked in the file: {', '.join(made_up.values())}", soft_wrap=True, highlight=False
-    )
-
-
-def _support(spring: Spring, source: str) -> dict[str, Any]:
-    """The support of a bearing of another program, as a machine file describes it."""
-    below = spring.support or spring
-    pairs = {"mass": spring.support_mass, "stiffness": below.stiffness, "damping": below.damping}
-    return {
-        f"{name}{end}": {"value": f"{value!r} {si_unit(name)}", "source": source}
-        for name, pair in pairs.items()
-        for end, value in zip(("_horizontal", ""), pair, strict=True)
-    }
+    numbers = {"designation": designation, "gap": gap, "speed": speed}
+    given = {name: value for name, value in numbers.items() if value is not None}
+    text, made_up = imported_text(imported, source, given)
+    deliver_text(text, output, overwrite=force)
+    console(sys.stderr).print(f"made up, marked in the file: {', '.join(made_up)}", soft_wrap=True)
 
 
 def _written_for_ross(machine: Path, output: Path, json: Path | None) -> None:
     """Write the rotor of a machine, with its AMBs as springs and dampers."""
     from rotordrop.machine import load_machine
-    from rotordrop.machine.ross_files import Spring, write_ross
+    from rotordrop.machine.ross_files import springs_of, write_ross
 
     require_places(output, json)  # the output has a name of its own by default
     described = load_machine(machine)
-    springs = [
-        Spring(
-            node=amb.node,
-            name=f"AMB {amb.name}",
-            stiffness=(amb.stiffness.value, amb.stiffness.value),
-            damping=(amb.damping.value, amb.damping.value),
-        )
-        for amb in described.ambs
-    ]
-    write_ross(described.rotor, output, springs)
+    write_ross(described.rotor, output, springs_of(described.ambs))
     damping = float(described.rotor.modal_damping)
     without = f"; left out: modal damping of {percent(damping, 1)}, which files of ROSS do not hold"
     without *= damping > 0.0

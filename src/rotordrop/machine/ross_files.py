@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotordrop.document import parse_toml
+from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.rotor import Rotor
 from rotordrop.errors import MachineFileError, UsageError
 from rotordrop.files import write_text
@@ -351,6 +352,19 @@ def _spring(k: int, kind: str, item: Mapping[str, Any], node: int) -> Spring:
         kind=kind if kind in ("SealElement", MAGNETIC) else "BearingElement",
         told=told if says_more else {},
     )
+
+
+def springs_of(ambs: Iterable[ActiveMagneticBearing]) -> list[Spring]:
+    """AMBs as springs and dampers, alike in x and y."""
+    return [
+        Spring(
+            node=amb.node,
+            name=f"AMB {amb.name}",
+            stiffness=(amb.stiffness.value, amb.stiffness.value),
+            damping=(amb.damping.value, amb.damping.value),
+        )
+        for amb in ambs
+    ]
 
 
 def write_ross(rotor: Rotor, path: str | Path, springs: Iterable[Spring] = ()) -> None:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ValidationError
@@ -16,9 +17,10 @@ from rotordrop.elements.support import REFERENCE_MASS
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.errors import UsageError
 from rotordrop.machine.machine import Machine
+from rotordrop.machine.ross_files import MAGNETIC, ImportedRotor, Spring
 from rotordrop.machine.saving import machine_text
 from rotordrop.machine.schema import field_meanings
-from rotordrop.units import InSI, format_quantity, in_si
+from rotordrop.units import InSI, format_quantity, in_si, si_unit
 
 STEEL_DENSITY, STEEL_MODULUS = 7850.0, 206e9
 _ELEMENTS = 16
@@ -271,6 +273,86 @@ def drafted_machine(
             ],
         }
     )
+
+
+_MADE_UP = {
+    "": {
+        "balance_grade.grade": "balance grade",
+        "rotor.modal_damping": "modal damping",
+        "sensors.node": "planes of the sensors",
+        "sensors.angle": "angles of the sensors",
+    },
+    "designation": {
+        "touchdown_bearings.bearing.designation": "touchdown bearings",
+        "touchdown_bearings.bore_radius": "their bores",
+    },
+    "gap": {"touchdown_bearings.air_gap": "air gap"},
+    "speed": {
+        "speed.nominal": "nominal speed",
+        "balance_grade.at_speed": "speed of the balance grade",
+    },
+}
+"""What a rotor of another program does not tell, by the number that gives it; the first never."""
+
+
+def imported_text(
+    imported: ImportedRotor, source: Path, given: Mapping[str, Any]
+) -> tuple[str, tuple[str, ...]]:
+    """The machine file of a rotor from a file of another program, and what in it is made up and marked so.
+
+    ``given`` are designation, gap [m] and nominal speed [rad/s] as far as they are known.
+    """
+    made_up = {p: what for name, of in _MADE_UP.items() if name not in given for p, what in of.items()}
+    magnets, ends = (
+        sorted({spring.node for spring in imported.springs if spring.kind == kind})
+        for kind in (MAGNETIC, "BearingElement")
+    )
+    last = len(imported.rotor.node_positions)
+    if len(ends) < 2:
+        ends = magnets if len(magnets) > 1 else [max(1, round(0.1 * last)), min(last, round(0.9 * last))]
+        made_up["touchdown_bearings.node"] = "planes of the touchdown bearings"
+    if len(magnets) < 2:
+        magnets = ends
+        made_up["ambs.node"] = "planes of the magnets"
+    if ends[0] == ends[-1]:
+        raise UsageError("the rotor has too few nodes for two bearings; cut it into more elements")
+    supports = {s.node: _support(s, source.name) for s in imported.springs if s.support is not None}
+    if not {ends[0], ends[-1]} <= set(supports):
+        made_up["touchdown_bearings.support"] = "supports"
+    known: dict[str, Any] = {"designation": "XCB7013C", "gap": 250e-6, "speed": 600.0 * math.pi, **given}
+    rotor, length = imported.rotor, imported.rotor.node_positions[-1]
+    machine = drafted_machine(
+        rotor=rotor.changed(modal_damping=float(rotor.modal_damping)),
+        bearings=[("NDE", ends[0]), ("DE", ends[-1])],
+        sensors=[("NDE", magnets[0]), ("DE", magnets[-1])],
+        known=SimpleMachine(
+            mass=rotor.mass,
+            centre=rotor.centre_of_gravity,
+            length=length,
+            bearings=(0.0, length),
+            sensors=(0.0, length),
+            sensor_angle="135 deg",
+            grade="G 2.5",
+            support="1e8 N/m",
+            name=source.stem,
+            **known,
+        ),
+        notes=[f"rotor from {source.name} ({imported.source})", *imported.notes],
+        supports=supports,
+    )
+    marked = [*made_up, "touchdown_bearings.support.stiffness", "touchdown_bearings.support.mass"]
+    return machine_text(machine, dict.fromkeys(marked, "made up: put yours here")), tuple(made_up.values())
+
+
+def _support(spring: Spring, source: str) -> dict[str, Any]:
+    """The support of a bearing of another program, as a machine file describes it."""
+    below = spring.support or spring
+    pairs = {"mass": spring.support_mass, "stiffness": below.stiffness, "damping": below.damping}
+    return {
+        f"{name}{end}": {"value": f"{value!r} {si_unit(name)}", "source": source}
+        for name, pair in pairs.items()
+        for end, value in zip(("_horizontal", ""), pair, strict=True)
+    }
 
 
 def beam_nodes(length: float, planes: Sequence[float]) -> list[float]:
