@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from threading import Event, Thread
 from typing import Literal
 
 from rotordrop.errors import UsageError
@@ -39,6 +40,35 @@ def shown(progress: Shown, title: str) -> Iterator[Progress]:
             yield told
     else:
         yield lambda stage, fraction: None
+
+
+BETWEEN_LINES_S = 5.0
+"""Pause between two lines where there is no terminal [s]; chosen, not measured."""
+
+
+@contextmanager
+def told_in_lines(title: str) -> Iterator[Progress]:
+    """Tell stage and fraction in lines on standard error, for a log; none where all is done before."""
+    ended, latest = Event(), [""]
+
+    def say() -> None:
+        said = ""
+        while not ended.wait(BETWEEN_LINES_S):
+            if latest[0] != said:
+                said = latest[0]
+                with suppress(OSError, ValueError):  # whoever read it has gone
+                    sys.stderr.write(f"{said}\n")
+
+    def tell(stage: str, fraction: float) -> None:
+        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
+
+    lines = Thread(target=say, daemon=True)
+    lines.start()
+    try:
+        yield tell
+    finally:
+        ended.set()
+        lines.join()
 
 
 @contextmanager

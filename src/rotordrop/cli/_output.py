@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, suppress
 from functools import wraps
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.files import require_place, with_digest, write_json, write_text
-from rotordrop.progress import Progress, is_shown, shown
+from rotordrop.progress import Progress, is_shown, shown, told_in_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
 """Columns of what is printed to a file or a pipe; chosen, not measured."""
-
-BETWEEN_LINES_S = 5.0
-"""Pause between two lines on the progress where there is no terminal [s]; chosen, not measured."""
 
 OUTPUTS = ("json", "report", "output")
 """Parameters of the verbs that name files to write; other paths are read."""
@@ -176,35 +172,6 @@ def places_beside(named: Path | None, records: Iterable[Path]) -> list[Path]:
     return [named.with_name(f"{named.stem}_{stem}{named.suffix}") for stem in stems]
 
 
-@contextmanager
-def _progress_lines(title: str) -> Iterator[Progress]:
-    """Lines for a log: one at most every `BETWEEN_LINES_S`, none where all is done before."""
-    ended, latest, out = Event(), [""], console(sys.stderr)
-
-    def say() -> None:
-        said = ""
-        while not ended.wait(BETWEEN_LINES_S):
-            if latest[0] != said:
-                said = latest[0]
-                with suppress(OSError, ValueError):  # whoever read it has gone
-                    out.print(said)
-
-    def tell(stage: str, fraction: float) -> None:
-        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
-
-    lines = Thread(target=say, daemon=True)
-    lines.start()
-    try:
-        yield tell
-    finally:
-        ended.set()
-        lines.join()
-
-
 def progress_bar(title: str) -> AbstractContextManager[Progress]:
-    """Show a bar with the time left on standard error while a long computation runs.
-
-    It gives a function to call with the name of the present stage and the fraction done (0 to 1). Where
-    standard error is not a terminal it gets a line now and then: stage and fraction, if they have changed.
-    """
-    return shown(None, title) if is_shown() else _progress_lines(title)
+    """Show a long computation on standard error: a bar, or lines where that is no terminal."""
+    return shown(None, title) if is_shown() else told_in_lines(title)

@@ -80,15 +80,7 @@ def compare(
     )
     ranked: dict[str, Any] = {}
     for (bearing, key), ranking in rankings(drops, list(drops[0].drop.bearings), drop_scatter or {}).items():
-        condition = ranking.worst_condition
-        ranked.setdefault(bearing, {})[key] = {
-            "worst_first": list(ranking.names),
-            "values": list(ranking.values),
-            "probability_worst_drop": list(ranking.worst_drop),
-            "probability_worse_than_next": list(ranking.worse_than_next),
-            "probability_worst_condition": None if condition is None else list(condition),
-            "statement": ranking.statement,
-        }
+        ranked.setdefault(bearing, {})[key] = ranking.as_json()
     verdict = limit_statement(drops, limits).text
     numbers = {"left_out": left_out(drops), "bearings": ranked, "verdict": verdict}
     deliver(numbers, json, page, report=report)

@@ -6,6 +6,7 @@ import json as json_module
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -15,28 +16,19 @@ from typer import Argument, Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured, pairs, refuse_beside, text_option
 from rotordrop.cli._output import STANDARD_OUTPUT, console, deliver, deliver_text, require_places
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.errors import UsageError
 from rotordrop.units import percent
 
 TEMPLATE_FILE = Path("machine.toml")
 
-_QUESTIONS = {
-    "mass": 'mass of the rotor, such as "60 kg"',
-    "length": 'length of the rotor, "1.1 m"',
-    "centre": 'centre of mass from its NDE end, "520 mm"',
-    "bearings": 'touchdown bearings from the NDE end, "110 mm, 980 mm"',
-    "sensors": 'sensor planes from the NDE end, "180 mm, 900 mm"',
-    "sensor_angle": 'first sensor of a plane, "135 deg": counter-clockwise from +x, seen from the DE (the '
-    "second stands 90° before it)",
-    "designation": 'designation of the touchdown bearings, "7014 ACD/HCP4A"',
-    "gap": 'radial air gap, "0.25 mm"',
-    "speed": 'nominal speed, "9000 rpm"',
-    "grade": 'balance grade, "G 2.5"',
-    "support": 'support of the touchdown bearings: "stiff", "soft", "1e8 N/m", or two: "8e7 N/m, 5e8 N/m"',
-}
-
 Document = StrEnum("Document", ["machine", "numbers", "estimate", "look"])
 """Documents with a published schema."""
+_SCHEMAS = {
+    Document.machine: "machine.schema:machine_schema",
+    Document.numbers: "machine.simple:simple_schema",
+    Document.estimate: "estimate.published:estimate_schema",
+    Document.look: "evidence.look:look_schema",
+}
 
 
 def init(
@@ -58,9 +50,7 @@ def init(
     ] = False,
     numbers: Annotated[
         list[str] | None,
-        Option(
-            "--set", metavar="NAME=VALUE", help=f"A number for --simple; of {', '.join(_QUESTIONS)}, preload."
-        ),
+        Option("--set", metavar="NAME=VALUE", help='A number for --simple, "mass=60 kg"; repeat it.'),
     ] = None,
     schema: Annotated[
         Document | None,
@@ -91,7 +81,10 @@ def init(
     if numbers:
         raise UsageError("numbers of a machine belong to --simple; add it")
     if example is not None:
-        _copy_example(example, target or Path(example), overwrite=force)
+        from rotordrop.examples import copy_example
+
+        for file in copy_example(example, target or Path(example), overwrite=force):
+            typer.echo(f"written: {file}")
         return
     from rotordrop.machine.template import template_text
 
@@ -100,13 +93,14 @@ def init(
 
 def _simple_text(numbers: Sequence[str]) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
-    from rotordrop.machine.simple import EXAMPLES, read_number, simple_text
+    from rotordrop.machine.simple import EXAMPLES, read_number, simple_schema, simple_text
 
     given = pairs(numbers, 'a number, "mass=60 kg"')
+    asked = simple_schema()
     for name in EXAMPLES:
         if given.get(name):
             read_number(name, given)
-    missing = [name for name in _QUESTIONS if not given.get(name)]
+    missing = [name for name in asked["required"] if not given.get(name)]
     if missing and not (sys.stdin and sys.stdin.isatty()):
         raise UsageError(
             f"--simple needs {', '.join(missing)}; nobody can be asked, because the input is no terminal: "
@@ -122,29 +116,14 @@ def _simple_text(numbers: Sequence[str]) -> str:
             return said
 
         try:
-            given[name] = typer.prompt(_QUESTIONS[name], err=True, value_proc=readable)
+            meaning = asked["properties"][name]["description"].rstrip(".")
+            question = f"{meaning[0].lower()}{meaning[1:]}, such as {EXAMPLES[name]!r}"
+            given[name] = typer.prompt(question, err=True, value_proc=readable)
         except typer.Abort:
             said = " ".join(f'--set "{one}={value}"' for one, value in given.items())
             console(sys.stderr).print(f"\ngo on with: rotordrop init --simple {said}", soft_wrap=True)
             raise
     return simple_text(given)
-
-
-def _copy_example(name: str, folder: Path, *, overwrite: bool) -> None:
-    """Copy the machine file of an example, its shaft table and recordings; or none when one stands there."""
-    from rotordrop.examples import example_files
-    from rotordrop.files import atomic_path, make_folder
-
-    machine, *others = example_files(name).values()
-    contents = {"machine.toml": machine.read_bytes()} | {one.name: one.read_bytes() for one in others}
-    standing = [folder / file for file in contents if (folder / file).exists()]
-    if standing and not overwrite:
-        raise OutputError(f"{standing[0]} exists already; name another folder or add --force")
-    make_folder(folder)
-    for file, content in contents.items():
-        with atomic_path(folder / file) as temporary:
-            temporary.write_bytes(content)
-        typer.echo(f"written: {folder / file}")
 
 
 def check(
@@ -209,14 +188,8 @@ def bearings(
 
 def _schema_text(document: Document) -> str:
     """The JSON Schema of a document, for editors and programs."""
-    if document is Document.machine:
-        from rotordrop.machine.schema import machine_schema as schema_of
-    elif document is Document.numbers:
-        from rotordrop.machine.simple import simple_schema as schema_of
-    elif document is Document.look:
-        from rotordrop.evidence.look import look_schema as schema_of
-    else:
-        from rotordrop.estimate.published import estimate_schema as schema_of
+    module, function = _SCHEMAS[document].split(":")
+    schema_of = getattr(import_module(f"rotordrop.{module}"), function)
     return json_module.dumps(schema_of(), indent=2, ensure_ascii=False) + "\n"
 
 

@@ -165,9 +165,7 @@ def clearance(
 
     Example: rotordrop clearance lift.csv --machine machine.toml -o measured.toml
     """
-    from rotordrop.elements.touchdown_bearing import AIR_GAP
-    from rotordrop.evidence.clearance import measure_clearance, wear_between
-    from rotordrop.known import Known
+    from rotordrop.evidence.clearance import measure_clearance, wear_between, with_measured_gaps
     from rotordrop.machine.saving import save_machine
 
     if output is not None and machine is None:
@@ -179,38 +177,15 @@ def clearance(
     ]
     wear = wear_between(*checks) if after is not None else ()
     if output is not None and described is not None:
-        gaps = {
-            AIR_GAP.path_of(found.bearing): Known(
-                value=found.gap,
-                status="estimated",
-                interval_90=found.interval_90,
-                standard_error=found.standard_error,
-                source=f"lift check {paths[-1].name}",
-                unit="m",
-            )
-            for found in checks[-1]
-        }
-        save_machine(described.with_values(gaps), output)
+        save_machine(with_measured_gaps(described, checks[-1], f"lift check {paths[-1].name}"), output)
     content: dict[str, Any] = {"clearances": [found.as_json() for found in checks[-1]]}
     if wear:
         content["earlier"] = [found.as_json() for found in checks[0]]
         content["wear"] = [found.as_json() for found in wear]
 
     def summarise(out: Console) -> None:
-        for found in checks[-1]:
-            low, high = (1e6 * limit for limit in found.interval_90)
-            x, y = 1e6 * found.centre
-            out.print(
-                f"{found.bearing}: air gap {1e6 * found.gap:.1f} µm (90 %: {low:.1f} to {high:.1f} µm)"
-                + (f", the shaft goes {1e6 * found.sag:.1f} µm beyond it" if found.sag else "")
-                + f", centre at x = {x:+.1f} µm, y = {y:+.1f} µm, {len(found.polygon)} directions, "
-                f"out of round by {1e6 * found.out_of_round:.1f} µm"
-            )
-        for change in wear:
-            low, high = (1e6 * limit for limit in change.interval_90)
-            said = "" if low <= 0.0 <= high else "; it has worn" if change.growth > 0 else "; it has shrunk"
-            span = f"{low:+.1f} to {high:+.1f} µm"
-            out.print(f"{change.bearing}: grown by {1e6 * change.growth:+.1f} µm (90 %: {span}){said}")
+        for one in (*checks[-1], *wear):
+            out.print(one.sentence())
         if not any(found.sag for found in checks[-1]):
             out.print(
                 "The gain of the sensors comes on top: an error of 1 % is 1 % of the gap. What the bearing "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
 from typer import Option
 
@@ -15,13 +15,7 @@ from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import UsageError
 from rotordrop.units import parse_quantity
 
-if TYPE_CHECKING:
-    from rotordrop.simulate.case import MagnetEvent
-
 STANDSTILL = "standstill"
-REST_VELOCITY = 5e-3
-"""Velocity [m/s] below which a rotor at its touchdown bearings counts as at rest; chosen, that of a fall of a
-micrometre."""
 
 
 def simulate(
@@ -60,7 +54,7 @@ def simulate(
     from rotordrop.machine import load_machine
     from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
     from rotordrop.report.terminal import summary_console
-    from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart
+    from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, MagnetEvent
     from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
 
@@ -77,7 +71,7 @@ def simulate(
         tolerance=tolerance,
         reduction=reduction.value,
         start=LevitatedStart() if levitated else CentredStart(),
-        magnets=tuple(map(magnet_event, magnets)) if magnets else None,
+        magnets=tuple(map(MagnetEvent.read, magnets)) if magnets else None,
     )
     warning = long_run(described, duration, case.most_steps)
     errors = summary_console(sys.stderr)
@@ -96,38 +90,6 @@ def simulate(
         said = simulate_page(result, described)
     deliver(simulation_numbers(result, described), json, said, report=report, written=[output])
     result.check_finished()
-
-
-def magnet_event(text: str) -> MagnetEvent:
-    """Read an event such as ``"20 ms: off"``.
-
-    Examples
-    --------
-    >>> from rotordrop.cli.simulate import magnet_event
-    >>> str(magnet_event("10 ms: lost NDE x"))
-    'lost NDE x'
-    """
-    from rotordrop.simulate.case import MagnetAction, MagnetEvent
-
-    when, _, what = (part.strip() for part in text.partition(":"))
-    actions: dict[str, MagnetAction] = {action: action for action in get_args(MagnetAction)}
-    said = next((one for one in actions if what == one or what.startswith(f"{one} ")), None)
-    where = what.removeprefix(said or "").split()
-    axes: dict[str, Literal["x", "y"]] = {"x": "x", "y": "y"}
-    axis = axes[where.pop()] if where and where[-1] in axes else None
-    if said is None or len(where) > 1:
-        raise UsageError(
-            f"{text!r} is not 'WHEN: ACTION [MAGNET] [AXIS]' with an action out of {', '.join(actions)}; "
-            "write for example '20 ms: off', 'speed 50 Hz: levitate', 'rest: levitate' or '0 s: lost NDE x'"
-        )
-    moment: dict[str, float] = {}
-    if when == "rest":
-        moment["rest_velocity"] = REST_VELOCITY
-    elif when.startswith("speed "):
-        moment["below_speed"] = parse_quantity(when.removeprefix("speed "), "speed")
-    else:
-        moment["time"] = parse_quantity(when, "time")
-    return MagnetEvent(action=actions[said], magnet=where[0] if where else None, axis=axis, **moment)
 
 
 def coast_down(

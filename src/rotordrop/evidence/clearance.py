@@ -13,12 +13,13 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.document import stated
+from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import refuse_unusable
 from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.evidence.rest import PUSH, of_few, sag_under, stay
-from rotordrop.known import NINETY
+from rotordrop.known import NINETY, Known
 from rotordrop.record.profile import Profile, rules_of
 from rotordrop.record.record import Record, open_record
 from rotordrop.require import require
@@ -106,6 +107,17 @@ class Clearance:
             "out_of_round_m",
         )
 
+    def sentence(self) -> str:
+        """The gap, where its centre lies, and how round it is."""
+        low, high = (1e6 * limit for limit in self.interval_90)
+        x, y = 1e6 * self.centre
+        sag = f", the shaft goes {1e6 * self.sag:.1f} µm beyond it" if self.sag else ""
+        return (
+            f"{self.bearing}: air gap {1e6 * self.gap:.1f} µm (90 %: {low:.1f} to {high:.1f} µm){sag}, "
+            f"centre at x = {x:+.1f} µm, y = {y:+.1f} µm, {len(self.polygon)} directions, "
+            f"out of round by {1e6 * self.out_of_round:.1f} µm"
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Wear:
@@ -123,6 +135,30 @@ class Wear:
     def as_json(self) -> dict[str, Any]:
         """Give everything in SI units, ready for JSON."""
         return stated(self, "bearing growth_m interval_90_m centre_moved_m=moved")
+
+    def sentence(self) -> str:
+        """The growth, and whether it is one."""
+        low, high = (1e6 * limit for limit in self.interval_90)
+        said = "" if low <= 0.0 <= high else "; it has worn" if self.growth > 0 else "; it has shrunk"
+        return (
+            f"{self.bearing}: grown by {1e6 * self.growth:+.1f} µm (90 %: {low:+.1f} to {high:+.1f} µm){said}"
+        )
+
+
+def with_measured_gaps(machine: Machine, found: Sequence[Clearance], source: str) -> Machine:
+    """The machine with the gaps of a lift check, and where they come from."""
+    gaps = {
+        AIR_GAP.path_of(one.bearing): Known(
+            value=one.gap,
+            status="estimated",
+            interval_90=one.interval_90,
+            standard_error=one.standard_error,
+            source=source,
+            unit="m",
+        )
+        for one in found
+    }
+    return machine.with_values(gaps)
 
 
 def measure_clearance(

@@ -6,7 +6,8 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
-from rotordrop.errors import UsageError
+from rotordrop.errors import OutputError, UsageError
+from rotordrop.files import atomic_path, make_folder
 from rotordrop.require import require
 
 _FOLDER, _SUFFIXES = Path(__file__).parent, (".h5", ".csv")
@@ -39,6 +40,26 @@ def example_files(name: str) -> dict[str, Path]:
     machine = example_path(name)
     found = (machine, *sorted(machine.parent.glob(f"{name}_*.csv")), *sorted((_FOLDER / name).glob("*")))
     return {file.name: file for file in found}
+
+
+def copy_example(name: str, folder: Path, *, overwrite: bool = False) -> list[Path]:
+    """Copy the machine file of an example, its shaft table and recordings; or none where one stands there.
+
+    Raises
+    ------
+    OutputError
+        When one stands there and shall not be replaced.
+    """
+    machine, *others = example_files(name).values()
+    contents = {folder / "machine.toml": machine} | {folder / one.name: one for one in others}
+    standing = [file for file in contents if file.exists()]
+    if standing and not overwrite:
+        raise OutputError(f"{standing[0]} exists already; name another folder or add --force")
+    make_folder(folder)
+    for file, source in contents.items():
+        with atomic_path(file) as temporary:
+            temporary.write_bytes(source.read_bytes())
+    return [*contents]
 
 
 @lru_cache(maxsize=1)

@@ -88,8 +88,8 @@ class SimpleMachine:
 
 EXAMPLES = {
     "mass": "60 kg",
-    "centre": "520 mm",
     "length": "1.1 m",
+    "centre": "520 mm",
     "bearings": "110 mm, 980 mm",
     "sensors": "180 mm, 900 mm",
     "sensor_angle": "135 deg",

@@ -6,10 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.errors import UsageError
 from rotordrop.known import NINETY
 from rotordrop.require import each, require
@@ -62,6 +64,14 @@ class Ranking:
     """Probability that each drop but the last was worse than the one after it [1]."""
     statement: str
     """The order in words."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON."""
+        return stated(
+            self,
+            "worst_first=names values probability_worst_drop=worst_drop statement "
+            "probability_worse_than_next=worse_than_next probability_worst_condition=worst_condition",
+        )
 
 
 def rank_drops(

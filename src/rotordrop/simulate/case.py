@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
-from rotordrop.errors import SimulationError
+from rotordrop.errors import SimulationError, UsageError
 from rotordrop.require import each, numbers, require
 from rotordrop.rotor.reduction import Reduction, reduction_of
-from rotordrop.units import InSI
+from rotordrop.units import InSI, parse_quantity
 
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
 IntegratorName: TypeAlias = Literal["tsit5", "dp5"]
@@ -108,6 +108,11 @@ class UnbalanceJump:
 MagnetAction: TypeAlias = Literal["off", "levitate", "hold", "lost", "bias decays"]
 
 
+REST_VELOCITY = 5e-3
+"""Velocity [m/s] below which a rotor at its touchdown bearings counts as at rest; chosen, that of a fall of a
+micrometre."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class MagnetEvent:
     """What magnets in the loop do from some moment on: a time, a speed, or when the rotor has come to rest.
@@ -136,6 +141,36 @@ class MagnetEvent:
                 f"the magnets' event {self.action!r} has the moments {stated}; give one of time, below_speed "
                 "and rest_velocity, not negative"
             )
+
+    @classmethod
+    def read(cls, text: str) -> MagnetEvent:
+        """Read an event such as ``"20 ms: off"``.
+
+        Examples
+        --------
+        >>> from rotordrop.simulate.case import MagnetEvent
+        >>> str(MagnetEvent.read("10 ms: lost NDE x"))
+        'lost NDE x'
+        """
+        when, _, what = (part.strip() for part in text.partition(":"))
+        actions: tuple[MagnetAction, ...] = get_args(MagnetAction)
+        said = next((one for one in actions if what == one or what.startswith(f"{one} ")), None)
+        where = what.removeprefix(said or "").split()
+        axes: dict[str, Literal["x", "y"]] = {"x": "x", "y": "y"}
+        axis = axes[where.pop()] if where and where[-1] in axes else None
+        if said is None or len(where) > 1:
+            raise UsageError(
+                f"{text!r} is not 'WHEN: ACTION [MAGNET] [AXIS]' with an action out of {', '.join(actions)}; "
+                "write for example '20 ms: off', 'speed 50 Hz: levitate', 'rest: levitate' or "
+                "'0 s: lost NDE x'"
+            )
+        if when == "rest":
+            moment = {"rest_velocity": REST_VELOCITY}
+        elif when.startswith("speed "):
+            moment = {"below_speed": parse_quantity(when.removeprefix("speed "), "speed")}
+        else:
+            moment = {"time": parse_quantity(when, "time")}
+        return cls(action=said, magnet=where[0] if where else None, axis=axis, **moment)
 
     def __str__(self) -> str:
         """What happens, and where."""

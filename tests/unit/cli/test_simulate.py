@@ -13,9 +13,9 @@ from tests.unit.simulate.looped import looped_machine
 
 from rotordrop import load_result, save_machine
 from rotordrop.cli.app import INTERRUPTED, run
-from rotordrop.cli.simulate import magnet_event
 from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine, example_path
+from rotordrop.simulate.case import MagnetEvent
 
 PAPER = str(example_path("paper"))
 SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduction", "quick"]
@@ -77,12 +77,12 @@ def test_a_lift_stands_in_json(tmp_path):
 
 
 def test_events_of_magnets_are_read_and_bad_ones_refused():
-    events = [*map(magnet_event, ("speed 50 Hz: levitate", "rest: bias decays", "0 s: lost NDE x"))]
+    events = [*map(MagnetEvent.read, ("speed 50 Hz: levitate", "rest: bias decays", "0 s: lost NDE x"))]
     assert [str(event) for event in events] == ["levitate", "bias decays", "lost NDE x"]
     assert events[0].below_speed == pytest.approx(314.159265)
     for text in ("20 ms: lift", "20 ms", "20 ms: lost NDE DE x"):
         with pytest.raises(UsageError, match="is not 'WHEN: ACTION"):
-            magnet_event(text)
+            MagnetEvent.read(text)
 
 
 def test_where_a_magnet_stays_on_nothing_falls(capsys):

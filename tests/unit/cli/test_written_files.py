@@ -261,7 +261,7 @@ NEVER_READ = {
     "physics._numba:save_overload": "the compiler's own objects, compiled again where they do not load",
     "report.page:write_page": "for people",
     "cli._terminal:open_streams": "the null device",
-    "cli.machine:_copy_example": "what the package brings, read as a machine and a record",
+    "examples.__init__:copy_example": "what the package brings, read as a machine and a record",
     "estimate.histories:_csv": "a table for other programs",
     "estimate.histories:_mat": "for MATLAB",
     "estimate.histories:_parquet": "for other programs",
