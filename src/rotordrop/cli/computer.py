@@ -49,6 +49,7 @@ def serve(
 
     Example: rotordrop serve
     """
+    from rotordrop.web.server import data_folder
     from rotordrop.web.server import serve as serve_page
 
     place = folder or data_folder()
@@ -61,13 +62,6 @@ def serve(
             typer.launch(address)
 
     serve_page(place, port, announce, lambda words: console(sys.stderr).print(words))
-
-
-def data_folder() -> Path:
-    """Folder for data of this user that outlives a restart, by the custom of the system."""
-    if os.name == "nt":
-        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "rotordrop" / "serve"
-    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "rotordrop" / "serve"
 
 
 def doctor(

@@ -184,8 +184,8 @@ def clearance(
         content["wear"] = [found.as_json() for found in wear]
 
     def summarise(out: Console) -> None:
-        for one in (*checks[-1], *wear):
-            out.print(one.sentence())
+        for said in (*(one.sentence() for one in checks[-1]), *(one.sentence() for one in wear)):
+            out.print(said)
         if not any(found.sag for found in checks[-1]):
             out.print(
                 "The gain of the sensors comes on top: an error of 1 % is 1 % of the gap. What the bearing "

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Argument, Option
 
 from rotordrop.cli._options import text_option
 from rotordrop.cli._output import console
-from rotordrop.errors import UsageError
-
-if TYPE_CHECKING:
-    from rotordrop.watch.kept import Kept
 
 
 def watch(
@@ -39,6 +35,7 @@ def watch(
 
     Example: rotordrop watch /share/drops --machines machines --log drops.db
     """
+    from rotordrop.watch.kept import kept_of
     from rotordrop.watch.watcher import Watcher
 
     out, notes = console(), console(sys.stderr)
@@ -50,7 +47,7 @@ def watch(
     watcher = Watcher(
         folder=folder,
         machines=machines,
-        kept=kept_beside(log, keep),
+        kept=kept_of(log, keep),
         log=log,
         hook=hook,
         quick=quick,
@@ -60,14 +57,3 @@ def watch(
     watcher.prepare()
     say(f"Watching {folder}; kept in {watcher.kept.path}, overview {watcher.kept.path / 'overview.html'}")
     watcher.run(once=once)
-
-
-def kept_beside(log: str, keep: Path | None) -> Kept:
-    """The records kept for a log."""
-    from rotordrop.jobs.workspace import Workspace
-    from rotordrop.ledger.book import is_url
-    from rotordrop.watch.kept import Kept
-
-    if keep is None and is_url(log):
-        raise UsageError("a log in a data base has no folder beside it; name one for the records with --keep")
-    return Kept(Workspace(keep or Path(log).with_suffix(".kept")))

@@ -27,6 +27,7 @@ from rotordrop.files import (
     write_text,
 )
 from rotordrop.jobs.workspace import Job, Role, Workspace, labelled, stored_as
+from rotordrop.ledger.book import is_url
 
 STATUS_FILE = "watch.json"
 QUARANTINE = "quarantine"
@@ -236,3 +237,10 @@ def status_of(job: Job) -> dict[str, Any] | None:
 def keep_status(job: Job, status: Mapping[str, Any]) -> None:
     """Keep what became of a drop."""
     write_json(job.path / STATUS_FILE, status, sealed=True)
+
+
+def kept_of(log: str, folder: Path | None = None) -> Kept:
+    """The records kept for a log, beside it unless a folder is named."""
+    if folder is None and is_url(log):
+        raise UsageError("a log in a data base has no folder beside it; name one for the records with --keep")
+    return Kept(Workspace(folder or Path(log).with_suffix(".kept")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,13 @@ from rotordrop.jobs.workspace import Workspace
 
 if TYPE_CHECKING:
     import uvicorn
+
+
+def data_folder() -> Path:
+    """Folder for data of this user that outlives a restart, by the custom of the system."""
+    if os.name == "nt":
+        return Path(os.environ.get("LOCALAPPDATA", str(Path.home()))) / "rotordrop" / "serve"
+    return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "rotordrop" / "serve"
 
 
 def serve(folder: Path, port: int, announce: Callable[[str], None], tell: Callable[[str], None]) -> None:
