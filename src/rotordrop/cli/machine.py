@@ -148,9 +148,9 @@ def check(
     """
     from rotordrop.machine import load_machine
     from rotordrop.report.critical_speeds_page import machine_page
-    from rotordrop.report.machine_content import machine_content, machine_json
+    from rotordrop.report.machine_content import machine_content
     from rotordrop.report.page import write_page
-    from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+    from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine
 
     described = load_machine(machine)
     summary = summarise_machine(described)
@@ -174,7 +174,7 @@ def bearings(
     Example: rotordrop bearings 7016 ACD/HCP4A
     """
     from rotordrop.elements.catalog.lookup import find_bearing, search_bearings
-    from rotordrop.report.machine_content import bearing_content, bearing_json
+    from rotordrop.report.machine_content import bearing_content
 
     asked = " ".join(designation)
     try:
@@ -183,7 +183,7 @@ def bearings(
         raise UsageError(str(error)) from None
     found = search_bearings(asked)
     content = bearing_content(asked, found)
-    deliver([bearing_json(bearing) for bearing in found], json, content, whole=everything)
+    deliver([bearing.as_json() for bearing in found], json, content, whole=everything)
 
 
 def _schema_text(document: Document) -> str:

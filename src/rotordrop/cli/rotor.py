@@ -31,8 +31,8 @@ def critical_speeds(
     Example: rotordrop critical-speeds machine.toml --report speeds.html
     """
     from rotordrop.machine import load_machine
-    from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page
-    from rotordrop.rotor.campbell import campbell_diagram, speed_grid
+    from rotordrop.report.critical_speeds_page import critical_speeds_page
+    from rotordrop.rotor.campbell import campbell_diagram, critical_speeds_json, speed_grid
     from rotordrop.rotor.critical_speeds import WHIRLS, critical_speed_map
 
     described = load_machine(machine)

@@ -51,8 +51,9 @@ def simulate(
 
     Example: rotordrop simulate machine.toml --speed "60 Hz" --report drop.html
     """
+    from rotordrop.estimate.simulated_drop import simulation_numbers
     from rotordrop.machine import load_machine
-    from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
+    from rotordrop.report.simulate_page import simulate_summary
     from rotordrop.report.terminal import summary_console
     from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, MagnetEvent
     from rotordrop.simulate.drop import model_for, simulate_drop

@@ -199,8 +199,7 @@ def write_waterfall(
 def write_check(machine: Machine, made: Path) -> None:
     """Write what a machine amounts to: its report and its document."""
     from rotordrop.report.critical_speeds_page import machine_page
-    from rotordrop.report.machine_content import machine_json
-    from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+    from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine
 
     summary = summarise_machine(machine)
     warnings = machine_warnings(machine, summary)

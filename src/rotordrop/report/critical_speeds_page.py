@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.document import stated
 from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
 from rotordrop.report.content import (
     Card,
@@ -57,7 +56,6 @@ from rotordrop.units import percent
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.rotor.machine_summary import MachineSummary, MachineWarning
-    from rotordrop.rotor.suspension import EquivalentStiffness
 
 HIGHEST = 1000.0
 """Highest frequency of a Campbell diagram [Hz]; chosen, not measured."""
@@ -361,59 +359,3 @@ def campbell_figure(diagram: CampbellDiagram, highest: float, nominal: float | N
     figure.update_yaxes(range=[0.0, highest], col=1)
     figure.update_yaxes(title_text="damping ratio [%]", rangemode="tozero", col=2)
     return finished(figure, "rotor speed [Hz]", "frequency [Hz]")
-
-
-def critical_speeds_json(
-    maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
-) -> dict[str, Any]:
-    """Everything the page shows, ready for JSON, SI units; null where there is no line."""
-    told = {name: _map_json(found) for name, found in maps.items()}
-    return {"maps": told, "campbell": {name: _campbell_json(d) for name, d in diagrams.items()}}
-
-
-def _map_json(found: CriticalSpeedMap) -> dict[str, Any]:
-    bearings = {
-        part.bearing: stated(
-            part,
-            "load_N tangent_N_m simple_N_m support_N_m contact_N_m equivalent_tangent_N_m "
-            "equivalent_simple_N_m",
-            equivalent_tangent_N_m=part.equivalent("tangent"),
-            equivalent_simple_N_m=part.equivalent("simple"),
-        )
-        | (_relaxing_json(found, part) if part.branches else {})
-        for part in found.lines
-    }
-    return stated(
-        found,
-        "whirl stiffness_N_m massless_Hz with_support_mass_Hz bearings at_the_machine_Hz=at_lines",
-        bearings=bearings,
-    )
-
-
-def _relaxing_json(found: CriticalSpeedMap, part: EquivalentStiffness) -> dict[str, Any]:
-    """Stiffness and loss factor of a support at the lines with the mass of the supports."""
-    lines = found.at_lines["with support mass"]
-    dynamic = [part.dynamic(float(hertz)) for hertz in lines if np.isfinite(hertz)]
-    return {
-        "support_at_lines_N_m": [stiffness.real for stiffness in dynamic],
-        "loss_factor_at_lines": [stiffness.imag / stiffness.real for stiffness in dynamic],
-    }
-
-
-def _campbell_json(diagram: CampbellDiagram) -> dict[str, Any]:
-    shapes = diagram.shapes[0]
-    return stated(
-        diagram,
-        "speed_Hz frequency_Hz damping_ratio whirl node_positions_m shapes_at_lowest_speed critical_speeds",
-        speed_Hz=diagram.speed / TURN,
-        shapes_at_lowest_speed={"real": shapes.real, "imaginary": shapes.imag},
-        critical_speeds=[
-            stated(
-                crossing,
-                "speed_Hz line direction damping_ratio amplification_factor",
-                speed_Hz=crossing.speed / TURN,
-                amplification_factor=amplification_factor(crossing.damping_ratio),
-            )
-            for crossing in diagram.crossings
-        ],
-    )

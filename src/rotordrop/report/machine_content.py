@@ -12,7 +12,6 @@ import plotly.graph_objects as go
 
 from rotordrop._version import __version__
 from rotordrop.document import stated
-from rotordrop.elements.catalog.boundary import clearance_range
 from rotordrop.elements.catalog.lookup import CatalogueBearing
 from rotordrop.machine.ross_files import ImportedRotor, Spring
 from rotordrop.physics.friction import stribeck_coefficient
@@ -179,58 +178,6 @@ def mode_table(modes: Iterable[tuple[str, Iterable[float]]], head: str, count: i
     rows = [(name, list(values)) for name, values in modes]
     count = count or max(len(values) for _, values in rows)
     return table(rows, (Column(head, lambda row: row[0]), *map(frequency, range(count))))
-
-
-def machine_json(
-    machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
-) -> dict[str, object]:
-    """Give what ``rotordrop check`` found, ready for JSON, in SI units."""
-    parts = "machine free_free_Hz settled_Hz levitated_sag_m bearings"
-    parts += " magnets" if summary.magnets else ""
-    parts += " control_loop=loop" if summary.loop is not None else ""
-    made = stated(
-        summary,
-        f"{parts} warnings defaults inferred",
-        machine=machine.name,
-        bearings={
-            rest.name: {
-                "load_N": rest.load,
-                **{figure.field: figure.value for figure in rest.figures},
-                **stated(
-                    rest,
-                    "contact_pressure_at_rest_Pa=contact_pressure tangent_stiffness_N_per_m "
-                    "equivalent_stiffness_N_per_m support_frequency_Hz",
-                ),
-            }
-            for rest in summary.bearings
-        },
-        magnets={one.name: _magnet_json(one) for one in summary.magnets},
-        control_loop=None
-        if summary.loop is None
-        else stated(summary.loop, "stable growth_per_s frequency_Hz delay_s longest_delay_s"),
-        warnings=[warning.message for warning in warnings],
-        defaults=machine.defaults_in_use,
-        inferred=machine.inferred,
-    )
-    return {"machine": made.pop("machine"), **inertias_json(summary.fe), **made}
-
-
-def _magnet_json(one: MagnetSummary) -> dict[str, object]:
-    known = stated(
-        one,
-        "force_by_current_N_per_A=by_current negative_stiffness_N_per_m=by_way inductance_H "
-        "spare_force_at_rest_N=spare_at_rest linear_lift",
-        linear_lift=stated(one.lift, "deepest_m time_s speed_m_per_s"),
-    )
-    if one.margins is not None:
-        keys = "crossover_Hz phase_margin_rad=phase delay_margin_s=delay"
-        known |= stated(one.margins, keys, crossover_Hz=one.margins.crossover / (2.0 * math.pi))
-    return known
-
-
-def inertias_json(fe: RotorFE) -> dict[str, object]:
-    """Mass, centre of gravity and inertias of a rotor, ready for JSON [SI]."""
-    return stated(fe, "mass_kg=total_mass centre_of_gravity_m polar_inertia_kg_m2 diametral_inertia_kg_m2")
 
 
 POINTS = 801
@@ -416,7 +363,7 @@ def imported_json(imported: ImportedRotor) -> dict[str, object]:
         "source": imported.source,
         "notes": list(imported.notes),
         "nodes": len(imported.rotor.node_positions),
-        **inertias_json(rotor_fe(imported.rotor)),
+        **rotor_fe(imported.rotor).as_json(),
         "free_free_Hz": _free(imported),
         "on_source_bearings_x_Hz": _supported(imported, 0),
         "on_source_bearings_y_Hz": _supported(imported, 1),
@@ -486,28 +433,6 @@ def bearing_content(written: str, found: Sequence[CatalogueBearing]) -> ReportCo
     )
 
 
-def bearing_json(bearing: CatalogueBearing) -> dict[str, object]:
-    """Give a bearing ready for JSON, in SI units."""
-    return stated(
-        bearing,
-        "designation maker listed kind bore_m outside_diameter_m width_m contact_angle_rad "
-        "contact_angle_range_rad ball_material ball_count=complement.ball_count "
-        "ball_count_range=complement.count_range ball_diameter_m=complement.ball_diameter "
-        "ball_diameter_range_m=complement.diameter_range pitch_diameter_m=complement.pitch_diameter "
-        "conformity=complement.conformity conformity_range=complement.conformity_range "
-        "basis=complement.basis clearance_range_m preload_N preload_basis axial_rigidity_N_per_m",
-        clearance_range_m=clearance_of(bearing),
-        preload_basis=bearing.preload_basis or None,
-    )
-
-
-def clearance_of(bearing: CatalogueBearing) -> tuple[float, float] | None:
-    """Radial clearance [m] of the class that a deep-groove designation names, CN where it names none."""
-    if bearing.kind != "deep groove" or bearing.read is None:
-        return None
-    return clearance_range(bearing.read.clearance_class or "CN", bearing.bore)
-
-
 def _statements(written: str, first: CatalogueBearing) -> list[Statement]:
     balls = first.complement
     if first.listed:
@@ -532,7 +457,7 @@ def _statements(written: str, first: CatalogueBearing) -> list[Statement]:
 
 
 def _meant(bearing: CatalogueBearing) -> Table:
-    balls, play = bearing.complement, clearance_of(bearing)
+    balls, play = bearing.complement, bearing.clearance_range
     width = "" if bearing.width is None else f" × {1e3 * bearing.width:g}"
     rows: list[tuple[str, object]] = [
         (

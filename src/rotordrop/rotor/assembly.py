@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.rotor import element_factors
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics import timoshenko
@@ -90,6 +91,12 @@ class RotorFE:
     def polar_inertia(self) -> float:
         """Inertia about the rotor axis [kg m²], which drives the spin."""
         return float(product(product(self.rigid_shapes[:, 1], self.polar), self.rigid_shapes[:, 1]))
+
+    def as_json(self) -> dict[str, Any]:
+        """Mass, centre of gravity and inertias, ready for JSON [SI]."""
+        return stated(
+            self, "mass_kg=total_mass centre_of_gravity_m polar_inertia_kg_m2 diametral_inertia_kg_m2"
+        )
 
     def node_index(self, node: int) -> int:
         """Index of the displacement of a node (counted from 1) among the degrees of freedom of a plane."""

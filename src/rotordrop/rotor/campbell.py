@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotordrop.arrays import Array, ComplexArray
+from rotordrop.document import stated
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
 from rotordrop.require import numbers, require
 from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.critical_speeds import CriticalSpeedMap
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.suspension import Support, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
 
+TURN = 2.0 * math.pi
 REDUCTION = Reduction(modes=16, attachment=True)
 BEYOND_NOMINAL = 1.3
 """Highest speed of a diagram over the nominal one [1]: past the largest margin that API 617 asks for."""
@@ -43,6 +47,15 @@ class Crossing:
     damping_ratio: float
     """Damping ratio there [1]."""
 
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, with its amplification."""
+        return stated(
+            self,
+            "speed_Hz line direction damping_ratio amplification_factor",
+            speed_Hz=self.speed / TURN,
+            amplification_factor=amplification_factor(self.damping_ratio),
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CampbellDiagram:
@@ -64,6 +77,17 @@ class CampbellDiagram:
     """Positions along z [m], shape (N,)."""
     crossings: tuple[Crossing, ...]
     """Critical speeds between the first and the last speed."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, SI units, with the shapes at the lowest speed."""
+        shapes = self.shapes[0]
+        return stated(
+            self,
+            "speed_Hz frequency_Hz damping_ratio whirl node_positions_m shapes_at_lowest_speed "
+            "critical_speeds=crossings",
+            speed_Hz=self.speed / TURN,
+            shapes_at_lowest_speed={"real": shapes.real, "imaginary": shapes.imag},
+        )
 
     def direction(self, line: int) -> str:
         """Direction of a line, by the mean over its speeds."""
@@ -250,4 +274,14 @@ def separations(diagram: CampbellDiagram, lowest: float, highest: float) -> dict
         one: Separation.of(one.speed, amplification_factor(one.damping_ratio), lowest, highest)
         for one in diagram.crossings
         if one.direction != "backward"
+    }
+
+
+def critical_speeds_json(
+    maps: Mapping[str, CriticalSpeedMap], diagrams: Mapping[str, CampbellDiagram]
+) -> dict[str, Any]:
+    """Maps by whirl and diagrams by what holds the rotor, ready for JSON, SI units."""
+    return {
+        "maps": {name: found.as_json() for name, found in maps.items()},
+        "campbell": {name: found.as_json() for name, found in diagrams.items()},
     }

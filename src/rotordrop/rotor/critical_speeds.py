@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
@@ -66,6 +68,34 @@ class CriticalSpeedMap:
     def _repr_html_(self) -> str:
         lines = {str(k): (np.log10(self.stiffness), of) for k, of in enumerate(self.massless.T, 1)}
         return sketch(repr(self), "log10 of the stiffness [N/m]", "frequency [Hz]", lines)
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, SI units; null where there is no line."""
+        bearings = {
+            part.bearing: stated(
+                part,
+                "load_N tangent_N_m simple_N_m support_N_m contact_N_m equivalent_tangent_N_m "
+                "equivalent_simple_N_m",
+                equivalent_tangent_N_m=part.equivalent("tangent"),
+                equivalent_simple_N_m=part.equivalent("simple"),
+            )
+            | (self._relaxing(part) if part.branches else {})
+            for part in self.lines
+        }
+        return stated(
+            self,
+            "whirl stiffness_N_m massless_Hz with_support_mass_Hz bearings at_the_machine_Hz=at_lines",
+            bearings=bearings,
+        )
+
+    def _relaxing(self, part: EquivalentStiffness) -> dict[str, Any]:
+        """Stiffness and loss factor of a support at the lines with the mass of the supports."""
+        lines = self.at_lines["with support mass"]
+        dynamic = [part.dynamic(float(hertz)) for hertz in lines if np.isfinite(hertz)]
+        return {
+            "support_at_lines_N_m": [stiffness.real for stiffness in dynamic],
+            "loss_factor_at_lines": [stiffness.imag / stiffness.real for stiffness in dynamic],
+        }
 
 
 @one_thread()

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.bearing_numbers import BearingFigure, numbers_of
 from rotordrop.elements.face import UNPRESSED, Face
 from rotordrop.elements.table import rows
@@ -275,3 +276,34 @@ def _lifted(rest: BearingSummary) -> Iterator[MachineWarning]:
 
 def _warning(kind: str, bearing: str, value: float, limit: float, text: str) -> MachineWarning:
     return MachineWarning(kind=kind, bearing=bearing, value=value, limit=limit, message=f"{bearing}: {text}")
+
+
+def machine_json(
+    machine: Machine, summary: MachineSummary, warnings: tuple[MachineWarning, ...]
+) -> dict[str, object]:
+    """Give what ``rotordrop check`` found, ready for JSON, in SI units."""
+    parts = "machine free_free_Hz settled_Hz levitated_sag_m bearings"
+    parts += " magnets" if summary.magnets else ""
+    parts += " control_loop=loop" if summary.loop is not None else ""
+    made = stated(
+        summary,
+        f"{parts} warnings defaults inferred",
+        machine=machine.name,
+        bearings={
+            rest.name: {
+                "load_N": rest.load,
+                **{figure.field: figure.value for figure in rest.figures},
+                **stated(
+                    rest,
+                    "contact_pressure_at_rest_Pa=contact_pressure tangent_stiffness_N_per_m "
+                    "equivalent_stiffness_N_per_m support_frequency_Hz",
+                ),
+            }
+            for rest in summary.bearings
+        },
+        magnets={one.name: one.as_json() for one in summary.magnets},
+        warnings=[warning.message for warning in warnings],
+        defaults=machine.defaults_in_use,
+        inferred=machine.inferred,
+    )
+    return {"machine": made.pop("machine"), **summary.fe.as_json(), **made}

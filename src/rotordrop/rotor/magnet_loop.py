@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
+from rotordrop.document import stated
 from rotordrop.elements.magnet import Controller, Magnet
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
@@ -47,6 +49,10 @@ class LoopStability:
     def stable(self) -> bool:
         """Whether motion decays."""
         return self.growth < 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, SI units."""
+        return stated(self, "stable growth_per_s frequency_Hz delay_s longest_delay_s")
 
     def sentence(self) -> str:
         """What is wrong with a loop that is not stable, with its margin; else what is left."""
@@ -148,6 +154,20 @@ class MagnetSummary:
     margins: Margins | None
     """Crossover, phase and delay margin; None without a controller, or where the gain never falls through
     one."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, SI units."""
+        known = stated(
+            self,
+            "force_by_current_N_per_A=by_current negative_stiffness_N_per_m=by_way inductance_H "
+            "spare_force_at_rest_N=spare_at_rest linear_lift",
+            linear_lift=stated(self.lift, "deepest_m time_s speed_m_per_s"),
+        )
+        if self.margins is None:
+            return known
+        crossover = self.margins.crossover / (2.0 * math.pi)
+        keys = "crossover_Hz phase_margin_rad=phase delay_margin_s=delay"
+        return known | stated(self.margins, keys, crossover_Hz=crossover)
 
 
 def magnet_summaries(machine: Machine, fe: RotorFE) -> tuple[MagnetSummary, ...]:

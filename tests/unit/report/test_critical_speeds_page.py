@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rotordrop.machine import example_machine
-from rotordrop.report.critical_speeds_page import critical_speeds_json, critical_speeds_page, crossing_table
-from rotordrop.rotor.campbell import Crossing, campbell_diagram, separations
+from rotordrop.report.critical_speeds_page import critical_speeds_page, crossing_table
+from rotordrop.rotor.campbell import Crossing, campbell_diagram, critical_speeds_json, separations
 from rotordrop.rotor.critical_speeds import critical_speed_map
 
 MACHINE = example_machine("small")

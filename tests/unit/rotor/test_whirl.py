@@ -9,7 +9,6 @@ from tests.unit.simulate.test_mount import O_RING, RIBBON, mounted
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics.timoshenko import Section, round_section
-from rotordrop.report.critical_speeds_page import critical_speeds_json
 from rotordrop.rotor.assembly import (
     PointMass,
     assemble,
@@ -18,7 +17,7 @@ from rotordrop.rotor.assembly import (
     modal_damping_matrix,
     modes_on_springs,
 )
-from rotordrop.rotor.campbell import campbell_diagram
+from rotordrop.rotor.campbell import campbell_diagram, critical_speeds_json
 from rotordrop.rotor.critical_speeds import critical_speed_map, critical_speeds
 from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.reduction import Reduction, reduce_rotor

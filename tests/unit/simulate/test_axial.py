@@ -15,6 +15,7 @@ from tests.unit.simulate.test_right_hand_side import a_state, both_jacobians
 from rotordrop import build_drop_model, load_result, simulate_coast_down, simulate_drop
 from rotordrop.elements.face import Face
 from rotordrop.errors import MachineFileError
+from rotordrop.estimate.simulated_drop import landing_count, simulation_numbers
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.impacts import HOP
 from rotordrop.machine import example_path, loads_machine
@@ -28,9 +29,8 @@ from rotordrop.physics.ball_set import (
     two_row_force,
 )
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
-from rotordrop.report.machine_content import machine_json
-from rotordrop.report.simulate_page import landing_count, simulate_page, simulation_numbers
-from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+from rotordrop.report.simulate_page import simulate_page
+from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, CoastDownCase, DropCase, LevitatedStart
 from rotordrop.simulate.expected_steps import expected_steps

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.machine import loads_machine
 from rotordrop.machine.saving import machine_text
-from rotordrop.report.simulate_page import simulation_numbers
 from rotordrop.simulate.used import clearance_uses
 from rotordrop.study.quantities import columns_of, row_of
 

@@ -8,13 +8,14 @@ import pytest
 
 from rotordrop import build_drop_model, load_result, simulate_coast_down, simulate_drop
 from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics import thermal
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.fast_balls import FastBalls, centred_balls
-from rotordrop.report.simulate_page import simulate_page, simulation_numbers
+from rotordrop.report.simulate_page import simulate_page
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.simulate import _rhs as R
 from rotordrop.simulate import heat

@@ -7,9 +7,9 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop import DropCase, build_drop_model, simulate_drop
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.report.simulate_page import simulation_numbers
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop_bench.settled import settled_coordinates
 

@@ -9,11 +9,12 @@ from tests.unit.simulate.test_right_hand_side import SPEED, a_state, assert_jaco
 from rotordrop import DropCase, Known, simulate_drop
 from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.machine import example_path, load_machine, loads_machine
 from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.physics import columns as L
-from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
+from rotordrop.report.simulate_page import simulate_summary
 from rotordrop.rotor.machine_summary import summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.rotor.unknowns import structure_unknowns

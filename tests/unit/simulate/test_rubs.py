@@ -6,10 +6,11 @@ from tests.unit.simulate.test_right_hand_side import mirrored_drops
 
 from rotordrop import DropCase, build_drop_model, load_result, simulate_drop
 from rotordrop.errors import MachineFileError
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import touch
-from rotordrop.report.simulate_page import simulate_summary, simulation_numbers
+from rotordrop.report.simulate_page import simulate_summary
 from rotordrop.simulate.losses import losses
 from rotordrop.simulate.used import clearance_uses
 

@@ -15,11 +15,12 @@ from rotordrop import (
     simulate_drop,
 )
 from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.estimate.simulated_drop import simulation_numbers
 from rotordrop.machine import example_path, loads_machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
-from rotordrop.report.critical_speeds_page import critical_speeds_json
-from rotordrop.report.simulate_page import simulate_page, simulation_numbers
+from rotordrop.report.simulate_page import simulate_page
+from rotordrop.rotor.campbell import critical_speeds_json
 from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
 from rotordrop.rotor.parameters import build_drop_model, sag_of_model
 from rotordrop.simulate.losses import losses

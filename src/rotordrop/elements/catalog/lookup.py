@@ -11,11 +11,13 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
+from rotordrop.document import stated
 from rotordrop.elements.catalog.boundary import (
     DIMENSION_SERIES,
     PRELOAD_CLASSES,
     PreloadClass,
     boundary_dimensions,
+    clearance_range,
     known_bores,
 )
 from rotordrop.elements.catalog.designation import Designation, Kind, read_designation
@@ -66,6 +68,26 @@ class CatalogueBearing:
     """What the preloads rest on, where they are not its maker's."""
     read: Designation | None = None
     """What the designation said, where it was not found in a maker's list."""
+
+    @property
+    def clearance_range(self) -> tuple[float, float] | None:
+        """Radial clearance [m] of the class that a deep-groove designation names, CN where it names none."""
+        if self.kind != "deep groove" or self.read is None:
+            return None
+        return clearance_range(self.read.clearance_class or "CN", self.bore)
+
+    def as_json(self) -> dict[str, Any]:
+        """Give it ready for JSON, in SI units."""
+        return stated(
+            self,
+            "designation maker listed kind bore_m outside_diameter_m width_m contact_angle_rad "
+            "contact_angle_range_rad ball_material ball_count=complement.ball_count "
+            "ball_count_range=complement.count_range ball_diameter_m=complement.ball_diameter "
+            "ball_diameter_range_m=complement.diameter_range pitch_diameter_m=complement.pitch_diameter "
+            "conformity=complement.conformity conformity_range=complement.conformity_range "
+            "basis=complement.basis clearance_range_m preload_N preload_basis axial_rigidity_N_per_m",
+            preload_basis=self.preload_basis or None,
+        )
 
 
 def find_bearing(
