@@ -98,7 +98,8 @@ def _deliver_results(
     json: Path | None,
 ) -> None:
     """Write what was asked for, and print how force, stress and whirl are spread."""
-    from rotordrop.report.study_page import study_numbers, study_page
+    from rotordrop.report.study_page import study_page
+    from rotordrop.study.numbers import study_numbers
     from rotordrop.study.quantities import BEARING_QUANTITIES
     from rotordrop.study.summary import save_results
     from rotordrop.units import parse_quantity
@@ -144,7 +145,8 @@ def study_repeat(
     """
     from rotordrop.estimate.published import read_drop
     from rotordrop.machine import load_machine
-    from rotordrop.report.study_page import repeat_numbers, repeat_page
+    from rotordrop.report.study_page import repeat_page
+    from rotordrop.study.numbers import repeat_numbers
     from rotordrop.study.repeat import recorded_numbers, repeat_study, repeats
     from rotordrop.study.run import run_study
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,7 +12,6 @@ import plotly.graph_objects as go
 from rotordrop._version import __version__
 from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError, unknown_key
-from rotordrop.files import finite
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.machine import kind_of_path
@@ -42,23 +41,16 @@ from rotordrop.report.style import (
     upright,
     words,
 )
-from rotordrop.simulate.fingerprint import fingerprint
 from rotordrop.simulate.used import share_column, stopped
-from rotordrop.study.plan import Study, case_kind
+from rotordrop.study.numbers import MATTERS, SHARES, asked, influences_of
+from rotordrop.study.plan import case_kind
 from rotordrop.study.quantities import LIFT, Quantity
 from rotordrop.study.repeat import Repeat
-from rotordrop.study.sensitivity import Influence, influences
 from rotordrop.study.summary import StudyResults
 from rotordrop.units import format_quantity
 
-SHARES = (0.5, 0.9, 0.99)
 BELOW = 115.0
 """Upper end of the axis of the shares below a value [%]: the label of the last one stands above 100."""
-MAPPED = ("peak_force", "peak_stress", "settling_time")
-"""Quantities of a bearing whose quantiles are drawn against what varies."""
-MATTERS = ("peak_force", "peak_stress")
-"""Quantities of a bearing that stand beside the verdict, are drawn, and have their influences said."""
-WHIRL = {"backward_whirl": 0.0}
 Marks: TypeAlias = Sequence[tuple[str, float, float]]
 """Values that are marked in a distribution: text, value [SI], share of the drops below it [1]."""
 SCOPE = "Simulated: the spread is that of the values that vary here, not of all that is unknown."
@@ -246,7 +238,7 @@ def _kind(results: StudyResults, name: str) -> str:
 
 def _influence_section(results: StudyResults) -> tuple[Section, ...]:
     """Which varied values matter, or nothing where there are too few drops to say it."""
-    every = _influences(results).items()
+    every = influences_of(results).items()
     found = {_in_words(column): {one.name: one for one in of} for column, of in every}
     if not found:
         return ()
@@ -283,20 +275,10 @@ def spoken_value(machine: Machine, name: str) -> str:
     return f"{label}, {'every bearing' if owner == '*' else owner}"
 
 
-def _asked(results: StudyResults, limits: Mapping[str, float]) -> Iterator[tuple[list[str], float | None]]:
-    """Columns that are shown against a varied value, with the limit [SI] that they may exceed."""
-    bearings = [bearing.name for bearing in results.study.machine.touchdown_bearings]
-    wanted: dict[str, float | None] = dict.fromkeys(MAPPED)
-    for quantity, limit in (*wanted.items(), *(WHIRL | dict(limits)).items()):
-        yield [f"{bearing}.{quantity}" for bearing in bearings], limit
-    if results.study.looped:
-        yield [LIFT], 0.5
-
-
 def _map_section(results: StudyResults, name: str, limits: Mapping[str, float]) -> Section:
     """Quantiles of what counts, and probabilities of what happened, against a varied value."""
     figures = []
-    for columns, limit in _asked(results, limits):
+    for columns, limit in asked(results, limits):
         # what happened in no drop is said in the verdict: its figure would be a line at zero
         if (
             limit is None
@@ -348,57 +330,6 @@ def _map_figure(
         quantity = f"P({quantity}{above})"
     x_title = axis_title(plain(spoken_value(machine, name)), unit)
     return finished(figure, x_title, axis_title(quantity, size_unit))
-
-
-def study_numbers(
-    results: StudyResults, by: Sequence[str] = (), limits: Mapping[str, float] | None = None
-) -> dict[str, Any]:
-    """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
-
-    def mapped(name: str, column: str, limit: float | None) -> list[dict[str, Any]]:
-        return [
-            {
-                "from": cell["from"],
-                "to": cell["to"],
-                **({"quantile": share} if limit is None else {}),
-                **(ends(cell["known"]) or {}),
-            }
-            for share in (SHARES if limit is None else SHARES[:1])
-            for cell in results.map(column, name, share=share, above=limit)
-        ]
-
-    asked = {
-        column if limit is None else f"{column} > {limit:g}": (column, limit)
-        for columns, limit in _asked(results, limits or {})
-        for column in columns
-    }
-    return study_numbers_of(results.study) | {
-        "drops": len(results),
-        "failed": dict(results.failed),
-        "quantiles": {
-            q.name: {
-                "unit": q.unit,
-                "meaning": q.meaning,
-                **{f"{share:g}": ends(results.quantile(q.name, share)) for share in (0.05, *SHARES)},
-            }
-            for q in results.columns
-        },
-        "maps": {name: {key: mapped(name, *one) for key, one in asked.items()} for name in by},
-        "influences": {
-            column: [{"name": one.name, "alone": ends(one.alone), "total": ends(one.total)} for one in every]
-            for column, every in _influences(results).items()
-        },
-    }
-
-
-def _influences(results: StudyResults) -> dict[str, tuple[Influence, ...]]:
-    """How much every varied value matters to every quantity; nothing where there are too few drops."""
-    names = [bearing.name for bearing in results.study.machine.touchdown_bearings]
-    columns = [f"{name}.{quantity}" for name in names for quantity in MATTERS]
-    try:
-        return {column: influences(results, column) for column in columns}
-    except UsageError:
-        return {}
 
 
 FEW = 0.05
@@ -478,51 +409,6 @@ def _repeat_table(results: StudyResults, found: Sequence[Repeat]) -> Table:
     return table(found, columns, "The recorded drop among those that could have happened (90 %)", NOTE)
 
 
-def repeat_numbers(results: StudyResults, found: Sequence[Repeat]) -> dict[str, Any]:
-    """The same numbers, ready for JSON (SI; an open end of an interval is null)."""
-
-    def quantity(one: Repeat) -> dict[str, Any]:
-        made: dict[str, Any] = finite(
-            {
-                "column": one.column,
-                **{name: ends(getattr(one, name)) for name in ("median", "low", "high", "worst")},
-                "of": one.of,
-                "recorded": one.recorded
-                and {"value": one.recorded.value, "interval": one.recorded.interval_90},
-                "place": ends(one.place),
-            }
-        )
-        return made
-
-    made = study_numbers_of(results.study)
-    del made["digest"]
-    return made | {
-        "drops": len(results),
-        "failed": dict(results.failed),
-        "quantities": [quantity(one) for one in found],
-    }
-
-
 def percent(share: Known, form: str = "{:.3g} % (90 %: {:.3g} to {:.3g} %)") -> str:
     """A share of the drops with its 90 % interval in words."""
     return form.format(*(100 * number for number in (share.value, share.low, share.high)))
-
-
-def ends(known: Known | None) -> dict[str, Any] | None:
-    """A number with its interval, ready for JSON."""
-    if known is None:
-        return None
-    found = {"value": known.value, "interval_90": [known.low, known.high], "drops": known.drops}
-    made: dict[str, Any] = finite(found)
-    return made
-
-
-def study_numbers_of(study: Study) -> dict[str, Any]:
-    """What makes the same drops again, ready for JSON."""
-    return {
-        "study": study.document(),
-        "machine": study.machine.name,
-        "digest": study.digest,
-        "rotordrop": __version__,
-        "fingerprint": fingerprint(),
-    }

@@ -18,9 +18,10 @@ from tests.unit.simulate.looped import looped_machine
 from rotordrop import DropCase, build_drop_model, example_machine, save_machine, simulate_drop, sweep
 from rotordrop.errors import DamagedFileError, OutputError, UsageError
 from rotordrop.files import write_json
-from rotordrop.report.study_page import study_numbers, study_page
+from rotordrop.report.study_page import study_page
 from rotordrop.study import run, summary
 from rotordrop.study.folder import StudyFolder, alone_in, open_folder, read_shards, study_of
+from rotordrop.study.numbers import study_numbers
 from rotordrop.study.plan import load_study, read_study
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
