@@ -25,7 +25,7 @@ from rotordrop.report.content import (
     fact,
     table,
 )
-from rotordrop.report.machine_content import defaults_section, drawing_section, machine_content, rotor_tables
+from rotordrop.report.machine_content import drawing_section, machine_content, not_given, rotor_tables
 from rotordrop.report.quantity import NO_BREAK
 from rotordrop.report.style import (
     INK,
@@ -101,6 +101,8 @@ def critical_speeds_page(
     """
     first, *others = sorted(maps.values(), key=lambda found: found.whirl != "forward")
     margins = _margins(machine, diagrams)
+    given = not_given(machine)
+    rest = [Section("Values that were not given", tables=given)] if given else []
     return ReportContent(
         title=f"Critical speeds of {machine.name}",
         verdict=_verdict(machine, maps["standstill"], diagrams, margins),
@@ -110,7 +112,7 @@ def critical_speeds_page(
             Section("Damped critical speeds", tables=(crossing_table(machine, diagrams, margins),)),
             _map_section(first),
             *(_campbell_section(machine, diagram) for diagram in diagrams.values()),
-            *appendix([*map(_map_section, others), *defaults_section(machine)]),
+            *appendix([*map(_map_section, others), *rest]),
         ),
         lead=2,
     )

@@ -30,7 +30,7 @@ from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Agreement
 from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.evidence.impacts import CONTACT_FROM
-from rotordrop.known import NINETY, Correlation, Known
+from rotordrop.known import NINETY, Known
 from rotordrop.report.content import (
     SIMULATED_RECORD,
     Column,
@@ -51,7 +51,6 @@ from rotordrop.report.drop_sections import (
     quality_statements,
     record_quality_section,
     sensor_figure,
-    speed_figure,
     static_limit_statement,
     unseen_in,
 )
@@ -345,7 +344,6 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         certain=estimate.consistent,
     )
     agreement = () if estimate.agreement is None else (agreement_section(estimate.agreement),)
-    speed = () if steps is None else (speed_section(estimate, steps),)
     unseen = unseen_in(estimate.notes)
     elsewhere = {*summary.grave, *map(Statement, unseen), *_next(estimate).statements}
     notes = Section("", statements=tuple(one for one in summary.verdict[1:] if one not in elsewhere))
@@ -353,7 +351,7 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         force,
         orbit,
         impacts,
-        folded("Motion at the sensors", motion, *agreement, *speed),
+        folded("Motion at the sensors", motion, *agreement),
         folded("Parameters", _parameters(estimate)),
         folded("Checks", notes, _checks(estimate)),
         folded("Severity", stress, _severity(estimate), printed=True),
@@ -515,12 +513,16 @@ def _parameters(estimate: Estimate) -> Section:
             verdict_column(lambda o: (o.phase or o.amount).status),
         )
         tables.append(table(estimate.unbalance, columns, "Unbalance", PHASE_NOTE))
-    steps = estimate.replay
-    if steps is not None and steps.correlations:
-        tables.append(correlation_table(steps.correlations))
-    fixed = "" if steps is None else steps.fixed
-    text = [f"The supports were taken from {fixed}; this drop did not change them."] if fixed else []
-    return Section("Parameters", tuple(text), tables=tuple(tables))
+    return Section("Parameters", (*_of_replay(estimate.replay),), tables=tuple(tables))
+
+
+def _of_replay(steps: ReplaySteps | None) -> Iterator[str]:
+    """Where supports were taken from, and which parameters the record cannot tell apart."""
+    if steps is not None and steps.fixed:
+        yield f"The supports were taken from {steps.fixed}; this drop did not change them."
+    for pair in () if steps is None else steps.correlations:
+        if abs(pair.value) >= CONFOUNDED:
+            yield f"{pair.first} and {pair.second} are confounded: only their combination is known."
 
 
 def _checks(estimate: Estimate) -> Section:
@@ -723,10 +725,6 @@ HALF_PERIOD = (
     "Eq. (17) takes the contact for half a period; gravity lengthens it, and one contact can be two. Both "
     "stiffnesses serve as a start of the search only."
 )
-DISTANCES = (
-    "Distances are root mean square; a bounce counts from the rest position; comparable means closer than a "
-    "tenth of the air gap."
-)
 
 
 def first_contact_table(names: Sequence[str], contacts: Sequence[TimedContact]) -> Table:
@@ -752,21 +750,6 @@ def first_contact_table(names: Sequence[str], contacts: Sequence[TimedContact]) 
     return table(rows, columns, "First contact (Neisi 2020, Table 3)", f"{timing}{HALF_PERIOD}")
 
 
-def correlation_table(correlations: Sequence[Correlation]) -> Table:
-    """Say which parameters the record cannot tell apart."""
-
-    def meaning(pair: Correlation) -> str:
-        apart = abs(pair.value) < CONFOUNDED
-        return "told apart" if apart else "confounded: only their combination is known"
-
-    columns = (
-        Column("parameters", lambda pair: f"{pair.first} and {pair.second}"),
-        Column("correlation", "value", "dimensionless", 2),
-        Column("meaning", meaning),
-    )
-    return table(sorted(correlations, key=lambda pair: -abs(pair.value)), columns, "Correlations")
-
-
 def agreement_section(agreement: Agreement) -> Section:
     """How far a replay follows the record, and how long a comparison point by point means anything."""
     horizon = min(bearing.horizon_s for bearing in agreement.bearings.values())
@@ -777,45 +760,4 @@ def agreement_section(agreement: Agreement) -> Section:
     if agreement.expected_horizon_s is not None:
         expected = 1e3 * agreement.expected_horizon_s
         text += f" With everything that is uncertain here, {expected:.0f} ms are to be expected."
-    return Section("Agreement with the record", (text,), tables=(window_table(agreement),))
-
-
-def window_table(agreement: Agreement) -> Table:
-    """State the distance of the orbits by window, the bounce heights and the horizon of every bearing."""
-    rows = [
-        (f"distance of the orbits, {window.name}", [*window.rms.values()], "length")
-        for window in agreement.windows
-    ]
-    rows += [
-        (label, [getattr(one, field) for one in agreement.bearings.values()], kind)
-        for label, field, kind in (
-            ("first bounce, measured", "measured_bounce_m", "length"),
-            ("first bounce, simulated", "simulated_bounce_m", "length"),
-            ("comparable up to", "horizon_s", "time"),
-        )
-    ]
-
-    def at(index: int, name: str) -> Column:
-        return Column(name, lambda row: Quantity.of(row[1][index], row[2], 3))
-
-    columns = (Column("agreement", lambda row: row[0]), *(at(*one) for one in enumerate(agreement.bearings)))
-    return table(rows, columns, "Agreement in windows", DISTANCES)
-
-
-def speed_section(estimate: Estimate, steps: ReplaySteps) -> Section:
-    """Recorded and simulated speed with the time constants found."""
-    record = estimate.record
-    histories = [History(label="simulated", time=steps.speed_time, values=steps.speed_simulated)]
-    if record.speed is not None and record.measured_speed is not None:
-        time = np.asarray(record.time) - estimate.drop_instant.value
-        measured = History(label="measured", time=time, values=np.asarray(record.speed), role="measured")
-        histories.insert(0, measured.between(0.0, float(steps.speed_time[-1])))
-    known = steps.speed.aero_time_constant
-    constant = Quantity.of(known, "duration")
-    text = (
-        f"Aerodynamic time constant {constant.text} ({constant.interval_text or known.status}); "
-        "a plain exponential through the record, friction included, has "
-        f"{shown(steps.speed.profile_time_constant, 'duration', 3)}."
-    )
-    figure = Figure(speed_figure(histories), "Speed of the rotor, measured and simulated.")
-    return Section("Speed", (text,), figures=(figure,))
+    return Section("Agreement with the record", (text,))

@@ -14,7 +14,6 @@ from rotordrop._version import __version__
 from rotordrop.document import stated
 from rotordrop.elements.catalog.lookup import CatalogueBearing
 from rotordrop.machine.ross_files import ImportedRotor, Spring
-from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.linear_algebra import generalised_eigen
 from rotordrop.report.content import (
     Card,
@@ -30,7 +29,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.quantity import Quantity, shown
-from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, finished, panels, plain
+from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, panels, plain
 from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rotor_fe
 from rotordrop.rotor.suspension import Support, link
 from rotordrop.rotor.whirl import matrices_of
@@ -180,61 +179,17 @@ def mode_table(modes: Iterable[tuple[str, Iterable[float]]], head: str, count: i
     return table(rows, (Column(head, lambda row: row[0]), *map(frequency, range(count))))
 
 
-POINTS = 801
-NOT_GIVEN = "These values were not in the machine file. Give them there if they are known."
 DRAWN = "The rotor to scale. Bearings, AMBs and sensors stand at their nodes."
-FRICTION = "Friction between rotor and race; a cubic replaces the jump at zero speed (Neisi 2020, Fig. 2)."
 
 
 def machine_sections(machine: Machine) -> tuple[Section, ...]:
-    """The machine of a simulation in one folded part: drawing, friction law, what was not given."""
-    law = Figure(friction_curve_figure(machine), FRICTION)
-    rest = Section("", figures=(law,), tables=not_given(machine))
-    return (folded("Machine", drawing_section(machine), rest),)
-
-
-def friction_curve_figure(machine: Machine) -> go.Figure:
-    """Draw friction over the relative surface speed (Neisi 2020, Fig. 2); equal laws share one curve.
-
-    Left the whole law, right the smoothed passage through zero.
-    """
-    laws: dict[tuple[float, float, float, float], list[str]] = {}
-    for bearing in machine.touchdown_bearings:
-        rub = bearing.friction
-        numbers = (rub.static, rub.dynamic, rub.stribeck_speed, rub.smoothing_speed)
-        static, dynamic, stribeck, smoothing = map(float, numbers)
-        key = (static, dynamic, stribeck, smoothing)
-        laws.setdefault(key, []).append(bearing.name)
-    whole = 5.0 * max(stribeck for _, _, stribeck, _ in laws)
-    near = 4.0 * max(smoothing for *_, smoothing in laws)
-    figure = panels(("whole law", "near zero speed"))
-    for index, ((static, dynamic, stribeck, smoothing), names) in enumerate(laws.items()):
-        law = (static, dynamic, stribeck, max(smoothing, 1e-12))
-        for column, reach in enumerate((whole, near), start=1):
-            speed = np.linspace(-reach, reach, POINTS)
-            curve(
-                figure,
-                speed,
-                np.array([stribeck_coefficient(float(v), *law) for v in speed]),
-                ", ".join(names),
-                column=column,
-                colour=SERIES[index % len(SERIES)],
-                width=1.7,
-                legend=column == 1,
-                hover="%{x:.4~g} m/s: %{y:.3f}",
-            )
-    return finished(figure, "relative surface speed [m/s]", "friction coefficient [1]")
+    """The machine of a simulation in one folded part: drawing, what was not given."""
+    return (folded("Machine", drawing_section(machine), Section("", tables=not_given(machine))),)
 
 
 def drawing_section(machine: Machine) -> Section:
     """The rotor to scale with everything that sits on it."""
     return Section("Rotor", figures=(Figure(rotor_figure(machine), DRAWN),))
-
-
-def defaults_section(machine: Machine) -> tuple[Section, ...]:
-    """Values of the machine that were defaulted or inferred, with the reason; empty where all were given."""
-    tables = not_given(machine)
-    return (Section("Values that were not given", (NOT_GIVEN,), tables=tables),) if tables else ()
 
 
 def not_given(machine: Machine, *, reasons: bool = True) -> tuple[Table, ...]:

@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from rotordrop.elements.friction import Friction
 from rotordrop.estimate.bearing_drop import (
     AirGap,
     Band,
@@ -33,22 +31,11 @@ from rotordrop.report.drop_sections import (
     speed_figure,
 )
 from rotordrop.report.estimate_page import innovations_figure
-from rotordrop.report.machine_content import friction_curve_figure
 from rotordrop.report.style import Panel, block_envelope, time_panels
 from rotordrop.series import peak_indices
 
 TIME = np.linspace(0.0, 0.1, 1001)
 SINGLE = 2e-7
-
-
-def rubbing(name, static, dynamic, stribeck, smoothing):
-    """A machine of which only the friction of one bearing is known; speeds in m/s."""
-    speeds = {"stribeck_speed": f"{stribeck} m/s", "smoothing_speed": f"{smoothing} m/s"}
-    friction = Friction(static=static, dynamic=dynamic, **speeds)
-    return SimpleNamespace(touchdown_bearings=[SimpleNamespace(name=name, friction=friction)])
-
-
-LAW = rubbing("NDE", 0.13, 0.10, 0.2, 0.02)
 
 
 def motion(label, role="simulated", phase=0.0):
@@ -114,7 +101,6 @@ def shapes(figure, panel=1):
 EVIL = "<a href='https://example.org'>x</a>"
 EVIL_DROP = drop(EVIL, AirGap.of(1e-4), label=EVIL, force=History(label=EVIL, time=TIME, values=TIME))
 FIGURES = {
-    "friction curve": lambda: friction_curve_figure(rubbing(EVIL, 0.2, 0.1, 1.0, 0.1)),
     "displacement": lambda: displacement_figure([EVIL_DROP]),
     "first contact": lambda: first_contact_figure([EVIL_DROP]),
     "orbit": lambda: orbit_figure([EVIL_DROP]),
@@ -247,15 +233,6 @@ def test_a_window_around_a_peak_cuts_history_and_band():
     drawn = time_panels([[panel.around(2e-3, 4e-3)]], 1.0, "N")
     assert all(min(item.x) >= 48.0 and max(item.x) <= 54.0 for item in drawn.data)
     assert any("peak" in note.text for note in drawn.layout.annotations)
-
-
-def test_the_friction_curve_is_odd_with_the_static_value_at_the_end_of_the_smoothing():
-    drawn = friction_curve_figure(LAW)
-    whole, near = trace(drawn, "NDE"), trace(drawn, "NDE", 2)
-    assert_allclose(whole.y, -np.asarray(whole.y)[::-1], atol=1e-7)
-    assert whole.y[-1] == pytest.approx(0.10 + 0.03 * np.exp(-(1.0 - 0.02) / 0.2), rel=1e-6)
-    assert max(near.y) == pytest.approx(0.13, rel=1e-4)
-    assert near.x[int(np.argmax(near.y))] == pytest.approx(0.02, abs=3e-4)
 
 
 def test_innovations_come_with_the_band_the_filter_expects():
