@@ -54,8 +54,8 @@ def compare(
         left_out,
         limit_statement,
         rankings,
-        read_limits,
     )
+    from rotordrop.severity.numbers import read_limits
 
     found = [(path, name, drop) for path in estimates for name, drop in read_drops(path).items()]
     records = Counter(drop.record for *_, drop in found)

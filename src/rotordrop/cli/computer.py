@@ -107,6 +107,8 @@ def doctor(
 
 def examined() -> dict[str, Any]:
     """Everything the command says, ready for JSON."""
+    from rotordrop.physics.cached import compiled_code
+
     needs: dict[str, dict[str, str | None]] = {extra: {} for extra in ("", *EXTRAS)}
     for text in requires("rotordrop") or []:
         extra = re.search(r"extra == ['\"](\w+)", text)
@@ -118,7 +120,7 @@ def examined() -> dict[str, Any]:
         "system": platform.platform(),
         "packages": needs[""],
         "extras": {extra: {"for": text, "packages": needs[extra]} for extra, text in EXTRAS.items()},
-        "cache": _cache(),
+        "cache": compiled_code(),
         "cores": os.cpu_count() or 1,
         "threads": os.environ.get("OPENBLAS_NUM_THREADS"),
     }
@@ -134,24 +136,6 @@ def _version(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
-
-
-def _cache() -> dict[str, Any]:
-    """Compiled code that came with the package, and where more is kept, whether it can be written there."""
-    from rotordrop.physics._compile import _SHIPPED, cache_folder
-    from rotordrop.physics._numba import _is_portable_here
-
-    folder = cache_folder()
-    shipped = (_SHIPPED / folder.name).glob("*.object") if _is_portable_here() else ()
-    files = list(folder.glob("*.object"))
-    nearest = next(parent for parent in (folder, *folder.parents) if parent.exists())
-    return {
-        "shipped": len(list(shipped)),
-        "folder": str(folder),
-        "writable": os.access(nearest, os.W_OK),
-        "kernels": len(files),
-        "bytes": sum(file.stat().st_size for file in files),
-    }
 
 
 def cache_lines(cache: dict[str, Any]) -> list[str]:

@@ -228,7 +228,8 @@ def convert(
         _written_for_ross(source, output or Path("rotor_ross.toml"), json)
         return
     from rotordrop.machine.ross_files import read_rotor
-    from rotordrop.report.machine_content import imported_content, imported_json
+    from rotordrop.report.machine_content import imported_content
+    from rotordrop.rotor.imported import imported_json
 
     imported = read_rotor(source)
     deliver(imported_json(imported), json, imported_content(imported, source.name))

@@ -54,7 +54,6 @@ def simulate(
     from rotordrop.estimate.simulated_drop import simulation_numbers
     from rotordrop.machine import load_machine
     from rotordrop.report.simulate_page import simulate_summary
-    from rotordrop.report.terminal import summary_console
     from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, MagnetEvent
     from rotordrop.simulate.drop import model_for, simulate_drop
     from rotordrop.simulate.expected_steps import long_run
@@ -75,10 +74,8 @@ def simulate(
         magnets=tuple(map(MagnetEvent.read, magnets)) if magnets else None,
     )
     warning = long_run(described, duration, case.most_steps)
-    errors = summary_console(sys.stderr)
     if warning is not None:
-        errors.print(warning, soft_wrap=True)
-
+        console(sys.stderr).print(warning, soft_wrap=True)
     model = interruptible(lambda: model_for(described, case))
     result = interruptible(lambda: simulate_drop(model, case, certify=certify))
     if output is not None:
@@ -132,7 +129,6 @@ def coast_down(
     from rotordrop.record.record import read_record
     from rotordrop.report.page import write_page
     from rotordrop.report.simulate_page import coast_down_page
-    from rotordrop.report.terminal import summary_console
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate.case import CentredStart, CoastDownCase, LevitatedStart
     from rotordrop.simulate.coast_down import MOST_STEPS_PER_WINDOW, simulate_coast_down
@@ -156,7 +152,7 @@ def coast_down(
     model = build_drop_model(described, case.reduction)
     warning = long_run(described, 1.0, MOST_STEPS_PER_WINDOW)
     if warning is not None:
-        summary_console(sys.stderr).print(f"each second: {warning}", soft_wrap=True)
+        console(sys.stderr).print(f"each second: {warning}", soft_wrap=True)
     try:
         with progress_bar("coast-down") as progress:
             result = interruptible(

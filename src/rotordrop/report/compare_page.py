@@ -10,7 +10,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.errors import UsageError, unknown_key
+from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
 from rotordrop.report.content import Column, Figure, Level, ReportContent, Section, Statement, Table, table
@@ -19,7 +19,7 @@ from rotordrop.report.style import axis_title, bars, curve, finished, panels, pl
 from rotordrop.severity.numbers import LOADS, NOTE, NUMBERS, Number
 from rotordrop.severity.ranking import DropSeverity, Ranking, rank_drops
 from rotordrop.twin.allowances import MODEL_STRESS_SIGMA
-from rotordrop.units import format_chance, format_minute, parse_quantity, percent
+from rotordrop.units import format_chance, format_minute, percent
 
 RANKED = tuple(one for one in NUMBERS if not one.field.startswith(("severity.fatigue", "severity.static")))
 """Numbers that rank drops; shares of a life have upper ends only, safety factors go with force and stress."""
@@ -297,33 +297,6 @@ def left_out(drops: Sequence[ComparedDrop]) -> dict[str, str]:
 
 SURE = 0.95
 """Probability from which a limit counts as kept, or as passed [1]; chosen, not measured."""
-_UNITS = ("_N_s", "_N", "_Pa", "_J")
-
-
-def _short(field: str) -> str:
-    """How a limit is called: the field without group and unit, ``"peak_stress"``."""
-    name = field.rpartition(".")[2]
-    return next((name.removesuffix(unit) for unit in _UNITS if name.endswith(unit)), name)
-
-
-def read_limits(written: Sequence[str]) -> dict[str, float]:
-    """Limits [SI] by field of an estimate document, of texts such as ``"peak_stress=2.5 GPa"``.
-
-    Raises
-    ------
-    UsageError
-        If there is no such number, or its limit has another unit.
-    """
-    known = {_short(number.field): number for number in NUMBERS}
-    found = {}
-    for text in written:
-        name, equals, limit = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise UsageError(f'limit {text!r}; expected a number and its limit, "peak_stress=2.5 GPa"')
-        if name not in known:
-            raise UsageError(f"limit: {unknown_key(name, tuple(known))}")
-        found[known[name].field] = parse_quantity(limit, known[name].kind)
-    return found
 
 
 def limit_statement(drops: Sequence[ComparedDrop], limits: Mapping[str, float]) -> Statement:

@@ -7,14 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import plotly.graph_objects as go
 
 from rotordrop._version import __version__
-from rotordrop.document import stated
 from rotordrop.elements.catalog.lookup import CatalogueBearing
-from rotordrop.machine.ross_files import ImportedRotor, Spring
-from rotordrop.physics.linear_algebra import generalised_eigen
+from rotordrop.machine.ross_files import ImportedRotor
 from rotordrop.report.content import (
     Card,
     Column,
@@ -30,9 +27,8 @@ from rotordrop.report.content import (
 )
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, panels, plain
-from rotordrop.rotor.assembly import N_RIGID, free_free_modes, rotor_fe
-from rotordrop.rotor.suspension import Support, link
-from rotordrop.rotor.whirl import matrices_of
+from rotordrop.rotor.assembly import rotor_fe
+from rotordrop.rotor.imported import SHOWN, free_frequencies, supported_frequencies
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -309,30 +305,14 @@ def _add_pieces(figure: go.Figure, pieces: Iterable[Any], name: str, colour: str
         curve(figure, x, y, name, hover=None, line=edge, fill="toself", fillcolor=colour)
 
 
-SHOWN = 6
-
-
-def imported_json(imported: ImportedRotor) -> dict[str, object]:
-    """Mass, inertias and frequencies of a rotor from another program, ready for JSON [SI]."""
-    return {
-        "source": imported.source,
-        "notes": list(imported.notes),
-        "nodes": len(imported.rotor.node_positions),
-        **rotor_fe(imported.rotor).as_json(),
-        "free_free_Hz": _free(imported),
-        "on_source_bearings_x_Hz": _supported(imported, 0),
-        "on_source_bearings_y_Hz": _supported(imported, 1),
-        "bearings": [_bearing_json(spring) for spring in imported.springs],
-    }
-
-
 def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
     """Show mass, inertias and frequencies of a rotor from another program."""
     rows = [("nodes", len(imported.rotor.node_positions)), *rotor_values(rotor_fe(imported.rotor), 5)]
-    modes = [("free-free bending, at standstill", _free(imported))]
+    modes = [("free-free bending, at standstill", free_frequencies(imported))]
     for k, axis in enumerate("xy"):
         if imported.springs:
-            modes.append((f"on the bearings of the source, {axis}, undamped", _supported(imported, k)))
+            held = f"on the bearings of the source, {axis}, undamped"
+            modes.append((held, supported_frequencies(imported, k)))
     return ReportContent(
         title=f"Rotor from {name}",
         subtitle=imported.source,
@@ -340,34 +320,6 @@ def imported_content(imported: ImportedRotor, name: str) -> ReportContent:
         or (Statement("All of the rotor in the file was taken over.", "good"),),
         summary=(named_values("rotor", rows), mode_table(modes, "rotor held", SHOWN)),
     )
-
-
-def _bearing_json(spring: Spring) -> dict[str, object]:
-    entry = stated(spring, "node name stiffness_N_per_m damping_N_s_per_m")
-    if spring.support is not None:
-        entry["support"] = _bearing_json(spring.support) | {"mass_kg": spring.support_mass}
-    return entry
-
-
-def _free(imported: ImportedRotor) -> list[float]:
-    fe = rotor_fe(imported.rotor)
-    return [float(f) for f in free_free_modes(fe, min(fe.size, N_RIGID + SHOWN)).frequency[N_RIGID:]]
-
-
-def _supported(imported: ImportedRotor, axis: int) -> list[float]:
-    """Undamped frequencies [Hz] in x or y at standstill, on the bearings and supports of the source."""
-    if not imported.springs:
-        return []
-    fe, held = rotor_fe(imported.rotor), []
-    for spring in imported.springs:
-        links = [link(one.stiffness) for one in (spring, spring.support) if one is not None]
-        mass = () if spring.support is None else (spring.support_mass[axis],)
-        held.append(Support(node=spring.node, links=tuple(links), masses=mass))
-    system = matrices_of(fe, held)
-    n = system.plane_size
-    plane = slice(axis * n, (axis + 1) * n)
-    values, _ = generalised_eigen(system.stiffness[plane, plane], system.mass[plane, plane])
-    return [float(f) for f in np.sqrt(np.maximum(values[:SHOWN], 0.0)) / (2.0 * np.pi)]
 
 
 def bearing_content(written: str, found: Sequence[CatalogueBearing]) -> ReportContent:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from rotordrop.document import without_unit
+from rotordrop.errors import UsageError, unknown_key
+from rotordrop.units import parse_quantity
 
 
 @dataclass(frozen=True)
@@ -58,3 +63,23 @@ NOTE = (
     "a limit."
 )
 """What stands beneath a table of these numbers."""
+
+
+def read_limits(written: Sequence[str]) -> dict[str, float]:
+    """Limits [SI] by field of an estimate document, of texts such as ``"peak_stress=2.5 GPa"``.
+
+    Raises
+    ------
+    UsageError
+        If there is no such number, or its limit has another unit.
+    """
+    known = {without_unit(number.field.rpartition(".")[2]): number for number in NUMBERS}
+    found = {}
+    for text in written:
+        name, equals, limit = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise UsageError(f'limit {text!r}; expected a number and its limit, "peak_stress=2.5 GPa"')
+        if name not in known:
+            raise UsageError(f"limit: {unknown_key(name, tuple(known))}")
+        found[known[name].field] = parse_quantity(limit, known[name].kind)
+    return found

@@ -18,7 +18,7 @@ from rotordrop.errors import UsageError
 from rotordrop.files import require_file
 from rotordrop.machine import load_machine
 from rotordrop.record.profile import load_profile
-from rotordrop.report.compare_page import read_limits
+from rotordrop.severity.numbers import read_limits
 
 HEAD = 2**16
 """Bytes of a record in which a serial number is looked for; chosen, not measured."""

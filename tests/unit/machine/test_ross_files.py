@@ -9,8 +9,8 @@ from rotordrop.cli.app import run
 from rotordrop.errors import MachineFileError
 from rotordrop.machine import example_machine, load_machine
 from rotordrop.machine.ross_files import Spring, read_ross, read_rotor, write_ross
-from rotordrop.report.machine_content import imported_json
 from rotordrop.rotor.assembly import modes_on_springs, rotor_fe
+from rotordrop.rotor.imported import imported_json
 
 STEEL = {"name": "Steel", "rho": 7810.0, "E": 211e9, "G_s": 81.2e9}
 

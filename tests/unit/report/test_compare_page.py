@@ -17,10 +17,9 @@ from rotordrop.report.compare_page import (
     left_out,
     limit_statement,
     rankings,
-    read_limits,
 )
 from rotordrop.report.quantity import Quantity
-from rotordrop.severity.numbers import LOADS
+from rotordrop.severity.numbers import LOADS, read_limits
 from rotordrop.severity.ranking import DropSeverity, rank_drops
 
 
