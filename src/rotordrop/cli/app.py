@@ -28,8 +28,9 @@ from rotordrop._version import __version__
 from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._output import with_files_apart
-from rotordrop.cli._terminal import interruptions_kept, open_streams, printable
+from rotordrop.cli._terminal import open_streams, printable
 from rotordrop.errors import OutputError, RotordropError, UsageError, speaking_of_options
+from rotordrop.interrupts import interruptions_kept
 from rotordrop.one_thread import ENVIRONMENT
 
 BROKEN_PIPE = 141

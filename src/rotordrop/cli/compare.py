@@ -65,19 +65,9 @@ def compare(
         place = path.stem if stems[path.stem] == 1 else f"{path.resolve().parent.name}/{path.stem}"
         of_place = place if name == path.stem else f"{place}: {name}"
         drops.append(ComparedDrop(drop.record if records[drop.record] == 1 else of_place, drop))
-    if len(drops) < 2:
-        raise UsageError(
-            f"{len(drops)} drop to compare; at least two are needed. "
-            "Give several estimates, or one of several drops."
-        )
     drop_scatter = None if scatter is None else {"peak_force_N": scatter}
     limits = read_limits(limit or ())
-    page = compare_page(
-        drops,
-        machine_name=", ".join(sorted({one.drop.machine for one in drops})),
-        drop_scatter=drop_scatter,
-        limits=limits,
-    )
+    page = compare_page(drops, drop_scatter=drop_scatter, limits=limits)
     ranked: dict[str, Any] = {}
     for (bearing, key), ranking in rankings(drops, list(drops[0].drop.bearings), drop_scatter or {}).items():
         ranked.setdefault(bearing, {})[key] = ranking.as_json()
@@ -90,8 +80,7 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
     from rotordrop.estimate.changed import changes
     from rotordrop.estimate.published import read_drop
     from rotordrop.files import finite
-    from rotordrop.report.content import ReportContent, Statement
-    from rotordrop.report.told_changes import told_changes
+    from rotordrop.report.told_changes import changes_page
 
     if len(estimates) != 2:
         raise UsageError(f"--changes compares two estimates, and {len(estimates)} are given; name two files.")
@@ -102,8 +91,4 @@ def _deliver_changes(estimates: list[Path], json: Path | None) -> None:
             "estimate of another drop"
         )
     found = changes(before, after)
-    content = asdict(found) | {"sentence": found.sentence()}
-    statement, told = told_changes(found)
-    title = f"{found.second} against {found.first}"
-    page = ReportContent(title=title, verdict=(statement, Statement(told.note)), summary=(told,))
-    deliver(finite(content), json, page)
+    deliver(finite(asdict(found) | {"sentence": found.sentence()}), json, changes_page(found))

@@ -13,8 +13,8 @@ from typer import Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, text_option
 from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places
-from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import ConsistencyError, UsageError
+from rotordrop.interrupts import interruptible
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -56,13 +56,12 @@ def look(
         raise UsageError(f"look takes one record and its machine file (.toml), and {told} are two records")
     *first, record = options.machine_first(*files)
     machine = first[0] if first else None
-    if split is not None and machine is None:
-        raise UsageError(
-            "--split needs the machine file too: rotordrop look machine.toml both.h5 --split parts"
-        )
-    others = {"--gap": gap, "--speed": speed, "--report": report, "--json": json}
     if split is not None:
-        refuse_beside("--split", others)
+        refuse_beside("--split", {"--gap": gap, "--speed": speed, "--report": report, "--json": json})
+        if machine is None:
+            raise UsageError(
+                "--split needs the machine file too: rotordrop look machine.toml both.h5 --split parts"
+            )
     described = _loaded(machine)
     if split is not None and described is not None:
         _split(record, described, split, mapping or (), profile)

@@ -38,14 +38,10 @@ def critical_speeds(
     described = load_machine(machine)
     grid = speed_grid(described, top_speed)
     chosen = list(held or (item for item in Held if item is not Held.ambs or described.ambs))
-    maps, diagrams = {}, {}
     with progress_bar("critical speeds") as progress:
-        parts = len(WHIRLS) + len(chosen)
-        for number, whirl in enumerate(WHIRLS):
-            progress(f"map, {whirl}", number / parts)
-            maps[whirl] = critical_speed_map(described, whirl=whirl)
-        for number, item in enumerate(chosen, start=len(WHIRLS)):
-            progress(f"Campbell diagram, {item.value}", number / parts)
-            diagrams[item.value] = campbell_diagram(described, grid, item.value)
+        progress("maps", 0.0)
+        maps = {whirl: critical_speed_map(described, whirl=whirl) for whirl in WHIRLS}
+        progress("Campbell diagrams", 0.5)
+        diagrams = {item.value: campbell_diagram(described, grid, item.value) for item in chosen}
     page = critical_speeds_page(described, maps, diagrams)
     deliver(critical_speeds_json(maps, diagrams), json, page, report=report)

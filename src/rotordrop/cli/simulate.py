@@ -11,8 +11,8 @@ from typer import Option
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, measured, text_option
 from rotordrop.cli._output import console, deliver, progress_bar
-from rotordrop.cli._terminal import interruptible
 from rotordrop.errors import UsageError
+from rotordrop.interrupts import interruptible
 from rotordrop.units import parse_quantity
 
 STANDSTILL = "standstill"
@@ -127,7 +127,6 @@ def coast_down(
     from rotordrop.estimate.waterfall import waterfall
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
-    from rotordrop.report.page import write_page
     from rotordrop.report.simulate_page import coast_down_page
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.simulate.case import CentredStart, CoastDownCase, LevitatedStart
@@ -168,13 +167,13 @@ def coast_down(
         with progress_bar("at a tighter tolerance") as progress:
             certificate = certify_coast_down(model, case, result, progress=progress)
     numbers: dict[str, Any] = result.as_json()
+    analysis = None
     if report is not None:
         # with samples on disk the page also has waterfalls, lines and resonances
         analysis = None if result.path is None else waterfall(described, result.path)
-        write_page(coast_down_page(result, described, analysis, certificate), report)
         numbers["frequencies"] = None if analysis is None else analysis.as_json()
     if certificate is not None:
         numbers["certificate"] = certificate.as_json()
-    page = coast_down_page(result, described, certificate=certificate)
-    deliver(numbers, json, page, written=[report, output])
+    page = coast_down_page(result, described, analysis, certificate)
+    deliver(numbers, json, page, report=report, written=[output])
     result.check_finished()

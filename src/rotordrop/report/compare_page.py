@@ -35,7 +35,6 @@ Rankings = Mapping[tuple[str, str], Ranking]
 def compare_page(
     drops: Sequence[ComparedDrop],
     *,
-    machine_name: str = "",
     drop_scatter: Mapping[str, float] | None = None,
     limits: Mapping[str, float] | None = None,
 ) -> ReportContent:
@@ -48,10 +47,11 @@ def compare_page(
     ranked = rankings(drops, bearings, drop_scatter or {})
     simulated = [one.name for one in drops if one.drop.simulated_record]
     which = "" if len(simulated) == len(drops) else f": {', '.join(simulated)}"
+    machines = sorted({one.drop.machine for one in drops if one.drop.machine})
     judged = limit_statement(drops, limits or {})
     said = _verdict(drops, bearings, ranked)
     return ReportContent(
-        title=f"Comparison of {len(drops)} drops" + (f" of {machine_name}" if machine_name else ""),
+        title=f"Comparison of {len(drops)} drops" + (f" of {', '.join(machines)}" if machines else ""),
         subtitle=", ".join(one.name for one in drops),
         simulated=f"Simulated records{which}." if simulated else "",
         verdict=(judged, *said) if limits else (*said, judged),
@@ -63,7 +63,10 @@ def compare_page(
 
 def _bearings(drops: Sequence[ComparedDrop]) -> tuple[str, ...]:
     if len(drops) < 2:
-        raise UsageError(f"comparison: {len(drops)} drop given, at least two are needed")
+        raise UsageError(
+            f"{len(drops)} drop to compare; at least two are needed. Give several estimates, or one of "
+            "several drops."
+        )
     bearings = tuple(drops[0].drop.bearings)
     for one in drops[1:]:
         if set(one.drop.bearings) != set(bearings):

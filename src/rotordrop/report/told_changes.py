@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rotordrop.elements.table import row_of
 from rotordrop.estimate.changed import Change, Changes, asked_for
-from rotordrop.report.content import Column, Statement, Table, table
+from rotordrop.report.content import Column, ReportContent, Statement, table
 from rotordrop.report.quantity import Quantity, written
 from rotordrop.units import format_chance
 
@@ -16,7 +16,7 @@ CHANGES_NOTE = (
 )
 
 
-def told_changes(found: Changes) -> tuple[Statement, Table]:
+def changes_page(found: Changes) -> ReportContent:
     """What changed in a sentence, and every parameter as it was, with its change by both records."""
     columns = (
         Column("parameter", lambda one: spoken_path(one.path)),
@@ -27,7 +27,11 @@ def told_changes(found: Changes) -> tuple[Statement, Table]:
     )
     statement = Statement(found.sentence(spoken_path), "warning" if found.named else "good")
     told = [one for one in found.found if one.determined]  # the sentence names the others
-    return statement, table(told, columns, note=CHANGES_NOTE)
+    return ReportContent(
+        title=f"{found.second} against {found.first}",
+        verdict=(statement, Statement(CHANGES_NOTE)),
+        summary=(table(told, columns, note=CHANGES_NOTE),),
+    )
 
 
 def spoken_path(path: str) -> str:

@@ -54,7 +54,7 @@ DROPS = (drop("a", 60, 3300, 3600), drop("b", 100, 3100, 3300), drop("c", 210, 2
 
 
 def test_every_number_of_every_drop_is_in_the_table_of_its_bearing():
-    page = compare_page(DROPS, machine_name="LP-400")
+    page = compare_page(DROPS)
     name, speed, bearing_name, told, _ = page.screen.rows[0]
     assert (name, bearing_name, speed.text) == ("c", "DE", "210 Hz")
     table = next(t for t in page.sections[0].tables if t.caption == "DE: severity of every drop")
@@ -120,7 +120,7 @@ SECOND = marked("second", record="4f", method="replay", consistent=False)
 @pytest.mark.parametrize(
     ("drops", "message"),
     [
-        (DROPS[:1], "1 drop given, at least two are needed"),
+        (DROPS[:1], "1 drop to compare; at least two are needed"),
         (
             (DROPS[0], another(DROPS[1], "x", bearings={"front": bearing({}), "rear": bearing({})})),
             "x has the bearings front, rear, a has NDE, DE; only drops of one machine",

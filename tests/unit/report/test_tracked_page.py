@@ -19,7 +19,7 @@ from rotordrop.evidence.quality.finding import Finding
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, estimate_screen
 from rotordrop.report.page import render_page
-from rotordrop.report.told_changes import told_changes
+from rotordrop.report.told_changes import changes_page
 from rotordrop.track.consistency import Check
 
 
@@ -174,5 +174,5 @@ def test_a_wider_gap_before_is_named_in_words(estimate):
     known["value"] -= 60e-6
     known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
     document["joint"] = None
-    first, _ = told_changes(changes(drop_of(document, "before.json"), published_drop(estimate)))
+    first = changes_page(changes(drop_of(document, "before.json"), published_drop(estimate))).verdict[0]
     assert first.level == "warning" and "NDE: air gap (" in first.text
