@@ -52,32 +52,36 @@ SENSOR_PLANES = f"Displacement in the planes of the sensors; time counts from {R
 
 def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     """Build the page of a look at a record, with figures where they are wanted."""
-    if not seen.drops:
-        return _page_without_drop(seen, drawn=drawn)
-    record, figures = seen.record, _figures(seen) if drawn else ()
+    told, facts = (_of_drop if seen.drops else _without_drop)(seen, drawn=drawn), _facts(seen)
+    notes = tuple(map(Statement, seen.notes))
+    # the terminal shows neither the facts nor the sections
+    read = f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}."
+    said = Statement(" ".join((read, *(note.sentence for note in notes))))
+    quality = record_quality_section(seen.findings, seen.not_seen)
+    return replace(
+        told,
+        facts=facts,
+        simulated=SIMULATED_RECORD if seen.record.is_simulated else "",
+        verdict=told.verdict if drawn else (*told.verdict, said),
+        sections=(*told.sections, quality, Section("What was read and guessed", statements=notes)),
+    )
+
+
+def _of_drop(seen: Look, *, drawn: bool) -> ReportContent:
+    """Impacts, motion and indices of the first drop of a record."""
+    figures = _figures(seen) if drawn else ()
     speed = "" if seen.speed is None else f" at {shown(seen.speed / TURN, 'frequency', 3)}"
-    notes = tuple(Statement(note) for note in seen.notes)
-    facts = _facts(seen)
     given = any(plane.gap_interval_90 is None for plane in seen.planes)
     # what a gap that was given makes false, or the speed of the headline, stands before the numbers
     false = {"wrong speed", "wrong speed unit", *(("wrong air gap",) if given else ())}
     doubted = [one for one in seen.findings if one.kind in false]
     others = [one for one in seen.findings if one not in doubted]
-    read = f"Read: {dict(facts)['channels']}; samples: {dict(facts)['samples']}."
     return ReportContent(
-        title=f"A look at {record.name}",
+        title=f"A look at {seen.record.name}",
         # figures of a page count from the release
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}"
-        + ("" if drawn else f", times as in the record (from {format_moment(record.time[0])})"),
-        facts=facts,
-        simulated=SIMULATED_RECORD if record.is_simulated else "",
-        # the terminal shows neither the facts nor the sections
-        verdict=(
-            *quality_statements(doubted),
-            *_verdict(seen),
-            *quality_statements(others),
-            *(() if drawn else (Statement(" ".join((read, *(note.sentence for note in notes)))),)),
-        ),
+        + ("" if drawn else f", times as in the record (from {format_moment(seen.record.time[0])})"),
+        verdict=(*quality_statements(doubted), *_verdict(seen), *quality_statements(others)),
         cards=tuple(_card(seen, plane) for plane in seen.planes),
         counted_from=RELEASE,
         lead=1 if drawn else 0,
@@ -86,17 +90,12 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
             *figures[:2],
             *(() if _loud(seen) else (Section("Impacts", tables=(_impacts(seen),)),)),
             *figures[2:],
-            record_quality_section(seen.findings, seen.not_seen),
-            Section("What was read and guessed", statements=notes),
         ),
     )
 
 
-def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
+def _without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     """Contacts of a held rotor, levels and spectra of a record in which nothing falls."""
-    record, facts = seen.record, _facts(seen)
-    notes = tuple(Statement(note) for note in seen.notes)
-    read = Statement(f"Samples read: {dict(facts)['samples']}.")
     doubted = seen.unit_doubted
     if doubted:
         said = [Statement("No number of a drop is shown before the unit is right.")]
@@ -133,9 +132,9 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
     summary = [table(seen.levels, levels, f"Levels, in the unit {unit}", stands_out)]
     if seen.contacts:
         summary.insert(0, _contact_table(seen))
-    spectra = Section("Spectrum", figures=tuple(_spectrum(level) for level in seen.levels)) if drawn else None
+    spectra = [Section("Spectrum", figures=tuple(map(_spectrum, seen.levels)))] if drawn else []
     return ReportContent(
-        title=f"A look at {record.name}",
+        title=f"A look at {seen.record.name}",
         subtitle=(
             "a drop is not determined: the unit of the readings is in doubt"
             if doubted
@@ -143,23 +142,14 @@ def _page_without_drop(seen: Look, *, drawn: bool) -> ReportContent:
             if seen.motion.paths
             else "a drop is not determined: no pair of channels shows a plane"
         ),
-        facts=facts,
-        simulated=SIMULATED_RECORD if record.is_simulated else "",
         verdict=(
             *(quality_statements(seen.findings) if doubted else ()),
             *said,
             *(() if doubted else quality_statements(seen.findings)),
-            *(() if drawn else (read, *notes)),
         ),
-        cards=(),
         counted_from="the start of the record",
         summary=tuple(summary),
-        sections=(
-            *(() if spectra is None else (spectra,)),
-            Section("What happened when", tables=(_timeline(seen),)),
-            record_quality_section(seen.findings, seen.not_seen),
-            Section("What was read and guessed", statements=notes),
-        ),
+        sections=(*spectra, Section("What happened when", tables=(_timeline(seen),))),
     )
 
 
