@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Literal
+from numbers import Real
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from rotordrop.errors import UsageError
+from rotordrop.require import require
 
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
@@ -26,6 +32,7 @@ Status = (
     ]
 )
 """How a value is known, or the verdict on one that a record was asked for."""
+_STATUSES = [one for part in get_args(Status) for one in get_args(part)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +68,24 @@ class Known:
     """Where the value comes from."""
     unit: str = ""
     """SI unit, for display."""
+
+    def __post_init__(self) -> None:
+        require(self.status, "status", str, among=_STATUSES)
+        require(self.drops, "drops", int, none=True, least=1)
+        require(self.unit, "unit", str)
+        require(self.source, "source", str, none=True)
+        for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):
+            one = getattr(self, name)  # nan: no number follows from the record
+            if not (isinstance(one, Real) and not isinstance(one, bool)) and (
+                one is not None or name == "value"
+            ):
+                raise UsageError(f"{name} is {one!r}; expected a number, in SI units")
+            if name in ("standard_error", "allowance_90") and one is not None and one < 0.0:
+                raise UsageError(f"{name} is {one!r}; expected at least 0")
+        for name in ("interval_90", "range", "bounds"):
+            pair = getattr(self, name)
+            if pair is not None and (np.shape(pair) != (2,) or pair[0] > pair[1]):
+                raise UsageError(f"{name} is {pair!r}; expected two numbers, the lower one first")
 
     def __float__(self) -> float:
         return self.value

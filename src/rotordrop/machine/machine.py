@@ -330,7 +330,7 @@ class Machine(Description):
         """
         tree: dict[str, Any] = {}
         for path, value in require(values, "values", Mapping).items():
-            *keys, last = _resolved(self, path)
+            *keys, last = _resolved(self, require(path, "a path", str))
             branch = tree
             for key in keys:
                 branch = branch.setdefault(key, {})

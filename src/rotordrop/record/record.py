@@ -321,7 +321,9 @@ class Record:
     def of_channels(self, columns: Sequence[int]) -> Record:
         """The record of some of its sensors."""
         most = len(self.sensors) - 1
-        chosen = [require(one, "column", int, least=0, most=most) for one in columns]
+        chosen = [require(one, "column", int, least=0, most=most) for one in each(columns, "columns", int)]
+        if not chosen or len(set(chosen)) < len(chosen):
+            raise UsageError(f"columns is {chosen}; expected one or more, each once, of 0 to {most}")
         return replace(
             self,
             signals=np.ascontiguousarray(self.signals[:, chosen]),

@@ -44,7 +44,10 @@ class PlacedStart:
 
     def __post_init__(self) -> None:
         for name, most in (("displacement", FARTHEST), ("velocity", FASTEST)):
-            largest = np.abs(numbers(getattr(self, name), name, finite=True)).max(initial=0.0)
+            values = numbers(getattr(self, name), name, finite=True)
+            if values.ndim != 2 or values.shape[1] != 2:
+                raise UsageError(f"{name} has the shape {values.shape}; expected (bearings, 2)")
+            largest = np.abs(values).max(initial=0.0)
             require(float(largest), f"the largest {name}", float, most=most)
 
 
@@ -181,6 +184,10 @@ class MagnetEvent:
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 
+COARSEST = 1e-3
+"""Tolerance [1] above which forces of impacts are no numbers any more: 0.1 gives meganewtons (chosen)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Case:
     """What every simulation is told."""
@@ -193,8 +200,10 @@ class Case:
     """Runge–Kutta pair."""
 
     def _check(self, *positive: str) -> None:
-        for name in (*positive, "tolerance", "largest_step"):
+        for name in (*positive, "largest_step"):
             require(getattr(self, name), name, float, above=0.0, error=SimulationError)
+        coarsest = COARSEST if self.largest_step >= 1e-3 else np.inf  # the bound of the step alone, then
+        require(self.tolerance, "tolerance", float, above=0.0, most=coarsest, error=SimulationError)
         require(self.integrator, "integrator", str, among=get_args(IntegratorName))
         require(self.start, "start", *get_args(Start))
 

@@ -289,6 +289,24 @@ WRONG = {
         lambda: replace(RECORD, sensors=NAMES),
         r"sensors\[0\] is 'S_NDE_A'; expected a Sensor",
     ),
+    "known as text": (lambda: rd.Known(value="3"), "value is '3'; expected a number"),
+    "an interval that runs backwards": (
+        lambda: rd.Known(value=1.0, interval_90=(2, 0)),
+        "the lower one first",
+    ),
+    "an error below zero": (lambda: rd.Known(value=1.0, standard_error=-1.0), "standard_error is -1.0"),
+    "a status nobody gives": (
+        lambda: rd.Known(value=1.0, status="sure"),
+        "status is 'sure'; expected one of",
+    ),
+    "a number for a path": (lambda: MACHINE.with_values({5: 1e-4}), "a path is 5; expected a text"),
+    "no channels": (lambda: RECORD.of_channels([]), r"columns is \[\]; expected one or more, each once"),
+    "a channel twice": (lambda: RECORD.of_channels([0, 0]), r"columns is \[0, 0\]"),
+    "a start of three numbers": (
+        lambda: rd.PlacedStart(displacement=np.zeros(3), velocity=np.zeros(3)),
+        r"displacement has the shape \(3,\); expected \(bearings, 2\)",
+    ),
+    "a coarse tolerance": (lambda: case(tolerance=0.1), "tolerance is 0.1; expected .* up to 0.001"),
     "no such channel": (lambda: RECORD.of_channels([9]), "column is 9; expected a whole number"),
     "tail of two": (
         lambda: rd.check_record(RECORD, MACHINE, RECORD.of_channels([0, 1])),
