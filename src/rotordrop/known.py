@@ -71,7 +71,7 @@ class Known:
 
     def __post_init__(self) -> None:
         require(self.status, "status", str, among=_STATUSES)
-        require(self.drops, "drops", int, none=True, least=1)
+        require(self.drops, "drops", int, none=True, least=0)
         require(self.unit, "unit", str)
         require(self.source, "source", str, none=True)
         for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):

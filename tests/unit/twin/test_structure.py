@@ -301,7 +301,9 @@ def test_the_soft_axis_is_that_of_the_stiffness_matrix(turn, ratio):
 def test_every_extension_says_what_was_found_with_its_interval(lp400, extension):
     machine = extension.added_to(lp400)
     values = {
-        u.path: Known(value=u.value_of(u.begin), interval_90=(u.begin - half, u.begin + half))
+        u.path: Known(
+            value=u.value_of(u.begin), interval_90=(u.value_of(u.begin - half), u.value_of(u.begin + half))
+        )
         for u in all_unknowns(build_drop_model(machine, "quick"))
         for half in (0.1 * abs(u.begin) + 1e-6,)
     }
