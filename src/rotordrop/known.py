@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from numbers import Real
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -76,9 +75,10 @@ class Known:
         require(self.source, "source", str, none=True)
         for name in ("value", "standard_error", "allowance_90", "lower", "upper", "start"):
             one = getattr(self, name)  # nan: no number follows from the record
-            if not (isinstance(one, Real) and not isinstance(one, bool)) and (
-                one is not None or name == "value"
-            ):
+            fits = (isinstance(one, float | np.number) or type(one) is int) or (
+                one is None and name != "value"
+            )
+            if not fits:
                 raise UsageError(f"{name} is {one!r}; expected a number, in SI units")
             if name in ("standard_error", "allowance_90") and one is not None and one < 0.0:
                 raise UsageError(f"{name} is {one!r}; expected at least 0")

@@ -201,8 +201,8 @@ class Case:
 
     def _check(self, *positive: str) -> None:
         for name in (*positive, "largest_step"):
-            require(getattr(self, name), name, float, above=0.0, error=SimulationError)
-        coarsest = COARSEST if self.largest_step >= 1e-3 else np.inf  # the bound of the step alone, then
+            step = require(getattr(self, name), name, float, above=0.0, error=SimulationError)
+        coarsest = np.inf if step < 1e-3 else COARSEST  # steps of a fixed size, nearly
         require(self.tolerance, "tolerance", float, above=0.0, most=coarsest, error=SimulationError)
         require(self.integrator, "integrator", str, among=get_args(IntegratorName))
         require(self.start, "start", *get_args(Start))
