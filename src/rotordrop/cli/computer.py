@@ -107,7 +107,7 @@ def doctor(
 
 def examined() -> dict[str, Any]:
     """Everything the command says, ready for JSON."""
-    from rotordrop.physics.cached import compiled_code
+    from rotordrop.physics._cached import compiled_code
 
     needs: dict[str, dict[str, str | None]] = {extra: {} for extra in ("", *EXTRAS)}
     for text in requires("rotordrop") or []:
