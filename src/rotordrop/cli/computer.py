@@ -10,7 +10,6 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from typer import Option
 
 from rotordrop._version import __version__
@@ -43,7 +42,6 @@ def serve(
         int,
         Option("--port", min=0, max=65535, metavar="N", help="Where to listen; 0 takes a free port."),
     ] = USUAL_PORT,
-    open_page: Annotated[bool, Option("--open", help="Open the page in the browser.")] = False,
 ) -> None:
     """Serve a local page: look at drops, estimate, read reports.
 
@@ -58,8 +56,6 @@ def serve(
         out = console()
         out.print(f"The page is {address}\nJobs are kept in {place}. Ctrl-C ends the server.", soft_wrap=True)
         sys.stdout.flush()
-        if open_page:
-            typer.launch(address)
 
     serve_page(place, port, announce, lambda words: console(sys.stderr).print(words))
 
