@@ -63,7 +63,8 @@ def states_between(
 ) -> None:
     """Fill ``fine`` (1 + (N - 1) ``substeps``, n) with estimates (N, n) at ``times`` (N,) [s] and between.
 
-    Between samples the rotor moves by the model. What the next sample has beside that has come evenly.
+    Between samples the rotor moves by the model. What the next sample has beside that has come evenly. Where
+    the explicit step does not bear the estimated numbers, a model that lost the record, lies a straight line.
     """
     s, count, work = p.rotor_at[L.N_DYNAMIC], p.rotor_at[L.N_STATES], scratch_of(p)
     y, trial, rates = np.zeros(count), np.empty(count), np.zeros((5, count))
@@ -76,8 +77,13 @@ def states_between(
             copy_into(means[i], fine[i * substeps + k])
             copy_into(y[:s], fine[i * substeps + k, :s])
             P.rk4_step(times[i] + k * h, h, y, p, rates, trial, work)
+        largest, unstable = np.max(np.abs(means[i + 1, :s])), False
+        for j in range(s):
+            unstable |= not abs(y[j]) < 10.0 * largest
         for k in range(1, substeps):
             for j in range(s):
+                if unstable:
+                    fine[i * substeps + k, j], y[j] = means[i, j], means[i, j]
                 fine[i * substeps + k, j] += k / substeps * (means[i + 1, j] - y[j])
 
 
