@@ -29,7 +29,7 @@ from rotordrop.cli import INTERRUPTED as INTERRUPTED
 from rotordrop.cli import STOPPED
 from rotordrop.cli._output import with_files_apart
 from rotordrop.cli._terminal import open_streams, printable
-from rotordrop.errors import OutputError, RotordropError, UsageError, speaking_of_options
+from rotordrop.errors import OutputError, RotordropError, UnmatchedError, UsageError, speaking_of_options
 from rotordrop.interrupts import interruptions_kept
 from rotordrop.one_thread import ENVIRONMENT
 
@@ -203,7 +203,8 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
     except typer.Exit as stop:
         return stop.exit_code
     except RotordropError as error:
-        return fail(str(error), error.exit_code)
+        code = fail(str(error), error.exit_code)
+        return code if not _likeliest_wanted(error) else run([*arguments, "--map", "likely"], program, name)
     except _CallError as error:
         called: Any = getattr(error, "ctx", None)
         path = called.command_path if called else name
@@ -222,6 +223,17 @@ def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotor
             return fail(f"cannot write the output: {error.strerror}", OutputError.exit_code)
         place = error.filename or "the current folder"
         return fail(f"{place}: {error.strerror or error}", OutputError.exit_code)
+
+
+def _likeliest_wanted(error: RotordropError) -> bool:
+    """Whether somebody at a terminal takes the likeliest channels where no names tell."""
+    if not (isinstance(error, UnmatchedError) and "likeliest" in error.remedy and sys.stdin.isatty()):
+        return False
+    try:
+        return typer.confirm("Use the likeliest?", default=True, err=True)
+    except typer.Abort:  # nobody answers
+        typer.echo(err=True)
+        return False
 
 
 def _discard_standard_output() -> None:

@@ -95,3 +95,15 @@ def test_a_wrong_call_names_the_way_out_and_writes_nothing(call, code, words, tm
     assert told.out == "" and re.search(words, said) and "Traceback" not in said, said
     left = {str(f.relative_to(tmp_path)): f.read_bytes() for f in tmp_path.rglob("*") if f.is_file()}
     assert left == FILES
+
+
+def test_who_answers_no_question_reads_what_is_missing(tmp_path, monkeypatch, capsys):
+    rows = [f"{i * 5e-5:.5f};0.001;0.001;0.001;0.001" for i in range(50)]
+    record = tmp_path / "drop.csv"
+    record.write_text("\n".join(["Time [s];VE-1X [mm];VE-1Y [mm];VE-2X [mm];VE-2Y [mm]", *rows]) + "\n")
+    ended = io.StringIO("")
+    ended.isatty = lambda: True
+    monkeypatch.setattr("sys.stdin", ended)
+    assert run(["look", str(record), str(LP400)]) == 3
+    told = capsys.readouterr().err
+    assert "has no channel" in told and told.rstrip().endswith("Use the likeliest? [Y/n]:")
