@@ -26,8 +26,8 @@ class CentredStart:
     """The rotor starts straight, at rest and in the centre of all bearings."""
 
 
-FARTHEST, FASTEST = 0.02, 100.0
-"""Displacement [m] and velocity [m/s] at a start beyond which a unit is mistyped (chosen)."""
+FARTHEST, FASTEST, FASTEST_SPIN = 0.02, 100.0, 1e5
+"""Displacement [m] and velocity [m/s] at a start, speed [rad/s], beyond which a unit is mistyped (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,9 +235,9 @@ class DropCase(Case):
 
     def __post_init__(self) -> None:
         self._check("duration", "output_step")
-        if not np.isfinite(self.speed):
+        if not abs(self.speed) <= FASTEST_SPIN:
             raise SimulationError(
-                f"speed is {self.speed!r} rad/s; expected a finite number. Give another value."
+                f"speed is {self.speed!r} rad/s; expected a finite number up to {FASTEST_SPIN:g}."
             )
         require(self.spin, "spin", str, among=get_args(SpinMode))
         require(self.most_steps, "most_steps", int, least=1)
@@ -309,10 +309,10 @@ class CoastDownCase(Case):
         reduction_of(self.reduction)
         require(self.rest, "rest", float, least=0.0, error=SimulationError)
         require(self.settled_scheme, "settled_scheme", bool, error=SimulationError)
-        if not np.isfinite(self.speed) or abs(self.speed) <= self.stop_speed:
+        if not self.stop_speed < abs(self.speed) <= FASTEST_SPIN:
             raise SimulationError(
-                f"speed is {self.speed!r} rad/s; a coast-down starts above {self.stop_speed:g} rad/s. "
-                "Give another speed."
+                f"speed is {self.speed!r} rad/s; a coast-down starts above {self.stop_speed:g} rad/s and "
+                f"below {FASTEST_SPIN:g}. Give another speed."
             )
         per_window = FIRST_WINDOW / self.output_step
         if per_window < 1.0 or abs(per_window - round(per_window)) > 1e-6:

@@ -306,6 +306,7 @@ WRONG = {
         lambda: rd.PlacedStart(displacement=np.zeros(3), velocity=np.zeros(3)),
         r"displacement has the shape \(3,\); expected \(bearings, 2\)",
     ),
+    "a gigahertz": (lambda: case(speed="1 GHz"), "speed is 6283185307.* up to 100000"),
     "a coarse tolerance": (lambda: case(tolerance=0.1), "tolerance is 0.1; expected .* up to 0.001"),
     "no such channel": (lambda: RECORD.of_channels([9]), "column is 9; expected a whole number"),
     "tail of two": (
