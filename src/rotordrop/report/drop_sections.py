@@ -220,7 +220,9 @@ def _stress(bearings: Sequence[BearingDrop], *, certain: bool) -> Section:
         stress_box_figure(bearings),
         "Distribution of the stress within the drop; dashed in the box: mean (Neisi 2020, Fig. 16).",
     )
-    return Section("Hertz stress", figures=(history, box))
+    # statistics of an estimated history have no interval of their own; mean and peak stand above with theirs
+    tables = () if any(one.stress_band for one in bearings) else (stress_table(bearings),)
+    return Section("Hertz stress", figures=(history, box), tables=tables)
 
 
 def _impacts(bearings: Sequence[BearingDrop]) -> Section:
@@ -559,6 +561,22 @@ def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, 
     words(figure, MILLI * contact.deepest_time, MICRO * depth, text, **left, **arrow)
 
 
+STATED = (
+    ("mean", "mean", "pressure"),
+    ("median", "median", "pressure"),
+    ("lower quartile", "lower_quartile", "pressure"),
+    ("upper quartile", "upper_quartile", "pressure"),
+    ("lower whisker", "lower_whisker", "pressure"),
+    ("upper whisker", "upper_whisker", "pressure"),
+    ("standard deviation", "standard_deviation", "pressure"),
+    ("maximum", "maximum", "pressure"),
+    ("samples beyond the whiskers", "beyond_whiskers", "count"),
+    ("samples above mean + 3 σ", "above_three_sigma", "count"),
+    ("preload's share of the mean", "preload_share", "share"),
+)
+"""Lines of the table: label, field of the statistics, kind."""
+
+
 def stress_box_figure(bearings: Sequence[BearingDrop]) -> go.Figure:
     """Draw the distribution of the stress at every bearing as a box plot (Neisi 2020, Fig. 16).
 
@@ -588,3 +606,22 @@ def stress_box_figure(bearings: Sequence[BearingDrop]) -> go.Figure:
     figure.update_yaxes(title_text=axis_title("max. Hertz stress", "MPa"))
     figure.update_xaxes(title_text="touchdown bearing", type="category", showgrid=False)
     return figure
+
+
+def stress_table(bearings: Sequence[BearingDrop]) -> Table:
+    """State the numbers of the box plots (Neisi 2020, Table 5), with the share of the preload in the mean."""
+    found = {bearing.name: bearing.statistics for bearing in bearings}
+
+    def of(name: str) -> Column:
+        def stated(row: tuple[str, str, str]) -> Quantity:
+            _, field, kind = row
+            return Quantity.of(getattr(found[name], field), kind, 3 if kind == "share" else 4)
+
+        return Column(name, stated)
+
+    known = any(one.preload_share is not None for one in found.values())
+    rules = dict.fromkeys(one.rules() for one in found.values())
+    head = Column("stress, peak of the contact ellipse", lambda row: row[0])
+    rows = STATED if known else STATED[:-1]
+    note = f"Rules in use: {'; '.join(rules)}."
+    return table(rows, (head, *map(of, found)), "Distribution of the maximum Hertz stress", note)

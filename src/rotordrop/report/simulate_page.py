@@ -132,6 +132,9 @@ TRUSTED_CHANGE = 5e-3
 """Change of a peak at a tighter tolerance beyond which it is a warning [1]; chosen, not measured."""
 NO_INTERVAL = "One run, no interval. A drop is chaotic: after about 40 ms compare statistics (study run)."
 NUMERICAL = "Numerical error: "
+EQUAL = 1e-6
+"""Difference of forces over their peak that is rounding [1]; chosen, not measured."""
+SYMMETRIC = "All ends do the same: a symmetric machine, which no real one is."
 BACKWARDS = "The speed is negative: the shaft turns from y towards x, clockwise seen from the DE."
 
 
@@ -206,6 +209,10 @@ def _verdict(
     numerical = _certificate(result)
     said += [numerical] if numerical.level == "warning" else []
     said.append(Statement(NO_INTERVAL))
+    first = bearings[0].force.values
+    near = EQUAL * float(np.max(first))
+    if len(bearings) > 1 and all(np.allclose(one.force.values, first, 0.0, near) for one in bearings):
+        said.append(Statement(SYMMETRIC))
     known = () if machine is None else machine.touchdown_bearings
     unrated = [one.name for one in known if numbers_of(one).balls is None]
     if rated := [bearing for bearing in bearings if bearing.name not in unrated]:

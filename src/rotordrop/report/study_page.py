@@ -27,6 +27,7 @@ from rotordrop.report.content import (
 )
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit, one_line, shown
+from rotordrop.report.simulate_page import EQUAL, SYMMETRIC
 from rotordrop.report.style import (
     MUTED,
     OVER,
@@ -156,6 +157,9 @@ def _verdict(results: StudyResults, limits: Mapping[str, float]) -> list[Stateme
         lifted = results.exceedance(LIFT, 0.5)
         text = f"The magnets lift the rotor again in {percent(lifted)} of the drops."
         said.append(Statement(text, "good" if lifted.value == 1.0 else "warning"))
+    peaks = [results.numbers[f"{name}.peak_force"] for name in names]
+    if len(peaks) > 1 and all(np.allclose(one, peaks[0], EQUAL, equal_nan=True) for one in peaks):
+        said.append(Statement(SYMMETRIC))
     return [*said, Statement(SCOPE)]
 
 

@@ -56,6 +56,14 @@ class Statistics(Document):
     preload_share: float = ABSENT
     """``preload_stress`` over ``mean`` [1]: near 1 the mean says little about the drop."""
 
+    def rules(self) -> str:
+        """Name the rules in use, for a table or a figure."""
+        weight = "weighted by time" if self.weighted_by_time else "every sample counts alike"
+        return (
+            f"quartiles: {QUARTILE_RULES[self.rule]}; whiskers: {WHISKER_REACH:g} interquartile ranges; "
+            f"outliers: above mean + {SIGMA_REACH:g} standard deviations (n − 1); {weight}"
+        )
+
 
 def stress_statistics(
     stress: ArrayLike,

@@ -16,6 +16,7 @@ from rotordrop.report.drop_sections import (
     quality_statements,
     record_quality_section,
     stress_box_figure,
+    stress_table,
 )
 from rotordrop.report.estimate_page import (
     ParameterRow,
@@ -152,3 +153,17 @@ def test_the_box_plot_draws_the_numbers_of_the_statistics(stressed):
     assert min(outliers.y) >= round(1e-6 * told.upper_whisker)
     assert (list(first.x), list(drawn.data[2].x)) == (["NDE"], ["DE"])
     assert "[MPa]" in drawn.layout.yaxis.title.text
+
+
+def test_the_stress_table_states_the_statistics_names_the_rules_and_the_preload(stressed):
+    table = stress_table(stressed)
+    names = "mean,median,lower quartile,upper quartile,lower whisker,upper whisker,standard deviation,maximum"
+    for column, bearing in enumerate(stressed, start=1):
+        told = bearing.statistics
+        rows = {cells[0]: cells[column].value for cells in table.rows}
+        expected = {name: getattr(told, name.replace(" ", "_")) for name in names.split(",")}
+        expected["samples beyond the whiskers"] = told.beyond_whiskers
+        expected["samples above mean + 3 σ"] = told.above_three_sigma
+        expected["preload's share of the mean"] = 993e6 / told.mean
+        for name, value in expected.items():
+            assert rows[name] == value, name
