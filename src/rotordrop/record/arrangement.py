@@ -149,17 +149,27 @@ def planes_as_listed(recording: Recording) -> dict[str, str]:
 def seats(channels: Sequence[Channel], sensors: Sequence[Sensor]) -> list[Sensor]:
     """The sensor of each channel of a plane whose angles are not told: by their names, or in their order.
 
-    Where the names show axes, X stands a quarter turn before Y, counter-clockwise, the right probe before
-    the left.
+    Sensors named by the axes of their channels tell; else X stands a quarter turn before Y,
+    counter-clockwise, the right probe before the left.
     """
-    pairs, _ = pairs_of(channels)
-    axes = pairs[0][2] if len(pairs) == 1 and len(channels) == len(sensors) == 2 else ""
-    if axes not in ("XY", "HV", "LR"):
+    if len(channels) != len(sensors) or len(sensors) != 2:
         return list(sensors)
+    (pair, axes), (own, said) = _axes_of(channels, channels), _axes_of(channels, sensors)
     one, other = sensors
-    if (math.sin(float(other.angle) - float(one.angle)) > 0.0) != (axes != "LR"):
+    if axes and axes == said:
+        one, other = sensors if own[0] is channels[0] else (other, one)
+    elif axes not in ("XY", "HV", "LR"):
+        return [one, other]
+    elif (math.sin(float(other.angle) - float(one.angle)) > 0.0) != (axes != "LR"):
         one, other = other, one
-    return [one, other] if channels[0] is pairs[0][1][0] else [other, one]
+    return [one, other] if channels[0] is pair[0] else [other, one]
+
+
+def _axes_of(channels: Sequence[Channel], named: Sequence[Channel | Sensor]) -> tuple[Sequence[Channel], str]:
+    """Two channels in the order of the axes that the names of their counterparts show, and their letters."""
+    names = {id(channel): one.name for channel, one in zip(channels, named, strict=True)}
+    pairs, _ = pairs_of(channels, lambda channel: names[id(channel)])
+    return pairs[0][1:] if pairs else (channels, "")
 
 
 def given_planes(

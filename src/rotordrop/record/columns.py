@@ -96,7 +96,7 @@ def match_sensors(
     return tuple(taken)
 
 
-RULE = "planes in their order, X a quarter turn before Y"
+RULE = "planes in their order, axes by the names of the sensors, else X a quarter turn before Y"
 """How the likeliest channels of sensors are found where no names tell."""
 
 

@@ -200,6 +200,19 @@ def test_channels_without_the_names_of_sensors_are_asked_with_the_likeliest_answ
         np.testing.assert_allclose(record.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
 
 
+@pytest.mark.parametrize("axes", ["XY", "HV", "LR", "AB"])
+def test_letters_of_the_sensors_seat_the_channels_whatever_their_angles(axes, machine):
+    """The first letter stands at 135 and the other at 45°; the letters of the machine decide."""
+    swap = {"A": axes[0], "B": axes[1]}
+    sensors = tuple(s.model_copy(update={"name": s.name[:-1] + swap[s.name[-1]]}) for s in machine.sensors)
+    said = numbered(*(f"VE-41{plane}{axis}" for plane in (11, 12) for axis in axes[::-1]))
+    maps = ["NDE: VE-4111{0}, VE-4111{1}", "DE: VE-4112{1}, VE-4112{0}"]
+    named = rules_of(None, [text.format(*axes) for text in maps])
+    for rules in (Profile(likely=True), named, guess_profile(said, Profile(likely=True), sensors).profile):
+        found = record_of(said, sensors, profile=rules)
+        np.testing.assert_allclose(found.signals[0], [1e-6, 0.0, 3e-6, 2e-6])
+
+
 @pytest.mark.parametrize(
     ("names", "planes"),
     [
