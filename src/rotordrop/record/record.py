@@ -227,6 +227,9 @@ class Record:
                 words = "no column 'time' and its index only counts rows; name the time 'time [s]'"
                 raise RecordError(f"the table has {words}")
             columns[f"time [{split_unit(named)[2]}]"] = index
+        timed = [name for name in columns if whose_time(split_unit(name)[0]) is not None]
+        texts = [n for n, one in columns.items() if one.dtype.kind not in ("fiuMm" if n in timed else "fiu")]
+        columns = {name: one for name, one in columns.items() if name not in texts}
         rules = rules_of(profile, ())
         require(unit, "unit", str, Mapping, none=True)
         given, every = (unit, "") if isinstance(unit, Mapping) else ({}, unit or "")
@@ -234,7 +237,9 @@ class Record:
             replace(one, unit=spelled(given.get(one.name) or given.get(one.label) or one.unit or every))
             for one in recording_of_arrays(columns, Path("the table"), rules).channels
         ]
-        return _record_of_channels(machine, channels, channels[0].time, speed, rules)
+        record = _record_of_channels(machine, channels, channels[0].time, speed, rules)
+        notes = (*record.notes, f"left out, no numbers: {', '.join(texts)}") if texts else record.notes
+        return replace(record, notes=notes)
 
     def __repr__(self) -> str:
         """Name, length, rate and channels."""

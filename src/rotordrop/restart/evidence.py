@@ -23,6 +23,8 @@ _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 IMPOSSIBLE = 3.0
 """Standard errors from which a change that cannot be is named, one in 740 sound ones; chosen."""
+SAME_SPEED = 0.05
+"""Difference of the speeds of two drops up to which unbalances are compared [1]; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +130,11 @@ def _parameters(since: Drop, drop: Drop) -> Iterator[_Moved]:
 
 
 def _unbalances(since: Drop, drop: Drop) -> Iterator[_Moved]:
-    """The unbalance of each plane that both drops know."""
+    """The unbalance of each plane that both drops know, of one speed: planes stand for what is spread along
+    the shaft, and how much each takes of it goes with the speed.
+    """
+    if abs(drop.speed_Hz - since.speed_Hz) > SAME_SPEED * drop.speed_Hz:
+        return
     before = {one.node: _logarithm(one.amount_kg_m) for one in since.unbalance}
     for one in drop.unbalance:
         was, now = before.get(one.node), _logarithm(one.amount_kg_m)

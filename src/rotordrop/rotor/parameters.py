@@ -14,6 +14,7 @@ from rotordrop.elements.bearing_numbers import numbers_of, places_of
 from rotordrop.elements.description import Placed
 from rotordrop.elements.support import support_sag
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
+from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics import aerodynamics, magnet, touch
 from rotordrop.physics import columns as L
@@ -49,6 +50,11 @@ class DropModel:
 
     def with_machine(self, machine: Machine) -> DropModel:
         """The same model of a machine with the same rotor and other bearings or values."""
+        nodes = require(machine, "machine", Machine).rotor.node_positions
+        if not np.array_equal(nodes, self.machine.rotor.node_positions):
+            raise UsageError(
+                f"{machine.name} has another rotor than {self.machine.name}; build its own model"
+            )
         values = _of_values(machine, self.fe, self.basis, self.load_shares)
         if self.layout.magnet_own:
             values["magnet"] = _magnet_rows(machine, self.basis, loops=True)

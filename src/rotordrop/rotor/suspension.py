@@ -17,7 +17,7 @@ from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_tangent
-from rotordrop.require import require
+from rotordrop.require import numbers, require
 from rotordrop.rotor.statics import bearing_load_shares
 
 SUSPENSIONS = ("free-free", "AMBs", "touchdown bearings")
@@ -218,6 +218,7 @@ def link(stiffness: ArrayLike, damping: ArrayLike = 0.0, branches: tuple[Relaxin
 
 def spring(node: int, stiffness: ArrayLike, damping: ArrayLike = 0.0) -> Support:
     """Spring and damper from a node (counted from 1) straight to the ground; numbers as in `link`."""
+    require(node, "node", int, least=1)
     return Support(node=node, links=(link(stiffness, damping),))
 
 
@@ -229,7 +230,7 @@ def in_series(*stiffness: float) -> float:
 
 
 def _planar(value: ArrayLike) -> Array:
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers(value, "stiffness or damping of a link", finite=True)
     if array.shape == (2, 2):
         return array
     if array.shape not in ((), (2,)):

@@ -18,6 +18,7 @@ import rotordrop as rd
 from rotordrop.errors import RotordropError
 from rotordrop.evidence.clearance import measure_clearance
 from rotordrop.restart.card import restart_card
+from rotordrop.rotor.suspension import spring
 from rotordrop.spectrum.coast_down import WaterfallChoice
 from rotordrop.study.repeat import repeat_study
 
@@ -305,6 +306,20 @@ WRONG = {
     "a start of three numbers": (
         lambda: rd.PlacedStart(displacement=np.zeros(3), velocity=np.zeros(3)),
         r"displacement has the shape \(3,\); expected \(bearings, 2\)",
+    ),
+    "half a node for a spring": (lambda: spring(3.5, 1e6), "node is 3.5; expected a whole number"),
+    "no stiffness": (lambda: spring(3, np.nan), "stiffness or damping of a link holds 1 values"),
+    "the model of another rotor": (
+        lambda: rd.build_drop_model(MACHINE, "quick").with_machine(SMALL),
+        "has another rotor than",
+    ),
+    "moments for readings": (
+        lambda: rd.Record.from_dataframe(
+            MACHINE,
+            pd.DataFrame({"time [s]": TIME, NAMES[0]: TIME, NAMES[1]: pd.to_timedelta(TIME)}),
+            unit="m",
+        ),
+        "no channel",
     ),
     "a gigahertz": (lambda: case(speed="1 GHz"), "speed is 6283185307.* up to 100000"),
     "a coarse tolerance": (lambda: case(tolerance=0.1), "tolerance is 0.1; expected .* up to 0.001"),

@@ -97,6 +97,14 @@ def test_a_change_speaks_of_its_damage_and_none_against_it(now, kind, where):
     assert others == {one.kind: one.ratio for one in same.indicators if one.kind != kind}
 
 
+def test_unbalances_found_at_two_speeds_are_not_compared():
+    """What a plane takes of an unbalance spread along the shaft goes with the speed."""
+    before = drop(unbalance=1.5e-5)
+    assert ratio(restart_card(drop(unbalance=5e-5, speed_Hz=62.0), earlier=[before]), "unbalance", "") > 100.0
+    faster = restart_card(drop(unbalance=5e-5, speed_Hz=70.0), earlier=[before])
+    assert "unbalance" not in {one.kind for one in faster.indicators}
+
+
 def test_a_stiffer_support_is_no_loose_one():
     stiffer = restart_card(drop(stiffness=1.3e8), earlier=[drop()])
     assert ratio(stiffer, "loose") < 0.01
