@@ -15,9 +15,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, UnsettledError
-from rotordrop.evidence.levitated import MAINS
 from rotordrop.known import NINETY
-from rotordrop.physics.pendulum import small_frequency
 from rotordrop.units import format_quantity, percent
 
 if TYPE_CHECKING:
@@ -31,18 +29,6 @@ STANDSTILL = 2 * np.pi * 0.5
 
 MOST_SWING = 0.5
 """Peak-to-peak motion at rest, in nominal air gaps (chosen)."""
-
-MOST_LEAN = 25.0
-"""A rotor at rest may lie this far from straight below its levitated position, and swing so far from the
-level [deg] (chosen)."""
-
-VISIBLE_SWING = 4e-6
-"""Amplitude of a swing whose direction shows [m] (chosen): some times the noise of a good sensor."""
-
-_DYING, _TOO_FAST = 2.0, 2.0
-"""A bounce falls by this from the first to the last third of what shows it [1] (chosen): a swing along the
-race takes seconds. Frequency over that of a small swing in the air gap above which no swing is [1]: a hop as
-high as half the gap has 3."""
 
 _QUIET = 0.1
 """Length of the blocks by which the end of a record is looked at for its rest [s]: three swings."""
@@ -168,54 +154,12 @@ def settled_tail(record: Record, machine: Machine) -> SettledTail:
             f"{format_quantity(gap, 'length')}",
         )
     first = len(time) - quiet * block
-    while bounces := bouncing(path[first:], record.sampling_rate, gap):
-        first += (len(time) - first) // 3
-        if len(time) - first < SHORTEST_TAIL * record.sampling_rate:
-            raise UnsettledError(
-                record.name,
-                f"is not settled: the rotor still bounces by {format_quantity(bounces, 'length')}",
-            )
     return SettledTail(
         start=float(time[first]),
         end=float(time[-1]),
         mean=np.mean(still.signals[first:], axis=0),
         swing=np.asarray(np.ptp(path[first:], axis=0)),
     )
-
-
-def main_motion(path: Array, rate: float) -> tuple[float, float, Array] | None:
-    """Amplitude [m], slope [deg] and course [m] of a path, shape (N, 2), about its mean at a `rate` [Hz].
-
-    None where it has no direction. What the mains add is left out.
-    """
-    time = np.arange(len(path)) / rate
-    waves = [part(2.0 * np.pi * mains * time) for mains in MAINS for part in (np.cos, np.sin)]
-    design = np.column_stack([np.ones(len(path)), *waves])
-    deviation = path - design @ np.linalg.lstsq(design, path, rcond=None)[0]
-    values, vectors = np.linalg.eigh(deviation.T @ deviation / len(deviation))
-    size = float(np.sqrt(2 * values[1]))
-    if size < VISIBLE_SWING or values[1] < 9.0 * values[0]:
-        return None
-    slope = float(np.degrees(np.arctan2(abs(vectors[1, 1]), abs(vectors[0, 1]))))
-    return size, slope, np.asarray(deviation @ vectors[:, 1])
-
-
-def bouncing(path: Array, rate: float, gap: float) -> float:
-    """Largest amplitude [m] of planes, shape (N, P, 2), that move up and down as no resting rotor does.
-
-    That dies away, or is faster than any swing along a race: a channel in the wrong place shows swings.
-    """
-    found = [0.0]
-    for plane in range(path.shape[1]):
-        motion = main_motion(path[:, plane], rate)
-        if motion is None or motion[1] <= MOST_LEAN:
-            continue
-        size, _, course = motion
-        early, *_, late = (float(np.std(part)) for part in np.array_split(course, 3))
-        frequency = np.fft.rfftfreq(len(course), 1.0 / rate)[np.argmax(np.abs(np.fft.rfft(course)))]
-        if early > _DYING * late or frequency > _TOO_FAST * small_frequency(gap):
-            found.append(size)
-    return max(found)
 
 
 def resting_record(record: Record, tail: Record | None, machine: Machine) -> Record:

@@ -12,9 +12,8 @@ from rotordrop.elements.support import PEAK_LOADS
 from rotordrop.errors import RecordError, UnsettledError
 from rotordrop.evidence.events import nominal_gaps, planes_at_bearings
 from rotordrop.evidence.evidence import Missing
-from rotordrop.evidence.levitated import LevitatedModel
+from rotordrop.evidence.levitated import MAINS, LevitatedModel
 from rotordrop.evidence.quality.finding import Finding, found
-from rotordrop.evidence.rest import MOST_LEAN, main_motion
 from rotordrop.record.axes import Plane, along_sensors, planar_of
 from rotordrop.series import noise_by_differences
 from rotordrop.units import format_quantity
@@ -22,6 +21,9 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
+
+MOST_LEAN = 25.0
+"""A rotor at rest may lie this far from straight below its levitated position [deg] (chosen)."""
 
 _SOME_LEAN = 10.0
 """From this lean on it is worth a word [deg] (chosen)."""
@@ -31,6 +33,9 @@ _TURNED_LEAN = 65.0
 
 DEPTH = (0.6, 1.7)
 """How far it may lie below it, in nominal air gaps (chosen)."""
+
+_VISIBLE_SWING = 4e-6
+"""Amplitude of a swing whose direction shows [m] (chosen): some times the noise of a good sensor."""
 
 _NO_DEPTH, _SAME_NOISE = 0.2, 0.2
 """A level that is not recorded: distance over the air gap, and noise over that of the record [1]."""
@@ -70,7 +75,7 @@ def check_tail(
     if isinstance(still, Missing):
         if not isinstance(still.error, UnsettledError):
             raise still.error or RecordError(still.reason)
-        return [found("not-settled", seen=still.error.seen)]
+        return [found("not-settled", seen=still.error.seen, way_out=still.error.remedy)]
     path = planar_of(still.along - along_sensors(levitated.mean, still.sensors), still.planes)
     gaps = nominal_gaps(machine, still)
     if _without_level(still, path, gaps, record.window(levitated.start, levitated.end)):
@@ -172,9 +177,22 @@ def _place(path: Array, plane: Plane, gap: float) -> list[Finding]:
     return [found(row, channel=plane.names, lean=lean, x=1e6 * x, y=1e6 * y)]
 
 
+def _without_hum(path: Array, rate: float) -> Array:
+    """Motion about the mean without what the mains add to it."""
+    time = np.arange(len(path)) / rate
+    waves = [part(2.0 * np.pi * mains * time) for mains in MAINS for part in (np.cos, np.sin)]
+    design = np.column_stack([np.ones(len(path)), *waves])
+    return np.asarray(path - design @ np.linalg.lstsq(design, path, rcond=None)[0])
+
+
 def _swing(path: Array, plane: Plane, rate: float) -> list[Finding]:
     """A rotor that rests on the race can only swing along it: level at the bottom."""
-    motion = main_motion(path, rate)
-    if motion is None or motion[1] <= MOST_LEAN:
+    deviation = _without_hum(path, rate)
+    values, vectors = np.linalg.eigh(deviation.T @ deviation / len(deviation))
+    size = float(np.sqrt(2 * values[1]))
+    if size < _VISIBLE_SWING or values[1] < 9.0 * values[0]:
         return []
-    return [found("swing", channel=plane.names, node=plane.node, size=motion[0], slope=motion[1])]
+    slope = float(np.degrees(np.arctan2(abs(vectors[1, 1]), abs(vectors[0, 1]))))
+    if slope <= MOST_LEAN:
+        return []
+    return [found("swing", channel=plane.names, node=plane.node, size=size, slope=slope)]
