@@ -98,12 +98,11 @@ def estimate(
         *(("tail", path) for path in tail or []),
     ]
     origin = origin_here(sys.argv[1:], used, operator)
-    pages = [(estimate_page if reports else estimate_summary)(made, origin) for made in estimates]
-    screens = pages if everything else [estimate_screen(made) for made in estimates]
+    screens = [estimate_summary(made, origin) if everything else estimate_screen(made) for made in estimates]
     for made, place in zip(estimates, outputs, strict=False):
         made.save(place)
-    for page, place in zip(pages, reports, strict=False):
-        write_page(page, place)
+    for made, place in zip(estimates, reports, strict=False):
+        write_page(estimate_page(made, origin), place)
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
     deliver(numbers, json, screens, written=[*reports, *outputs], whole=everything)

@@ -216,11 +216,12 @@ INCONSISTENT = (
 
 @pytest.mark.slow
 def test_an_estimate_inconsistent_with_its_record_is_written_and_ends_with_its_own_code(
-    calibrated, tmp_path, monkeypatch
+    calibrated, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr("rotordrop.twin.tracked.consistency_checks", lambda *_: INCONSISTENT)
     out, page = tmp_path / "out.json", tmp_path / "report.html"
-    assert run([*calibrated, "--quick", "--json", str(out), "--report", str(page)]) == 7
+    assert run([*calibrated, "--quick", "--all", "--json", str(out), "--report", str(page)]) == 7
+    assert "Parameters of the machine" in capsys.readouterr().out
     written = json.loads(out.read_text())
     assert written["consistent"] is False and page.exists()
 
