@@ -173,6 +173,16 @@ class UsageError(RotordropError, ValueError):
     exit_code: ClassVar[int] = 64
 
 
+@contextmanager
+def needing(extra: str) -> Iterator[None]:
+    """Refuse where a package of an extra, imported in here, is not installed: says what to install."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        text = f"the package {error.name} is not installed; install it: pip install 'rotordrop[{extra}]'"
+        raise UsageError(text) from None
+
+
 def unknown_key(key: str, known: tuple[str, ...]) -> str:
     """Say that a key is not known, with the nearest one."""
     close = get_close_matches(key, known, 1, 0.6)

@@ -18,6 +18,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
+from rotordrop.errors import needing
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.methods import Method
@@ -385,7 +386,8 @@ class Estimates(tuple[Estimate, ...]):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per drop and bearing: verdict, peaks with intervals, air gap [SI]."""
-        import pandas
+        with needing("tables"):
+            import pandas
 
         return pandas.DataFrame([row for estimate in self for row in estimate.rows()])
 

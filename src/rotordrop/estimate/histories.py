@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
-from rotordrop.errors import OutputError, UsageError
+from rotordrop.errors import OutputError, UsageError, needing
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.files import atomic_path, new_hdf5
 from rotordrop.labelled import Stored, put
@@ -113,7 +112,8 @@ def _marks(estimate: Estimate) -> dict[str, str]:
 
 def as_dataframe(estimate: Estimate) -> pandas.DataFrame:
     """Histories as a table with columns (bearing, quantity), indexed by time [s]; units in ``attrs``."""
-    import pandas
+    with needing("tables"):
+        import pandas
 
     time, columns = history_columns(estimate)
     frame = pandas.DataFrame(
@@ -126,7 +126,8 @@ def as_dataframe(estimate: Estimate) -> pandas.DataFrame:
 
 def as_dataset(estimate: Estimate) -> xarray.Dataset:
     """Histories as a labelled data set over time and bearing; every variable has units and a long name."""
-    import xarray
+    with needing("tables"):
+        import xarray
 
     time, columns = history_columns(estimate)
     names = [bearing.name for bearing in estimate.bearings]
@@ -160,11 +161,9 @@ def require_format(path: Path) -> str:
             f"{path}: {suffix or 'no suffix'!r} is not a format of histories; "
             f"write one of {', '.join(FORMATS)}"
         )
-    if suffix == ".parquet" and find_spec("pyarrow") is None:
-        raise OutputError(
-            f"{path}: Parquet needs a package that is not installed; install rotordrop[tables], "
-            "or write .csv or .h5"
-        )
+    if suffix == ".parquet":
+        with needing("tables"):
+            import pyarrow  # noqa: F401
     return suffix
 
 

@@ -17,7 +17,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import RING_STATE
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.face import AXIAL_STATE
-from rotordrop.errors import SimulationError, UsageError
+from rotordrop.errors import SimulationError, UsageError, needing
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write
 from rotordrop.physics.hertz import LineContact
@@ -257,7 +257,8 @@ class DropResult(SimulationResult):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Histories as a table with columns (bearing, quantity) against time [s]; units in ``attrs``."""
-        import pandas
+        with needing("tables"):
+            import pandas
 
         told = {name: said.unit for name, said in HISTORIES.items() if said.axes == "time bearing"}
         histories = {"force": self.bearing_force_magnitude, **{name: getattr(self, name) for name in told}}
@@ -268,7 +269,8 @@ class DropResult(SimulationResult):
 
     def to_xarray(self) -> xarray.Dataset:
         """The histories as a labelled data set (needs the extra ``rotordrop[tables]``)."""
-        import xarray
+        with needing("tables"):
+            import xarray
 
         variables = {
             name: (said.axes.split(), getattr(self, name), {"units": said.unit, "long_name": said.label})

@@ -108,7 +108,7 @@ def ends(known: Known | None) -> dict[str, Any] | None:
     """A number with its interval, ready for JSON."""
     if known is None:
         return None
-    return stated(known, "value interval_90 drops", interval_90=[known.low, known.high])
+    return stated(known, "value interval_90 drops", interval_90=[*(known.interval_90 or (None, None))])
 
 
 def study_numbers_of(study: Study) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rotordrop.errors import RotordropError, UsageError
+from rotordrop.errors import RotordropError, needing
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress, Shown, shown
@@ -219,12 +219,8 @@ def _on_threads(place: StudyFolder, wanted: list[int], threads: int, study: Stud
 
 
 def _on_dask(place: StudyFolder, wanted: list[int], address: str, watch: _Watch) -> None:
-    try:
+    with needing("cluster"):
         distributed: Any = import_module("distributed")
-    except ImportError as error:
-        raise UsageError(
-            "a Dask cluster needs the extra 'cluster'; install it with: pip install 'rotordrop[cluster]'"
-        ) from error
     with ExitStack() as stack:
         scheduler: Any = address
         if address == "local":

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import beta, binom
 
 from rotordrop.arrays import Array
-from rotordrop.errors import DamagedFileError, OutputError, UsageError, unknown_key
+from rotordrop.errors import DamagedFileError, OutputError, UsageError, needing, unknown_key
 from rotordrop.known import Known
 from rotordrop.sketch import sketch
 from rotordrop.study.folder import StudyFolder, read_plan, read_shards, study_of
@@ -73,7 +73,8 @@ class StudyResults:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """One row per drop: number, what was varied [SI], quantities (units in ``attrs``), why it failed."""
-        import pandas
+        with needing("tables"):
+            import pandas
 
         table = pandas.DataFrame({"drop": self.drop, **self.varied, **self.numbers, "reason": self.reasons})
         table.attrs["units"] = {quantity.name: quantity.unit for quantity in self.columns}
@@ -106,7 +107,8 @@ class StudyResults:
 
         Over cells with equal numbers of drops; a value with fewer distinct values has one cell for each.
         Every cell has ``from``, ``to`` [SI of the varied value] and ``known``, a `Known`; a probability
-        counts among the drops that were computed.
+        counts among the drops that were computed. Too few drops for either end give no interval, and
+        ``source`` says how many do.
         """
         x, y = self.column(by), self.column(name)
         place, done = cells_of(x, cells), self._computed
@@ -115,7 +117,12 @@ class StudyResults:
         def known(group: NDArray[np.bool_]) -> Known:
             if above is None:
                 unit = next((one.unit for one in self.columns if one.name == name), "")
-                return replace(quantile(y[group], share), unit=unit)
+                found = replace(quantile(y[group], share), unit=unit)
+                if math.isfinite(found.low) or math.isfinite(found.high):
+                    return found
+                least = math.ceil(math.log(0.5 * (1.0 - COVER)) / math.log(max(share, 1.0 - share)))
+                text = f"an interval needs {least} drops in a cell, there are {found.drops}"
+                return replace(found, interval_90=None, source=text)
             return exceedance(y[group & done], above)
 
         return [
@@ -272,16 +279,11 @@ def save_results(results: StudyResults, path: str | Path) -> None:
 
 def _save_parquet(results: StudyResults, path: Path) -> None:
     """One column a value; units and digest in the metadata of the file."""
-    from importlib.util import find_spec
-
     from rotordrop.files import atomic_path
 
-    if find_spec("pyarrow") is None:
-        raise OutputError(
-            f"{path}: Parquet needs a package that is not installed; install rotordrop[tables], or write .h5"
-        )
-    import pyarrow
-    from pyarrow import parquet
+    with needing("tables"):
+        import pyarrow
+        from pyarrow import parquet
 
     columns = {"drop": results.drop, **results.varied, **results.numbers, "failure": list(results.reasons)}
     units = {q.name: q.unit for q in results.columns}

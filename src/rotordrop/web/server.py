@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotordrop.errors import UsageError
+from rotordrop.errors import UsageError, needing
 from rotordrop.jobs.runner import running
 from rotordrop.jobs.workspace import Workspace
 
@@ -45,14 +45,10 @@ def serve(folder: Path, port: int, announce: Callable[[str], None], tell: Callab
 
 def server_of(space: Workspace, listening: socket.socket) -> uvicorn.Server:
     """The server of a folder, for a socket that listens."""
-    try:
+    with needing("serve"):
         import uvicorn
 
         from rotordrop.web.app import make_app
-    except ModuleNotFoundError as error:
-        raise UsageError(
-            f"the page needs the package {error.name}; install it with pip install 'rotordrop[serve]'"
-        ) from None
     app = make_app(space, port=listening.getsockname()[1])
     configured = uvicorn.Config(
         app, log_level="warning", access_log=False, ws="none", server_header=False, date_header=False,

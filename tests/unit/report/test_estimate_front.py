@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from rotordrop.errors import OutputError
+from rotordrop.errors import OutputError, UsageError
 from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.estimate import Estimates
 from rotordrop.physics.ball_bearing import bearing_constants
@@ -69,10 +69,13 @@ def test_a_format_nobody_knows_is_refused(estimate, tmp_path):
         estimate.save(tmp_path / "histories.xls")
 
 
-def test_parquet_without_its_package_says_what_it_needs(estimate, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(OutputError, match=r"Parquet needs a package .* rotordrop\[tables\]"):
-        estimate.save(tmp_path / "histories.parquet")
+def test_without_its_package_a_table_says_what_to_install(estimate, tmp_path, monkeypatch):
+    tables = {"pandas": Estimates([estimate]).to_dataframe, "xarray": estimate.to_xarray}
+    tables["pyarrow"] = lambda: estimate.save(tmp_path / "histories.parquet")
+    for package, table in tables.items():
+        monkeypatch.setitem(sys.modules, package, None)
+        with pytest.raises(UsageError, match=rf"{package} is not installed; .*rotordrop\[tables\]"):
+            table()
 
 
 def test_page_and_numbers_are_written(estimate, tmp_path):
