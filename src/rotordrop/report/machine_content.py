@@ -16,7 +16,6 @@ from rotordrop.report.content import (
     Card,
     Column,
     Figure,
-    Level,
     ReportContent,
     Section,
     Statement,
@@ -55,7 +54,7 @@ def machine_content(
             _verdict(warnings),
             _rotor(summary),
             *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
-            *_remarks(warnings),
+            *map(Statement, _remarks(one for one in warnings if not one.doubtful)),
         ),
         cards=(
             *(_card(machine, rest) for rest in summary.bearings),
@@ -68,10 +67,9 @@ def machine_content(
 
 def _verdict(warnings: tuple[MachineWarning, ...]) -> Statement:
     """One line: may this description be worked with?"""
-    doubtful = dict.fromkeys(f"{one.kind} ({one.bearing})" for one in warnings if one.doubtful)
-    if doubtful:
-        count = "one value looks" if len(doubtful) == 1 else f"{len(doubtful)} values look"
-        return Statement(f"{count} wrong: {', '.join(doubtful)}.", "warning")
+    if doubts := _remarks(one for one in warnings if one.doubtful):
+        count = "one value looks" if len(doubts) == 1 else f"{len(doubts)} values look"
+        return Statement(f"{count} wrong: {'; '.join(doubts)}.", "warning")
     return Statement("Machine file OK." if warnings else ALL_RIGHT, "good")
 
 
@@ -85,13 +83,12 @@ def _has(bearing: TouchdownBearing, rest: BearingSummary) -> Iterator[Statement]
         yield Statement(f"{bearing.name} has {', '.join(parts)}{held}.")
 
 
-def _remarks(warnings: tuple[MachineWarning, ...]) -> list[Statement]:
-    """What looks wrong as a warning, where the drop model ends as a note; the same of several in one."""
-    said: dict[tuple[str, Level], list[str]] = {}
-    for one in sorted(warnings, key=lambda one: not one.doubtful):
-        level: Level = "warning" if one.doubtful else "notice"
-        said.setdefault((one.message.removeprefix(f"{one.bearing}: "), level), []).append(one.bearing)
-    return [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in said.items()]
+def _remarks(warnings: Iterable[MachineWarning]) -> list[str]:
+    """What looks wrong, or where the drop model ends; the same of several in one."""
+    said: dict[str, list[str]] = {}
+    for one in warnings:
+        said.setdefault(one.message.removeprefix(f"{one.bearing}: "), []).append(one.bearing)
+    return [f"{', '.join(of)}: {text}" for text, of in said.items()]
 
 
 def _card(machine: Machine, rest: BearingSummary) -> Card:
@@ -110,7 +107,7 @@ def _rotor(summary: MachineSummary) -> Statement:
     """Mass and lowest modes of a rotor in a sentence, short enough for the first screen."""
     free, resting = (", ".join(f"{one:.4g}" for one in of[:3]) for of in (summary.free_free, summary.settled))
     mass = shown(summary.fe.total_mass, "mass")
-    return Statement(f"Mass {mass}; free-free {free} Hz; in touchdown bearings {resting} Hz.")
+    return Statement(f"Mass {mass}; free-free {free} Hz; on massless supports {resting} Hz.")
 
 
 def rotor_tables(summary: MachineSummary) -> tuple[Table, ...]:
