@@ -146,11 +146,8 @@ def _verdict(
         if (bearing, number.field) in ranked:
             text = f"{ranked[bearing, number.field].statement}."
         else:
-            text = (
-                "not every drop states an interval, so the order of the numbers says nothing about which "
-                "drop was the worst."
-            )
-        texts.setdefault((text, "good" if sure else "warning"), []).append(f"{bearing} {number.label}")
+            text = "not every drop states an interval, so their order does not say which was the worst."
+        texts.setdefault((text, "notice" if sure else "warning"), []).append(f"{bearing} {number.label}")
     said += [Statement(f"{', '.join(of)}: {text}", level) for (text, level), of in texts.items()]
     of_drops: dict[str, list[str]] = {}
     for one in drops:
