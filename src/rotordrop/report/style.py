@@ -464,6 +464,10 @@ def _draw(
         return new
 
     place: dict[str, Any] = {"row": row, "column": column}
+    if not panel.certain and panel.histories[0].role == "estimated":
+        histories = tuple(replace(one, label=f"{one.label}, not believed") for one in panel.histories)
+        band = panel.band and replace(panel.band, label=f"{panel.band.label}, not believed")
+        panel = replace(panel, histories=histories, band=band)
     if panel.band is not None:
         add_band(figure, panel.band, scale, unit, **place, legend=first(panel.band.label))
     compared = len({history.role for history in panel.histories}) > 1

@@ -27,6 +27,7 @@ from rotordrop.report.drop_sections import (
     displacement_figure,
     drop_sections,
     first_contact_figure,
+    force_panel,
     orbit_figure,
     speed_figure,
 )
@@ -225,6 +226,8 @@ def test_the_force_has_its_band_its_peak_and_the_weight():
     near = trace(drawn, "estimated", 2)
     assert (near.x[0], near.x[-1]) == pytest.approx((6.2, 12.1), abs=0.1)
     assert sum("peak 3333 N" in text for text in texts) == 1
+    drawn = time_panels([[force_panel(drop("DE"), {}, certain=False)]], 1.0, "N")
+    assert {one.name for one in drawn.data} == {"estimated, not believed", "90 % interval, not believed"}
 
 
 def test_a_window_around_a_peak_cuts_history_and_band():
