@@ -81,7 +81,7 @@ class Known:
             if not fits:
                 raise UsageError(f"{name} is {one!r}; expected a number, in SI units")
             if name in ("standard_error", "allowance_90") and one is not None and one < 0.0:
-                raise UsageError(f"{name} is {one!r}; expected at least 0")
+                raise UsageError(f"{name} is {one!r}; it must be zero or positive")
         for name in ("interval_90", "range", "bounds"):
             pair = getattr(self, name)
             if pair is not None and (np.shape(pair) != (2,) or pair[0] > pair[1]):

@@ -130,8 +130,8 @@ class Physical:
                     f"{self.text(value.value)} lies outside its own {name}, {self.text(pair[0])} to "
                     f"{self.text(pair[1])}; change one of them"
                 )
-        if value.standard_error is not None and not 0.0 <= value.standard_error < math.inf:
-            raise UsageError(f"standard_error = {value.standard_error:g} must be zero or positive")
+        if value.standard_error is not None and not value.standard_error < math.inf:
+            raise UsageError(f"standard_error = {value.standard_error:g} is no finite number")
         lower, upper = value.lower, value.upper
         if lower is not None and upper is not None and lower > upper:
             raise UsageError(
