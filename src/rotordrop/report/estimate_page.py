@@ -131,7 +131,7 @@ def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportCon
     Everything it says of the drop comes from the estimate; the origin says how it was made.
     """
     summary = estimate_summary(estimate, origin)
-    identity = "record {record}, SHA-256 {SHA-256}, rotordrop {rotordrop}".format_map(dict(summary.facts))
+    identity = "record {record}, SHA-256 {SHA-256:.16}, rotordrop {rotordrop}".format_map(dict(summary.facts))
     return replace(
         summary,
         subtitle=f"{summary.subtitle}; {identity}",
