@@ -39,7 +39,15 @@ class RotordropError(Exception):
 
 
 class MachineFileError(RotordropError):
-    """The machine description cannot be used as it stands; says where in the file, counted from 1."""
+    """The machine description cannot be used as it stands; says where in the file.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, with the value, and the way out.
+    file, line, column : optional
+        Place of the error in the file; line and column count from 1.
+    """
 
     exit_code: ClassVar[int] = 2
 
@@ -71,7 +79,16 @@ class RecordError(RotordropError):
 class NoDropError(RecordError):
     """A record does not show a rotor that levitates and then falls.
 
-    ``begins_late``: what is missing is the levitated part before the drop.
+    Parameters
+    ----------
+    record : str
+        Name of the record.
+    seen : str
+        What it shows.
+    remedy : str
+        The way out.
+    begins_late : bool
+        Whether what is missing is the levitated part before the drop.
     """
 
     def __init__(self, record: str, seen: str, remedy: str, *, begins_late: bool) -> None:
@@ -85,8 +102,14 @@ class NoDropError(RecordError):
 class NothingFallsError(RecordError):
     """Nothing falls in a record: its rotor is held throughout, or lies on its bearings throughout.
 
-    ``moved``: how far the shaft goes [m] and with which acceleration [m/s²], where it leaves its place too
-    slowly.
+    Parameters
+    ----------
+    seen : str
+        What it does.
+    remedy : str
+        The way out.
+    moved : tuple of float, optional
+        How far the shaft goes [m] and with which acceleration [m/s²], where it leaves its place too slowly.
     """
 
     def __init__(self, seen: str, remedy: str, moved: tuple[float, float] | None = None) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from rotordrop.errors import UsageError
-from rotordrop.require import require
+from rotordrop.require import numbers, require
 
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
@@ -84,7 +84,8 @@ class Known:
                 raise UsageError(f"{name} is {one!r}; it must be zero or positive")
         for name in ("interval_90", "range", "bounds"):
             pair = getattr(self, name)
-            if pair is not None and (np.shape(pair) != (2,) or pair[0] > pair[1]):
+            low, high = (0.0, 0.0) if pair is None else numbers(pair, name, (2,))
+            if low > high:
                 raise UsageError(f"{name} is {pair!r}; expected two numbers, the lower one first")
 
     def __float__(self) -> float:

@@ -184,8 +184,9 @@ class MagnetEvent:
 Start: TypeAlias = CentredStart | PlacedStart | StateStart | LevitatedStart
 
 
-COARSEST = 1e-3
-"""Tolerance [1] above which forces of impacts are no numbers any more: 0.1 gives meganewtons (chosen)."""
+COARSEST, FIXED_STEP = 1e-3, 1e-5
+"""Tolerance [1] above which forces of impacts are no numbers any more: 0.1 gives meganewtons; bound of the
+step [s] down to which it is asked for: below, the bound alone sets the step (both chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,7 +203,7 @@ class Case:
     def _check(self, *positive: str) -> None:
         for name in (*positive, "largest_step"):
             step = require(getattr(self, name), name, float, above=0.0, error=SimulationError)
-        coarsest = np.inf if step < 1e-3 else COARSEST  # steps of a fixed size, nearly
+        coarsest = COARSEST if step > FIXED_STEP else np.inf
         require(self.tolerance, "tolerance", float, above=0.0, most=coarsest, error=SimulationError)
         require(self.integrator, "integrator", str, among=get_args(IntegratorName))
         require(self.start, "start", *get_args(Start))
