@@ -77,8 +77,8 @@ POLAR = (
     "is taken off for slow roll."
 )
 NO_LINE = "No line stands out: a short record is too short for one."
-SAID = 3
-"""Lines that are named in the verdict (chosen)."""
+SAID = 5
+"""Lines that stand in the verdict (chosen)."""
 
 
 def waterfall_page(
@@ -158,13 +158,13 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
             held = held_maximum(history)
             said.append(Statement(f"{name}: {history.statement}", "good" if held else "warning"))
     said += _covered(analysis)
-    named = [line for line in analysis.lines if line.named]
+    lines = analysis.lines
     largest = ", ".join(
-        f"{line.label} {where_of(line)} ({shown(line.amplitude, 'length', 3)})" for line in named[:SAID]
+        f"{line.label if line.named else 'no name'} {where_of(line)} ({shown(line.amplitude, 'length', 3)})"
+        for line in lines[:SAID]
     )
-    count = f"{len(analysis.lines)} line{'s' * (len(analysis.lines) > 1)}, {len(named)} named"
-    more = f"{count}; the strongest: {largest}." if named else f"{count}."
-    said.append(Statement(more if analysis.lines else NO_LINE))
+    count = f"{len(lines)} line{'s' * (len(lines) > 1)}, {sum(line.named for line in lines)} named"
+    said.append(Statement(f"{count}; the strongest: {largest}." if lines else NO_LINE))
     if analysis.signal.profile is None:
         said.append(Statement(NO_SPEED, "warning"))
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,12 @@ from rotordrop.physics.contact import depth_at
 from rotordrop.physics.pendulum import effective_length, period_ratio, small_frequency, spin_participation
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
-from rotordrop.rotor.suspension import EquivalentStiffness, equivalent_stiffness, touchdown_supports
+from rotordrop.rotor.suspension import (
+    EquivalentStiffness,
+    equivalent_stiffness,
+    in_series,
+    touchdown_supports,
+)
 from rotordrop.rotor.whirl import matrices_of, whirl_modes
 
 Kind = Literal["order", "steady"]
@@ -53,6 +58,8 @@ class Candidate:
     """Planes in which it would be strongest; empty when it may be in any."""
     narrow: bool = False
     """Whether the source holds its frequency, as a power grid does: a broad line is then something else."""
+    of_swing: bool = False
+    """Whether value and tolerance are shares of the frequency of a swing that was found [1]."""
 
 
 def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:
@@ -111,7 +118,7 @@ def pendulum_candidate(
     """Swing of the settled rotor in a race, between its frequencies [Hz] at large and small amplitude."""
     return Candidate(
         name=name,
-        family="pendulum",
+        family=PENDULUM,
         kind="steady",
         value=0.5 * (lowest + highest),
         tolerance=0.5 * (highest - lowest),
@@ -192,15 +199,49 @@ def harmonic_candidates(name: str, frequency: float, error: float, highest: int 
     )
 
 
+def mixed_candidates(names: tuple[str, str], frequencies: tuple[float, float]) -> tuple[Candidate, ...]:
+    """Sums and differences of two swings that were found [Hz], to the third order: the gap is not linear."""
+    found = []
+    for times in ((1, 1), (1, -1), (2, -1), (-1, 2), (2, 1), (1, 2)):
+        value = sum(k * frequency for k, frequency in zip(times, frequencies, strict=True))
+        signed = [(k if value > 0.0 else -k, name) for k, name in zip(times, names, strict=True)]
+        (first, name), (second, other) = sorted(signed, reverse=True)
+        found.append(
+            Candidate(
+                name=f"{_times(first)}{name} {'+' if second > 0 else '−'} {_times(abs(second))}{other}",
+                family=f"{times} of two swings",
+                kind="steady",
+                value=abs(value),
+                tolerance=MIXED_TOLERANCE * float(np.dot(np.abs(times), frequencies)),
+                reason=f"of the {names[0]} at {frequencies[0]:.2f} Hz and the {names[1]} at "
+                f"{frequencies[1]:.2f} Hz",
+                weight=0.5,
+            )
+        )
+    return tuple(found)
+
+
+def _times(k: int) -> str:
+    return "" if k == 1 else f"{k} × "
+
+
 HIGHEST_MODE = 1000.0
 """Highest frequency of a mode that is offered as a name [Hz] (chosen)."""
 MODE_TOLERANCE = 0.06
 """How far a mode may be off [1] because supports and contacts are known roughly."""
+WIDEST_MODE = 0.2
+"""How far a mode may be off by what the machine file leaves open [1]; one less known is no name (chosen)."""
 LARGEST_SWING = 1.2
 """Amplitude [rad] up to which a swing is called a pendulum; beyond it the rotor bounces or whirls."""
 _REDUCTION = Reduction(modes=12, attachment=True)
 _SAME = 0.02
 """Relative distance of two modes below which one name stands for both [1] (chosen)."""
+PENDULUM = "pendulum"
+CONICAL = "conical swing"
+CONICAL_TOLERANCE = 0.05
+"""How far its share of the pendulum's frequency may be off [1]: a swing of 1 rad is slower by 6 %."""
+MIXED_TOLERANCE = 0.01
+"""How far each of two swings that mix may be off from where it is strongest [1] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,32 +327,136 @@ def _swing(bearing: TouchdownBearing, part: EquivalentStiffness, inertia: float,
 
 
 def settled_modes(machine: Machine) -> tuple[Candidate, ...]:
-    """Modes of the rotor lying in its touchdown bearings, told by where most of the energy moves."""
-    supports = touchdown_supports(machine)
-    fe = build_rotor_fe(machine)
-    basis = reduce_rotor(fe, _REDUCTION, [support.node for support in supports])
-    modes = whirl_modes(basis, 0.0, supports)
-    system = matrices_of(basis, supports)
-    m, n = system.rotor_size, system.plane_size
-    rotor = np.sum(np.abs(modes.vectors[:m]) ** 2 + np.abs(modes.vectors[n : n + m]) ** 2, axis=0)
-    found: list[Candidate] = []
+    """Modes of the rotor lying in its touchdown bearings, told by where most of the energy moves.
+
+    Along the race only the weight holds it: the two lowest horizontal modes are its swings, of which the one
+    with the ends against each other is a share of the other, which a record shows. Where the machine states
+    ranges of stiffness and mass, a mode is anywhere between those of the softest and the stiffest machine,
+    and names nothing where these are far apart.
+    """
+    modes = _modes_at_rest(machine)
+    corners = [_modes_at_rest(corner) for corner in _softest_and_stiffest(machine)]
+    along = [mode for mode in modes if mode.horizontal]
+    found = list(_conical(along[:2]))
     counted = {"bending mode": 0, "support resonance": 0}
-    for frequency, share, damping in zip(modes.frequency, rotor, modes.damping_ratio, strict=True):
-        if frequency > HIGHEST_MODE or damping > 0.5:
+    named: list[float] = []
+    for mode in modes:
+        frequency = mode.frequency
+        if mode in along[:2] or frequency > HIGHEST_MODE or mode.damping > 0.5:
             continue
-        if found and abs(frequency - found[-1].value) < _SAME * frequency:
+        if named and frequency - named[-1] < _SAME * frequency:
             continue
-        kind = "bending mode" if share >= 0.5 else "support resonance"
+        named.append(frequency)
+        kind = "bending mode" if mode.share >= 0.5 else "support resonance"
         counted[kind] += 1
+        places = [(1.0 - MODE_TOLERANCE) * frequency, (1.0 + MODE_TOLERANCE) * frequency]
+        places += [one.frequency for corner in corners for one in corner if one.place == mode.place]
+        low, high = min(places), max(places)
+        if high - low > 2.0 * WIDEST_MODE * frequency:
+            continue
         found.append(
             mode_candidate(
                 f"{kind} {counted[kind]} in contact",
-                float(frequency),
-                MODE_TOLERANCE * float(frequency),
+                0.5 * (low + high),
+                0.5 * (high - low),
                 reason=(
-                    f"model: {frequency:.1f} Hz with contact, balls and supports, {100 * share:.0f} % of the "
-                    f"moving energy in the rotor, damping ratio {100 * damping:.1f} %"
+                    f"model: {frequency:.1f} Hz ({low:.1f} to {high:.1f} Hz), "
+                    f"{'horizontal' if mode.horizontal else 'vertical'}, {100 * mode.share:.0f} % of "
+                    f"the moving energy in the rotor, damping ratio {100 * mode.damping:.1f} %"
                 ),
             )
         )
     return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Mode:
+    frequency: float
+    horizontal: bool
+    order: int
+    """Among those of its direction, from 0."""
+    share: float
+    """Of the moving energy in the rotor [1]."""
+    damping: float
+    opposed: bool
+    """Whether the ends move against each other."""
+
+    @property
+    def place(self) -> tuple[bool, int]:
+        return self.horizontal, self.order
+
+
+def _modes_at_rest(machine: Machine) -> list[_Mode]:
+    supports = []
+    loads = equivalent_stiffness(machine)
+    for bearing, part, support in zip(
+        machine.touchdown_bearings, loads, touchdown_supports(machine), strict=True
+    ):
+        first, *rest = support.links
+        stiffness = first.stiffness.copy()
+        stiffness[0, 0] = in_series(float(stiffness[0, 0]), part.load / float(bearing.air_gap))
+        supports.append(replace(support, links=(replace(first, stiffness=stiffness), *rest)))
+    basis = reduce_rotor(build_rotor_fe(machine), _REDUCTION, [support.node for support in supports])
+    modes = whirl_modes(basis, 0.0, supports)
+    system = matrices_of(basis, supports)
+    m, n = system.rotor_size, system.plane_size
+    energy = np.abs(modes.vectors) ** 2
+    rotor = np.sum(energy[:m] + energy[n : n + m], axis=0)
+    across = np.sum(energy[:n], axis=0) >= np.sum(energy[n:], axis=0)
+    ends = modes.shapes[:, [supports[0].node - 1, supports[-1].node - 1], 0]
+    counted = {True: 0, False: 0}
+    found = []
+    for k, frequency in enumerate(modes.frequency):
+        horizontal = bool(across[k])
+        found.append(
+            _Mode(
+                frequency=float(frequency),
+                horizontal=horizontal,
+                order=counted[horizontal],
+                share=float(rotor[k]),
+                damping=float(modes.damping_ratio[k]),
+                opposed=bool((ends[k, 0] * ends[k, 1].conj()).real < 0.0),
+            )
+        )
+        counted[horizontal] += 1
+    return found
+
+
+def _softest_and_stiffest(machine: Machine) -> list[Machine]:
+    """The machine at both ends of the ranges it states of stiffness and mass; empty where it states none."""
+    factor = machine.rotor.stiffness_factor
+    open_to = {"rotor.stiffness_factor": (None if factor is None else factor.range, 0)}
+    for bearing in machine.touchdown_bearings:
+        open_to[f"{bearing.name}.support.stiffness"] = (bearing.support.stiffness.range, 0)
+        open_to[f"{bearing.name}.support.mass"] = (bearing.support.mass.range, 1)
+    stated = {path: (ends, first) for path, (ends, first) in open_to.items() if ends is not None}
+    if not stated:
+        return []
+    return [
+        machine.with_values({path: ends[(first + k) % 2] for path, (ends, first) in stated.items()})
+        for k in (0, 1)
+    ]
+
+
+def _conical(swings: Sequence[_Mode]) -> tuple[Candidate, ...]:
+    """The swing with the ends against each other, where it is not too near the other to be told from it."""
+    if len(swings) < 2 or swings[0].opposed == swings[1].opposed:
+        return ()
+    one, other = sorted(swings, key=lambda mode: mode.opposed)
+    share = other.frequency / one.frequency
+    if abs(share - 1.0) < 2.0 * CONICAL_TOLERANCE:
+        return ()
+    return (
+        Candidate(
+            name=CONICAL,
+            family=CONICAL,
+            kind="steady",
+            value=share,
+            tolerance=CONICAL_TOLERANCE,
+            reason=f"the ends swing against each other: model, {share:.3f} times the frequency at which they "
+            "swing together",
+            shape="flat",
+            weight=3.0,  # once the pendulum is found, another line there is hardly a second one of it
+            of_swing=True,
+        ),
+    )

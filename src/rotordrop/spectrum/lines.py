@@ -11,7 +11,13 @@ from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
-from rotordrop.spectrum.candidates import Candidate, harmonic_candidates
+from rotordrop.spectrum.candidates import (
+    CONICAL,
+    PENDULUM,
+    Candidate,
+    harmonic_candidates,
+    mixed_candidates,
+)
 from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
@@ -124,13 +130,16 @@ def name_lines(
         return _line(line, plane, name_line(_evidence(line, plane, bands), choice, air_gap=air_gap))
 
     single = [(plane, line) for plane, line in found if line.parent is None]
-    first = [named(plane, line, candidates) for plane, line in single]
-    swings = [
-        (name.label, line)
-        for (_, line), name in zip(single, first, strict=True)
-        if name.named and name.kind in ("steady", "undecided") and _swings(name)
-    ]
-    lines = [named(plane, line, (*candidates, *harmonics_of(line, swings))) for plane, line in single]
+    lines = [named(plane, line, candidates) for plane, line in single]
+    for _ in range(2):  # the pendulum gives the conical swing its name, both give theirs to what they mix to
+        swings = [
+            (_swing_name(name), line)
+            for (_, line), name in zip(single, lines, strict=True)
+            if name.named and name.kind in ("steady", "undecided") and _swings(name)
+        ]
+        lines = [
+            named(plane, line, (*candidates, *of_swings(line, swings, candidates))) for plane, line in single
+        ]
     label = {
         line: (result.label if result.named else f"{line.frequency:.1f} Hz")
         for (_, line), result in zip(single, lines, strict=True)
@@ -199,23 +208,46 @@ def _merged(line: Line, other: Line) -> Line:
 
 def _swings(line: Line) -> bool:
     """Whether the line is a swing or whirl, whose path along the race has multiples of its frequency."""
-    family = line.name.matches[0].candidate.family if line.name.matches else "whirl"
-    return family in ("pendulum", "whirl")
+    return not line.name.matches or line.name.matches[0].candidate.family in (PENDULUM, CONICAL)
 
 
-def harmonics_of(line: FoundLine, swings: Sequence[tuple[str, FoundLine]]) -> list[Candidate]:
-    """Where the multiples of each swing would be seen, as it wanders, while this line was there."""
+def _swing_name(line: Line) -> str:
+    """What a swing is called in the names of its multiples: whichever end it was seen at."""
+    return line.name.matches[0].candidate.family if line.name.matches else line.label
+
+
+def of_swings(
+    line: FoundLine, swings: Sequence[tuple[str, FoundLine]], candidates: Sequence[Candidate] = ()
+) -> list[Candidate]:
+    """Where what each swing leads to would be seen, as it wanders, while this line was there.
+
+    These are its multiples, what the candidates know as a share of a pendulum, and sums and differences with
+    the conical swing.
+    """
     total = float(line.power.sum())
     if total == 0.0:
         return []
-    return [
-        candidate
-        for label, swing in swings
+    others = [
+        (name, float(line.power @ swing.path) / total, swing.frequency_error + SWING_ERROR)
+        for name, swing in swings
         if swing is not line
-        for candidate in harmonic_candidates(
-            label, float(line.power @ swing.path) / total, swing.frequency_error + SWING_ERROR
-        )
     ]
+    found = [one for other in others for one in harmonic_candidates(*other)]
+    pendulums = [other for other in others if other[0] == PENDULUM]
+    found += [
+        replace(one, value=one.value * hertz, tolerance=one.tolerance * hertz, of_swing=False)
+        for one in candidates
+        if one.of_swing
+        for _, hertz, _ in pendulums
+    ]
+    found += [
+        mixed
+        for name, hertz, _ in others
+        if name == CONICAL
+        for other, beside, _ in pendulums
+        for mixed in mixed_candidates((name, other), (hertz, beside))
+    ]
+    return found
 
 
 def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineEvidence:

@@ -156,7 +156,7 @@ def _whirl(line: LineEvidence, air_gap: float | None) -> Name | None:
 
 
 def _possible(line: LineEvidence, candidate: Candidate) -> bool:
-    if line.kind != "undecided" and line.kind != candidate.kind:
+    if candidate.of_swing or (line.kind != "undecided" and line.kind != candidate.kind):
         return False
     if candidate.narrow and (line.width > NARROW or line.frequency_error > STEADY_ERROR):
         return False

@@ -6,12 +6,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.stats import norm
 from tests.unit.spectrum.synthetic import TURN, CoastDown, found_line
 
+from rotordrop.known import Known
+from rotordrop.machine import example_machine
+from rotordrop.rotor.assembly import build_rotor_fe
+from rotordrop.rotor.suspension import equivalent_stiffness
 from rotordrop.spectrum._search import BRIEF, LineSearch
 from rotordrop.spectrum._views import View
-from rotordrop.spectrum.candidates import bearing_defect_candidates, mode_candidate, pendulum_candidate
+from rotordrop.spectrum.candidates import (
+    bearing_defect_candidates,
+    mode_candidate,
+    pendulum_candidate,
+    settled_modes,
+)
 from rotordrop.spectrum.detection import (
     DetectionSettings,
     FramePower,
@@ -19,7 +29,7 @@ from rotordrop.spectrum.detection import (
     clearest_peak,
     half_power_width,
 )
-from rotordrop.spectrum.lines import SWING_ERROR, harmonics_of, name_lines
+from rotordrop.spectrum.lines import SWING_ERROR, name_lines, of_swings
 from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
@@ -121,11 +131,11 @@ def test_a_harmonic_is_looked_for_where_the_swing_was_while_the_line_was_strong(
     """Weighted by power: at 10 Hz with three times the amplitude, as long at 20 Hz."""
     swing = SimpleNamespace(path=np.array([10.0] * 50 + [20.0] * 50), frequency_error=0.01)
     line = SimpleNamespace(power=np.repeat(np.float32([9e-12, 1e-12]), 50))
-    first, *_ = harmonics_of(line, [("pendulum", swing), ("itself", line)])
+    first, *_ = of_swings(line, [("pendulum", swing), ("itself", line)])
     assert first.value == pytest.approx(2.0 * 11.0)
     assert first.tolerance >= 2.0 * SWING_ERROR
     silent = SimpleNamespace(power=np.zeros(100, dtype=np.float32))
-    assert harmonics_of(silent, [("pendulum", swing)]) == []
+    assert of_swings(silent, [("pendulum", swing)]) == []
 
 
 def test_defect_frequencies_are_those_published_for_a_6205():
@@ -197,4 +207,49 @@ def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide():
     assert names == ["pendulum", "pendulum, harmonic 2"]
     ends = [pendulum_candidate(end, 28.3, 29.8, planes=[end]) for end in ("NDE", "DE")]
     seen = [("NDE", swing), ("DE", replace(swing, frequency=28.71)), ("DE", twice)]
-    assert name_lines(seen, ends, 285e-6, bands)[2].label == "NDE, harmonic 2 or DE, harmonic 2"
+    assert name_lines(seen, ends, 285e-6, bands)[2].label == "pendulum, harmonic 2"
+
+
+def rigid_share(machine):
+    """Frequency of the second over that of the first swing of a rigid body held at two places."""
+    fe, parts = build_rotor_fe(machine), equivalent_stiffness(machine)
+    arms = fe.node_positions[[one.node - 1 for one in machine.touchdown_bearings]] - fe.centre_of_gravity
+    rows = np.column_stack([np.ones(2), arms])
+    springs = [
+        part.load / float(one.air_gap) for part, one in zip(parts, machine.touchdown_bearings, strict=True)
+    ]
+    body = np.diag([fe.total_mass, fe.diametral_inertia])
+    slow, fast = eigh(rows.T @ np.diag(springs) @ rows, body, eigvals_only=True)
+    return math.sqrt(fast / slow)
+
+
+def test_the_conical_swing_and_what_it_mixes_to_are_named_from_the_pendulum_found():
+    """The small machine is stiff: it swings as a rigid body on two springs."""
+    machine = example_machine("small")
+    (share,) = (one.value for one in settled_modes(machine) if one.of_swing)
+    assert share == pytest.approx(rigid_share(machine), rel=0.02)
+    time = np.arange(0.0, 20.0, 0.01)
+    places = {
+        "pendulum": 30.0,
+        "conical swing": 30.0 * share,
+        "pendulum + conical swing": 30.0 * (1.0 + share),
+        "2 × conical swing − pendulum": 30.0 * (2.0 * share - 1.0),
+        "conical swing − pendulum": 30.0 * (share - 1.0),
+    }
+    turning = np.array([5e-5])
+    seen = [
+        found_line("steady", hertz, time, forward=turning, backward=turning, power=np.ones(time.size))
+        for hertz in places.values()
+    ]
+    known = (pendulum_candidate("pendulum", 29.0, 31.0), *settled_modes(machine))
+    lines = name_lines([("DE", one) for one in seen], known, 285e-6, (450.0, 20.0))
+    assert [line.label for line in lines] == list(places)
+
+
+def test_modes_that_the_machine_leaves_wide_open_name_no_line():
+    machine = example_machine("paper")
+    assert any("mode" in one.name for one in settled_modes(machine))
+    wide = Known(value=1e8, status="guess", range=(2e7, 5e8))
+    ends = {f"{one.name}.support.stiffness": wide for one in machine.touchdown_bearings}
+    left = {one.name for one in settled_modes(machine.with_values(ends))}
+    assert not any("resonance" in name for name in left)
