@@ -7,7 +7,7 @@ import pytest
 from tests.scaled_machines import scaled_machine
 
 from rotordrop.errors import UsageError
-from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop
+from rotordrop_bench import SensorChain, Violations, hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import (
     PERFECT,
@@ -154,16 +154,16 @@ def test_the_speed_is_read_every_hundredth_of_a_second(synthetic):
 
 def test_a_shifted_plane_reads_what_is_there_and_a_filter_is_late(known, perfect, hidden):
     """30 mm nearer to the middle of the rotor the sensors see another point of the shaft."""
-    shifted = hidden_machine(known, 3, "sensor planes 30 mm off")
+    shifted = hidden_machine(known, 3, Violations.of({"sensors": {"plane_shift": "30 mm"}}))
     one, two = perfect, synthesize_drop(shifted, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
     assert two.truth["sensor_plane_shift_m"] == [0.03] * 4
     assert two.truth["peak_force_N"] == one.truth["peak_force_N"]
     difference = np.max(np.abs(two.record.signals - one.record.signals))
     assert 2e-6 < difference < 6e-5
-    chain = replace(PERFECT, plane_shift=-2.0)
+    outside = hidden_machine(known, 3, Violations.of({"sensors": {"plane_shift": "-2 m"}}))
     with pytest.raises(UsageError, match=r"a sensor plane at .* mm lies outside the rotor"):
-        synthesize_drop(hidden, SPEED, 8, sensor_chain=chain, duration=0.01, tail=False)
-    filtered = hidden_machine(known, 3, "anti-alias filter")
+        synthesize_drop(outside, SPEED, 8, sensor_chain=PERFECT, duration=0.01, tail=False)
+    filtered = hidden_machine(known, 3, Violations.of({"sensors": {"anti_alias_frequency": "4 kHz"}}))
     one, two = perfect, synthesize_drop(filtered, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
     assert two.record.signals.shape == one.record.signals.shape
     # fourth order at 4 kHz: a group delay of 2.6/(2π 4000 Hz) = 104 µs at low frequency

@@ -45,11 +45,11 @@ def law(points):
 
 
 def hidden_of(known=KNOWN, **parts):
-    return hidden_machine(known, 0, Violations.model_validate(parts), drawn=False, reduction="quick")
+    return hidden_machine(known, 0, Violations.of(parts), drawn=False, reduction="quick")
 
 
 def row_of(**parts):
-    return departures_of(KNOWN, Violations.model_validate(parts))[0]
+    return departures_of(KNOWN, Violations.of(parts))[0]
 
 
 def rows(names, table):

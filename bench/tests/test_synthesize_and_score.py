@@ -36,7 +36,9 @@ def test_names_count_and_faults_are_told_in_the_truth(folder, tmp_path):
 
 
 def test_a_violation_is_told_in_the_truth(tmp_path):
-    arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--hdf5", "--violation", "contact exponent 1.5"]
+    (tmp_path / "case.toml").write_text("[contact]\nexponent = 1.5")
+    case = str(tmp_path / "case.toml")
+    arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--hdf5", "--violation", case]
     assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
     truth = json.loads((tmp_path / "truth" / "synthetic_100Hz.json").read_text())
     assert truth["violations"]["contact"]["exponent"] == 1.5
@@ -46,7 +48,7 @@ def test_a_violation_is_told_in_the_truth(tmp_path):
 @pytest.mark.parametrize(
     ("option", "message"),
     [
-        (["--violation", "moon"], "there is no 'moon'; choose one of 'none', 'contact stiffness +25 %'"),
+        (["--violation", "moon"], "cannot read the case file moon"),
         (["--fault", "fire"], "there is no 'fire'; choose one of 'inverted polarity'"),
         (["--duration", "10"], "'10' has no unit"),
     ],

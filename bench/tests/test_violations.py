@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop.errors import MachineFileError, UsageError
+from rotordrop.errors import UsageError
 from rotordrop.machine import example_machine
 from rotordrop.physics.columns import POSITION
 from rotordrop_bench import Violations, hidden_machine, load_violations, score_estimate, synthesize_drop
@@ -14,7 +14,7 @@ from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.sensor_chain import PERFECT, lagging
 from rotordrop_bench.true_values import KINDS, violated_kinds
 from rotordrop_bench.truth import truth_of
-from rotordrop_bench.violations import violations_schema
+from rotordrop_bench.violations import KEYS
 
 SPEED = 2.0 * np.pi * 60.0
 
@@ -44,47 +44,49 @@ amount = "600 g mm"
 
 
 def violations(**parts):
-    return Violations.model_validate(parts)
+    return Violations.of(parts)
 
 
-def test_a_case_file_says_what_is_violated(tmp_path, known):
+def test_a_case_file_says_what_is_violated(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(CASE)
     case = load_violations(path)
-    assert float(case.of_bearing("NDE").support.axes_angle) == pytest.approx(np.pi / 6)
-    assert case.of_bearing("NDE").foundation.mass is None
-    assert float(case.of_bearing("DE").foundation.mass) == 400.0
-    assert case.values()["contact"]["law"][1] == {"depth": pytest.approx(4e-6), "force": 1600.0}
+    assert case.of_bearing("NDE")["support.axes_angle"] == pytest.approx(np.pi / 6)
+    assert case.of_bearing("NDE")["foundation.mass"] is None
+    assert case.of_bearing("DE")["foundation.mass"] == 400.0
+    assert case["contact.law"][1] == {"depth": pytest.approx(4e-6), "force": 1600.0}
     kinds = ("turned support axes", "foundation mode", "contact law", "sensor lag", "unbalance jump")
     assert violated_kinds(case) == kinds
-    assert hidden_machine(known, 3, str(path)).violations == case
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('[support]\naxes_angel = "3 deg"', r"2:1: support.axes_angel: unknown key .* mean 'axes_angle'"),
-        ("[support]\naxes_angle = 30", r"2:14: support.axes_angle: 30 has no unit; an angle needs one"),
+        ('[support]\naxes_angel = "3 deg"', r"support.axes_angel: unknown key .* mean 'axes_angle'"),
+        ("[support]\naxes_angle = 30", r"support.axes_angle: 30 has no unit; an angle needs one"),
         ("[support]\nhardening = 0.5", r"support.hardening: 'hardening' needs 'hardening_force' beside it"),
         ('[foundation]\nfrequency = "85 Hz"', r"'frequency' needs 'mass' beside it; add it or leave"),
-        ('[foundation]\nmass = "-4 kg"\nfrequency = "85 Hz"', r"foundation.mass: -4.00 kg is not allowed"),
+        ('[bearing.DE.foundation]\nmass = "-4 kg"', r"DE.foundation.mass: -4.00 kg is not"),
         ('[gap]\ndrift = "-10 um"', r"gap.drift: 'drift' needs 'drift_time' beside it"),
         ("[sensors]\ncross_axis = 0.7", r"sensors.cross_axis: 0.700 is not allowed here; at most 0.5"),
         ('[[contact.law]]\ndepth = "1 um"\nforce = "9 N"', r"a law has 2 to 9 points, not 1"),
         (CASE.replace("1.6 kN", "80 N"), r"force 80 at point 2 does not exceed 90 before it; order"),
         (CASE + "\n[contact]\nexponent = 1.5", r"the contact has both 'law' and 'exponent'"),
-        ('[unbalance_jump]\namount = "3 g mm"', r"unbalance_jump.node: 'node' is missing; add it"),
+        ('[supports]\naxes_angle = "3 deg"', r"supports: unknown key .* mean 'support'"),
+        ("[unbalance_jump]\nnode = 3.5", r"unbalance_jump.node: 3.5 is no int"),
+        ("[support", r"cannot read the case file .*case.toml: Expected"),
+        ('[unbalance_jump]\namount = "3 g mm"', r"'amount' needs 'node' beside it; add it"),
     ],
 )  # fmt: skip
 def test_a_case_file_is_refused_with_place_value_and_way_out(text, message, tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(text)
-    with pytest.raises(MachineFileError, match=message):
+    with pytest.raises(UsageError, match=message):
         load_violations(path)
 
 
 def test_a_missing_case_file_is_named(tmp_path):
-    with pytest.raises(MachineFileError, match="cannot read the case file: No such file"):
+    with pytest.raises(UsageError, match=r"cannot read the case file .*none.toml: .* No such file"):
         load_violations(tmp_path / "none.toml")
 
 
@@ -92,7 +94,6 @@ def test_a_missing_case_file_is_named(tmp_path):
     ("parts", "message"),
     [
         ({"bearing": {"XX": {"gap": {}}}}, "the bearing 'XX', which the machine does not have; it has NDE"),
-        ({"sensor": {"S1": {"cross_axis": 0.1}}}, "the sensor 'S1', which the machine does not have"),
         ({"unbalance_jump": {"node": 999, "amount": "1 g mm"}}, "at node 999, outside the rotor; its nodes"),
         ({"magnets": {"stays_on": ["A"]}}, "no AMB 'A'"),
     ],
@@ -102,17 +103,8 @@ def test_what_a_machine_does_not_have_or_the_bench_cannot_make_is_refused(known,
         hidden_machine(known, 3, violations(**parts))
 
 
-def test_the_schema_knows_every_key_and_unit():
-    schema = violations_schema()
-    assert set(schema["properties"]) == set(Violations.model_fields)
-    parts = schema["$defs"]
-    assert parts["SupportViolation"]["properties"]["axes_angle"]["$ref"] == "#/$defs/angle"
-    for keys in KINDS.values():
-        for key in keys:
-            part, name = key.split(".")
-            field = Violations.model_fields[part].annotation
-            fields = getattr(field, "model_fields", None) or field.__args__[0].model_fields
-            assert name in fields, key
+def test_every_kind_of_departure_has_its_keys():
+    assert {key for keys in KINDS.values() for key in keys} <= {f"{p}.{k}" for p in KEYS for k in KEYS[p]}
 
 
 @pytest.fixture(scope="module")
@@ -125,22 +117,19 @@ def _recorded(known, chain=PERFECT, **parts):
     return synthesize_drop(hidden, SPEED, 8, sensor_chain=chain, duration=0.03)
 
 
-def test_cross_axis_sensitivity_reads_the_motion_across_of_one_or_all(known, perfect):
-    name = known.sensors[0].name
-    drop = _recorded(known, sensor={name: {"cross_axis": 0.02}})
+def test_cross_axis_sensitivity_reads_the_motion_across(known, perfect):
+    drop = _recorded(known, sensors={"cross_axis": 0.02})
+    drawn = np.array(drop.truth["sensor_cross_axis"])
+    assert len(set(drawn)) == len(drawn)
+    assert np.all((np.abs(drawn) >= 0.01) & (np.abs(drawn) <= 0.02))
     angle = [float(s.angle) for s in known.sensors[:2]]
     assert known.sensors[0].node == known.sensors[1].node
     sign = np.sign(np.sin(angle[1] - angle[0]))
     for record, plain in ((drop.record, perfect.record), (drop.tail, perfect.tail)):
         extra = record.signals - plain.signals
         polarity = known.sensors[0].polarity * known.sensors[1].polarity * sign
-        assert extra[:, 0] == pytest.approx(0.02 * polarity * plain.signals[:, 1], abs=1e-12)
-        assert np.max(np.abs(extra[:, 1:])) == 0.0
-    assert drop.truth["structure"][f"sensors.{name}.cross_axis"] == 0.02
-    drop = _recorded(known, sensors={"cross_axis": 0.02})
-    drawn = np.array(drop.truth["sensor_cross_axis"])
-    assert len(set(drawn)) == len(drawn)
-    assert np.all((np.abs(drawn) >= 0.01) & (np.abs(drawn) <= 0.02))
+        assert extra[:, 0] == pytest.approx(drawn[0] * polarity * plain.signals[:, 1], abs=1e-12)
+    assert drop.truth["structure"][f"sensors.{known.sensors[0].name}.cross_axis"] == drawn[0]
 
 
 def test_a_bracket_on_the_housing_takes_its_motion_off_the_reading(known, perfect):
@@ -234,17 +223,11 @@ def test_a_lagging_sensor_reads_the_shaft_of_a_while_ago(known, rate):
 
 
 def test_remanence_unbalance_and_friction_leave_their_ranges(known):
-    v = violations(
-        magnets={"remanence_time": "50 ms", "remanent_lift": 0.3},
-        rotor={"unbalance": 1.6},
-        friction={"dynamic": 0.28},
-    )
+    v = violations(magnets={"remanence_time": "50 ms"}, rotor={"unbalance": 1.6}, friction={"dynamic": 0.28})
     hidden, plain = hidden_machine(known, 3, v), hidden_machine(known, 3)
     start, other = (drop_conditions(h, SPEED, 5).start for h in (hidden, plain))
     assert start.remanence_time_constant == 0.05
-    share = hidden.machine.rotor.mass * 9.81 / len(hidden.machine.ambs)
-    assert start.remanent_force[:, 1] == pytest.approx(0.3 * share)
-    assert np.array_equal(start.remanent_force[:, 0], other.remanent_force[:, 0])
+    assert np.array_equal(start.remanent_force, other.remanent_force)
     for mine, drawn in zip(hidden.machine.unbalances, plain.machine.unbalances, strict=True):
         assert float(mine.amount) == pytest.approx(1.6 * float(drawn.amount))
     for mine, drawn in zip(hidden.machine.touchdown_bearings, plain.machine.touchdown_bearings, strict=True):
@@ -253,15 +236,7 @@ def test_remanence_unbalance_and_friction_leave_their_ranges(known):
         assert float(mine.friction.static) == pytest.approx(0.28 * ratio)
 
 
-def test_friction_may_replace_a_damper_and_a_law_its_exponent(known):
-    drop = _recorded(known, support={"damping": 0.0, "slip_force": "100 N", "slip_travel": "2 um"})
-    assert drop.truth["violated"] == ["support damping", "hysteretic support"]
-    assert set(drop.truth["support.damping_N_s_per_m"].values()) == {0.0}
-    half = hidden_machine(known, 3, violations(support={"damping": 0.5, "damping_ratio": 0.6}), drawn=False)
-    for mine, described in zip(half.machine.touchdown_bearings, known.touchdown_bearings, strict=True):
-        assert float(mine.support.damping) == pytest.approx(0.5 * float(described.support.damping))
-        across = float(described.support.damping_horizontal)
-        assert float(mine.support.damping_horizontal) == pytest.approx(0.3 * across)
+def test_a_law_takes_the_place_of_stiffness_and_exponent(known):
     law = [{"depth": "1 um", "force": "90 N"}, {"depth": "4 um", "force": "1.6 kN"}]
     truth = _recorded(known, bearing={"DE": {"contact": {"law": law}}}).truth
     assert list(truth["contact.stiffness_N_per_m_n"]) == list(truth["contact.exponent"]) == ["NDE"]
@@ -305,13 +280,13 @@ def test_what_a_machine_file_says_is_not_lost_beside_violations():
     branch = {"stiffness": "4e7 N/m", "time": "3 ms"}
     bearings = tuple(one.changed(mount={"maxwell": [branch]}) for one in machine.touchdown_bearings)
     mounted = machine.changed(touchdown_bearings=bearings)
-    assert hidden_machine(mounted, 1, "none").model.layout.further[0][1] == ((POSITION,) * 2,) * 2
+    assert hidden_machine(mounted, 1).model.layout.further[0][1] == ((POSITION,) * 2,) * 2
     with pytest.raises(UsageError, match=r"states NDE\.mount .* leave the mount or the violations out"):
-        hidden_machine(mounted, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
+        hidden_machine(mounted, 1, Violations.of({"support": {"axes_angle": "20 deg"}}))
     coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})
-    assert not len(departures_in(hidden_machine(coupled, 1, "none").model))
+    assert not len(departures_in(hidden_machine(coupled, 1).model))
     with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
-        hidden_machine(coupled, 1, Violations.model_validate({"support": {"axes_angle": "20 deg"}}))
+        hidden_machine(coupled, 1, Violations.of({"support": {"axes_angle": "20 deg"}}))
 
 
 def test_a_magnet_that_stays_on_holds_its_end_and_leaves_no_tail(known):

@@ -15,13 +15,12 @@ from rotordrop_bench.score import score_estimate
 from rotordrop_bench.sensor_chain import SensorChain
 from rotordrop_bench.table import BenchScores, score_bench
 from rotordrop_bench.truth import Truth, read_truth
-from rotordrop_bench.violations import VIOLATIONS, Violations, load_violations
+from rotordrop_bench.violations import Violations, load_violations
 
 __all__ = [
     "DROPS",
     "FAULTS",
     "VERSION",
-    "VIOLATIONS",
     "BenchDrop",
     "BenchScores",
     "DropConditions",

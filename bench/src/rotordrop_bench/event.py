@@ -18,7 +18,7 @@ from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import LevitatedStart
 from rotordrop_bench.departing import departing
 from rotordrop_bench.structure import departures_of, loosened, pushed, violated
-from rotordrop_bench.violations import Violations, named_violations
+from rotordrop_bench.violations import Violations
 
 FINER = Reduction(modes=14, attachment=True)
 """Basis of the true rotor: finer than that of any estimator."""
@@ -61,7 +61,7 @@ class DropConditions:
 def hidden_machine(
     machine: Machine,
     seed: int,
-    violations: str | Violations = "none",
+    violations: Violations | None = None,
     *,
     drawn: bool = True,
     reduction: Reduction = FINER,
@@ -70,10 +70,9 @@ def hidden_machine(
 
     Supports differ by -40 to +45 %; air gap, contact, friction, preload, race, damping, drag, first ball and
     unbalance differ as first guesses do. Values keep to the range the description states; the same seed gives
-    the same machine, and without ``drawn`` the description is the truth. Violations come by name from
-    `VIOLATIONS`, by the path of a case file (.toml), or in full.
+    the same machine, and without ``drawn`` the description is the truth.
     """
-    broken = named_violations(violations)
+    broken = violations or Violations()
     broken.check_names(machine)
     if machine.loads or machine.base is not None:
         raise UsageError(
@@ -119,9 +118,6 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
     remanent = share * np.column_stack(
         [random.uniform(-0.03, 0.03, magnets), random.uniform(0.05, 0.3, magnets)]
     )
-    magnet = hidden.violations.magnets
-    if magnet.remanent_lift is not None:
-        remanent[:, 1] = float(magnet.remanent_lift) * share
     gap = min(float(bearing.air_gap) for bearing in hidden.machine.touchdown_bearings)
     radius = np.minimum(LARGEST_ORBIT, 0.05 * gap) * random.uniform(0.3, 1.0, magnets)
     start = LevitatedStart(
@@ -131,8 +127,8 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
         remanence_time_constant=float(random.uniform(1.5e-3, 2.5e-3)),
         orbit=radius * np.exp(2j * math.pi * random.uniform(0.0, 1.0, magnets)),
     )
-    if magnet.remanence_time is not None:
-        start = replace(start, remanence_time_constant=float(magnet.remanence_time))
+    if (lasts := hidden.violations["magnets.remanence_time"]) is not None:
+        start = replace(start, remanence_time_constant=lasts)
     late = float(random.uniform(-LARGEST_JITTER, LARGEST_JITTER))
     return DropConditions(speed=speed, start=start, jitter=late if jitter else 0.0)
 

@@ -29,7 +29,7 @@ def bench_recording(drop: BenchDrop) -> SyntheticDrop:
     """Simulate and record one drop of the bench; the same bits wherever the probe drop has the same."""
     machine = bench_rotor(drop.rotor)
     speed = 2.0 * math.pi * drop.speed
-    broken = Violations.model_validate(departures(machine, speed, drop.departures))
+    broken = Violations.of(departures(machine, speed, drop.departures))
     hidden = hidden_machine(machine, drop.machine_seed, broken)
     chain = fitted_to(SensorChain(sampling_rate=drop.sampling_rate), hidden.machine)
     return synthesize_drop(

@@ -28,7 +28,7 @@ from rotordrop_bench.sensor_chain import (
 )
 from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
 from rotordrop_bench.true_values import housing_motion, true_histories, true_motion, true_values
-from rotordrop_bench.violations import SensorViolation
+from rotordrop_bench.violations import CHAIN, SENSORS
 
 TRUE_TOLERANCE = 1e-8
 """Tolerance of the true simulation, that of the reference [1]."""
@@ -76,10 +76,9 @@ def synthesize_drop(
     before the trigger [s], the tolerance that of the true simulation [1]. The seed is that of start, noise
     and trigger; the sensor errors belong to the machine. Conditions take the place of a drawn start.
     """
-    chain, wrong = fitted_to(sensor_chain or SensorChain(), hidden.known), hidden.violations.sensors
-    own = wrong.model_fields_set - SensorViolation.model_fields.keys()
-    changed: dict[str, Any] = {key: float(getattr(wrong, key)) for key in own}
-    chain = replace(chain, **changed)
+    wrong = hidden.violations.given.get("sensors", {})
+    chain = fitted_to(sensor_chain or SensorChain(), hidden.known)
+    chain = replace(chain, **{key: wrong[key] for key in CHAIN if key in wrong})
     conditions = conditions or drop_conditions(hidden, speed, seed)
     case = DropCase(
         speed=conditions.speed,
@@ -98,7 +97,7 @@ def synthesize_drop(
         phase=random.uniform(0.0, 2.0 * np.pi, count),
         decay_time=float(random.uniform(2.0, 20.0)),
     )
-    held = hidden.violations.magnets.stays_on  # a rotor with one end held does not settle
+    held = hidden.violations["magnets.stays_on"]  # a rotor with one end held does not settle
     truth = true_values(hidden, result, conditions, chain, errors, rest, name)
     return SyntheticDrop(
         record=record,
@@ -111,17 +110,14 @@ def synthesize_drop(
 
 def true_drop(hidden: HiddenMachine, case: DropCase) -> DropResult:
     """The drop of a hidden machine, with an unbalance that comes at its time or at the first contact."""
-    jump = hidden.violations.unbalance_jump
-    if jump is not None:
-        if jump.time is None:
+    node, amount, phase, time = (
+        hidden.violations[f"unbalance_jump.{key}"] for key in ("node", "amount", "phase", "time")
+    )
+    if node is not None:
+        if time is None:
             plain = simulate_drop(hidden.model, case)
             time = float(next(iter(plain.time[np.any(plain.indentation > 0.0, axis=1)]), np.inf))
-        else:
-            time = float(jump.time)
-        comes = UnbalanceJump(
-            node=jump.node, amount=float(jump.amount), phase=float(jump.phase), time=float(time)
-        )
-        case = replace(case, jump=comes)
+        case = replace(case, jump=UnbalanceJump(node=node, amount=amount, phase=phase, time=time))
     result = simulate_drop(hidden.model, case)
     if not result.finished:
         raise SimulationError(
@@ -133,18 +129,11 @@ def true_drop(hidden: HiddenMachine, case: DropCase) -> DropResult:
 
 def _true_errors(hidden: HiddenMachine, chain: SensorChain) -> SensorErrors:
     """Errors of the sensors of a hidden machine: those of its chain, and what is violated beside."""
-    sensors = hidden.machine.sensors
-    errors = drawn_errors(chain, len(sensors), stream(hidden.seed, "sensors"))
-    broken = [hidden.violations.of_sensor(sensor.name) for sensor in sensors]
-    wrong = {
-        key: np.array([float(getattr(one, key)) for one in broken]) for key in SensorViolation.model_fields
-    }
+    count = len(hidden.machine.sensors)
+    errors = drawn_errors(chain, count, stream(hidden.seed, "sensors"))
+    wrong = {key: np.full(count, hidden.violations[f"sensors.{key}"]) for key in SENSORS}
     random = stream(hidden.seed, "cross axis")
-    drawn = random.uniform(0.5, 1.0, len(sensors)) * random.choice([-1.0, 1.0], len(sensors))
-    alone = [hidden.violations.sensor.get(sensor.name) for sensor in sensors]
-    exact = [one is not None and "cross_axis" in one.model_fields_set for one in alone]
-    wrong["plane_shift"] += errors.plane_shift
-    wrong["cross_axis"] *= np.where(exact, 1.0, drawn)
+    wrong["cross_axis"] *= random.uniform(0.5, 1.0, count) * random.choice([-1.0, 1.0], count)
     wrong["curvature"] /= wrong.pop("curvature_at") ** 2
     return replace(errors, **wrong)
 

@@ -44,8 +44,6 @@ class SensorChain:
     """Largest amplitude of electrical runout at once and twice per turn [m]."""
     angle_error: float = 0.0
     """Largest error of a sensor's direction [rad]."""
-    plane_shift: float = 0.0
-    """Distance by which every sensor plane lies nearer to the middle of the rotor than stated [m]."""
     bits: int = 16
     """Bits of the converter; 0 for none."""
     full_scale: float | None = None
@@ -126,14 +124,13 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
     angle = chain.angle_error * random.uniform(-1.0, 1.0, sensors)
     size = random.uniform(0.3, 1.0, (2, sensors))
     turn = np.exp(2j * np.pi * random.uniform(0.0, 1.0, (2, sensors)))
-    nothing = ("cross_axis", "follows_housing", "time_constant", "curvature")
+    nothing = ("plane_shift", "cross_axis", "follows_housing", "time_constant", "curvature")
     return SensorErrors(
         gain=gain,
         offset=offset,
         angle=angle,
         runout_1x=chain.runout_1x * size[0] * turn[0],
         runout_2x=chain.runout_2x * size[1] * turn[1],
-        plane_shift=np.full(sensors, chain.plane_shift),
         **{name: np.zeros(sensors) for name in nothing},
     )
 

@@ -16,7 +16,6 @@ from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.clearance import Clearance
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.errors import UsageError
-from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
@@ -24,7 +23,7 @@ from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop_bench import departure as D
 from rotordrop_bench.departing import departures_in
-from rotordrop_bench.violations import BearingViolations, Violations
+from rotordrop_bench.violations import Violations
 
 PULL_LASTS, PULL_POINTS = 6.0, 61
 """Time constants after which a pull is gone, and points of its course: straight between two of them it is
@@ -45,20 +44,20 @@ def violated(machine: Machine, violations: Violations) -> Machine:
     for bearing in machine.touchdown_bearings:
         mine = _of_bearing(bearing, violations.of_bearing(bearing.name), typical)
         values |= {f"{bearing.name}.{path}": value for path, value in mine.items()}
-    factor = float(violations.rotor.unbalance)
+    factor = violations["rotor.unbalance"]
     if factor != 1.0:
         for index, unbalance in enumerate(machine.unbalances):
             values[f"unbalance.{index}.amount"] = factor * float(unbalance.amount)
     machine = machine.with_values(values) if values else machine
-    machine = machine.with_magnets_on(violations.magnets.stays_on)
-    seal = violations.seal
-    if seal is not None:
-        gap = float(seal.gap) * max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-        stiffness = f"{float(seal.stiffness)!r} N/m"
-        place = Clearance(name="seal", node=seal.node, gap=f"{gap!r} m", stiffness=stiffness)
+    machine = machine.with_magnets_on(violations["magnets.stays_on"])
+    node = violations["seal.node"]
+    if node is not None:
+        gap = violations["seal.gap"] * max(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+        stiffness = f"{violations['seal.stiffness']!r} N/m"
+        place = Clearance(name="seal", node=node, gap=f"{gap!r} m", stiffness=stiffness)
         place = place.completed_with(place.completed(machine.rotor))
         machine = machine.completed_with({"clearances": (*machine.clearances, place)})
-    softer = float(violations.rotor.youngs_modulus)
+    softer = violations["rotor.youngs_modulus"]
     if softer == 1.0:
         return machine
     rotor = machine.rotor
@@ -70,34 +69,27 @@ def violated(machine: Machine, violations: Violations) -> Machine:
     return machine.completed_with({"rotor": rotor.changed(materials={**rotor.materials, **changed})})
 
 
-def _of_bearing(bearing: TouchdownBearing, v: BearingViolations, typical: float) -> Mapping[str, float]:
-    contact = bearing.contact
-    stiffness = float(contact.stiffness) * float(v.contact.stiffness)
+def _of_bearing(bearing: TouchdownBearing, v: Violations, typical: float) -> Mapping[str, float]:
+    contact, exponent = bearing.contact, v["contact.exponent"]
     values: dict[str, float] = {}
-    if v.contact.exponent is not None:
-        law = contact_law(stiffness, float(contact.exponent), float(contact.damping))
-        exponent = float(v.contact.exponent)
-        stiffness = stiffness_of_exponent(law, typical, exponent)
+    if exponent is not None:
+        law = contact_law(float(contact.stiffness), float(contact.exponent), float(contact.damping))
         values["contact.exponent"] = exponent
-    rubs = 1.0 if v.friction.dynamic is None else float(v.friction.dynamic) / float(bearing.friction.dynamic)
+        stiffness = stiffness_of_exponent(law, typical, exponent)
+        if stiffness != float(contact.stiffness):
+            values["contact.stiffness"] = stiffness
+    dynamic = v["friction.dynamic"]
+    rubs = 1.0 if dynamic is None else dynamic / float(bearing.friction.dynamic)
     factors = {
-        "contact.damping": float(v.contact.damping),
-        "race.mass": float(v.race.mass),
-        "race.inertia": float(v.race.inertia) * float(v.race.mass),
-        "friction.stribeck_speed": float(v.friction.stribeck_speed),
+        "race.mass": v["race.mass"],
+        "race.inertia": v["race.mass"],
         "friction.dynamic": rubs,
-        "friction.static": rubs * float(v.friction.static),
-        "support.stiffness_horizontal": float(v.support.stiffness_ratio),
-        "support.damping": float(v.support.damping),
-        "support.damping_horizontal": float(v.support.damping) * float(v.support.damping_ratio),
+        "friction.static": rubs,
+        "support.stiffness_horizontal": v["support.stiffness_ratio"],
+        "support.damping_horizontal": v["support.damping_ratio"],
     }
     changed = {path: factor for path, factor in factors.items() if factor != 1.0}
-    values |= {path: float(attrgetter(path)(bearing)) * factor for path, factor in changed.items()}
-    if stiffness != float(contact.stiffness):
-        values["contact.stiffness"] = stiffness
-    if v.balls.first_ball_angle is not None:
-        values["bearing.first_ball_angle"] = float(v.balls.first_ball_angle)
-    return values
+    return values | {path: float(attrgetter(path)(bearing)) * factor for path, factor in changed.items()}
 
 
 def departures_of(machine: Machine, violations: Violations) -> Array:
@@ -108,40 +100,55 @@ def departures_of(machine: Machine, violations: Violations) -> Array:
             for b, load in zip(machine.touchdown_bearings, bearing_load_shares(machine), strict=True)
         ]
     )
-    if violations.unbalance_jump is None and np.all(rows == D.no_departure()):
+    if violations["unbalance_jump.node"] is None and np.all(rows == D.no_departure()):
         return rows[:0]
     return rows
 
 
-def _departure(bearing: TouchdownBearing, v: BearingViolations, load: float) -> Array:
-    row = D.no_departure()
-    support, foundation, balls = v.support, v.foundation, bearing.bearing
-    for part in (support, v.gap, v.friction, v.balls, v.sleeve, v.centre):
-        part.fill(row)
-    angle = float(support.axes_angle)
+COLUMNS: tuple[dict[str, int], ...] = (
+    {"support.slip_force": D.SLIP_FORCE, "support.slip_travel": D.SLIP_TRAVEL},
+    {"gap.drift": D.GAP_DRIFT, "gap.drift_time": D.GAP_DRIFT_TIME},
+    {"gap.closing": D.GAP_CLOSING, "gap.heat": D.GAP_HEAT},
+    {"friction.wear": D.WEAR, "friction.wear_heat": D.WEAR_HEAT},
+    {"balls.seat_play": D.LOOSE_WAY},
+    {"sleeve.eccentricity": D.SLEEVE_OFF},
+    {"sleeve.ovality": D.SLEEVE_OVAL},
+    {"sleeve.angle": D.SLEEVE_ANGLE},
+    {"centre.x": D.CENTRE_X},
+    {"centre.y": D.CENTRE_Y},
+)
+"""Columns of violations that stand in a row as they are, unless the first of them is zero."""
+
+
+def _departure(bearing: TouchdownBearing, v: Violations, load: float) -> Array:
+    row, balls, angle = D.no_departure(), bearing.bearing, v["support.axes_angle"]
+    for group in COLUMNS:
+        if v[next(iter(group))] != 0.0:
+            for path, column in group.items():
+                row[column] = v[path]
     if angle != 0.0:
         row[[D.AXIS_COSINE, D.AXIS_SINE]] = math.cos(angle), math.sin(angle)
-    deflection = float(support.hardening_force) / float(bearing.support.stiffness)
-    row[D.HARDENING] = float(support.hardening) / deflection**2
-    row[D.RADIAL] = float(support.hardening_radial and row[D.HARDENING] > 0.0)
+    deflection = v["support.hardening_force"] / float(bearing.support.stiffness)
+    row[D.HARDENING] = v["support.hardening"] / deflection**2
+    row[D.RADIAL] = float(v["support.hardening_radial"] and row[D.HARDENING] > 0.0)
     if row[D.LOOSE_WAY] > 0.0:
         row[D.TABLE_WAY_STEP :] = _seat_table(bearing, row[D.LOOSE_WAY], load)
-    if foundation.mass is not None and foundation.frequency is not None:
-        across = foundation.frequency_horizontal or foundation.frequency
+    if (mass := v["foundation.mass"]) is not None:
+        upright = v["foundation.frequency"]
+        across = v["foundation.frequency_horizontal"] or upright
         row[D.FOUNDATION_MODE : D.FOUNDATION_MODE + D.MODE_WIDTH] = _mode(
-            1.0 / float(foundation.mass), float(across), float(foundation.frequency), foundation.damping_ratio
+            1.0 / mass, across, upright, v["foundation.damping_ratio"]
         )
-    if v.race.tilt_stiffness is not None and v.race.tilt_frequency is not None:
-        frequency = float(v.race.tilt_frequency)
+    if (frequency := v["race.tilt_frequency"]) is not None:
         w = 2.0 * math.pi * frequency
         row[D.TILT_MODE : D.TILT_MODE + D.MODE_WIDTH] = _mode(
-            w * w / float(v.race.tilt_stiffness), frequency, frequency, v.race.tilt_damping_ratio
+            w * w / v["race.tilt_stiffness"], frequency, frequency, v["race.tilt_damping_ratio"]
         )
-    if v.balls.turn:
+    if v["balls.turn"]:
         radial = float(balls.ball_diameter) * math.cos(float(balls.contact_angle))
         # turn of the cage per turn of the inner race
         row[D.CAGE_RATIO] = 0.5 * (1.0 - radial / float(balls.pitch_diameter))
-    law = [(float(p.depth), float(p.force)) for p in v.contact.law]
+    law = [(point["depth"], point["force"]) for point in v["contact.law"]]
     row[D.LAW_PIECES] = max(len(law) - 1, 0)
     for i, ((d1, f1), (d2, f2)) in enumerate(pairwise(law)):  # a power of the depth each
         exponent = math.log(f2 / f1) / math.log(d2 / d1)
@@ -190,24 +197,23 @@ def pushed(model: DropModel, violations: Violations) -> DropModel:
     """The model with what pushes its rotor beside level gravity and the drawn unbalance."""
     p, machine = model.parameters, model.machine
     rows: list[tuple[Array, Array, Array]] = []  # entries, course, shape over the modes
-    side, tilt, bow = violations.side_force, float(violations.stand.tilt), float(violations.rotor.bow)
+    side, tilt, bow = (violations[path] for path in ("side_force.force", "stand.tilt", "rotor.bow"))
 
     def steady(x: float, y: float, shape: Array) -> None:
         entries = np.zeros(L.N_LOAD_COLUMNS)
         entries[[L.LOAD_X, L.LOAD_Y]] = x, y
         rows.append((entries, np.zeros((0, 3)), shape))
 
-    if side is not None and float(side.force) > 0.0:
-        force, angle = float(side.force), float(side.direction)
-        steady(force * math.cos(angle), force * math.sin(angle), model.basis.node_row(side.node))
+    if side:
+        steady(side, 0.0, model.basis.node_row(violations["side_force.node"]))
     if tilt != 0.0:  # gravity alone acts along -y
         steady(-math.sin(tilt), math.cos(tilt) - 1.0, p.gravity)
-    pull = float(violations.magnets.pull)
+    pull = violations["magnets.pull"]
     if pull > 0.0:
         share = pull * machine.rotor.mass * float(machine.gravity) / len(machine.ambs)
         times = np.append(np.linspace(0.0, PULL_LASTS, PULL_POINTS), PULL_LASTS + 1.0)
         left = np.append(np.exp(-times[:-1]), 0.0)
-        course = np.column_stack([float(violations.magnets.pull_time) * times, share * left, 0.0 * left])
+        course = np.column_stack([violations["magnets.pull_time"] * times, share * left, 0.0 * left])
         rows += [(np.zeros(L.N_LOAD_COLUMNS), course, shape) for shape in p.magnet_shape]
     if rows:
         points = np.zeros((0, 3))
@@ -230,21 +236,21 @@ def pushed(model: DropModel, violations: Violations) -> DropModel:
         bent[0::2] = 4.0 * bow * along * (1.0 - along)
         bent[1::2] = 4.0 * bow * (1.0 - 2.0 * along) / (place[-1] - place[0])
         straightening = p.eigenvalue * (model.basis.shapes.T @ (model.fe.mass @ bent))
-        speed = 2.0 * math.pi * float(violations.rotor.bow_speed)
+        speed = 2.0 * math.pi * violations["rotor.bow_speed"]
         p = p._replace(unbalance_cos=p.unbalance_cos + straightening / speed**2)
     return model if p is model.parameters else replace(model, parameters=p)
 
 
-def _mode(compliance: float, across: float, upright: float, damping_ratio: Known) -> list[float]:
+def _mode(compliance: float, across: float, upright: float, damping_ratio: float) -> list[float]:
     """Entries of a mode from 1/M [1/kg], its frequencies along x and y [Hz] and its damping ratio [1]."""
     wx, wy = 2.0 * math.pi * across, 2.0 * math.pi * upright
-    twice = 2.0 * float(damping_ratio)
+    twice = 2.0 * damping_ratio
     return [compliance, wx * wx, wy * wy, twice * wx, twice * wy]
 
 
-def support_matrices(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, Any]:
+def support_matrices(bearing: TouchdownBearing, v: Violations) -> dict[str, Any]:
     """True stiffness and damping of a support in x and y [N/m], [N s/m]: K_xx, K_xy, K_yy and so on."""
-    angle = float(v.support.axes_angle)
+    angle = v["support.axes_angle"]
     c, s = (math.cos(angle), math.sin(angle)) if angle != 0.0 else (1.0, 0.0)
     support, found = bearing.support, {}
     for letter, first, second in (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from rotordrop_bench.departures import DEPARTURES
 from rotordrop_bench.event import DropConditions, HiddenMachine
 from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places
 from rotordrop_bench.structure import support_matrices
-from rotordrop_bench.violations import BearingViolations, Violations
+from rotordrop_bench.violations import Violations
 
 WHOLE, SETTLING = 0.2, (0.15, 0.2)
 HISTORY_BEFORE, CONTACT_WINDOW = 0.02, 0.25
@@ -110,7 +111,7 @@ def true_values(
         "runout_2x_m": np.abs(errors.runout_2x).tolist(),
         "bits": chain.bits,
         "anti_alias_hz": chain.anti_alias_frequency,
-        "violations": hidden.violations.values() | {"machine_seed": hidden.seed},
+        "violations": {**hidden.violations.given, "machine_seed": hidden.seed},
         "time_note": "times are from power-off; record time = t_off_in_record_s + t; unbalance phases are "
         "relative to the (unknown) rotor mark; axes x horizontal, y up",
     }
@@ -152,7 +153,7 @@ def _motion(hidden: HiddenMachine, result: DropResult, rest: Array) -> dict[str,
     first = {name: rows[0] for name, rows in intervals.items() if rows}
     furthest = np.linalg.norm(result.displacement, axis=-1).max(axis=0)
     values: dict[str, Any] = {"max_radial_displacement_m": _each(names, furthest)}
-    if not hidden.violations.magnets.stays_on:  # with one end held nobody knows how long it stays so
+    if not hidden.violations["magnets.stays_on"]:  # with one end held nobody knows how long it stays so
         radius = np.hypot(shape @ rest[layout.modal_x], shape @ rest[layout.modal_y])
         values["settled_radius_um"] = _each(names, 1e6 * radius)
     values["first_contact_time_s"] = {name: row[0] for name, row in first.items()}
@@ -171,11 +172,11 @@ def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[st
     for bearing, load in zip(bearings, bearing_load_shares(machine), strict=True):
         parts = numbers_of(bearing).tangent_stiffness(float(load)), float(bearing.support.stiffness)
         series[bearing.name] = parts[0] * parts[1] / sum(parts)
-        own = BearingViolations() if broken is None else broken.of_bearing(bearing.name)
-        if own.contact.law:
+        own = (broken or Violations()).of_bearing(bearing.name)
+        if own["contact.law"]:
             for path in ("contact.stiffness_N_per_m_n", "contact.exponent"):
                 del values[path][bearing.name]
-        if float(own.support.axes_angle) != 0.0:
+        if own["support.axes_angle"] != 0.0:
             matrix = support_matrices(bearing, own)
             values["support.stiffness_N_per_m"][bearing.name] = matrix["K_yy"]
             values["support.damping_N_s_per_m"][bearing.name] = matrix["C_yy"]
@@ -246,31 +247,14 @@ def _sampled(time: Array, grid: Array, values: Array, before: float | None) -> A
     return np.asarray(sampled)
 
 
-FURTHER = {
-    "support damping": ["support.damping"],
-    "contact stiffness": ["contact.stiffness"],
-    "contact damping": ["contact.damping"],
-    "race inertia": ["race.inertia"],
-    "one end held": ["magnets.stays_on"],
-    "friction": ["friction.static", "friction.stribeck_speed"],
-    "ball phase": ["balls.first_ball_angle"],
-    "long remanence": ["magnets.remanent_lift"],
-}
-"""Keys of a case file that make a violation of a kind, beside those of `DEPARTURES`."""
-KINDS = {
-    kind: [*FURTHER.get(kind, ()), *DEPARTURES.get(kind, ())]
-    for kind in (*(kind for kind in FURTHER if kind not in DEPARTURES), *DEPARTURES)
-}
+KINDS: dict[str, Collection[str]] = {"one end held": ("magnets.stays_on",), **DEPARTURES}
 """Names of the kinds of violations, with the keys of a case file that make them."""
 
 
 def violated_kinds(violations: Violations) -> tuple[str, ...]:
     """Names of the kinds of violations that a case holds, in the order of `KINDS`."""
-    values = violations.values()
-    parts = [(part, keys) for part, keys in values.items() if part not in ("bearing", "sensor")]
-    for bearing in values.get("bearing", {}).values():
-        parts += list(bearing.items())
-    parts += [("sensors", sensor) for sensor in values.get("sensor", {}).values()]
+    alone = violations.given.get("bearing", {}).values()
+    parts = [part for own in (violations.given, *alone) for part in own.items() if part[0] != "bearing"]
     given = {f"{part}.{key}" for part, keys in parts for key in keys}
     return tuple(kind for kind, keys in KINDS.items() if given & set(keys))
 
@@ -289,42 +273,43 @@ def true_structure(
         mine = {name: getattr(errors, name)[i] for name in ("time_constant", "cross_axis", "follows_housing")}
         mine["plane_offset"] = places[i] - stated[sensor.node - 1]
         values |= {f"sensors.{sensor.name}.{path}": float(value) for path, value in mine.items()}
-    values["rotor.stiffness_factor"] = float(hidden.violations.rotor.youngs_modulus)
-    values["clock_error"] = float(hidden.violations.sensors.clock_error)
+    values["rotor.stiffness_factor"] = hidden.violations["rotor.youngs_modulus"]
+    values["clock_error"] = hidden.violations["sensors.clock_error"]
     # steady force in +x over the weight: gravity on a tilted machine, and what pushes the rotor
-    values["side_force"] = math.sin(float(hidden.violations.stand.tilt))
-    if (side := hidden.violations.side_force) is not None:
-        weight = hidden.machine.rotor.mass * float(hidden.machine.gravity)
-        values["side_force"] += float(side.force) * math.cos(float(side.direction)) / weight
+    values["side_force"] = math.sin(hidden.violations["stand.tilt"])
+    if (side := hidden.violations["side_force.force"]) is not None:
+        values["side_force"] += side / (hidden.machine.rotor.mass * float(hidden.machine.gravity))
     values["remanence.time_constant"] = conditions.start.remanence_time_constant
     return values
 
 
-def _of_bearing(bearing: TouchdownBearing, v: BearingViolations) -> dict[str, float]:
-    matrix = support_matrices(bearing, v)
-    support, foundation = bearing.support, v.foundation
-    deflection = float(v.support.hardening_force) / float(support.stiffness)
+def _of_bearing(bearing: TouchdownBearing, v: Violations) -> dict[str, float]:
+    matrix, support, mass = support_matrices(bearing, v), bearing.support, v["foundation.mass"]
+    deflection = v["support.hardening_force"] / float(support.stiffness)
     damped = matrix["C_xx"] * matrix["C_yy"]
     values = {
         "support.coupling": matrix["K_xy"] / math.sqrt(matrix["K_xx"] * matrix["K_yy"]),
         "support.damping_coupling": matrix["C_xy"] / math.sqrt(damped) if damped > 0.0 else 0.0,
-        "support.axes_angle": float(v.support.axes_angle),
         "support.axes_ratio": float(support.stiffness_horizontal) / float(support.stiffness),
-        "support.cubic": float(v.support.hardening) / deflection**2,
-        "support.slip_force": float(v.support.slip_force),
+        "support.cubic": v["support.hardening"] / deflection**2,
         "support.foundation_share": 0.0,
-        "gap.drift": float(v.gap.drift),
-        "gap.closing": float(v.gap.closing),
-        "centre.x": float(v.centre.x),
-        "centre.y": float(v.centre.y),
     }
-    if foundation.mass is not None and foundation.frequency is not None:
+    as_given = (
+        "support.axes_angle",
+        "support.slip_force",
+        "gap.drift",
+        "gap.closing",
+        "centre.x",
+        "centre.y",
+    )
+    values |= {path: v[path] for path in as_given}
+    if mass is not None:
         values |= {
-            "support.foundation_share": float(support.mass) / float(foundation.mass),
-            "support.foundation_frequency": 2.0 * math.pi * float(foundation.frequency),
-            "support.foundation_damping_ratio": float(foundation.damping_ratio),
-            "foundation.mass": float(foundation.mass),
+            "support.foundation_share": float(support.mass) / mass,
+            "support.foundation_frequency": 2.0 * math.pi * v["foundation.frequency"],
+            "support.foundation_damping_ratio": v["foundation.damping_ratio"],
+            "foundation.mass": mass,
         }
-    if v.race.tilt_stiffness is not None:
-        values["race.tilt_stiffness"] = float(v.race.tilt_stiffness)
+    if v["race.tilt_stiffness"] is not None:
+        values["race.tilt_stiffness"] = v["race.tilt_stiffness"]
     return values

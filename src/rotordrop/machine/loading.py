@@ -6,7 +6,7 @@ import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -19,8 +19,6 @@ from rotordrop.machine.machine import Machine
 from rotordrop.machine.shaft_table import SECTION_LINE, read_shaft_table
 from rotordrop.require import require
 from rotordrop.units import KINDS
-
-D = TypeVar("D", bound=Description)
 
 _UNION_TAGS = {"by_length", "by_nodes"}
 _DECIMAL_COMMA = re.compile(r"=\s*([+-]?\d+),(\d+)(?!\s*\])")
@@ -50,32 +48,23 @@ def load_machine(path: str | os.PathLike[str]) -> Machine:
         When the file cannot be used; the message holds file, line, column, the value and the way out.
     """
     file = Path(require(path, "path", str, os.PathLike))
-    return _loaded(_text_of(file, "machine file"), file, file.parent)
+    return _loaded(_text_of(file), file, file.parent)
 
 
-def load_description(kind: type[D], file: Path) -> D:
-    """Read a description that is no machine from a TOML file, refused with the same care."""
-    text = _text_of(file, "case file")
-    try:
-        return kind.model_validate(_parsed(text, file))
-    except ValidationError as error:
-        raise _located(error, TomlPositions(text), file, None) from None
-
-
-def _text_of(file: Path, what: str) -> str:
+def _text_of(file: Path) -> str:
     try:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
-        raise MachineFileError(f"cannot read the {what}: {error.strerror}", file=file) from error
+        raise MachineFileError(f"cannot read the machine file: {error.strerror}", file=file) from error
     if len(content) > LARGEST_FILE:
-        raise MachineFileError(f"more than {LARGEST_FILE} bytes are no {what}", file=file)
+        raise MachineFileError(f"more than {LARGEST_FILE} bytes are no machine file", file=file)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         start = content.rfind(b"\n", 0, error.start) + 1
         raise MachineFileError(
-            f"the byte 0x{content[error.start]:02x} is not UTF-8 text; save the {what} as UTF-8",
+            f"the byte 0x{content[error.start]:02x} is not UTF-8 text; save the machine file as UTF-8",
             file=file,
             line=content.count(b"\n", 0, error.start) + 1,
             column=len(content[start : error.start].decode("utf-8", "replace")) + 1,

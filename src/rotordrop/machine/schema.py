@@ -19,40 +19,22 @@ from rotordrop.units import KINDS, format_quantity
 
 def machine_schema() -> dict[str, Any]:
     """Give the JSON Schema (draft 2020-12) of a machine file."""
-    schema = _described(Machine)
-    _add_shaft_table(schema["$defs"]["Rotor"])
-    _add_shorthand(schema["$defs"])
-    _add_bearing_kinds(schema["$defs"])
-    _add_mount_elements(schema["$defs"])
-    return _finished(schema, "rotordrop machine file")
-
-
-def description_schema(kind: type[Description], title: str) -> dict[str, Any]:
-    """Give the JSON Schema (draft 2020-12) of a file that holds another description."""
-    return _finished(_described(kind), title)
-
-
-def _described(root: type[Description]) -> dict[str, Any]:
-    schema = root.model_json_schema()
+    schema = Machine.model_json_schema()
     parts = schema["$defs"]
-    for description in [root, *_parts(Description)]:
-        name = description.__name__
-        if description is root or name in parts:
-            _describe(schema if description is root else parts[name], description)
-    return schema
-
-
-def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
-    """Let physical values refer to their kinds, and give dialect and title."""
-    parts = schema["$defs"]
+    _describe(schema, Machine)
+    for description in _parts(Description):
+        if description.__name__ in parts:
+            _describe(parts[description.__name__], description)
+    _add_shaft_table(parts["Rotor"])
+    _add_shorthand(parts)
+    _add_bearing_kinds(parts)
+    _add_mount_elements(parts)
     kinds: set[str] = set()
     _refer(schema, kinds)
     for kind in sorted(kinds):
         parts[f"{kind}_number"] = _number(kind)
         parts[kind] = _value(kind)
-    return {"$schema": DIALECT, "title": title} | {
-        key: value for key, value in schema.items() if key != "title"
-    }
+    return {"$schema": DIALECT, "title": "rotordrop machine file", **schema}
 
 
 def _parts(base: type[Description]) -> list[type[Description]]:
@@ -87,7 +69,7 @@ def field_meanings(kind: type) -> dict[str, str]:
     """What stands beneath each field of a class; beneath the last of several, it holds for all of them."""
     found: dict[str, str] = {}
     for part in reversed(kind.__mro__):
-        if part.__module__.partition(".")[0] not in ("rotordrop", "rotordrop_bench"):
+        if part.__module__.partition(".")[0] != "rotordrop":
             continue
         (described,) = ast.parse(inspect.getsource(part)).body
         fields: list[str] = []

@@ -62,7 +62,7 @@ def test_power_off_where_one_end_bounces_before_the_other_has_sunk():
 def test_power_off_of_a_heavy_rotor_that_bends_at_low_frequencies():
     """Its fifth to tenth mode sag by micrometres: with four bending modes it was dated many errors early."""
     heavy = scaled_machine(6000.0, slenderness=1.5)
-    hidden = hidden_machine(heavy, 24007, "none", drawn=False)
+    hidden = hidden_machine(heavy, 24007, drawn=False)
     made = synthesize_drop(hidden, 2.0 * np.pi * 15.0, 24007, duration=0.06)
     found = power_off(made.record, heavy)
     assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)

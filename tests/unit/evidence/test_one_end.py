@@ -29,7 +29,7 @@ HELD, FELL = "NDE", "DE"
 @pytest.fixture(scope="module")
 def drop(known):
     """A recorded drop of a hidden machine whose NDE magnet stays on."""
-    hidden = hidden_machine(known, 14, Violations.model_validate({"magnets": {"stays_on": [HELD]}}))
+    hidden = hidden_machine(known, 14, Violations.of({"magnets": {"stays_on": [HELD]}}))
     made = synthesize_drop(hidden, SPEED, 140, duration=0.22, name="one end")
     assert made.tail is None
     assert made.truth["violated"] == ["one end held"]

@@ -60,7 +60,7 @@ from rotordrop.twin.tracked_parameters import (
     gap_of_record,
     is_impossible_gap,
 )
-from rotordrop_bench import hidden_machine, synthesize_drop
+from rotordrop_bench import Violations, hidden_machine, synthesize_drop
 from rotordrop_bench.event import FINER
 from rotordrop_bench.rotors import bench_rotor
 from rotordrop_bench.score import score_estimate
@@ -294,7 +294,7 @@ def test_without_tail_and_levitated_part_less_is_known(calibrated, workshop, qui
 
 @pytest.mark.slow
 def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(known, calibrated, quick):
-    elsewhere = hidden_machine(known, SEED, "sensor planes 30 mm off")
+    elsewhere = hidden_machine(known, SEED, Violations.of({"sensors": {"plane_shift": "30 mm"}}))
     record = synthesize_drop(elsewhere, SPEED, 10 * SEED, duration=0.22, tolerance=1e-7, name="moved")
     drop = estimate_drop(calibrated, record.record, tail=record.tail, method=Tracked(quick=True))
     assert drop.verdict in (Verdict.WIDENED, Verdict.REPLACED) and not drop.consistent

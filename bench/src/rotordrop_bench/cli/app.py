@@ -27,7 +27,6 @@ class BenchTable(VerbTable):
         "Any machine": (
             Verb("synthesize", "Make simulated recordings of drops whose truth is known", _DROPS),
             Verb("score", "Compare an estimate with the truth of its recording", _SCORES),
-            Verb("schema", "Print the JSON Schema of the violations 'synthesize' reads", _DROPS),
         ),
         "DropBench": (
             Verb("list", "Name the drops of the bench", _DROPS, "list_drops"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from typer import Argument, Option
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import measured, quantity, text_option
-from rotordrop.cli._output import deliver, deliver_text, progress_bar
+from rotordrop.cli._output import deliver, progress_bar
 from rotordrop.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,12 +40,8 @@ def synthesize(
     noise: Annotated[float, measured("length", "Sensor noise, rms.", "0.45 um")] = 0.45e-6,
     bits: Annotated[int, Option(metavar="NUMBER", help="Bits of the converter; 0 for none.")] = 16,
     violation: Annotated[
-        str,
-        Option(
-            metavar="NAME|FILE",
-            help="What the estimator's model cannot represent, by name ('list' names all) or as .toml file.",
-        ),
-    ] = "none",
+        str | None, text_option("FILE", "Case file of what no description has; 'list' names its keys.")
+    ] = None,
     fault: Annotated[
         str | None, text_option("NAME", "A deliberate mistake in the file; 'list' names all.")
     ] = None,
@@ -57,18 +52,30 @@ def synthesize(
 
     Example: rotordrop-bench synthesize machine.toml --speed "60 Hz" --output folder
     """
-    from rotordrop_bench import FAULTS, VIOLATIONS
-
-    if (not violation.endswith(".toml") and _listed(violation, VIOLATIONS)) or _listed(fault, FAULTS):
-        return
     from rotordrop.machine import load_machine
-    from rotordrop_bench import SensorChain, hidden_machine, synthesize_drop, with_fault, write_synthetic
+    from rotordrop_bench import (
+        FAULTS,
+        SensorChain,
+        hidden_machine,
+        load_violations,
+        synthesize_drop,
+        with_fault,
+        write_synthetic,
+    )
+    from rotordrop_bench.violations import KEYS
 
+    keys = {f"{part}.{key}": row[2] for part, keys in KEYS.items() for key, row in keys.items()}
+    if "list" in (violation, fault):
+        typer.echo("\n".join([f"{key}: {words}" for key, words in keys.items()] if violation else FAULTS))
+        return
+    if fault is not None and fault not in FAULTS:
+        raise UsageError(f"there is no {fault!r}; choose one of {', '.join(map(repr, FAULTS))}")
+    broken = None if violation is None else load_violations(violation)
     chain = SensorChain(sampling_rate=sampling_rate, noise=noise, bits=bits)
     names = [f"synthetic_{round(value / (2.0 * math.pi)):03d}Hz" for value in speed]
     written: list[dict[str, Any]] = []
     with progress_bar("synthesizing") as report:
-        hidden = hidden_machine(load_machine(machine), seed, violation)
+        hidden = hidden_machine(load_machine(machine), seed, broken)
         for index, value in enumerate(speed):
             # numbered where a speed comes more than once; no bundled recording is named so
             stem, number = names[index], names[: index + 1].count(names[index])
@@ -93,26 +100,6 @@ def synthesize(
                 out.print(f"  written: {file}")
 
     deliver({"origin": "simulated, not measured", "machine_seed": seed, "drops": written}, json, summarise)
-
-
-def _listed(choice: str | None, known: dict[str, Any]) -> bool:
-    if choice == "list":
-        typer.echo("\n".join(known))
-        return True
-    if choice is not None and choice not in known:
-        raise UsageError(f"there is no {choice!r}; choose one of {', '.join(map(repr, known))}")
-    return False
-
-
-def schema(output: options.TextFile = None, force: options.Force = False) -> None:
-    """Print the JSON Schema of the violations that 'synthesize --violation' reads.
-
-    Example: rotordrop-bench schema > violations.schema.json
-    """
-    from rotordrop_bench.violations import violations_schema
-
-    text = json_module.dumps(violations_schema(), indent=2, ensure_ascii=False) + "\n"
-    deliver_text(text, output, overwrite=force)
 
 
 def list_drops(only: OnlyOption = None, json: options.Json = None) -> None:

@@ -191,7 +191,7 @@ def _drawn(case: Case, seed: int) -> tuple[SyntheticDrop, Machine]:
     speed = 2.0 * math.pi * math.exp(random.uniform(low, high))
     true, drop = drawn_from_prior(known, stream(seed, "prior"))
     kinds = () if case.departure is None else (case.departure,)
-    broken = Violations.model_validate(departures(known, speed, kinds))
+    broken = Violations.of(departures(known, speed, kinds))
     hidden = replace(hidden_machine(true, seed, broken, drawn=False), known=known)
     row = {one.path: one for one in rows("sensor")}
     sigma = {
