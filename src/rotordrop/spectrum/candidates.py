@@ -25,7 +25,7 @@ from rotordrop.rotor.suspension import (
 from rotordrop.rotor.whirl import matrices_of, whirl_modes
 
 Kind = Literal["order", "steady"]
-OrbitShape = Literal["any", "flat", "round"]
+OrbitShape = Literal["any", "flat"]
 
 EQUAL_ORDER = 0.002
 """Relative tolerance of a rotor order [1] (chosen)."""

@@ -132,13 +132,15 @@ def name_lines(
     single = [(plane, line) for plane, line in found if line.parent is None]
     lines = [named(plane, line, candidates) for plane, line in single]
     for _ in range(2):  # the pendulum gives the conical swing its name, both give theirs to what they mix to
-        swings = [
-            (_swing_name(name), line)
-            for (_, line), name in zip(single, lines, strict=True)
-            if name.named and name.kind in ("steady", "undecided") and _swings(name)
-        ]
+        swings: dict[tuple[str, str], FoundLine] = {}  # of each name the strongest of a plane
+        for (plane, line), result in sorted(
+            zip(single, lines, strict=True), key=lambda at: at[0][1].strength
+        ):
+            if result.named and result.kind in ("steady", "undecided") and _swings(result):
+                swings[plane, _swing_name(result)] = line
         lines = [
-            named(plane, line, (*candidates, *of_swings(line, swings, candidates))) for plane, line in single
+            named(plane, line, (*candidates, *of_swings(line, _parents(plane, line, swings), candidates)))
+            for plane, line in single
         ]
     label = {
         line: (result.label if result.named else f"{line.frequency:.1f} Hz")
@@ -214,6 +216,17 @@ def _swings(line: Line) -> bool:
 def _swing_name(line: Line) -> str:
     """What a swing is called in the names of its multiples: whichever end it was seen at."""
     return line.name.matches[0].candidate.family if line.name.matches else line.label
+
+
+def _parents(
+    plane: str, line: FoundLine, swings: Mapping[tuple[str, str], FoundLine]
+) -> list[tuple[str, FoundLine]]:
+    """Swings that a line can be of: no weaker than it, those of its own plane where that has them."""
+    return [
+        (name, swing)
+        for (seen, name), swing in swings.items()
+        if swing.strength >= line.strength and (seen == plane or (plane, name) not in swings)
+    ]
 
 
 def of_swings(

@@ -162,8 +162,6 @@ def _possible(line: LineEvidence, candidate: Candidate) -> bool:
         return False
     if candidate.shape == "flat" and abs(line.roundness) > FLAT_ORBIT:
         return False
-    if candidate.shape == "round" and abs(line.roundness) < ROUND_ORBIT:
-        return False
     return not candidate.planes or line.plane in candidate.planes
 
 
