@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -300,8 +301,13 @@ class StaticSag:
 
 def race_sag(bearings: Sequence[TouchdownBearing], loads: Array) -> Array:
     """Deflection [m] of every bearing, shape (B,), under static loads (B,) [N]."""
-    pairs = zip(bearings, loads, strict=True)
-    return np.array([numbers_of(b).deflection(float(load))[0] for b, load in pairs])
+    return np.array([_race_sag(b, float(load)) for b, load in zip(bearings, loads, strict=True)])
+
+
+@lru_cache(maxsize=64)
+def _race_sag(bearing: TouchdownBearing, load: float) -> float:
+    """Found once for equal bearings and loads: a fit asks for them hundreds of times."""
+    return numbers_of(bearing).deflection(load)[0]
 
 
 def static_sag(rows: Array, race: Array, loads: Array) -> StaticSag:

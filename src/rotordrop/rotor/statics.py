@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -112,8 +113,12 @@ def settled_sag(fe: RotorFE, machine: Machine) -> Array:
     Measured from the straight line through the rotor's centre at the bearings (with one bearing: from the
     level through it, for a rotor that stays horizontal).
     """
-    nodes = [bearing.node for bearing in machine.touchdown_bearings]
-    gravity = float(machine.gravity)
+    return _sag_on(fe, tuple(bearing.node for bearing in machine.touchdown_bearings), float(machine.gravity))
+
+
+@lru_cache(maxsize=8)
+def _sag_on(fe: RotorFE, nodes: tuple[int, ...], gravity: float) -> Array:
+    """Found once for a rotor: a fit asks for it hundreds of times."""
     if len(nodes) == 1:
         return _inertia_relief(fe, nodes[0], gravity)
     return rest_on(fe, nodes, gravity)[0]

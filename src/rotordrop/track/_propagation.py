@@ -22,7 +22,7 @@ from rotordrop.simulate._rhs import (
     scratch_of,
 )
 from rotordrop.simulate._sensitivity import drop_jacobian_parts
-from rotordrop.track._arrays import copy_into, fill, fill_rows
+from rotordrop.track._arrays import copy_into, copy_rows, fill, fill_rows
 
 Flags = NDArray[np.bool_]
 
@@ -309,25 +309,6 @@ def add_row(weight: float, source: Array, target: Array) -> None:
 
 
 @lean_kernel
-def jacobian_product(
-    entries: Array,
-    columns: Integers,
-    starts: Integers,
-    touching: Integers,
-    g: Array,
-    p: KernelParameters,
-    V: Array,
-    moved: Array,
-    out: Array,
-) -> None:
-    """Product of the complete Jacobian, listed part and contacts, with a full matrix."""
-    sparse_product(entries, columns, starts, V, out)
-    for c in range(touching.shape[0]):
-        if touching[c] != 0:
-            add_contact_product(c, g[c], p, V, moved, out)
-
-
-@lean_kernel
 def rk4_step(
     t: float, h: float, y: Array, p: KernelParameters, k: Array, trial: Array, work: Scratch
 ) -> None:
@@ -411,7 +392,14 @@ def propagate(
         # F <- exp(hJ) F + what the parameters add, to third order at least: at second light modes would grow
         for e in range(settings.terms):
             source = F if e == 0 else V[e - 1]
-            jacobian_product(entries, places, starts, touching, g, p, source, moved, V[e])
+            if block + e > 0:
+                sparse_product(entries, places, starts, source, V[e])
+            else:  # F is the identity yet
+                copy_rows(J, V[0, :, :s])
+                fill_rows(V[0, :, s:], 0.0)
+            for c in range(touching.shape[0]):
+                if touching[c] != 0:
+                    add_contact_product(c, g[c], p, source, moved, V[e])
             for i in range(s if e == 0 else 0):
                 add_row(1.0, B[i], V[0, i, s:])
         for i in range(s):

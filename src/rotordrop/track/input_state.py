@@ -499,11 +499,11 @@ def forward_pass(
             inverse: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
             K, e = PH @ inverse, z - H @ x
             x = x + K @ e
-            left = identity - K @ H
-            P = left @ P @ left.T + (K * R) @ K.T  # Joseph form: stays positive with a channel missing
+            P = P - K @ PH.T
             done.append(_Update(K=K, H=H, whitened=inverse @ e, inverse=inverse, channels=channels))
         if len(live):
             negative_log_likelihood += 0.5 * float(e @ done[-1].whitened - np.linalg.slogdet(inverse)[1])
+        P = 0.5 * (P + P.T)  # else rounding would grow sample by sample
         updates.append(done)
         shown[i], rows[i] = watched @ x, watched @ P
     return Passed(updates=updates, shown=shown, rows=rows, negative_log_likelihood=negative_log_likelihood)

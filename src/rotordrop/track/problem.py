@@ -346,13 +346,10 @@ def settled_displacement(problem: DropProblem, theta: Array) -> Array:
     size = np.hypot(*pull)
     sag = static_sag(p.bearing, race_sag(bearings, size), size)
     level = sag.depth(p.bearing[:, L.AIR_GAP]) * pull / np.maximum(size, 1e-12)
-    z, at = np.asarray(model.fe.node_positions), np.array(nodes) - 1
     sensors = np.array([sensor.node for sensor in model.machine.sensors]) - 1
-    lines = [
-        np.polynomial.Polynomial.fit(z[at], along, min(1, len(nodes) - 1)).convert()(z[sensors])
-        for along in level
-    ]
-    return np.asarray(np.array(lines) + bend[:, 0::2][:, sensors], dtype=np.float64)
+    line = np.vander(np.asarray(model.fe.node_positions), min(2, len(nodes)))
+    lines = level @ np.linalg.pinv(line[np.array(nodes) - 1]).T @ line[sensors].T
+    return np.asarray(lines + bend[:, 0::2][:, sensors], dtype=np.float64)
 
 
 def parameters_at(problem: DropProblem, theta: Array) -> L.KernelParameters:

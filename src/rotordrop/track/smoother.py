@@ -137,8 +137,8 @@ class Forward:
             S=self.innovation_variances[chosen],
             P=np.empty((count, n * (n + 1) // 2 if covariances else 0), dtype=np.float32),
             F=np.empty((count, s, s + len(problem.unknowns)), dtype=np.float32),
-            H=np.zeros((count, updates, n)),
-            K=np.empty((count, updates, n)),
+            H=np.zeros((count, updates, n), dtype=np.float32),
+            K=np.empty((count, updates, n), dtype=np.float32),
             sigma=np.empty((count, len(problem.model.bearing_names))),
         )
         measured = Measurements(
