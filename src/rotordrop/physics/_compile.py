@@ -105,6 +105,7 @@ class Form:
     """Another form of kernels: what stands there under some names, in them and in all behind them.
 
     A part is changed in the same way, so that what it calls under another name is what it takes the place of.
+    What is called through its module stays as it stands.
     """
 
     name: str

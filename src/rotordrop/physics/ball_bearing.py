@@ -16,7 +16,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.physics.ball_bearing_geometry import BallBearingDescription
-from rotordrop.physics.elementary import acos, asin, cos, cos_each, cube_root_each, magnitude, sin, sin_each
+from rotordrop.physics.elementary import acos, asin, cos_each, cube_root_each, magnitude, sin_each
 from rotordrop.physics.hertz import compliance, contacts_in_series, race_contact
 
 ArrayLike = float | Array
@@ -90,7 +90,7 @@ class BearingConstants:
 
         Source: Harris, Rolling Bearing Analysis, free endplay of a bearing with radial clearance.
         """
-        return 2.0 * self.groove_distance * sin(self.contact_angle)
+        return 2.0 * self.groove_distance * float(sin_each(self.contact_angle))
 
     @property
     def radial_contact_angle(self) -> float:
@@ -209,14 +209,14 @@ def bearing_constants(bearing: BallBearingDescription) -> BearingConstants:
         float(bearing.ball_youngs_modulus),
         float(bearing.ball_poisson_ratio),
     )
-    radial = A_0 * cos(alpha)
+    radial = A_0 * float(cos_each(alpha))
     # The load of a loose bearing meets the balls at the angle of the first touch, in deep grooves at none.
     touching = alpha if F_V > 0.0 or radial_play == 0.0 else acos(min((radial + radial_play) / A_0, 1.0))
     inner = race_contact(D_w, D_pw, f_i, touching, eta, inner=True)
     outer = race_contact(D_w, D_pw, f_o, touching, eta, inner=False)
     K = float(contacts_in_series(inner.stiffness, outer.stiffness))
     s = float(row_approach(F_V, Z * K, A_0, alpha))
-    axial = A_0 * sin(touching) + s
+    axial = A_0 * float(sin_each(touching)) + s
     return BearingConstants(
         groove_distance=A_0,
         contact_angle=alpha,
@@ -278,7 +278,7 @@ def ball_centrifugal_force(bearing: BallBearingDescription, omega_i: ArrayLike) 
     """
     D_w, D_pw = float(bearing.ball_diameter), float(bearing.pitch_diameter)
     mass = float(bearing.ball_density) * math.pi / 6.0 * D_w * D_w * D_w
-    gamma = D_w * cos(float(bearing.contact_angle)) / D_pw
+    gamma = D_w * float(cos_each(float(bearing.contact_angle))) / D_pw
     return 0.5 * mass * D_pw * np.square(0.5 * omega_i * (1.0 - gamma))
 
 

@@ -14,7 +14,6 @@ Where a result must keep more than a double holds, it is carried as an unevaluat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -56,6 +55,9 @@ _LEADING = np.int64(-0x8000000)
 _IN_TABLE = np.int64(127)
 _OF_TABLE = np.int64(7)
 _BELOW_TABLE = np.int64(45)
+
+EXP_OF, LN_OF, SIN_OF, COS_OF, CUBE_ROOT_OF = range(5)
+"""Functions of all entries of an array."""
 
 
 @inner_kernel
@@ -329,18 +331,6 @@ def sine_cosine(x: float) -> tuple[float, float]:
 
 
 @lean_kernel
-def sin(x: float) -> float:
-    """Sine [1] of an angle up to 1e8 rad. Source: `sine_cosine`."""
-    return sine_cosine(x)[0]
-
-
-@lean_kernel
-def cos(x: float) -> float:
-    """Cosine [1] of an angle up to 1e8 rad. Source: `sine_cosine`."""
-    return sine_cosine(x)[1]
-
-
-@lean_kernel
 def atan2(y: float, x: float) -> float:
     """Angle of the point (x, y) from +x towards +y [rad], between −π and π; 0 of the origin.
 
@@ -407,69 +397,46 @@ def magnitude(x: Array, y: Array) -> Array:
 
 def exp_each(x: float | Array) -> Any:
     """Exponential [1] of every entry. Source: `exp`."""
-    return _each(_exp_each, x)
+    return _each(EXP_OF, x)
 
 
 def ln_each(x: float | Array) -> Any:
     """Natural logarithm [1] of every entry. Source: `ln`."""
-    return _each(_ln_each, x)
+    return _each(LN_OF, x)
 
 
 def sin_each(x: float | Array) -> Any:
     """Sine [1] of every angle [rad]. Source: `sine_cosine`."""
-    return _each(_sin_each, x)
+    return _each(SIN_OF, x)
 
 
 def cos_each(x: float | Array) -> Any:
     """Cosine [1] of every angle [rad]. Source: `sine_cosine`."""
-    return _each(_cos_each, x)
+    return _each(COS_OF, x)
 
 
 def cube_root_each(x: float | Array) -> Any:
     """Cube root [1] of every entry. Source: `cube_root`."""
-    return _each(_cube_root_each, x)
+    return _each(CUBE_ROOT_OF, x)
 
 
-def _each(loop: Callable[[Array], Array], x: float | Array) -> Any:
+def _each(function: int, x: float | Array) -> Any:
     values = np.asarray(x, dtype=np.float64)
-    return loop(values.ravel()).reshape(values.shape)[()]
+    return _values_of(function, values.ravel()).reshape(values.shape)[()]
 
 
 @kernel
-def _exp_each(x: Array) -> Array:
+def _values_of(function: int, x: Array) -> Array:
+    """Values of one of the functions ``*_OF``: one kernel, for most programs need them all."""
     out = np.empty_like(x)
     for i in range(x.shape[0]):
-        out[i] = exp(x[i])
-    return out
-
-
-@kernel
-def _ln_each(x: Array) -> Array:
-    out = np.empty_like(x)
-    for i in range(x.shape[0]):
-        out[i] = ln(x[i])
-    return out
-
-
-@kernel
-def _sin_each(x: Array) -> Array:
-    out = np.empty_like(x)
-    for i in range(x.shape[0]):
-        out[i] = sine_cosine(x[i])[0]
-    return out
-
-
-@kernel
-def _cos_each(x: Array) -> Array:
-    out = np.empty_like(x)
-    for i in range(x.shape[0]):
-        out[i] = sine_cosine(x[i])[1]
-    return out
-
-
-@kernel
-def _cube_root_each(x: Array) -> Array:
-    out = np.empty_like(x)
-    for i in range(x.shape[0]):
-        out[i] = cube_root(x[i])
+        if function == EXP_OF:
+            out[i] = exp(x[i])
+        elif function == LN_OF:
+            out[i] = ln(x[i])
+        elif function == CUBE_ROOT_OF:
+            out[i] = cube_root(x[i])
+        else:
+            sine, cosine = sine_cosine(x[i])
+            out[i] = sine if function == SIN_OF else cosine
     return out

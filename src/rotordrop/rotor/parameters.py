@@ -21,7 +21,7 @@ from rotordrop.physics import aerodynamics, magnet, touch
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.contact import depth_at
-from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.elementary import cos_each, sin_each
 from rotordrop.physics.linear_algebra import product
 from rotordrop.physics.load import load_now
 from rotordrop.require import require
@@ -179,7 +179,8 @@ def _of_values(machine: Machine, fe: RotorFE, basis: RotorBasis, shares: Array) 
     cosine, sine = np.zeros(basis.size), np.zeros(basis.size)
     for unbalance in machine.unbalances:
         # The phase is measured from +y, so 90° is added to get it from +x.
-        s, c = sine_cosine(float(unbalance.phase) + 0.5 * math.pi)
+        angle = float(unbalance.phase) + 0.5 * math.pi
+        s, c = sin_each(angle), cos_each(angle)
         shape = basis.node_row(unbalance.node)
         cosine += float(unbalance.amount) * c * shape
         sine += float(unbalance.amount) * s * shape

@@ -516,7 +516,7 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     log : ndarray, shape (R, 9)
         Contacts, columns ``LOG_*``; the first entries are those still open.
     running : ndarray, shape (W, 5)
-        The running contacts of all that are `watched`, from `start_running`.
+        The running contacts of all that are `watched`; a run that begins fills them with `start_running`.
     books : ndarray, shape (B + 1, 5)
         Energy lost so far by place [J].
     peaks : ndarray, shape (B, 7) or (0, 7)
@@ -539,7 +539,8 @@ def integrate(  # noqa: C901, PLR0915  one compiled loop
     t, t_end = progress[TIME], control.end
     h = progress[STEP]
     previous = progress[PREVIOUS_ERROR]
-    n_log = int(progress[LOGGED])
+    begins = progress[ACCEPTED] + progress[REJECTED] == 0.0
+    n_log = start_running(y, t, p, running, log) if begins else int(progress[LOGGED])
     stop_speed = control.stop_speed
     sense = 1.0 if y[i_w] >= 0.0 else -1.0
     landing = t_end - t

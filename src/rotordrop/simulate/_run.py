@@ -150,7 +150,6 @@ class Run:
         progress[[_loop.TIME, _loop.STEP]] = time, min(FIRST_STEP, setup.control.largest_step)
         progress[_loop.PREVIOUS_ERROR] = float(not setup.control.logarithmic)
         running, log = np.zeros((watched, _loop.N_RUN_COLUMNS)), np.zeros((watched, _loop.N_LOG_COLUMNS))
-        progress[_loop.LOGGED] = p.form.of(_loop.start_running)(y, time, p, running, log)
         status = np.zeros(7)
         status[[STOPPED_AT, LAST_SAMPLE]] = np.nan, last_sample
         run = cls(

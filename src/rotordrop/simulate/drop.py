@@ -14,7 +14,7 @@ from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
 from rotordrop.machine import Machine
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import magnitude, sine_cosine
+from rotordrop.physics.elementary import cos_each, magnitude, sin_each
 from rotordrop.require import require
 from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
@@ -102,7 +102,8 @@ def _with_jump(model: DropModel, parameters: KernelParameters, jump: UnbalanceJu
     nodes = len(model.fe.node_positions)
     if not 1 <= jump.node <= nodes:
         raise SimulationError(f"the unbalance comes at node {jump.node}; give one of the nodes 1 to {nodes}")
-    sine, cosine = sine_cosine(jump.phase + 0.5 * math.pi)  # the phase counts from +y
+    angle = jump.phase + 0.5 * math.pi  # the phase counts from +y
+    sine, cosine = sin_each(angle), cos_each(angle)
     row = jump.amount * model.basis.node_row(jump.node)
     return parameters._replace(
         unbalance_cos=parameters.unbalance_cos + cosine * row,

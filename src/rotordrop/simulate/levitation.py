@@ -10,7 +10,7 @@ from rotordrop.errors import SimulationError
 from rotordrop.physics import aerodynamics
 from rotordrop.physics import columns as L
 from rotordrop.physics.columns import KernelParameters
-from rotordrop.physics.elementary import sine_cosine
+from rotordrop.physics.elementary import cos_each, sin_each
 from rotordrop.physics.linear_algebra import least_squares, product, solve
 from rotordrop.physics.load import load_now
 from rotordrop.require import numbers
@@ -214,7 +214,7 @@ def _levitated(
     orbit = np.zeros(static.shape, dtype=np.complex128)
     if speed != 0.0:
         orbit = levitated_orbit(model, speed, start.orbit)
-    sine, cosine = sine_cosine(start.rotor_angle)
+    sine, cosine = sin_each(start.rotor_angle), cos_each(start.rotor_angle)
     position = static + (orbit.real * cosine - orbit.imag * sine)
     velocity = -speed * (orbit.real * sine + orbit.imag * cosine)
     layout = model.layout

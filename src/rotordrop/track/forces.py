@@ -20,9 +20,9 @@ from rotordrop.simulate._rhs import (
     ring_travel,
     scratch_of,
 )
-from rotordrop.track import _propagation as P
 from rotordrop.track._arrays import copy_into
 from rotordrop.track._filter import LARGEST_DEFLECTION
+from rotordrop.track._propagation import ParameterTargets, apply_parameters, rk4_step
 from rotordrop.track.problem import WATCHED, DropProblem, parameters_at, private_copy
 from rotordrop.track.smoother import Smoothed
 
@@ -59,7 +59,7 @@ def bearing_values(
 
 @kernel
 def states_between(
-    times: Array, means: Array, targets: P.ParameterTargets, p: KernelParameters, substeps: int, fine: Array
+    times: Array, means: Array, targets: ParameterTargets, p: KernelParameters, substeps: int, fine: Array
 ) -> None:
     """Fill ``fine`` (1 + (N - 1) ``substeps``, n) with estimates (N, n) at ``times`` (N,) [s] and between.
 
@@ -70,13 +70,13 @@ def states_between(
     y, trial, rates = np.zeros(count), np.empty(count), np.zeros((5, count))
     copy_into(means[-1], fine[-1])
     for i in range(means.shape[0] - 1):
-        P.apply_parameters(means[i, s : s + targets.logarithmic.shape[0]], targets, p)
+        apply_parameters(means[i, s : s + targets.logarithmic.shape[0]], targets, p)
         h = (1.0 + p.spin[L.CLOCK_ERROR]) * (times[i + 1] - times[i]) / substeps
         copy_into(means[i, :s], y)
         for k in range(substeps):
             copy_into(means[i], fine[i * substeps + k])
             copy_into(y[:s], fine[i * substeps + k, :s])
-            P.rk4_step(times[i] + k * h, h, y, p, rates, trial, work)
+            rk4_step(times[i] + k * h, h, y, p, rates, trial, work)
         largest, unstable = np.max(np.abs(means[i + 1, :s])), False
         for j in range(s):
             unstable |= not abs(y[j]) < 10.0 * largest
@@ -92,7 +92,7 @@ def force_values(
     times: Array,
     means: Array,
     s: int,
-    targets: P.ParameterTargets,
+    targets: ParameterTargets,
     p: KernelParameters,
     n_parameters: int,
     values: Array,
@@ -110,7 +110,7 @@ def force_values(
     y = np.zeros(p.rotor_at[L.N_STATES])
     step_d = 1e-9
     for i in range(means.shape[0]):
-        P.apply_parameters(means[i, s : s + n_parameters], targets, p)
+        apply_parameters(means[i, s : s + n_parameters], targets, p)
         copy_into(means[i, :s], y)
         for b in range(p.bearing.shape[0]):
             dx, dy = race_deflection(b, y, p)
