@@ -63,7 +63,7 @@ for another reading to be fitted in full [1]: of 43 that then fell freely, to 4,
 class _Case:
     """The record read with channels exchanged."""
 
-    row: str
+    kind: str
     words: str
     channels: tuple[str, ...]
     record: Record
@@ -88,7 +88,7 @@ def check_ends(
     """
     if len({amb.node for amb in machine.ambs}) < 2 or len(record.planes) < 2:
         return [undecided("it takes two AMB planes in the machine file and two sensor planes")]
-    described = _Case(row="", words="", channels=(), record=record, levitated=levitated)
+    described = _Case(kind="", words="", channels=(), record=record, levitated=levitated)
     own = own or described.fitted(rotor, coarse)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
         return _as_described(own, machine)
@@ -121,7 +121,8 @@ def check_ends(
     beam = "; but a beam stands for the rotor, and the deviation may be that of its bending"
     return [
         found(
-            cases[best].row,
+            "exchanged",
+            kind=cases[best].kind,
             channel=cases[best].channels,
             severity="warning" if machine.rotor.form_errs else None,
             mine=mine**0.5,
@@ -150,8 +151,10 @@ def check_exchanged(
         return []
     case = cases[int(np.argmin(near))]
     gained = trusted * (chi_square - _chi_square(case.fitted(own.rotor, coarse, own.end)))
-    row = f"{case.row}-likelier"
-    return [found(row, channel=case.channels, words=case.words, sure=gained**0.5)] if gained > SUSPECT else []
+    if gained <= SUSPECT:
+        return []
+    said = {"words": case.words, "sure": gained**0.5}
+    return [found("exchanged-likelier", said, kind=case.kind, channel=case.channels)]
 
 
 def _chi_square(fall: Fall) -> float:
@@ -215,20 +218,20 @@ def _other_cases(record: Record, levitated: LevitatedModel) -> list[_Case]:
     for first, second in combinations(record.planes, 2):
         if len(first.columns) == len(second.columns):
             pairs = list(zip(first.columns, second.columns, strict=True))
-            cases.append(_exchanged(record, levitated, pairs, "ends"))
+            cases.append(_exchanged(record, levitated, pairs, "swapped ends"))
         for pair in product(first.columns, second.columns):
-            cases.append(_exchanged(record, levitated, [pair], "crossed"))
+            cases.append(_exchanged(record, levitated, [pair], "swapped channels"))
     return cases
 
 
-def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], row: str) -> _Case:
+def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int, int]], kind: str) -> _Case:
     order = list(range(len(record.sensors)))
     for a, b in pairs:
         order[a], order[b] = b, a
     names = record.channel_names
     amplitudes, noise = levitated.amplitudes[:, order], levitated.noise[order]
     return _Case(
-        row=row,
+        kind=kind,
         words=" and ".join(f"{names[a]} and {names[b]} exchanged" for a, b in pairs),
         channels=tuple(names[i] for pair in pairs for i in pair),
         record=replace(record, signals=record.signals[:, order]),
