@@ -72,7 +72,7 @@ BAD = [
     # touchdown bearings
     ('"30.25 mm"', '"60.5 mm"', r"bore radius 60\.5 mm is larger than that of XCB71914E.*, 35 mm", '"60.5'),
     (GAP, 'air_gap = "31 mm"', "the air gap 31 mm must be smaller than the bore radius", '"31 mm"'),
-    ("XCB71914-E", "XCB71915-X", "no bearing 'XCB71915-X'; did you mean one of", '"XCB71915-X"'),
+    ("XCB71914-E", "XCB71915-X", "no bearing 'XCB71915-X'; did you mean", '"XCB71915-X"'),
     ("XCB71914-E", "30206", "no bearing '30206'", '"30206"'),
     ('"heavy"', '"hevy"', "'hevy' is no preload class; did you mean 'heavy'", '"hevy"'),
     (HEAVY, "ball_count = 40", r"40 balls of 9\.525 mm do not fit on .* 85 mm; at most 28", "40"),

@@ -141,7 +141,7 @@ def search_bearings(text: str) -> list[CatalogueBearing]:
         first = []
     read = read_designation(text)
     if read is None:
-        return first or [_index()[_key(name)] for name in _nearest(text)]
+        return first or [find_bearing(name) for name in _nearest(text)]
     size = boundary_dimensions(read.series, read.bore)
     same = [b for b in _index().values() if size and _is_of_size(b, read.bore, size[0])]
     return first + [b for b in same if not first or b.designation != first[0].designation]
@@ -154,6 +154,10 @@ def _is_mistyped(read: Designation) -> bool:
 
 
 def _nearest(designation: str) -> list[str]:
+    """Listed names like one, or the same with the digits for which O and I were typed."""
+    digits = re.sub(r"[OI](?=[OI]*\d)", lambda typed: "01"["OI".index(typed[0])], designation.upper())
+    if digits != designation.upper() and read_designation(digits):
+        return [digits]
     close = get_close_matches(_key(designation), list(_index()), 3, 0.7)
     return [_index()[key].designation for key in close]
 
@@ -161,7 +165,7 @@ def _nearest(designation: str) -> list[str]:
 def _unknown(designation: str, nearest: list[str], why: str = "") -> str:
     if re.match(r"NN|N[UJP]?\s?\d", designation.upper()):
         return f"{designation!r} names a roller bearing, and the model is one of balls; give another bearing"
-    hint = f"did you mean one of {', '.join(nearest)}?" if nearest else "no designation is similar."
+    hint = f"did you mean {' or '.join(nearest)}?" if nearest else "no designation is similar."
     return (
         f"the catalogue holds no bearing {designation!r}{why}; {hint} Else give the geometry: "
         "'ball_diameter', 'ball_count', 'pitch_diameter', 'contact_angle' and a 'preload' in N"
