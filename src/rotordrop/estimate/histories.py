@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,10 +55,14 @@ def finest_time(estimate: Estimate) -> Array:
 
 
 def history_columns(estimate: Estimate) -> tuple[Array, tuple[Column, ...]]:
-    """Time from power-off [s], shape (T,), and every history of every bearing against it."""
-    time = finest_time(estimate)
-    return time, tuple(
-        column for bearing in estimate.bearings for column in _columns(bearing, estimate.machine, time)
+    """Whole steps of time [s], shape (T,), and every history of every bearing against it.
+
+    Zero is the instant nearest to power-off, which is known no better than to half a step.
+    """
+    own = finest_time(estimate)
+    step = (own[-1] - own[0]) / (len(own) - 1)
+    return step * (round(own[0] / step) + np.arange(len(own))), tuple(
+        column for bearing in estimate.bearings for column in _columns(bearing, estimate.machine, own)
     )
 
 
@@ -105,6 +109,15 @@ def loads_of_balls(estimate: Estimate, name: str) -> Array:
     return numbers_of(estimate.machine.bearing(name)).element_loads_under(bearing.force_vector)
 
 
+def _by_quantity(columns: tuple[Column, ...], names: Sequence[str]) -> Iterator[tuple[Column, Array]]:
+    """A column of every quantity, and its values at all bearings, NaN where one has none, shape (T, B)."""
+    for quantity in dict.fromkeys(c.quantity for c in columns):
+        found = {c.bearing: c for c in columns if c.quantity == quantity}
+        one = next(iter(found.values()))
+        missing = replace(one, values=np.full(len(one.values), np.nan))
+        yield one, np.stack([found.get(name, missing).values for name in names], axis=1)
+
+
 def _marks(estimate: Estimate) -> dict[str, str]:
     """What every file says of a simulated record; nothing of a measured one."""
     return {"simulated_record": "yes"} if estimate.simulated_record else {}
@@ -131,17 +144,14 @@ def as_dataset(estimate: Estimate) -> xarray.Dataset:
 
     time, columns = history_columns(estimate)
     names = [bearing.name for bearing in estimate.bearings]
-    variables = {}
-    for quantity in dict.fromkeys(c.quantity for c in columns):
-        found = {c.bearing: c for c in columns if c.quantity == quantity}
-        one = next(iter(found.values()))
-        missing = np.full(len(time), np.nan)
-        values = np.stack([found[n].values if n in found else missing for n in names], axis=1)
-        variables[quantity] = (("time", "bearing"), values, {"units": one.unit, "long_name": one.text})
+    variables = {
+        one.quantity: (("time", "bearing"), values, {"units": one.unit, "long_name": one.text})
+        for one, values in _by_quantity(columns, names)
+    }
     attributes = {"drop": estimate.name, "machine": estimate.machine.name, "verdict": estimate.sentence}
     attributes |= _marks(estimate)
     data = xarray.Dataset(variables, coords={"time": time, "bearing": names}, attrs=attributes)
-    data["time"].attrs = {"units": "s", "long_name": "time from power-off"}
+    data["time"].attrs = {"units": "s", "long_name": "time from power-off, to half a step"}
     return data
 
 
@@ -211,13 +221,7 @@ def _hdf5(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pa
         file.attrs["verdict"] = estimate.sentence
         file.attrs.update(_marks(estimate))
         file.attrs["record_sha256"] = estimate.record.sha256
-        put(file, "time", time, Stored("time", "s", "time from power-off"))
+        put(file, "time", time, Stored("time", "s", "time from power-off, to half a step"))
         put(file, "bearing", names, Stored("bearing"))
-        for quantity in dict.fromkeys(c.quantity for c in columns):
-            found = {c.bearing: c for c in columns if c.quantity == quantity}
-            values = np.full((len(time), len(names)), np.nan)
-            for k, name in enumerate(names):
-                if name in found:
-                    values[:, k] = found[name].values
-            one = next(iter(found.values()))
-            put(file, quantity, values, Stored("time bearing", one.unit, one.text))
+        for one, values in _by_quantity(columns, names):
+            put(file, one.quantity, values, Stored("time bearing", one.unit, one.text))
