@@ -220,7 +220,9 @@ def _spectrum(level: Level) -> Figure:
 
 def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
     record = seen.record
-    planes = [f"{plane.bearing}: {', '.join(plane.names)}" for plane in record.planes]
+    between = {path.name for path in seen.motion.paths if not path.at_bearing}
+    ends = {", ".join(plane.names): plane.bearing for plane in record.planes}
+    planes = [f"{'between' if names in between else end}: {names}" for names, end in ends.items()]
     span = f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
     return (
         ("record", str(record.path.name if record.path else record.name)),

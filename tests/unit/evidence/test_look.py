@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from ast import literal_eval
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -657,3 +658,12 @@ def test_noise_is_named_and_what_it_hides_is_not_stated(noise, rows, tmp_path):
         assert plane.gap_determined == (rows > 1)
         low, high = plane.largest_interval_90
         assert low < GAP < high and high - low > 4.0 * noise
+
+
+def test_a_plane_between_the_bearings_has_the_name_of_neither(machine):
+    middle = [one.model_copy(update={"name": f"M{one.name}", "node": 12}) for one in machine.sensors[:2]]
+    three = machine.model_copy(update={"sensors": (*machine.sensors, *middle)})
+    drop = read_record(example_record_path("lp400_drop_060"), machine)
+    record = replace(drop, sensors=three.sensors, signals=drop.signals[:, [0, 1, 2, 3, 2, 3]])
+    read = dict(look_page(look(record, machine=three), drawn=False).facts)["channels"]
+    assert read.endswith("; between: MS_NDE_A, MS_NDE_B")
