@@ -15,9 +15,6 @@ from rotordrop.physics.pendulum import period_ratio, small_frequency
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.case import CentredStart, DropCase
 
-HUGE = 1e12
-"""Tolerance that lets every step of the given length pass."""
-
 
 def undamped(inputs):
     model = _without_losses(build_drop_model(example_machine("paper"), "quick"), inputs)

@@ -98,7 +98,6 @@ Json = Annotated[
     file_option("--json", "Write the result as JSON to FILE; '-' prints it in place of the summary."),
 ]
 Force = Annotated[bool, Option("--force", help="Overwrite what stands there already.")]
-TextFile = Annotated[Path | None, file_option("--output", "Write to FILE instead of printing.", "-o")]
 Report = Annotated[Path | None, file_option("--report", "Write the report, one offline HTML file.")]
 Profile = Annotated[Path | None, file_option("--profile", "Profile of the recorder, for its tails too.")]
 Tail = Annotated[
