@@ -176,7 +176,7 @@ def motion_of(
     sought = [path for path, given in zip(paths, gaps, strict=True) if given is None and path.at_bearing]
     open_ones = ", ".join(path.name for path in sought if not path.gap_determined)
     how = f"not determined by this record at {open_ones}" if open_ones else "by where the rotor touched"
-    notes = [f"air gap {how}; give it where it is known"] if sought else []
+    notes = [f"air gap {how} (unsure on soft supports); give it where it is known"] if sought else []
     if not angles_known:
         notes.append("vertical and sense of rotation taken from the record")
     return Motion(

@@ -226,7 +226,7 @@ def damaged(record):
 NAMES = ("S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B")
 A, B, C, D = NAMES
 EVERY = ", ".join(NAMES)
-NDE, DE, ENDS, CROSSED, OVER = f"{A}, {B}", f"{C}, {D}", f"{A}, {C}, {B}, {D}", f"{A}, {C}", f"{A}, {D}"
+NDE, DE, ENDS, CROSSED = f"{A}, {B}", f"{C}, {D}", f"{A}, {C}, {B}, {D}", f"{A}, {C}"
 BACK, RATE, UNIT = "non-monotonic time", "wrong sampling rate", "wrong unit factor"
 LOST, LOW = "dropped block", "recorder low-pass"
 TURNED, LATE = "inverted polarity", "missing pre-trigger"
@@ -234,28 +234,23 @@ TURNED, LATE = "inverted polarity", "missing pre-trigger"
 FAULTS = {
     "NaN": ("drop", signals(two_missing), "missing samples", C, "2 of 11001 samples are NaN"),
     "dead": ("drop", signals(dead), "dead channel", B, "around 3.0"),
-    "constant": ("drop", held(0, 99999, 3, 0.0), "dead channel", D, "moves by 0 m around 0 m"),
     "stuck": ("drop", held(6000, 500, 0), "stuck channel", A, "(25 ms) read exactly"),
     "held shortly": ("drop+", held(6000, 12, 0), "stuck channel", A, "12 samples (0.6 ms)"),
-    "six held": ("drop+", held(6000, 6, 1), "stuck channel", B, "6 samples (0.3 ms)"),
     "steps": ("drop+", held(9000, 6, 3, 0.0), "spikes", D, "2 steps of up to"),
     "spike": ("drop+", signals(spike), "spikes", C, "1 single samples"),
     "clock back": ("drop", at(5000, 4990), BACK, None, "after sample 5000 at -5e-05 s"),
-    "time twice": ("drop", at(100, 99), BACK, None, ""),
     "gap": ("drop", cut(without_60, True), LOST, None, "60 samples are missing"),
     "hidden gap": ("drop", cut(without_60, False), LOST, None, "1 jump(s) of most"),
     "twenty lost": ("fast_drop", lost(0.05, 20), LOST, None, ""),
     "copy": ("drop", cut(copied, False), "duplicate block", None, "repeat those from 0.025 s"),
     "half a rate": ("drop", clock(0.5), RATE, None, "at 60 Hz by the speed channel"),
-    "double rate": ("drop", clock(2.0), RATE, None, "so the clock is wrong"),
+    "double rate": ("drop", clock(2.0), RATE, None, "the clock is wrong"),
     "2 % fast": ("drop+", clock(1.02), RATE, None, "of the speed channel, +2.0 % or more"),
     "ms for s": ("drop", clock(1e-3, unit=1e3), RATE, None, "the clock gives 20 Hz over"),
     "s for ms": ("drop", clock(1e3, unit=1e-3), RATE, None, "in which no rotor moves by"),
     "no speed": ("drop", no_speed, "speed missing", None, "S_NDE_A"),
     "rpm for Hz": ("drop", speed(lambda r, _: 60 * r), "wrong speed unit", "speed", "rpm taken for Hz"),
-    "Hz for rpm": ("drop", speed(lambda r, _: r / 60), "wrong speed unit", "speed", "Hz taken for rpm"),
-    "half a speed": ("drop", speed(lambda r, _: 0.5 * r), "wrong speed", "speed", "so the speed is wrong"),
-    "double speed": ("drop", speed(lambda r, _: 2.0 * r), "wrong speed", "speed", "so the speed is wrong"),
+    "double speed": ("drop", speed(lambda r, _: 2.0 * r), "wrong speed", "speed", "the speed is wrong"),
     "pulse": ("drop+", speed(pulse), "speed readings", "speed", "1 readings jump, the first to 1"),
     "NaN speed": ("drop", speed(not_finite), "speed readings", "speed", "are not finite"),
     "dead speed": ("whole_drop", speed(lambda r, t: 0.0 * r), "dead speed", "speed", "from the begin"),
@@ -264,50 +259,26 @@ FAULTS = {
     "mm for µm": ("drop", times(all=1e3), UNIT, EVERY, "unit factor of 1000"),
     "µm for mm": ("drop", times(all=1e-3), UNIT, EVERY, "unit factor of 0.001"),
     "mil for µm": ("drop", times(all=25.4), UNIT, EVERY, "mil and µm mixed up"),
-    "µm for mil": ("drop", times(all=1 / 25.4), UNIT, EVERY, "mil and µm"),
     "one in mil": ("drop", times(c=1 / 25.4), UNIT, C, "mil and µm"),
-    "gain of two": ("drop+", times(c=2.0), "wrong gain", C, "reading about 1.6 ×"),
+    "gain of two": ("drop+", times(c=2.0), "wrong gain", C, "S_DE_A reading too much"),
     "inverted 0": ("drop", times(a=-1.0), TURNED, A, "it fits with S_NDE_A inverted"),
     "inverted 1": ("drop", times(b=-1.0), TURNED, B, "it fits with S_NDE_B inverted"),
-    "inverted 2": ("drop", times(c=-1.0), TURNED, C, "it fits with S_DE_A inverted"),
-    "inverted 3": ("drop", times(d=-1.0), TURNED, D, "it fits with S_DE_B inverted"),
     "axes": ("drop", order(1, 0, 2, 3), "swapped axes", NDE, "S_NDE_A and S_NDE_B exchanged"),
-    "axes, fast": ("fast_drop", order(1, 0, 2, 3), "swapped axes", NDE, "S_NDE_A and S_NDE_B exchanged"),
     "all axes": ("drop", order(1, 0, 3, 2), "swapped axes", EVERY, "against the spin"),
     "turned by a quarter": ("drop", lambda r: times(a=-1.0)(order(1, 0, 2, 3)(r)), "swapped axes", NDE, ""),
     "ends": ("drop", order(2, 3, 0, 1), "swapped ends", ENDS, "S_NDE_B and S_DE_B exchanged"),
-    "ends, fast": ("fast_drop", order(2, 3, 0, 1), "swapped ends", ENDS, "exchanged"),
     "crossed": ("fast_drop", order(2, 1, 0, 3), "swapped channels", CROSSED, "exchanged"),
-    "crossed over": ("fast_drop", order(3, 1, 2, 0), "swapped channels", OVER, "exchanged"),
-    "crossed, slow": (
-        "drop+",
-        order(2, 1, 0, 3),
-        "swapped channels",
-        CROSSED,
-        "by 15.7 standard deviations more",
-    ),
-    "crossed over, slow": (
-        "drop+",
-        order(3, 1, 2, 0),
-        "swapped channels",
-        OVER,
-        "by 18.4 standard deviations more",
-    ),
+    "crossed, slow": ("drop+", order(2, 1, 0, 3), "swapped channels", CROSSED, "by 15.7 standard"),
     "no drop": ("drop", window(-0.25, -0.01), "no drop in the record", None, "spans 26.5 µm, 20.5 µm"),
     "begins late": ("drop", window(0.002, 0.3), LATE, None, ""),
-    "begins shortly before": ("drop", window(-0.01, 0.3), LATE, None, ""),
     "begins thrown about": ("whole_drop", window(0.035, 0.6), LATE, None, ""),
     "short": ("drop+", window(-0.25, 0.1), "short record", None, "ends 100."),
     "damage": ("drop+", damaged, "damage on reading", None, "line 7"),
     "drift": ("drop+", signals(wander), "drift", A, "it wanders by"),
     "hum hides": ("drop", hum(100e-6, 60.0), "hum", EVERY, "mains hum of 60 Hz"),
     "low-pass 50": ("whole_drop", through(50.0, "low"), LOW, None, "holds no force of impacts"),
-    "low-pass 200": ("whole_drop", through(200.0, "low"), LOW, None, "holds no force of impacts"),
     "coupled 0.3": ("whole_drop", through(0.3, "high"), "AC coupling", None, "cannot rise"),
-    "coupled 1": ("whole_drop", through(1.0, "high"), "AC coupling", None, "cannot rise"),
     "late 0.5 ms": ("drop+", late(1, 5e-4), "late channel", B, "about 0.4 ms late"),
-    "late 1 ms": ("drop+", late(2, 1e-3), "late channel", C, "S_DE_A"),
-    "late 2 ms": ("drop+", late(3, 2e-3), "late channel", D, "S_DE_B"),
 }
 """Record, mistake, kind, channel and words of the one a warning with a tail (+), else a stop."""
 
@@ -315,7 +286,6 @@ TIMES = {
     "NaN": 0.01,
     "stuck": 0.05,
     "held shortly": 0.05,
-    "six held": 0.05,
     "spike": 0.2,
     "gap": 0.02995,
     "hidden gap": 0.02995,
@@ -545,6 +515,15 @@ class TestArrangement:
 def test_a_tail_that_still_moves(whole_drop, machine):
     found = only(whole_drop, machine, tail=whole_drop.window(1.5, 2.0))
     assert found.kind == "not settled"
+
+
+def test_a_tail_that_bounces_blames_no_channel(drop, tail, machine):
+    """A rotor that fell without a turn bounces straight up and down: it was "swapped channels", a stop."""
+    bounce = 12e-6 * np.cos(HZ * 110.0 * (tail.time - tail.time[0])) * np.sqrt(0.5)
+    level = np.mean(tail.signals, axis=0)
+    moving = replace(tail, signals=level + 0.1 * (tail.signals - level) + bounce[:, None])
+    found = [one for one in check_record(drop, machine, moving) if one.severity != "note"]
+    assert {(one.kind, one.severity) for one in found} == {("not settled", "warning")}
 
 
 def test_unusable_records_are_refused_with_all_faults(drop, machine, edited):

@@ -199,9 +199,9 @@ def _begins(evidence: Evidence) -> list[Finding]:
         return []
     if not isinstance(begun.error, NoDropError):
         raise begun.error or RecordError(begun.reason)
-    row = "begins-late" if begun.error.begins_late else "no-drop"
+    kind = "missing pre-trigger" if begun.error.begins_late else None
     humming = hum_instead_of_a_drop(evidence.record.whole, float(np.min(evidence.gaps)))
-    return humming or [found(row, seen=begun.error.seen, way_out=begun.error.remedy)]
+    return humming or [found("no-drop", kind=kind, seen=begun.error.seen, way_out=begun.error.remedy)]
 
 
 def _filters(evidence: Evidence) -> list[Finding]:
@@ -300,7 +300,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
 
 NO_CHECK_SEES = "No check sees: "
 UNSEEN_ANYWHERE = "exchanged blocks, jitter, limits with noise on them, up to 6 lost samples"
-UNSEEN = "gaps or all gains off by 20 %, the rotor's mass, ends or axes exchanged in the tail"
+UNSEEN = "gaps or gains off by 20 %, the rotor's mass, ends or axes exchanged in the tail"
 """What passes these checks by the faults of the bench, in any record and in one of a machine."""
 
 SEEN_BY: Mapping[str, str] = {

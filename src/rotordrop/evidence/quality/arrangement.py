@@ -226,14 +226,14 @@ def _wired_otherwise(
         return found("leaning", channel=plane.names, seen=seen, why=why)
     least = min(change.effort for change in fitting)
     simplest = [change for change in fitting if change.effort == least]
-    swapped = all(change.swaps for change in simplest)
+    kind = "swapped axes" if all(change.swaps for change in simplest) else None
     named = [
         name
         for i, name in enumerate(plane.names)
         if any(change.signs[i] < 0 or change.order[i] != i for change in simplest)
     ]
     causes = " or ".join(change.words(plane.names) for change in simplest)
-    return found("axes" if swapped else "inverted", channel=named, seen=seen, causes=causes)
+    return found("inverted", kind=kind, channel=named, seen=seen, causes=causes)
 
 
 def fall_of(record: Record, level: Array, sunk_at: int) -> Array:

@@ -294,7 +294,7 @@ class _Fault:
         if self.row == "turned":
             return f"{names} turned by about {np.degrees(np.arctan(size)):+.0f}°"
         if self.row == "gain":
-            return f"{names} reading about {1.0 + size:.1f} × what it should"
+            return f"{names} reading too {'much' if size > 0.0 else 'little'}"
         if size <= 0.0:
             return "sensors that read the more the farther off the rotor is"
         return f"sensors that saturate softly near {format_quantity(largest / size**0.5, 'length')}"
@@ -321,11 +321,11 @@ def read_otherwise(fall: Fall) -> list[Finding]:
     if any(other.row == "gain" and abs(value) < _WITHIN_TOLERANCE for _, value, other in alike):
         return []  # a gain that calibrated sensors may have explains as much
     largest = float(np.max(np.abs(fall.problem.record.signals)))
-    near = [
+    near = dict.fromkeys(
         other.words(value, largest)
         for _, value, other in alike[1:]
         if (other.row, other.channels) != (best.row, best.channels)
-    ]
+    )
     # what hits one channel as well as another is as likely something that the model leaves out
     anywhere = any(
         other.row == best.row and set(other.channels).isdisjoint(best.channels) for _, _, other in alike
