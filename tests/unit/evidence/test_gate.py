@@ -257,12 +257,10 @@ FAULTS = {
     "speed dies": ("whole_drop", speed(dies), "dead speed", "speed", "to nothing"),
     "negative": ("whole_drop+", speed(lambda r, t: -r), "negative speed", "speed", "the sign is left out"),
     "mm for µm": ("drop", times(all=1e3), UNIT, EVERY, "unit factor of 1000"),
-    "µm for mm": ("drop", times(all=1e-3), UNIT, EVERY, "unit factor of 0.001"),
     "mil for µm": ("drop", times(all=25.4), UNIT, EVERY, "mil and µm mixed up"),
     "one in mil": ("drop", times(c=1 / 25.4), UNIT, C, "mil and µm"),
     "gain of two": ("drop+", times(c=2.0), "wrong gain", C, "S_DE_A reading too much"),
     "inverted 0": ("drop", times(a=-1.0), TURNED, A, "it fits with S_NDE_A inverted"),
-    "inverted 1": ("drop", times(b=-1.0), TURNED, B, "it fits with S_NDE_B inverted"),
     "axes": ("drop", order(1, 0, 2, 3), "swapped axes", NDE, "S_NDE_A and S_NDE_B exchanged"),
     "all axes": ("drop", order(1, 0, 3, 2), "swapped axes", EVERY, "against the spin"),
     "turned by a quarter": ("drop", lambda r: times(a=-1.0)(order(1, 0, 2, 3)(r)), "swapped axes", NDE, ""),
@@ -512,13 +510,9 @@ class TestArrangement:
         assert [one.severity for one in found] == ["note", "note"]
 
 
-def test_a_tail_that_still_moves(whole_drop, machine):
-    found = only(whole_drop, machine, tail=whole_drop.window(1.5, 2.0))
-    assert found.kind == "not settled"
-
-
-def test_a_tail_that_bounces_blames_no_channel(drop, tail, machine):
+def test_a_tail_that_moves_or_bounces_blames_no_channel(whole_drop, drop, tail, machine):
     """A rotor that fell without a turn bounces straight up and down: it was "swapped channels", a stop."""
+    assert only(whole_drop, machine, tail=whole_drop.window(1.5, 2.0)).kind == "not settled"
     bounce = 12e-6 * np.cos(HZ * 110.0 * (tail.time - tail.time[0])) * np.sqrt(0.5)
     level = np.mean(tail.signals, axis=0)
     moving = replace(tail, signals=level + 0.1 * (tail.signals - level) + bounce[:, None])
