@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Event, Thread
+from time import monotonic
 from typing import Literal
 
 from rotordrop.errors import UsageError
@@ -44,12 +45,14 @@ def shown(progress: Shown, title: str) -> Iterator[Progress]:
 
 BETWEEN_LINES_S = 5.0
 """Pause between two lines where there is no terminal [s]; chosen, not measured."""
+FIRST_TOLD = 0.03
+"""Fraction done from which the time left is told [1]; chosen, not measured."""
 
 
 @contextmanager
 def told_in_lines(title: str) -> Iterator[Progress]:
-    """Tell stage and fraction in lines on standard error, for a log; none where all is done before."""
-    ended, latest = Event(), [""]
+    """Tell stage, fraction and time left in lines on standard error, for a log; none where all is done."""
+    ended, latest, begun = Event(), [""], monotonic()
 
     def say() -> None:
         said = ""
@@ -60,7 +63,7 @@ def told_in_lines(title: str) -> Iterator[Progress]:
                     sys.stderr.write(f"{said}\n")
 
     def tell(stage: str, fraction: float) -> None:
-        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
+        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %{_left(monotonic() - begun, fraction)})"
 
     lines = Thread(target=say, daemon=True)
     lines.start()
@@ -69,6 +72,14 @@ def told_in_lines(title: str) -> Iterator[Progress]:
     finally:
         ended.set()
         lines.join()
+
+
+def _left(seconds: float, fraction: float) -> str:
+    """What is left after so many seconds, in words; nothing where it is not to be told yet."""
+    if not FIRST_TOLD <= fraction < 1.0:
+        return ""
+    left = seconds * (1.0 - fraction) / fraction
+    return f", about {left:.0f} s left" if left < 90.0 else f", about {left / 60.0:.0f} min left"
 
 
 @contextmanager

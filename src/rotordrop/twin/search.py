@@ -49,7 +49,7 @@ from rotordrop.twin.mixture import Alternative, worth_keeping
 from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rises import LogLikelihoodGains, initial_guess_from
 from rotordrop.twin.rotor_search import with_found_rotor
-from rotordrop.twin.steps import GUESSES, WEIGHED, WHOLE, Steps
+from rotordrop.twin.steps import DESCRIBED, FORM, GUESSES, WEIGHED, WHOLE, Steps
 
 CALIBRATION_STAGE = Stage(until=0.06, force=0.07, share=0.01, passes=1)
 WHOLE_STAGE = replace(CALIBRATION_STAGE, until=0.2)
@@ -250,13 +250,13 @@ def track_drops(search: Search, machine: Machine, *, quick: bool = False) -> Can
         search.begins(WHOLE)
         # First: the coarse basis alone may not fit a record that the finer one fits, or lose it there.
         found = search.refine_if_followed(base)
-    if found is not None:
+    # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
+    if found is not None and (not machine.rotor.form_errs or fits(found)):
         search.begins(WEIGHED)
         found = search.weighed(found)
     if found is None or not fits(found):
         search.begins("trying extensions of the base model, and other starts")
         base = base or Candidate(machine=machine, fit=search.fit_base(machine))
-        # Where a beam stands for a rotor, its form is what does not fit: no extension stands for that.
         other = best_start(base, search) if machine.rotor.form_errs else best_structure(base, search)
         again = None if other.fit is base.fit else search.refine_if_followed(other)
         followed = [one for one in (found, again) if one is not None]
@@ -410,8 +410,10 @@ class Search:
         """The machine with its rotor as the records show it, where a beam stands for it."""
         if not machine.rotor.sought():
             return machine
+        self.begins(FORM, (FORM, *DESCRIBED))
         until = ROTOR_SEEN * fall_time(machine)
-        return with_found_rotor(machine, [recorded_drop(item, until) for item in self.drops.evidence])
+        drops = [recorded_drop(item, until) for item in self.drops.evidence]
+        return with_found_rotor(machine, drops, self.progress)
 
     def fit_base(self, machine: Machine) -> TrackedDrops:
         """Fit of a machine from its guesses by the coarse basis; where inconsistent, again in short steps."""

@@ -1,12 +1,14 @@
 """Long computations called from Python show a bar in a terminal and in a notebook, and nothing elsewhere."""
 
 import io
+import re
 import sys
+from time import sleep
 from types import SimpleNamespace
 
 import pytest
 
-from rotordrop.progress import shown
+from rotordrop.progress import BETWEEN_LINES_S, shown, told_in_lines
 
 
 @pytest.fixture
@@ -46,3 +48,16 @@ def test_notebooks_get_a_bar_and_who_gives_a_function_is_told(error, monkeypatch
         tell("step 1", 0.25)
     assert told == [("step 1", 0.25)]
     assert stream.getvalue() == ""
+
+
+@pytest.mark.slow
+def test_a_log_is_told_how_long_it_takes(capsys):
+    with told_in_lines("estimating") as tell:
+        sleep(0.2)
+        tell("a step", 0.02)  # too early to tell
+        sleep(BETWEEN_LINES_S)
+        tell("a step", 0.1)
+        sleep(BETWEEN_LINES_S)
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    assert first == "estimating: a step (2 %)"
+    assert re.fullmatch(r"estimating: a step \(10 %, about 4\d s left\)", second)

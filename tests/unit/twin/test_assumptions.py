@@ -15,7 +15,7 @@ from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, with_end_planes, with_sensors_of
-from rotordrop.twin.steps import GUESSES, LASTS, WEIGHED, WHOLE, Steps
+from rotordrop.twin.steps import BEYOND, DESCRIBED, FORM, GUESSES, LASTS, WEIGHED, WHOLE, Steps
 from rotordrop.twin.tracked_unbalance import plane_unbalances, polar_of
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
@@ -195,3 +195,15 @@ def test_a_calibrated_machine_has_fewer_steps_and_a_quick_one_is_not_counted():
     steps.begin(WHOLE, (WHOLE,))
     steps("a", 1.0)
     assert told[-1] == ("a", 1.0)
+
+
+def test_a_rotor_that_is_sought_is_a_step_more():
+    told: list[tuple[str, float]] = []
+    steps = Steps(lambda words, share: told.append((words, share)))
+    steps.begin(FORM, (FORM, *DESCRIBED))
+    steps("a", 1.0)
+    assert told[-1] == ("step 1 of 4, a", pytest.approx(LASTS[FORM] / sum(LASTS.values())))
+    steps.begin(GUESSES)
+    assert told[-1][0].startswith("step 2 of 4, ")
+    steps.begin("trying extensions of the base model")
+    assert told[-1][1] == pytest.approx(1.0 - LASTS[BEYOND] / sum(LASTS.values()))
