@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from rotordrop.rotor.suspension import (
 from rotordrop.rotor.whirl import matrices_of, whirl_modes
 
 Kind = Literal["order", "steady"]
-OrbitShape = Literal["any", "flat"]
 
 EQUAL_ORDER = 0.002
 """Relative tolerance of a rotor order [1] (chosen)."""
@@ -50,8 +49,8 @@ class Candidate:
     """How far the true place may be from ``value`` [same unit]."""
     reason: str
     """Where the value comes from."""
-    shape: OrbitShape = "any"
-    """Form of the orbit that the source would make."""
+    flat: bool = False
+    """Whether the source would make a flat orbit."""
     weight: float = 1.0
     """How likely the source is before the line is looked at, against other candidates [1]."""
     planes: tuple[str, ...] = ()
@@ -67,31 +66,19 @@ def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:
 
     Source: Neisi 2020, section 5.4: 1X, 2X, 3X in all tests; 1.5X, 2.5X, 3.5X, 4.5X as rub impact.
     """
-    whole = [
+    reasons = {1.0: "unbalance and runout", 0.5: "odd multiple of half the rotor speed: sign of rub"}
+    usual = "harmonic of the rotor speed: runout, misalignment, contact"
+    return tuple(
         Candidate(
-            name=f"{k}X",
-            family=f"{k}X",
+            name=f"{k:g}X",
+            family=f"{k:g}X",
             kind="order",
-            value=float(k),
+            value=k,
             tolerance=EQUAL_ORDER * k,
-            reason="unbalance and runout"
-            if k == 1
-            else "harmonic of the rotor speed: runout, misalignment, contact",
+            reason=reasons.get(k, reasons.get(k % 1.0, usual)),
         )
-        for k in range(1, highest + 1)
-    ]
-    half = [
-        Candidate(
-            name=f"{k + 0.5:g}X",
-            family=f"{k + 0.5:g}X",
-            kind="order",
-            value=k + 0.5,
-            tolerance=EQUAL_ORDER * (k + 0.5),
-            reason="odd multiple of half the rotor speed: sign of rub",
-        )
-        for k in range(highest)
-    ]
-    return (*whole, *half)
+        for k in (0.5 * half for half in range(1, 2 * highest + 1))
+    )
 
 
 def mains_candidates(frequencies: Sequence[float] = (50.0, 60.0), highest: int = 6) -> tuple[Candidate, ...]:
@@ -123,7 +110,7 @@ def pendulum_candidate(
         value=0.5 * (lowest + highest),
         tolerance=0.5 * (highest - lowest),
         reason=reason or f"swing in the race, {lowest:.2f} to {highest:.2f} Hz by amplitude",
-        shape="flat",
+        flat=True,
         planes=tuple(planes),
     )
 
@@ -205,10 +192,10 @@ def mixed_candidates(names: tuple[str, str], frequencies: tuple[float, float]) -
     for times in ((1, 1), (1, -1), (2, -1), (-1, 2), (2, 1), (1, 2)):
         value = sum(k * frequency for k, frequency in zip(times, frequencies, strict=True))
         signed = [(k if value > 0.0 else -k, name) for k, name in zip(times, names, strict=True)]
-        (first, name), (second, other) = sorted(signed, reverse=True)
+        terms = [("" if abs(k) == 1 else f"{abs(k)} × ") + name for k, name in sorted(signed, reverse=True)]
         found.append(
             Candidate(
-                name=f"{_times(first)}{name} {'+' if second > 0 else '−'} {_times(abs(second))}{other}",
+                name=(" + " if min(signed)[0] > 0 else " − ").join(terms),
                 family=f"{times} of two swings",
                 kind="steady",
                 value=abs(value),
@@ -219,10 +206,6 @@ def mixed_candidates(names: tuple[str, str], frequencies: tuple[float, float]) -
             )
         )
     return tuple(found)
-
-
-def _times(k: int) -> str:
-    return "" if k == 1 else f"{k} × "
 
 
 HIGHEST_MODE = 1000.0
@@ -350,7 +333,7 @@ def settled_modes(machine: Machine) -> tuple[Candidate, ...]:
         kind = "bending mode" if mode.share >= 0.5 else "support resonance"
         counted[kind] += 1
         places = [(1.0 - MODE_TOLERANCE) * frequency, (1.0 + MODE_TOLERANCE) * frequency]
-        places += [one.frequency for corner in corners for one in corner if one.place == mode.place]
+        places += [one.frequency for corner in corners for one in corner if one[1:3] == mode[1:3]]
         low, high = min(places), max(places)
         if high - low > 2.0 * WIDEST_MODE * frequency:
             continue
@@ -369,29 +352,21 @@ def settled_modes(machine: Machine) -> tuple[Candidate, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Mode:
+class _Mode(NamedTuple):
+    """Its number among those of its direction, share of the moving energy in the rotor, ends that oppose."""
+
     frequency: float
     horizontal: bool
-    order: int
-    """Among those of its direction, from 0."""
+    number: int
     share: float
-    """Of the moving energy in the rotor [1]."""
     damping: float
     opposed: bool
-    """Whether the ends move against each other."""
-
-    @property
-    def place(self) -> tuple[bool, int]:
-        return self.horizontal, self.order
 
 
 def _modes_at_rest(machine: Machine) -> list[_Mode]:
     supports = []
-    loads = equivalent_stiffness(machine)
-    for bearing, part, support in zip(
-        machine.touchdown_bearings, loads, touchdown_supports(machine), strict=True
-    ):
+    parts = zip(machine.touchdown_bearings, equivalent_stiffness(machine), strict=True)
+    for (bearing, part), support in zip(parts, touchdown_supports(machine), strict=True):
         first, *rest = support.links
         stiffness = first.stiffness.copy()
         stiffness[0, 0] = in_series(float(stiffness[0, 0]), part.load / float(bearing.air_gap))
@@ -404,38 +379,27 @@ def _modes_at_rest(machine: Machine) -> list[_Mode]:
     rotor = np.sum(energy[:m] + energy[n : n + m], axis=0)
     across = np.sum(energy[:n], axis=0) >= np.sum(energy[n:], axis=0)
     ends = modes.shapes[:, [supports[0].node - 1, supports[-1].node - 1], 0]
-    counted = {True: 0, False: 0}
-    found = []
-    for k, frequency in enumerate(modes.frequency):
-        horizontal = bool(across[k])
-        found.append(
-            _Mode(
-                frequency=float(frequency),
-                horizontal=horizontal,
-                order=counted[horizontal],
-                share=float(rotor[k]),
-                damping=float(modes.damping_ratio[k]),
-                opposed=bool((ends[k, 0] * ends[k, 1].conj()).real < 0.0),
-            )
-        )
-        counted[horizontal] += 1
-    return found
+    rows = (
+        modes.frequency,
+        across,
+        np.where(across, np.cumsum(across), np.cumsum(~across)),
+        rotor,
+        modes.damping_ratio,
+        (ends[:, 0] * ends[:, 1].conj()).real < 0.0,
+    )
+    return [_Mode(*row) for row in zip(*(one.tolist() for one in rows), strict=True)]
 
 
 def _softest_and_stiffest(machine: Machine) -> list[Machine]:
     """The machine at both ends of the ranges it states of stiffness and mass; empty where it states none."""
     factor = machine.rotor.stiffness_factor
-    open_to = {"rotor.stiffness_factor": (None if factor is None else factor.range, 0)}
+    stated = {"rotor.stiffness_factor": None if factor is None else factor.range}
     for bearing in machine.touchdown_bearings:
-        open_to[f"{bearing.name}.support.stiffness"] = (bearing.support.stiffness.range, 0)
-        open_to[f"{bearing.name}.support.mass"] = (bearing.support.mass.range, 1)
-    stated = {path: (ends, first) for path, (ends, first) in open_to.items() if ends is not None}
-    if not stated:
-        return []
-    return [
-        machine.with_values({path: ends[(first + k) % 2] for path, (ends, first) in stated.items()})
-        for k in (0, 1)
-    ]
+        stated[f"{bearing.name}.support.stiffness"] = bearing.support.stiffness.range
+        mass = bearing.support.mass.range
+        stated[f"{bearing.name}.support.mass"] = None if mass is None else mass[::-1]
+    ranges = {path: ends for path, ends in stated.items() if ends is not None}
+    return [machine.with_values({path: ends[k] for path, ends in ranges.items()}) for k in (0, 1) if ranges]
 
 
 def _conical(swings: Sequence[_Mode]) -> tuple[Candidate, ...]:
@@ -453,9 +417,8 @@ def _conical(swings: Sequence[_Mode]) -> tuple[Candidate, ...]:
             kind="steady",
             value=share,
             tolerance=CONICAL_TOLERANCE,
-            reason=f"the ends swing against each other: model, {share:.3f} times the frequency at which they "
-            "swing together",
-            shape="flat",
+            reason=f"the ends swing against each other: model, {share:.3f} times the pendulum",
+            flat=True,
             weight=3.0,  # once the pendulum is found, another line there is hardly a second one of it
             of_swing=True,
         ),

@@ -136,8 +136,8 @@ def name_lines(
         for (plane, line), result in sorted(
             zip(single, lines, strict=True), key=lambda at: at[0][1].strength
         ):
-            if result.named and result.kind in ("steady", "undecided") and _swings(result):
-                swings[plane, _swing_name(result)] = line
+            if result.named and result.kind in ("steady", "undecided") and (name := _swing(result)):
+                swings[plane, name] = line
         lines = [
             named(plane, line, (*candidates, *of_swings(line, _parents(plane, line, swings), candidates)))
             for plane, line in single
@@ -208,14 +208,10 @@ def _merged(line: Line, other: Line) -> Line:
     )
 
 
-def _swings(line: Line) -> bool:
-    """Whether the line is a swing or whirl, whose path along the race has multiples of its frequency."""
-    return not line.name.matches or line.name.matches[0].candidate.family in (PENDULUM, CONICAL)
-
-
-def _swing_name(line: Line) -> str:
-    """What a swing is called in the names of its multiples: whichever end it was seen at."""
-    return line.name.matches[0].candidate.family if line.name.matches else line.label
+def _swing(line: Line) -> str:
+    """What a swing or whirl is called at either end, of which multiples are seen; nothing of other lines."""
+    family = line.name.matches[0].candidate.family if line.name.matches else line.label
+    return family if family in (PENDULUM, CONICAL) or not line.name.matches else ""
 
 
 def _parents(

@@ -160,7 +160,7 @@ def _possible(line: LineEvidence, candidate: Candidate) -> bool:
         return False
     if candidate.narrow and (line.width > NARROW or line.frequency_error > STEADY_ERROR):
         return False
-    if candidate.shape == "flat" and abs(line.roundness) > FLAT_ORBIT:
+    if candidate.flat and abs(line.roundness) > FLAT_ORBIT:
         return False
     return not candidate.planes or line.plane in candidate.planes
 
