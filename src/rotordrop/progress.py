@@ -45,8 +45,6 @@ def shown(progress: Shown, title: str) -> Iterator[Progress]:
 
 BETWEEN_LINES_S = 5.0
 """Pause between two lines where there is no terminal [s]; chosen, not measured."""
-FIRST_TOLD = 0.03
-"""Fraction done from which the time left is told [1]; chosen, not measured."""
 
 
 @contextmanager
@@ -75,11 +73,8 @@ def told_in_lines(title: str) -> Iterator[Progress]:
 
 
 def _left(seconds: float, fraction: float) -> str:
-    """What is left after so many seconds, in words; nothing where it is not to be told yet."""
-    if not FIRST_TOLD <= fraction < 1.0:
-        return ""
-    left = seconds * (1.0 - fraction) / fraction
-    return f", about {left:.0f} s left" if left < 90.0 else f", about {left / 60.0:.0f} min left"
+    """What is left after so many seconds, in words; nothing where too little is done to tell."""
+    return f", about {seconds * (1.0 / fraction - 1.0):.0f} s left" if 0.03 <= fraction < 1.0 else ""
 
 
 @contextmanager

@@ -29,8 +29,7 @@ from rotordrop.track.input_state import corrections_by_record, rotor_likelihood_
 from rotordrop.track.problem import RecordedDrop, build_problem
 
 STEP = 2e-4
-"""Step of the derivatives, in standard deviations of the prior [1]: the readings tell the stiffness to some
-thousandths of one, and a longer step lets a search in that valley end early."""
+"""Step of the derivatives, in standard deviations of the prior [1]; the readings tell thousandths of one."""
 FARTHEST = 2.5
 """How far from the middle of its prior a number may be found, in standard deviations [1]."""
 ROUNDS = 25
