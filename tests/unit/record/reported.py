@@ -1,5 +1,6 @@
 """Forms of files and faults of recorders that users of other programs reported, made from one motion."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -500,6 +501,30 @@ REPORTED = [
         question=r"text\.names = .*with \[time\] step",
     ),
     Reported("signs apart", "a.csv", table().replace(b",-", b",-   ")),
+    Reported("bars", "a.csv", table(separator="|")),
+    Reported("two bytes a character", "a.csv", table().decode().encode("utf-16")),
+    Reported(
+        "quotes between blanks",
+        "a.txt",
+        re.sub(rb"[^,\n]+", rb'"\g<0>"', table([f"{n}[um]" for n in COUNTED], "", time="t[s]")).replace(
+            b",", b" "
+        ),
+        names=COUNTED,
+    ),
+    Reported(
+        "a comma in the seconds",
+        file="a.csv",
+        start=0.0,
+        content=table(
+            time="Zeit", separator=";", times=[f"14.03.2026 09:26:53,{i:04d}" for i in range(COUNT)]
+        ),
+    ),
+    Reported(
+        "a field too few",
+        file="a.csv",
+        content=b"".join([*LINES[:90], LINES[90].replace(b",", b" ", 1), *LINES[91:]]),
+        question="line 91: 4 columns where 5 are expected.*repair the line or export again",
+    ),
     Reported("a head of %", "a.txt", fortran().replace(b"#", b"%"), ("NDE_X", "NDE_Y", "DE_X", "DE_Y")),
     Reported("pages", "a.csv", b"".join([*LINES[:601], b"\nPage 2\n", LINES[0], *LINES[601:]])),
     *(

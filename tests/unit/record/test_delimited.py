@@ -2,20 +2,32 @@
 
 import numpy as np
 import pytest
-from tests.unit.record.test_ninety_recorders import COUNT, NAMES, READINGS, STEP, rows
 
 from rotordrop import example_machine, read_record
 from rotordrop.errors import RecordError
 from rotordrop.evidence.quality.recorder import check_clock
 from rotordrop.record.profile import Clock, Profile, TextLayout
 
+NAMES = ["S_NDE_A", "S_NDE_B", "S_DE_A", "S_DE_B"]
+COUNT, STEP = 60, 5e-5
+READINGS = np.round(
+    np.array([8.18, -6.98, -16.85, -16.31])
+    + np.outer(np.arange(COUNT), [-0.73, 0.21, 1.57, -3.25])
+    + np.random.default_rng(0).normal(0.0, 0.3, (COUNT, 4)),
+    2,
+)
 TIME = np.arange(-4, COUNT - 4) * STEP
 SPEED_HZ = 60.0
 
 
+def rows(first, *, speed="60.00", scale=1.0, digits=2):
+    """Fields of every sample: what stands in front, the readings, the speed."""
+    return [[*first(i), *(f"{scale * v:.{digits}f}" for v in READINGS[i]), speed] for i in range(COUNT)]
+
+
 def text_of(head, separator, first, **more):
     """A head and the rows below it, each behind its entry of the first column."""
-    table = rows(separator, ".", lambda i: [str(first[i])], **more)
+    table = rows(lambda i: [str(first[i])], **more)
     return "\n".join([head, *(separator.join(row) for row in table)]) + "\n"
 
 

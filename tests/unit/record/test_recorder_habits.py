@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from tests.unit.record.every_format import as_comtrade
-from tests.unit.record.test_ninety_recorders import COUNT, NAMES, READINGS, STEP, lined, rows
+from tests.unit.record.test_delimited import COUNT, NAMES, READINGS, STEP, rows
 
 from rotordrop import check_record, read_record
 from rotordrop.errors import RecordError
@@ -15,11 +15,11 @@ from rotordrop.record.profile import Profile, SpeedSource, TextLayout
 from rotordrop.record.readers import read_recording
 
 
-def table(first, *, separator=";", decimal=".", names=None, extra=()):
+def table(first, *, separator=";", names=None, extra=()):
     """Lines of a recording: what stands in front of the readings is given for every row."""
     head = names or ["Time [s]", *(f"{name} [um]" for name in NAMES), "Speed [Hz]"]
-    body = [[*row, *(word for _, word in extra)] for row in rows(separator, decimal, first)]
-    return lined(separator, [[*head, *(name for name, _ in extra)]], body)
+    body = [[*row, *(word for _, word in extra)] for row in rows(first)]
+    return "\n".join(map(separator.join, [[*head, *(name for name, _ in extra)], *body])) + "\n"
 
 
 def seconds(i):
