@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rotordrop.errors import RecordError
 from rotordrop.evidence.evidence import Evidence, Missing
-from rotordrop.evidence.quality import Finding, checked, found, refuse_unusable, sentences
+from rotordrop.evidence.quality import Finding, found, gate, refuse_unusable, sentences
 
 NO_TAIL = (
     "no settled tail: the air gap rests on its prior and on the contacts; give the readings at standstill"
@@ -46,7 +46,7 @@ def facts_of(evidence: Evidence) -> RecordFacts:
     """
     record, name = evidence.record, evidence.name
     try:
-        findings = checked(evidence)
+        findings = gate(evidence).findings
     except RecordError as error:  # a lost sensor keeps the gate from looking, but not the twin from following
         findings = (found("not-looked-at", why=error),)
     refuse_unusable(findings, name)

@@ -15,6 +15,7 @@ import numpy as np
 
 from rotordrop.errors import NoDropError, NothingFallsError, RecordError
 from rotordrop.evidence.ends import held_planes
+from rotordrop.evidence.events import nominal_gaps
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.given import require_drop, require_tail
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
@@ -27,7 +28,6 @@ from rotordrop.evidence.quality.fall import (
     check_exchanged,
     fell_as_described,
     read_otherwise,
-    undecided,
 )
 from rotordrop.evidence.quality.finding import (
     Finding,
@@ -90,7 +90,7 @@ def check_record(record: Record, machine: Machine, tail: Record | None = None) -
     require_drop(record, machine)
     require_tail(tail, record, machine)
     dropped = as_dropped(record, machine)
-    return checked(Evidence(record=record, machine=dropped, tail=tail, name=record.name))
+    return gate(Evidence(record=record, machine=dropped, tail=tail, name=record.name)).findings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,11 +101,6 @@ class Gate:
     """The worst first."""
     asked: frozenset[str]
     """Names of checks in `STAGES`."""
-
-
-def checked(evidence: Evidence) -> tuple[Finding, ...]:
-    """Pass a record through the gate; the facts it asks for are there for an estimate afterwards."""
-    return gate(evidence).findings
 
 
 @one_thread()
@@ -206,7 +201,7 @@ def _begins(evidence: Evidence) -> list[Finding]:
 
 def _filters(evidence: Evidence) -> list[Finding]:
     record, start = evidence.falling, known(evidence.beginning)
-    seen = check_coupling(record, start.coarse.instant)
+    seen = check_coupling(record, nominal_gaps(evidence.machine, record), start.coarse.instant)
     if seen or evidence.held:
         return seen
     turning = 2.0 * np.pi * start.levitated.frequency
@@ -216,12 +211,6 @@ def _filters(evidence: Evidence) -> list[Finding]:
 def _again(evidence: Evidence) -> list[Finding]:
     motion = _motion(evidence)
     return [] if motion is None else check_again(motion)
-
-
-def _bounces(evidence: Evidence) -> float:
-    """Angular frequency at which the rigid rotor bounces on the supports of the machine file [rad/s]."""
-    stiffness = sum(float(bearing.support.stiffness) for bearing in evidence.machine.touchdown_bearings)
-    return float(np.sqrt(stiffness / evidence.rotor.mass))
 
 
 def _length(evidence: Evidence) -> list[Finding]:
@@ -247,7 +236,10 @@ def _fall(evidence: Evidence) -> list[Finding]:
     own = None if isinstance(evidence.free_fall, Missing) else evidence.free_fall
     machine, floating = evidence.machine, evidence.floating
     if evidence.held:
-        return [undecided("only one of them fell"), *([] if own is None else read_otherwise(own))]
+        return [
+            found("undecided", why="only one of them fell"),
+            *([] if own is None else read_otherwise(own)),
+        ]
     seen = check_ends(near, machine, evidence.rotor, floating, coarse, own)
     if own is not None and not stops(seen):
         seen = check_exchanged(near, machine, floating, coarse, own) or seen
@@ -264,7 +256,8 @@ def _tail_at_rest(evidence: Evidence) -> list[Finding]:
     whole = still if isinstance(still, Missing) else still.whole
     seen = check_tail(whole, evidence.machine, evidence.floating, record)
     if evidence.tail is not None and not seen and not isinstance(whole, Missing):
-        sag = GRAVITY / _bounces(evidence) ** 2
+        stiffness = sum(float(bearing.support.stiffness) for bearing in evidence.machine.touchdown_bearings)
+        sag = GRAVITY * evidence.rotor.mass / stiffness  # of the rigid rotor
         return check_rest_in_record(whole, record, evidence.machine, evidence.floating.mean, sag)
     # a record that shows another gap than the file speaks for the tail that does so too
     if any(one.kind == "wrong unit factor" for one in seen) and _gaps(evidence):
@@ -338,7 +331,6 @@ __all__ = [
     "Gate",
     "Severity",
     "check_record",
-    "checked",
     "found",
     "gate",
     "not_seen",

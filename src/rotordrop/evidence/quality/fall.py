@@ -87,7 +87,7 @@ def check_ends(
     `own` is the fall fitted to the record as described, where it is known already.
     """
     if len({amb.node for amb in machine.ambs}) < 2 or len(record.planes) < 2:
-        return [undecided("it takes two AMB planes in the machine file and two sensor planes")]
+        return [found("undecided", why="it takes two AMB planes in the machine file and two sensor planes")]
     described = _Case(kind="", words="", channels=(), record=record, levitated=levitated)
     own = own or described.fitted(rotor, coarse)
     if own.misfit <= GOOD_FIT and own.end >= coarse.contact - _NEAR_CONTACT:
@@ -116,7 +116,7 @@ def check_ends(
     if other * _BETTER > mine or other > _BETTER * GOOD_FIT:
         words = f"as described, the fall deviates from the rotor model by {mine**0.5:.1f} × the noise"
         why = f"{words}, and no exchange of channels explains it clearly better"
-        return read_otherwise(own) or [undecided(why)]
+        return read_otherwise(own) or [found("undecided", why=why)]
     # a beam in place of the rotor falls otherwise than the rotor does: no record is refused for that
     beam = "; but a beam stands for the rotor, and the deviation may be that of its bending"
     return [
@@ -237,11 +237,6 @@ def _exchanged(record: Record, levitated: LevitatedModel, pairs: list[tuple[int,
         record=replace(record, signals=record.signals[:, order]),
         levitated=replace(levitated, mean=levitated.mean[order], amplitudes=amplitudes, noise=noise),
     )
-
-
-def undecided(why: str) -> Finding:
-    """That nothing tells the two ends apart, and why."""
-    return found("undecided", why=why)
 
 
 WRONG_GAIN = 0.08
