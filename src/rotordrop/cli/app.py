@@ -88,6 +88,12 @@ VERBS: dict[str, tuple[Verb, ...]] = {
         Verb("clearance", "Measure the air gap: a shaft pushed round its bearings", _HERE + "records"),
         Verb("waterfall", "Name the frequencies of a recorded or simulated coast-down", _HERE + "records"),
     ),
+    "Describe a machine": (
+        Verb("init", "Write a machine file to start from, or copy an example", _HERE + "machine"),
+        Verb("check", "Check a machine file and show what it amounts to", _HERE + "machine"),
+        Verb("bearings", "Search bearings by designation, however it is written", _HERE + "machine"),
+        Verb("convert", "Convert rotors between ROSS, shaft tables and machine files", _HERE + "machine"),
+    ),
     "Estimate": (
         Verb("estimate", "Estimate bearing force and stress from recorded drops", _HERE + "estimate"),
         Verb("watch", "Watch a folder: estimate and log every record that arrives", _HERE + "watch"),
@@ -105,12 +111,6 @@ VERBS: dict[str, tuple[Verb, ...]] = {
         Verb("simulate", "Simulate a drop and show forces, stresses and contacts", _HERE + "simulate"),
         Verb("coast-down", "Simulate a whole coast-down, from power-off to standstill", _HERE + "simulate"),
         Verb("critical-speeds", "Show critical speeds and damped modes against the speed", _HERE + "rotor"),
-    ),
-    "Describe a machine": (
-        Verb("init", "Write a machine file to start from, or copy an example", _HERE + "machine"),
-        Verb("check", "Check a machine file and show what it amounts to", _HERE + "machine"),
-        Verb("bearings", "Search bearings by designation, however it is written", _HERE + "machine"),
-        Verb("convert", "Convert rotors between ROSS, shaft tables and machine files", _HERE + "machine"),
     ),
     "Serve": (
         Verb("serve", "Serve a local page: look at drops, estimate, read reports", _HERE + "computer"),
@@ -183,7 +183,10 @@ def rotordrop(
         False, "--version", is_eager=True, callback=show_version, help="Print the version and stop."
     ),
 ) -> None:
-    """From a recorded rotor drop to touchdown-bearing force and stress."""
+    """From a recorded rotor drop to touchdown-bearing force and stress.
+
+    Begin with 'rotordrop init --example lp400', then look, check, estimate; each has a --help.
+    """
 
 
 def run(arguments: Sequence[str], program: typer.Typer = app, name: str = "rotordrop") -> int:

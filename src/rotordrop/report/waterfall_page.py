@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rotordrop._version import __version__
 from rotordrop.arrays import Array, ComplexArray
-from rotordrop.errors import UsageError
 from rotordrop.estimate.bearing_drop import AirGap, History
 from rotordrop.evidence.rest import STANDSTILL
 from rotordrop.known import NINETY, Known
@@ -374,8 +373,6 @@ def waterfall_figure(
     Named steady lines are marked above the map. Amplitudes are in µm; the colour bar says whether
     zero-to-peak or peak-to-peak.
     """
-    if against == "speed" and fall.speed is None:
-        raise UsageError("a waterfall against speed needs the rotor speed; this signal has none")
     if highest is not None:
         kept = np.abs(fall.frequency) <= highest
         fall = replace(fall, frequency=fall.frequency[kept], amplitude=fall.amplitude[:, kept])
@@ -420,8 +417,6 @@ def waterfall_figure(
 def _thinned(fall: Waterfall) -> tuple[Array, Array]:
     """Frequencies and amplitudes with the largest of neighbouring lines kept, as many as can be seen."""
     factor = max(1, math.ceil(fall.frequency.size / MOST_COLUMNS))
-    if factor == 1:
-        return fall.frequency, fall.amplitude
     whole = fall.frequency.size // factor * factor
     blocks = fall.amplitude[:, :whole].reshape(len(fall.time), -1, factor)
     middle = fall.frequency[:whole].reshape(-1, factor).mean(axis=1)
