@@ -254,8 +254,8 @@ def _sensitivity(
     found = next(iter(of_file), of_machine)
     if found is None:
         what = "is in volts and neither the recording nor the machine file gives a sensitivity"
-        ask = 'give sensitivity = "8 mV/um" in a profile or the machine file'
-        raise RecordError(f"{place}: channel {channel.label!r} {what}; {ask}")
+        ask = _profile_with('--sensitivity "8 mV/um"', place)
+        raise RecordError(f"{place}: channel {channel.label!r} {what}; give it there, or in a profile: {ask}")
     if of_machine is None or abs(of_machine / found - 1.0) <= _DISAGREE:
         return found, []
     return found, [
@@ -270,7 +270,7 @@ def speed_factor(channel: Channel, profile: Profile, place: str) -> float:
     unit = profile.speed.unit or profile.units.get(channel.label, channel.unit)
     words = f"{place}: the speed channel {channel.label!r}"
     if not unit:
-        raise RecordError(f'{words} has no unit; name it in the profile: [speed] unit = "Hz"')
+        raise RecordError(f'{words} has no unit; name it in the profile: [speed] unit = "rpm", or "Hz"')
     try:
         return parse_quantity(unit if unit[:1].isdigit() else f"1 {unit}", "speed")
     except UsageError as error:

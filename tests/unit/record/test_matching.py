@@ -91,7 +91,7 @@ def test_a_unit_that_is_missing_is_taken_from_the_profile_and_sensors_must_be_th
     blind = tuple(sensor.model_copy(update={"sensitivity": None}) for sensor in machine.sensors)
     record = record_of(recording(*SENSORS, unit="mV"), blind, profile=Profile(sensitivity="4 mV/um"))
     np.testing.assert_allclose(record.signals[1], 0.25e-6)
-    with pytest.raises(RecordError, match=r"'S_NDE_A' is in volts and neither the recording nor the machine"):
+    with pytest.raises(RecordError, match=r"'S_NDE_A' is in volts and neither .* --sensitivity \"8 mV/um"):
         record_of(recording(*SENSORS, unit="V"), blind)
     with pytest.raises(RecordError, match="the machine has no sensors"):
         record_of(recording(*SENSORS), ())
