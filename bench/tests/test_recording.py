@@ -28,19 +28,17 @@ def perfect(hidden):
 
 
 def along(drop):
-    """True displacement along the sensors on the clock of the record, from the histories, shape (N, S)."""
-    h = drop.histories
-    clock = float(h["first_250ms_t0"]) + np.arange(len(h["sensor_plane_displacement"])) / float(h["fs"])
-    record = drop.record
+    """True displacement along the sensors on the clock of the record, by straight lines, shape (N, S)."""
+    record, true = drop.record, drop.result
     time = record.time - drop.truth["t_off_in_record_s"]
-    inside = (time > -0.019) & (time < 0.045)
-    planes = [s.node for s in record.sensors]
-    places = [sorted(set(planes), key=planes.index).index(node) for node in planes]
-    columns = []
-    for s, sensor in enumerate(record.sensors):
-        xy = h["sensor_plane_displacement"][:, places[s]]
-        a = float(sensor.angle)
-        columns.append(np.interp(time[inside], clock, xy[:, 0] * np.cos(a) + xy[:, 1] * np.sin(a)))
+    inside = (time > 0.0) & (time < 0.045)
+    nodes = [sensor.node for sensor in record.sensors]
+    places = true.at_nodes(nodes)
+    angles = [float(sensor.angle) for sensor in record.sensors]
+    columns = [
+        np.interp(time[inside], true.time, places[:, s] @ [np.cos(a), np.sin(a)])
+        for s, a in enumerate(angles)
+    ]
     return inside, np.column_stack(columns)
 
 

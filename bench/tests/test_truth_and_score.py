@@ -68,27 +68,20 @@ def test_what_was_written_is_read_back_and_the_truth_apart(folder, synthetic, kn
     assert truth.name == "drop_060"
     assert truth.bearing_names == ("NDE", "DE")
     assert truth.of_bearing("DE")["peak_stress_Pa"] == pytest.approx(synthetic.truth["peak_stress_Pa"]["DE"])
-    with np.load(folder / "truth" / "drop_060.npz") as stored:
-        found, true = (one["bearing_displacement"] for one in (stored, synthetic.histories))
-        assert found == pytest.approx(true)
-        assert set(stored.files) == set(synthetic.histories)
 
 
-def test_numbers_and_histories_of_the_truth_agree(synthetic):
-    h, truth = synthetic.histories, synthetic.truth
-    clock = float(h["t0"]) + np.arange(len(h["bearing_force"])) / float(h["fs"])
-    whole, late = (clock >= 0) & (clock <= 0.2), (clock >= 0.15) & (clock <= 0.2)
+def test_the_numbers_of_the_truth_are_those_of_the_simulated_drop(synthetic):
+    drop, truth = synthetic.result, synthetic.truth
+    whole, late = drop.time <= 0.2, (drop.time >= 0.15) & (drop.time <= 0.2)
     for b, name in enumerate(("NDE", "DE")):
-        assert np.max(h["bearing_force"][whole, b]) == pytest.approx(truth["peak_force_N"][name], rel=0.01)
-        mean = truth["mean_force_0p15_0p2_N"][name]
-        assert np.mean(h["bearing_force"][late, b]) == pytest.approx(mean, rel=5e-3)
-        assert np.mean(h["max_inner_race_stress_MPa"][whole, b]) == pytest.approx(
-            1e-6 * truth["mean_stress_Pa"][name], rel=2e-3
-        )
+        force, contact = drop.bearing_force_magnitude[:, b], drop.contact_force[:, b]
+        assert np.max(force[whole]) == pytest.approx(truth["peak_force_N"][name], rel=0.01)
+        assert np.mean(force[late]) == pytest.approx(truth["mean_force_0p15_0p2_N"][name], rel=5e-3)
+        stress = np.mean(drop.max_stress[whole, b])
+        assert stress == pytest.approx(truth["mean_stress_Pa"][name], rel=2e-3)
         first = truth["first_contact_time_s"][name]
-        assert np.all(h["contact_force"][clock < first - 1e-4, b] == 0.0)
-        assert np.max(h["contact_force"][(clock > first) & (clock < first + 1e-3), b]) > 100.0
-    assert np.linalg.norm(h["bearing_force_xy"], axis=-1) == pytest.approx(h["bearing_force"])
+        assert np.all(contact[drop.time < first - 1e-4] == 0.0)
+        assert np.max(contact[(drop.time > first) & (drop.time < first + 1e-3)]) > 100.0
 
 
 def test_a_supplied_truth_is_read_by_the_paths_of_an_estimate():

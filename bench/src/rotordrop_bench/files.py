@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rotordrop.files import atomic_path, digest_of_file, make_folder, write_json, write_text
+from rotordrop.files import digest_of_file, make_folder, write_json, write_text
 from rotordrop.machine import Machine
 from rotordrop.machine.saving import save_machine
 from rotordrop.record.record import Record, as_recording, write_hdf5
@@ -26,12 +26,11 @@ def write_synthetic(
     *,
     name: str | None = None,
     formats: Sequence[Format] = ("csv",),
-    histories: bool = True,
 ) -> tuple[Path, ...]:
     """Write the files of a synthetic drop into a folder, and give them, the recording first.
 
-    The truth goes into a subfolder of its own, with the true histories where they are wanted; the tail is
-    always text. The stem of the files is the name of the drop by default.
+    The truth goes into a subfolder of its own; the tail is always text. The stem of the files is the name of
+    the drop by default.
     """
     folder, stem = Path(folder), name or str(drop.truth["name"])
     make_folder(folder / TRUTH_FOLDER)
@@ -44,13 +43,6 @@ def write_synthetic(
         write_record(drop.tail, paths[-1])
     paths.append(folder / TRUTH_FOLDER / f"{stem}.json")
     write_json(paths[-1], {**drop.truth, "name": stem, "record_sha256": hashes}, sealed=True)
-    if histories:
-        paths.append(paths[-1].with_suffix(".npz"))
-        # forces and stresses in single precision, displacements in double, as in the supplied files
-        precise = ("t0", "fs", "first_250ms_t0", "bearing_displacement", "sensor_plane_displacement")
-        stored = {k: v if k in precise else v.astype(np.float32) for k, v in drop.histories.items()}
-        with atomic_path(paths[-1]) as temporary, temporary.open("wb") as stream:
-            np.savez_compressed(stream, **stored)  # type: ignore[arg-type]
     return tuple(paths)
 
 

@@ -27,7 +27,7 @@ from rotordrop_bench.sensor_chain import (
     true_rows,
 )
 from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
-from rotordrop_bench.true_values import housing_motion, true_histories, true_motion, true_values
+from rotordrop_bench.true_values import housing_motion, true_motion, true_values
 from rotordrop_bench.violations import CHAIN, SENSORS
 
 TRUE_TOLERANCE = 1e-8
@@ -46,10 +46,8 @@ class SyntheticDrop:
     """The settled tail at standstill."""
     truth: dict[str, Any]
     """True parameters, sensor errors, forces and stresses, ready for JSON."""
-    histories: dict[str, Array] = field(repr=False)
-    """True histories, on the clock of the true power-off."""
     result: DropResult = field(repr=False)
-    """The simulated drop itself."""
+    """The simulated drop itself, with true forces and motions on the clock of the true power-off."""
 
     def reached(self, latest: float) -> bool:
         """Whether the rotor touched every bearing within this time of power-off [s]."""
@@ -103,7 +101,6 @@ def synthesize_drop(
         record=record,
         tail=_tail(hidden, rest, swing, chain, errors, seed, name) if tail and not held else None,
         truth=truth,
-        histories=true_histories(hidden, result, conditions, chain.sampling_rate),
         result=result,
     )
 

@@ -1,4 +1,4 @@
-"""The truth of a synthetic drop: motion at any time, numbers by the paths of an estimate, and histories."""
+"""The truth of a synthetic drop: motion at any time, and numbers by the paths of an estimate."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from rotordrop_bench.structure import support_matrices
 from rotordrop_bench.violations import Violations
 
 WHOLE, SETTLING = 0.2, (0.15, 0.2)
-HISTORY_BEFORE, CONTACT_WINDOW = 0.02, 0.25
-"""Windows of loads and of the settled force, and what histories and contacts hold [s], by definition."""
+CONTACT_WINDOW = 0.25
+"""Windows of loads, of the settled force and of contacts [s], by definition."""
 MPA = 1e-6
 SENSORS = {
     "gain": "gain",
@@ -195,56 +195,6 @@ def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[st
             for a in machine.ambs
         ],
     }
-
-
-def true_histories(
-    hidden: HiddenMachine, result: DropResult, conditions: DropConditions, rate: float
-) -> dict[str, Array]:
-    """True histories, keys and units of the supplied truth files: from 20 ms before power-off, B bearings.
-
-    Displacements in the sensor planes are those in the planes the owner states.
-    """
-    first = -round(HISTORY_BEFORE * rate)
-    time = np.arange(first, int(result.time[-1] * rate) + 1) / rate
-    amplitudes, _, speed = true_motion(hidden, result, conditions, time)
-    m = hidden.model.layout.n_modes
-    x, y = amplitudes[:, :m], amplitudes[:, m:]
-    nodes = list(dict.fromkeys(sensor.node for sensor in hidden.known.sensors))
-    planes = np.array([hidden.model.basis.node_row(node) for node in nodes]).reshape(len(nodes), m)
-    shape = hidden.model.parameters.bearing_shape
-    between = result.displacement - result.race_displacement
-    length = np.maximum(np.linalg.norm(between, axis=-1, keepdims=True), 1e-12)
-    pressed = result.contact_force[..., None] * between / length
-    force, normal, race = (
-        _sampled(time, result.time, values, 0.0)
-        for values in (result.bearing_force, pressed, result.race_speed)
-    )
-    stress = _sampled(time, result.time, result.max_stress, None)
-    return {
-        "t0": np.array(time[0]),
-        "fs": np.array(rate),
-        "bearing_force": np.linalg.norm(force, axis=-1),
-        "contact_force": np.linalg.norm(normal, axis=-1),
-        "max_inner_race_stress_MPa": MPA * stress,
-        "race_speed_hz": race[::10] / (2.0 * math.pi),
-        "speed_hz": speed[::10] / (2.0 * math.pi),
-        "bearing_displacement": np.stack([x @ shape.T, y @ shape.T], axis=-1),
-        "sensor_plane_displacement": np.stack([x @ planes.T, y @ planes.T], axis=-1),
-        "bearing_force_xy": force,
-        "contact_force_xy": normal,
-        "first_250ms_t0": np.array(time[0]),
-    }
-
-
-def _sampled(time: Array, grid: Array, values: Array, before: float | None) -> Array:
-    """Values on a grid at other times, by straight lines; before the grid a constant, or the first value."""
-    place = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, len(grid) - 2)
-    weight = np.clip((time - grid[place]) / (grid[place + 1] - grid[place]), 0.0, 1.0)
-    weight = weight.reshape((-1,) + (1,) * (values.ndim - 1))
-    sampled = (1.0 - weight) * values[place] + weight * values[place + 1]
-    if before is not None:
-        sampled[time < 0.0] = before
-    return np.asarray(sampled)
 
 
 KINDS: dict[str, Collection[str]] = {"one end held": ("magnets.stays_on",), **DEPARTURES}

@@ -213,7 +213,7 @@ def test_replays_and_correlations_that_cannot_be_are_refused(document, known, sy
 
 @pytest.mark.slow
 def test_command_writes_numbers_and_report(synthetic, document, tmp_path):
-    record, tail, *_ = write_synthetic(synthetic, tmp_path, formats=("h5",), histories=False)
+    record, tail, *_ = write_synthetic(synthetic, tmp_path, formats=("h5",))
     earlier, out, page = tmp_path / "earlier.json", tmp_path / "out.json", tmp_path / "report.html"
     earlier.write_text(json.dumps(document))
     arguments = ["estimate", str(example_path("lp400")), str(record), "--tail", str(tail)]

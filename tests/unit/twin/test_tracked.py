@@ -122,13 +122,11 @@ def test_loads_and_large_impacts_come_within_their_intervals(tracked, calibrated
 
 
 def test_estimated_orbit_has_the_shape_of_the_true_one_to_half_a_micrometre(workshop, tracked, synthetic):
-    true = synthetic.histories["bearing_displacement"]
-    start, rate = float(synthetic.histories["t0"]), float(synthetic.histories["fs"])
-    late = tracked.drop_instant.value - float(synthetic.truth["t_off_in_record_s"])
-    at = (workshop.forces.time + late - start) * rate
+    true, late = synthetic.result, tracked.drop_instant.value - float(synthetic.truth["t_off_in_record_s"])
+    at = workshop.forces.time + late
     for b in range(2):
         for axis in range(2):
-            there = np.interp(at, np.arange(len(true)), true[:, b, axis])
+            there = np.interp(at, true.time, true.displacement[:, b, axis])
             apart = workshop.forces.displacement[:, b, axis] - there
             assert np.std(apart) < 0.5e-6
             inside = np.abs(apart) < NINETY * workshop.forces.displacement_sigma[:, b, axis]
