@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 import rotordrop
-from rotordrop import build_drop_model, example_machine, read_record
+from rotordrop import build_drop_model, check_record, example_machine, read_record
 from rotordrop.elements.rotor import FORM
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.estimate.advice import Advice
@@ -165,6 +166,15 @@ def test_bending_and_inertia_are_found_from_the_record_without_a_contact_law(des
     assert rotor_fe(found).diametral_inertia == pytest.approx(true.diametral_inertia, rel=0.12)
     assert found.stiffness_factor.status == "estimated"
     assert "without a contact law" in found.stiffness_factor.source
+
+
+def test_a_rotor_that_is_sought_does_not_judge_what_a_filter_took(described, twelve):
+    for machine, seen in ((described, ["recorder low-pass"]), (twelve, [])):
+        record = read_record(RECORDS / "drop_060.h5", machine)
+        low = butter(2, 200.0, fs=record.sampling_rate, output="sos")
+        smooth = record.signals[0] + sosfilt(low, record.signals - record.signals[0], axis=0)
+        found = [one.kind for one in check_record(replace(record, signals=smooth), machine)]
+        assert [kind for kind in found if kind == "recorder low-pass"] == seen
 
 
 def test_what_is_known_of_a_rotor_is_not_sought(described, twelve):

@@ -202,7 +202,7 @@ def _begins(evidence: Evidence) -> list[Finding]:
 def _filters(evidence: Evidence) -> list[Finding]:
     record, start = evidence.falling, known(evidence.beginning)
     seen = check_coupling(record, nominal_gaps(evidence.machine, record), start.coarse.instant)
-    if seen or evidence.held:
+    if seen or evidence.held or evidence.machine.rotor.sought():  # a guessed rotor says nothing of a spectrum
         return seen
     turning = 2.0 * np.pi * start.levitated.frequency
     return check_low_pass(record, evidence.base, turning, start.coarse.instant)
