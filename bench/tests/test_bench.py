@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize(
     ("drops", "expected"),
     [
-        (DROPS[:73], "8dd028365b3c049a"),
+        (DROPS[:73], "1b05f9a545fadf57"),
         (DROPS[73:99], "cc2c7a5a86b4a900"),
         (DROPS[99:], "71515e7df797632f"),
     ],

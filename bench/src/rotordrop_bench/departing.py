@@ -256,9 +256,9 @@ def add_mode(
 def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, dy: Array) -> float:
     """Rates of a support that departs, and of its foundation, under a force [N]; power that they take [W].
 
-    Source: principal axes turned by an angle; ``K h (1 + k h²)`` along each, or the gradient of
-    ``(1 + k h²/2)`` times the energy of the linear springs, with h the whole deflection; slip of a bristle of
-    Dahl 1968, ``z' = (v - |v| z) / travel``. Not validated.
+    Source: principal axes turned by an angle; the gradient of ``(1 + k h²/2)`` times the energy of the linear
+    springs, with h the whole deflection; slip of a bristle of Dahl 1968, ``z' = (v - |v| z) / travel``.
+    Not validated.
     """
     n_q, h, row = p.rotor_at[L.N_COORDINATES], p.bearing_at[b, L.SUPPORT], p.bearing[b]
     s, own = departing_at(b, y, p)
@@ -268,13 +268,9 @@ def add_support(b: int, F_x: float, F_y: float, y: Array, p: KernelParameters, d
     cosine, sine, k = s[D.AXIS_COSINE], s[D.AXIS_SINE], s[D.HARDENING]
     along, across = cosine * x + sine * z, cosine * z - sine * x
     first, second = row[L.SUPPORT_STIFFNESS_X] * along, row[L.SUPPORT_STIFFNESS_Y] * across
-    if s[D.RADIAL] == 0.0:
-        first *= 1.0 + k * along * along
-        second *= 1.0 + k * across * across
-    else:  # no force without a potential
-        share = 1.0 + 0.5 * k * (along * along + across * across)
-        pull = 0.5 * k * (first * along + second * across)
-        first, second = first * share + pull * along, second * share + pull * across
+    share = 1.0 + 0.5 * k * (along * along + across * across)
+    pull = 0.5 * k * (first * along + second * across)
+    first, second = first * share + pull * along, second * share + pull * across
     damp_first = row[L.SUPPORT_DAMPING_X] * (cosine * vx + sine * vz)
     damp_second = row[L.SUPPORT_DAMPING_Y] * (cosine * vz - sine * vx)
     c_x, c_y = cosine * damp_first - sine * damp_second, cosine * damp_second + sine * damp_first
@@ -386,10 +382,7 @@ def spring_energy(b: int, y: Array, p: KernelParameters) -> float:
     along, across = cosine * x + sine * z, cosine * z - sine * x
     first, second = row[L.SUPPORT_STIFFNESS_X], row[L.SUPPORT_STIFFNESS_Y]
     first, second = 0.5 * first * along * along, 0.5 * second * across * across
-    if s[D.RADIAL] > 0.0:
-        energy: float = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
-    else:
-        energy = first * (1.0 + 0.5 * k * along * along) + second * (1.0 + 0.5 * k * across * across)
+    energy: float = (first + second) * (1.0 + 0.5 * k * (x * x + z * z))
     energy += 0.5 * s[D.SLIP_FORCE] * s[D.SLIP_TRAVEL] * (own[D.SLIP_X] ** 2 + own[D.SLIP_Y] ** 2)
     for mode, place in ((D.FOUNDATION_MODE, D.FOUNDATION), (D.TILT_MODE, D.TILT)):
         stored = 0.0

@@ -19,15 +19,15 @@ from rotordrop.physics.elementary import exp, sine_cosine
 
 # Columns of a departure, one row per bearing; SI units.
 AXIS_COSINE, AXIS_SINE = 0, 1  # of the angle from horizontal to the first principal axis of the support
-HARDENING, RADIAL = 2, 3  # k in F = K h (1 + k h²) [1/m²]; h along the axis, or the whole where RADIAL is 1
-SLIP_FORCE, SLIP_TRAVEL = 4, 5  # [N], [m]
-FOUNDATION_MODE, TILT_MODE = 6, 11  # of each: 1/M [1/kg], ω² along x and y [1/s²], 2ζω along x and y [1/s]
+HARDENING = 2  # k in the factor 1 + k h²/2 on the energy of the linear springs [1/m²], h the deflection
+SLIP_FORCE, SLIP_TRAVEL = 3, 4  # [N], [m]
+FOUNDATION_MODE, TILT_MODE = 5, 10  # of each: 1/M [1/kg], ω² along x and y [1/s²], 2ζω along x and y [1/s]
 COMPLIANCE, SQUARE_X, SQUARE_Y, DECAY_X, DECAY_Y, MODE_WIDTH = 0, 1, 2, 3, 4, 5
-CENTRE_X, CENTRE_Y = 16, 17  # centre of the bearing in the axes of the magnets [m]
-GAP_DRIFT, GAP_DRIFT_TIME = 18, 19  # [m] within [s]
-GAP_CLOSING, GAP_HEAT = 20, 21  # [m] when much more than [J] were rubbed
-CAGE_RATIO = 22  # turn of the cage per turn of the race
-LAW_PIECES, LAW = 23, 24
+CENTRE_X, CENTRE_Y = 15, 16  # centre of the bearing in the axes of the magnets [m]
+GAP_DRIFT, GAP_DRIFT_TIME = 17, 18  # [m] within [s]
+GAP_CLOSING, GAP_HEAT = 19, 20  # [m] when much more than [J] were rubbed
+CAGE_RATIO = 21  # turn of the cage per turn of the race
+LAW_PIECES, LAW = 22, 23
 LAW_UNTIL, LAW_WIDTH = contact.N_ENTRIES, contact.N_ENTRIES + 1  # behind a contact law, its end [m]
 MOST_PIECES = 8
 # Landing sleeve: its centre off the axis, half the difference of its largest and smallest radius [m], angle

@@ -30,7 +30,6 @@ DEPARTURES: dict[str, dict[str, Any]] = {
     "cubic support": {
         "support.hardening": (0.15, 0.5),
         "support.hardening_force": (PEAK_LOADS, PEAK_LOADS, "load"),
-        "support.hardening_radial": True,
     },
     "hysteretic support": {
         "support.slip_force": (0.2, 0.6, "load"),

@@ -130,7 +130,6 @@ def _departure(bearing: TouchdownBearing, v: Violations, load: float) -> Array:
         row[[D.AXIS_COSINE, D.AXIS_SINE]] = math.cos(angle), math.sin(angle)
     deflection = v["support.hardening_force"] / float(bearing.support.stiffness)
     row[D.HARDENING] = v["support.hardening"] / deflection**2
-    row[D.RADIAL] = float(v["support.hardening_radial"] and row[D.HARDENING] > 0.0)
     if row[D.LOOSE_WAY] > 0.0:
         row[D.TABLE_WAY_STEP :] = _seat_table(bearing, row[D.LOOSE_WAY], load)
     if (mass := v["foundation.mass"]) is not None:
