@@ -3,7 +3,6 @@
 import io
 import math
 import re
-from types import SimpleNamespace
 
 import pytest
 from tests.scaled_machines import TWELVE_NUMBERS
@@ -98,28 +97,6 @@ def test_numbers_that_do_not_fit_are_named(change, message):
         simple_machine(SimpleMachine(**(TWELVE_NUMBERS | change)))
 
 
-def test_the_command_takes_options_and_asks_for_the_rest(tmp_path, monkeypatch):
-    asked = []
-
-    def answer(question, **_):
-        asked.append(question)
-        return "soft"
-
-    monkeypatch.setattr("typer.prompt", answer)
-    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
-    said = {
-        key: ", ".join(value) if isinstance(value, tuple) else value for key, value in TWELVE_NUMBERS.items()
-    }
-    options = [f"--set={key}={value}" for key, value in said.items() if key != "support"]
-    target = tmp_path / "machine.toml"
-    assert run(["init", "--simple", str(target), *options]) == 0
-    assert len(asked) == 1
-    assert "support of the touchdown bearings" in asked[0]
-    assert load_machine(target).touchdown_bearings[0].support.stiffness.range == pytest.approx(
-        (1e7 / 7.0, 7e7), rel=1e-5
-    )
-
-
 class Terminal(io.StringIO):
     """What somebody types at a terminal."""
 
@@ -127,21 +104,23 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_an_answer_that_cannot_be_read_is_asked_for_again(tmp_path, monkeypatch, capsys):
+def test_what_no_option_gives_is_asked_for_until_it_can_be_read(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    typed = (
-        "60 kg\n1.1 m\n35 mm, 965 mm\n900 mm\n520 mm\n110 mm\n110 mm, 980 mm\n180 mm, 900 mm\n0 deg, 90 deg\n"
-    )
-    typed += "135 deg\nhello\n7014 ACD/HCP4A\n0.2\n0.25 mm\n9000 rpm\nfine\nG 2.5\nfirm\nstiff\n"
+    typed = "1.1 m\n35 mm, 965 mm\n900 mm\n520 mm\n110 mm\n110 mm, 980 mm\n180 mm, 900 mm\n0 deg, 90 deg\n"
+    typed += "135 deg\nhello\n7014 ACD/HCP4A\n0.2\n0.25 mm\n9000 rpm\nfine\nG 2.5\nfirm\nsoft\n"
     monkeypatch.setattr("sys.stdin", Terminal(typed))
-    assert run(["init", "--simple"]) == 0
+    assert run(["init", "--simple", "--set", "mass=60 kg"]) == 0
     asked = capsys.readouterr().err
     wrong = re.findall(r"Error: (\w+), such as .*?: (.*)", asked)
     assert [
         name for name, _ in wrong
     ] == "centre centre bearings sensor_angle designation gap grade support".split()
     assert "'0.2' has no unit" in wrong[5][1]
-    assert load_machine("machine.toml").rotor.centre_of_gravity == pytest.approx(0.52)
+    made = load_machine("machine.toml")
+    assert made.rotor.centre_of_gravity == pytest.approx(0.52)
+    assert made.rotor.mass == pytest.approx(60.0, rel=1e-3)
+    stiffness = made.touchdown_bearings[0].support.stiffness
+    assert stiffness.range == pytest.approx((1e7 / 7.0, 7e7), rel=1e-5)
 
 
 DYROBES = "Ele,L,OD,ID,Mass OD,Material\n,mm,mm,mm,mm,\n1,100,60,0,60,\n2,300,80,20,100,\n3,100,60,0,60,\n"
