@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from html import escape
 from itertools import count, cycle
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,5 +50,25 @@ def sketch(
         )
     parts += [f'<text x="{x}" y="{y}" text-anchor="end">{escape(mark)}</text>' for x, y, mark in marks]
     style = "font:12px sans-serif;fill:currentColor"
-    size = f'width="{WIDTH + 200}" height="{bottom + 24}"'
+    wide, tall = WIDTH + 200, bottom + 24
+    size = f'width="{wide}" height="{tall}" viewBox="0 0 {wide} {tall}"'
     return f'{text}<svg {size} style="{style}">{"".join(parts)}</svg>'
+
+
+def still(chart: Any) -> str:
+    """The curves of every pair of axes of a plotly figure as a small picture, where nothing can run."""
+    drawn: dict[str, dict[str, Any]] = {}
+    for trace in chart.data:
+        if trace.type == "scatter" and trace.mode == "lines" and (trace.line.width or 0.0) > 1.0:
+            drawn.setdefault(trace.yaxis or "y", {})[trace.name] = (trace.x, trace.y)
+    axes = {axis.plotly_name: axis for axis in (*chart.select_xaxes(), *chart.select_yaxes())}
+    across, up = (
+        next((a.title.text for name, a in axes.items() if name[0] == one and a.title.text), "")
+        for one in "xy"
+    )
+    titles = [note.text for note in chart.layout.annotations]
+    return "".join(
+        sketch(title, across, up, drawn[axis])
+        for axis, title in zip(drawn, [*titles, *[""] * len(drawn)], strict=False)
+        if axes[axis.replace("y", "yaxis")].scaleanchor is None
+    )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rotordrop.files import write_text
 from rotordrop.report.content import ReportContent
 from rotordrop.report.quantity import Quantity, unbroken
+from rotordrop.sketch import still
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -90,6 +91,7 @@ def _numbered_sections(content: ReportContent) -> list[dict[str, Any]]:
                 "number": number,
                 "caption": figure.caption,
                 "json": chart_json(figure.chart),
+                "still": "" if section.folded else still(figure.chart),
                 "height": int(figure.chart.layout.height or 400),
             }
             for number, figure in enumerate(section.figures, start=count + 1)

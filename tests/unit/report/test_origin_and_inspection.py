@@ -4,13 +4,16 @@ import hashlib
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
+
 from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.published import LaterMotion
 from rotordrop.known import Known
-from rotordrop.report.content import ReportContent
+from rotordrop.report.content import Figure, ReportContent, Section
 from rotordrop.report.estimate_page import inspection_section
 from rotordrop.report.origin import Origin, UsedFile, command_line
 from rotordrop.report.page import css_text, render_page
+from rotordrop.report.style import drawn_together
 
 
 def test_the_origin_names_who_when_how_and_from_what(tmp_path):
@@ -40,6 +43,14 @@ def test_a_running_title_cannot_leave_its_string():
     assert page.index("<noscript>") < page.index("<footer>")
     assert 'page " counter(page)' in page
     assert '@top-left { content: "T\\000022 \\00003c \\00002f style' in page
+
+
+def test_without_scripts_the_first_figures_are_small_pictures():
+    curve = drawn_together(np.array([0.0, 0.5]), {"NDE": {"force": np.array([1.0, 7.0])}}, "force", "N")
+    shown = Section("Force", figures=(Figure(curve, "The force."),))
+    page = render_page(ReportContent(title="T", sections=(shown, replace(shown, folded=True))))
+    assert page.count("<polyline") == 1 and "<noscript><pre>NDE</pre><svg" in page
+    assert all(f">{mark}</text>" in page for mark in ("7", "1", "500", "force [N]"))
 
 
 def estimate(drop_result, **changes):
