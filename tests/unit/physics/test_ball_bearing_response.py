@@ -62,18 +62,6 @@ def test_stiffness_is_minus_the_derivative_of_the_force_and_symmetric(touchdown_
         assert np.all(np.linalg.eigvalsh(stiffness * scale) > -1e-12 * size)
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_turning_the_displacement_by_one_pitch_turns_the_force(touchdown_bearing, arrangement):
-    constants = bearing_constants(touchdown_bearing(arrangement=arrangement, ball_count=5))
-    pitch = 2 * math.pi / 5
-    for q in displacements(3):
-        force = bearing_response(constants, q, row_spacing=SPACING).force
-        turned = bearing_response(constants, turn(q, pitch), row_spacing=SPACING).force
-        np.testing.assert_allclose(turned, turn(force, pitch), rtol=1e-9, atol=1e-9)
-        half = bearing_response(constants, turn(q, pitch / 2), row_spacing=SPACING).force
-        assert np.linalg.norm(half - turn(force, pitch / 2)) > 1e-6 * np.linalg.norm(force)
-
-
 def test_turning_the_balls_or_mirroring_turns_or_mirrors_the_force(touchdown_bearing):
     """The balls are their own mirror image (first on +y): x and the rotation about y change sign."""
     q = displacements(1)[0]

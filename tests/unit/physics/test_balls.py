@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 from tests.plain_bearing import BallBearingGeometry
-from tests.reference.differences import slopes
 
 from rotordrop.errors import SimulationError
 from rotordrop.machine import example_machine
@@ -41,10 +40,6 @@ def squeezes(shift, balls):
     return np.maximum(np.hypot(across, AXIAL) - GROOVE, 0.0)
 
 
-def force(shift, balls):
-    return ball_set_force(ENTRIES, balls, *shift, np.empty((2, 24)))
-
-
 @pytest.mark.parametrize("shift", SHIFTS)
 def test_largest_load_and_energy_of_all_balls(balls, shift):
     real = squeezes(shift, balls)[:23]
@@ -70,17 +65,6 @@ def test_padding_and_balls_out_of_contact_carry_no_load_and_lanes_add_everything
     assert ball_set_gradient(loose, balls, 1e-6, 2e-6) == (0.0, 0.0, 0.0, 0.0, 0.0)
     values = np.arange(24.0) ** 2
     assert lane_sum(values) == 4324.0
-
-
-@pytest.mark.parametrize("shift", SHIFTS[1:])
-def test_force_is_the_slope_of_the_energy_and_stiffness_that_of_the_force(balls, shift):
-    found = ball_set_gradient(ENTRIES, balls, *shift)
-    assert found[:2] == pytest.approx(force(shift, balls), rel=1e-9, abs=1e-6)
-    slope = slopes(lambda at: ball_set_energy(ENTRIES, balls, *at), shift, 1e-9)
-    assert slope == pytest.approx(force(shift, balls), rel=1e-5, abs=1e-2)
-    columns = slopes(lambda at: force(at, balls), shift, 1e-9)
-    expected = [columns[0][0], columns[0][1], columns[1][1]]
-    assert found[2:] == pytest.approx(expected, rel=1e-4, abs=1e-5 * abs(expected[0]))
 
 
 BALLS = {"ball_diameter": 9.525e-3, "conformity_inner": 0.53, "conformity_outer": 0.53}
