@@ -80,6 +80,8 @@ class Known:
             )
             if not fits:
                 raise UsageError(f"{name} is {one!r}; expected a number, in SI units")
+            if type(one) is int:
+                require(one, name, float)
             if name in ("standard_error", "allowance_90") and one is not None and one < 0.0:
                 raise UsageError(f"{name} is {one!r}; it must be zero or positive")
         for name in ("interval_90", "range", "bounds"):
@@ -89,7 +91,7 @@ class Known:
                 raise UsageError(f"{name} is {pair!r}; expected two numbers, the lower one first")
 
     def __float__(self) -> float:
-        return self.value
+        return float(self.value)
 
     def __repr__(self) -> str:
         known = ((one.name, getattr(self, one.name)) for one in fields(self))

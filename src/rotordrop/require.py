@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Collection, Iterable, Mapping
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,9 @@ from numpy.typing import ArrayLike
 
 from rotordrop.arrays import Array
 from rotordrop.errors import RecordError, RotordropError, UsageError
+
+LARGEST = sys.float_info.max
+"""Beyond it a whole number of Python is no float."""
 
 _WAYS = {
     "Machine": "load_machine('machine.toml') gives one",
@@ -42,9 +47,15 @@ def require(
     """
     value = value.item() if isinstance(value, np.generic) else value
     fits = isinstance(value, (*kinds, int) if float in kinds else kinds) or (none and value is None)
-    fits = fits and (not isinstance(value, bool) or bool in kinds) and (not among or value in among)
+    fits = (
+        fits
+        and (not isinstance(value, bool) or bool in kinds)
+        and (not among or value is None or value in among)
+    )
     if isinstance(value, int | float):
-        fits = fits and -math.inf < value < math.inf and least <= value <= most and value > above
+        fits = fits and abs(value) <= LARGEST and least <= value <= most and value > above
+    elif isinstance(value, str | PathLike) and PathLike in kinds:
+        fits = fits and "\0" not in str(value)
     if fits:
         return value
     expected = " or ".join(dict.fromkeys(_SPOKEN.get(kind.__name__, f"a {kind.__name__}") for kind in kinds))
@@ -85,7 +96,7 @@ def numbers(
             if given.dtype.kind not in "fiuO":
                 raise TypeError(f"they are of the kind {given.dtype}")
             array = np.array(np.ma.filled(given.astype(np.float64, copy=False), np.nan), subok=False)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise UsageError(
                 f"{name} is {_shown(values)} that is no array of real numbers ({error}). "
                 "Give numbers, np.nan where one is missing."

@@ -258,7 +258,7 @@ def in_si(value: object, kind: str, name: str) -> float:
         raise UsageError(
             f"{name} = {value} has no unit; write '{value} Hz' or '{value} rpm' (a float is taken as rad/s)"
         )
-    return float(value)
+    return float(require(value, name, float) if isinstance(value, int) else value)
 
 
 class InSI:
@@ -321,7 +321,7 @@ def format_quantity(value: float, kind: str, digits: int = 3) -> str:
         Significant digits.
     """
     value = float(numbers(value, "value", ()))
-    require(digits, "digits", int, least=1)
+    require(digits, "digits", int, least=1, most=17)
     scales = _kind(kind).scales
     if kind == "speed":
         turns = value / (2 * math.pi)

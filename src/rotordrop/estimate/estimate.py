@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib import import_module
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ from rotordrop.files import write_json
 from rotordrop.known import Correlation, Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
+from rotordrop.require import require
 from rotordrop.sketch import sketch
 from rotordrop.track.consistency import Check
 
@@ -288,17 +290,9 @@ class Estimate:
         return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 
     def bearing(self, name: str) -> BearingDrop:
-        """What happened at the bearing of a name.
-
-        Raises
-        ------
-        KeyError
-            If the machine has no such bearing; names those it has.
-        """
-        for one in self.bearings:
-            if one.name == name:
-                return one
-        raise KeyError(f"no bearing {name!r}; the machine has {', '.join(b.name for b in self.bearings)}")
+        """What happened at the bearing of a name."""
+        names = [one.name for one in self.bearings]
+        return self.bearings[names.index(require(name, "bearing", str, among=names))]
 
     def ball_loads(self, bearing: str) -> Array:
         """Load of every ball of a bearing [N], shape (T, rows, Z), at the times of its force."""
@@ -332,7 +326,7 @@ class Estimate:
         OutputError
             If the suffix names no format, or the file cannot be written.
         """
-        if Path(path).suffix.lower() == ".json":
+        if Path(require(path, "path", str, PathLike)).suffix.lower() == ".json":
             write_json(path, self.to_dict(), sealed=True)
             return
         from rotordrop.estimate.histories import write_histories

@@ -37,8 +37,9 @@ class Replay:
 
     def __post_init__(self) -> None:
         require(self.fixed, "fixed", str, PathLike, Mapping, none=True)
-        for name in ("draws", "starts", "threads"):
-            require(getattr(self, name), name, int, least=float(name != "draws"), none=name == "threads")
+        require(self.draws, "draws", int, least=0, most=100_000)
+        require(self.starts, "starts", int, least=1, most=1_000)
+        require(self.threads, "threads", int, least=1, none=True)
 
 
 Method: TypeAlias = Tracked | Replay

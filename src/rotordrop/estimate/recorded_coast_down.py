@@ -28,6 +28,9 @@ from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
 from rotordrop.spectrum.speed import fit_drag, fit_speed_profile
 
+MOST_UNEVEN = 0.01
+"""Share of uneven steps of the clock above which a spectrum means nothing [1] (chosen)."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedPlane:
@@ -67,6 +70,11 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     levitated rotor tells neither; it may float anywhere. A record that ends at rest shows centre and air gap;
     in one that ends before, both are those of a look at it, where it determines them.
     """
+    uneven = np.mean(np.abs(np.diff(record.time) * record.sampling_rate - 1.0) > 0.5)
+    if uneven > MOST_UNEVEN:
+        raise RecordError(
+            f"{uneven:.0%} of the steps of the clock are uneven; export the record without gaps"
+        )
     ends = end_columns(record.sensors, machine.rotor.node_positions)
     if len(ends) < len(record.sensors):
         record = record.of_channels(ends)

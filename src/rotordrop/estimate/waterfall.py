@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 
 from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
@@ -41,7 +42,7 @@ def waterfall(
         If the record cannot be used.
     """
     require(machine, "machine", Machine)
-    require(coast_down, "the coast-down", Record, str, Path)
+    require(coast_down, "the coast-down", Record, str, PathLike)
     require(choice, "choice", WaterfallChoice, none=True)
     if isinstance(coast_down, Record):
         require_drop(coast_down, machine)

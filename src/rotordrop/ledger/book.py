@@ -18,6 +18,7 @@ from rotordrop.estimate.published import Drop
 from rotordrop.ledger._store import Rows, append, read_rows
 from rotordrop.ledger._store import is_url as is_url
 from rotordrop.ledger._store import name_of as name_of
+from rotordrop.require import require
 
 QUANTITIES: Mapping[str, str] = {
     "peak_force_N": "N",
@@ -225,6 +226,7 @@ def remove_drop(where: str | Path, number: int) -> None:
 
 def logged_drops(where: str | Path | Log, *, machine: str | None = None) -> dict[int, LoggedDrop]:
     """Drops of a log by number, in the order they happened."""
+    require(machine, "name of a machine", str, none=True)
     return {n: drop for n, drop in read_log(where).drops.items() if machine in (None, drop.machine)}
 
 
@@ -323,6 +325,7 @@ def drop_of_estimate(drop: Drop, bearing_set: str, **known: Any) -> LoggedDrop:
     ``known`` is what the estimate does not know: ``duration`` [s], ``cause``, and ``recorded``, where its
     recorder wrote no date or a wrong one.
     """
+    require(drop, "drop", Drop)
     severity = [
         Severity(bearing=name, quantity=quantity, unit=unit, value=found.value, lower=ends[0], upper=ends[1])
         for name, bearing in sorted(drop.bearings.items())

@@ -27,7 +27,7 @@ from rotordrop.elements.values import Acceleration, Number, PositiveTime, defaul
 from rotordrop.errors import UsageError
 from rotordrop.known import Known, Status
 from rotordrop.machine.calibration import CalibrationOrigin
-from rotordrop.require import require
+from rotordrop.require import each, require
 from rotordrop.sketch import sketch
 from rotordrop.units import GRAVITY, format_quantity, in_si
 
@@ -381,7 +381,7 @@ class Machine(Description):
         UsageError
             If it has no AMB of a name, or none is left to let go.
         """
-        chosen, known = list(names), [amb.name for amb in self.ambs]
+        chosen, known = each(names, "names", str), [amb.name for amb in self.ambs]
         if not chosen:
             return self
         for name in chosen:

@@ -37,7 +37,6 @@ def save_machine(machine: Machine, path: str | os.PathLike[str]) -> None:
     from a table is written into the file, which therefore stands alone. Reading the file gives an equal
     machine.
     """
-    require(path, "path", str, os.PathLike)
     write_text(path, machine_text(require(machine, "machine", Machine)))
 
 

@@ -53,6 +53,8 @@ SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
 
 _TIME_UNITS = ("s", "ms", "us", "min")
+SLOWEST, FASTEST, FASTEST_SPIN = 1e-3, 1e9, 1e5
+"""Sampling rates [Hz] and speed [rad/s] beyond which a unit is mistyped (chosen)."""
 _PART = 65536
 """Samples of a long record that are resolved at a time (chosen)."""
 
@@ -94,26 +96,29 @@ class Record:
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", each(self.sensors, "sensors", Sensor))
         rate = float(numbers(self.sampling_rate, "sampling_rate", ()))
-        object.__setattr__(self, "sampling_rate", require(rate, "sampling_rate", float, above=0.0))
+        object.__setattr__(
+            self, "sampling_rate", require(rate, "sampling_rate", float, least=SLOWEST, most=FASTEST)
+        )
         require(self.speed_by_hand, "speed_by_hand", bool)
         require(self.path, "path", Path, none=True)
         require(self.sha256, "sha256", str)
         require(self.metadata, "metadata", Mapping, hint="Give the header as {name: text}")
         each(self.notes, "notes", str)
         each(self.warnings, "warnings", str)
-        shape = (numbers(self.time, "time", finite=True).size, len(self.sensors))
-        if np.shape(self.signals) != shape:
-            words = f"{shape[0]} times and {shape[1]} sensors need {shape}"
+        shape = (numbers(self.time, "time").size, len(self.sensors))
+        if np.shape(self.signals) != shape or 0 in shape:
+            words = f"{shape[0]} times and {shape[1]} sensors need {shape}, one of each at least"
             raise RecordError(f"signals have the shape {np.shape(self.signals)}; {words}")
-        if self.missing is not None and np.shape(self.missing) != shape:
-            raise RecordError(f"missing has the shape {np.shape(self.missing)}; expected {shape}")
+        if (m := self.missing) is not None and (np.shape(m) != shape or np.asarray(m).dtype != np.bool_):
+            raise RecordError(f"missing has the shape {np.shape(m)}; expected {shape}, True or False")
         if (self.speed_time is None) != (self.speed_readings is None):
             raise RecordError("speed_time and speed_readings belong together; give both or none")
         readings = None if self.speed_time is None else np.shape(self.speed_time)
-        lengths = {"time": None, "signals": None, "speed": shape[:1], "speed_time": None}
-        for name, length in (lengths | {"speed_readings": readings, "marks": None}).items():
+        lengths = {"time": shape[:1], "signals": None, "speed": shape[:1], "speed_readings": readings}
+        sizes = {name: (np.size(getattr(self, name)),) for name in ("speed_time", "marks")}
+        for name, length in (lengths | sizes).items():
             if getattr(self, name) is not None:
-                array = numbers(getattr(self, name), name, length)
+                array = numbers(getattr(self, name), name, length, finite=name != "signals")
                 array.setflags(write=False)
                 object.__setattr__(self, name, array)
 
@@ -378,7 +383,7 @@ class Record:
 
     def window(self, start: float, end: float) -> Self:
         """Give the samples from `start` to `end` [s], no copies of them; the speed readings stay whole."""
-        numbers([start, end], "start and end")
+        start, end = numbers([start, end], "start and end", (2,))
         slack = 1e-3 / self.sampling_rate
         inside = np.flatnonzero((self.time >= start - slack) & (self.time <= end + slack))
         if not len(inside):
@@ -559,7 +564,7 @@ def _record_of_channels(
 ) -> Record:
     """A record of channels in memory, with the speed given by hand or as readings."""
     if isinstance(speed, str | int | float):
-        constant = f"{require(in_si(speed, 'speed', 'speed'), 'speed', float)!r} rad/s"
+        constant = f"{require(in_si(speed, 'speed', 'speed'), 'speed', float, most=FASTEST_SPIN)!r} rad/s"
         rules = rules.model_copy(update={"speed": SpeedSource(constant=constant)})
     elif speed is not None:
         if not isinstance(speed, tuple) or len(speed) != 2 or not isinstance(speed[1], str):

@@ -27,7 +27,9 @@ REDUCTION = Reduction(modes=16, attachment=True)
 BEYOND_NOMINAL = 1.3
 """Highest speed of a diagram over the nominal one [1]: past the largest margin that API 617 asks for."""
 SPEEDS = 61
-"""Speeds of a diagram; chosen, not measured."""
+MOST_SPEEDS, FASTEST_SPIN = 10_000, 1e5
+"""Speeds of a diagram by default, and at most, as their shapes fill some 100 MB; speed [rad/s] beyond which a
+unit is mistyped; chosen, not measured."""
 _SPARE_MODES = 4
 """Modes computed beyond those asked for (chosen): a line that sinks with the speed comes from above."""
 _STANDSTILL = 1e-3
@@ -123,11 +125,11 @@ def campbell_lines(
 ) -> CampbellDiagram:
     """Campbell diagram of a reduced rotor on any supports; arguments as in `campbell_diagram`."""
     grid = np.atleast_1d(numbers(speeds, "speeds", finite=True))
-    require(count, "count", int, least=1)
+    require(count, "count", int, least=1, most=1000)
     if grid.ndim != 1 or not len(grid) or np.any(np.diff(grid) <= 0.0) or grid[0] < 0.0:
         raise UsageError("the speeds of a Campbell diagram must increase and not be negative")
-    if grid[-1] == 0.0:
-        raise UsageError("a Campbell diagram needs a speed above standstill")
+    require(float(grid[-1]), "highest speed [rad/s]", float, above=0.0, most=FASTEST_SPIN)
+    require(len(grid), "number of speeds", int, most=MOST_SPEEDS)
     mass = matrices_of(rotor, supports).mass
     slowest = _STANDSTILL * grid[grid > 0.0][0]
     followed: list[WhirlModes] = []

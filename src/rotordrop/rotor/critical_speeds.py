@@ -110,13 +110,15 @@ def critical_speed_map(
     (S,); by default 121 from 1e5 to 1e10 N/m.
     """
     require(machine, "machine", Machine)
-    require(count, "count", int, least=1)
+    require(count, "count", int, least=1, most=1000)
     given = np.geomspace(*DEFAULT_STIFFNESS, 121) if stiffness is None else stiffness
     grid = numbers(given, "stiffness", finite=True)
     if grid.ndim != 1 or not len(grid):
         raise UsageError("stiffness is no list of numbers [N/m]; give one at least")
     if not np.all(grid > 0.0):
         raise UsageError(f"stiffness must be positive, got {grid.min():g} N/m")
+    require(len(grid), "number of stiffnesses", int, most=10_000)
+    require(float(grid.max()), "largest stiffness [N/m]", float, most=1e20)
     fe = build_rotor_fe(machine)
     parts = equivalent_stiffness(machine)
     masses = [float(bearing.support.mass) for bearing in machine.touchdown_bearings]

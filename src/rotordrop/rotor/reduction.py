@@ -15,7 +15,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
-from rotordrop.errors import SimulationError, UsageError
+from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
 from rotordrop.physics.contact import contact_tangent
 from rotordrop.physics.linear_algebra import orthonormal, product, symmetric_eigen
@@ -54,6 +54,10 @@ class Reduction:
     """Free-free modes, the two rigid ones included; None for all finite-element coordinates."""
     attachment: bool = True
     """Whether residual-flexibility modes at the touchdown bearings are added."""
+
+    def __post_init__(self) -> None:
+        require(self.modes, "modes", int, none=True, least=N_RIGID)
+        require(self.attachment, "attachment", bool)
 
 
 PRESETS = {
@@ -148,10 +152,6 @@ def reduce_rotor(
         modes = free_free_modes(fe, choice.modes)
         rate = 2.0 * fe.modal_damping * modes.omega
         return _basis(fe, modes.shapes, modes.omega**2, np.diag(rate), choice, ())
-    if choice.modes < N_RIGID:
-        raise SimulationError(
-            f"{choice.modes} modes per plane are too few: the {N_RIGID} rigid modes are always needed"
-        )
     everything = free_free_modes(fe)
     kept = choice.modes
     inner, eigenvalues, damping = attachment_coordinates(fe, everything, kept, nodes)

@@ -33,6 +33,7 @@ class DropSeverity:
     """Of the estimate of this one drop [unit of value]."""
 
     def __post_init__(self) -> None:
+        require(self.name, "name", str)
         require(self.value, "value", float)
         require(self.standard_error, "standard_error", float, least=0.0)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
 from rotordrop.elements.magnet import REMANENCE_TIME
+from rotordrop.elements.values import MOST_TURNS
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.require import each, numbers, require
 from rotordrop.rotor.reduction import Reduction, reduction_of
@@ -26,8 +27,9 @@ class CentredStart:
     """The rotor starts straight, at rest and in the centre of all bearings."""
 
 
-FARTHEST, FASTEST, FASTEST_SPIN = 0.02, 100.0, 1e5
-"""Displacement [m] and velocity [m/s] at a start, speed [rad/s], beyond which a unit is mistyped (chosen)."""
+FARTHEST, FASTEST, FASTEST_SPIN, STRONGEST = 0.02, 100.0, 1e5, 1e7
+"""Displacement [m] and velocity [m/s] at a start, speed [rad/s] and force [N] beyond which a unit is wrong
+(chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +59,9 @@ class StateStart:
 
     state: Array
 
+    def __post_init__(self) -> None:
+        numbers(self.state, "state", finite=True)
+
 
 @dataclass(frozen=True, kw_only=True)
 class LevitatedStart:
@@ -82,10 +87,15 @@ class LevitatedStart:
         read["orbit"] = None if orbit is None else np.stack([orbit.real, orbit.imag])
         for name, values in read.items():
             if values is not None:
-                numbers(values, name, finite=True)
-        require(self.rotor_angle, "rotor_angle", float)
+                largest = np.abs(numbers(values, name, finite=True)).max(initial=0.0)
+                require(float(largest), f"the largest {name}", float, most=STRONGEST)
+        require(self.rotor_angle, "rotor_angle", float, least=-MOST_TURNS, most=MOST_TURNS)
         require(self.delay, "delay", float, least=0.0)
         require(self.remanence_time_constant, "remanence_time_constant", float, above=0.0)
+
+
+MOST_UNBALANCE = 10.0
+"""Unbalance that comes [kg m], beyond which a unit is mistyped (chosen): a blade of 20 kg at 0.5 m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,8 +113,8 @@ class UnbalanceJump:
 
     def __post_init__(self) -> None:
         require(self.node, "node", int, least=1)
-        require(self.amount, "amount", float)
-        require(self.phase, "phase", float)
+        require(self.amount, "amount [kg m]", float, above=0.0, most=MOST_UNBALANCE)
+        require(self.phase, "phase", float, least=-MOST_TURNS, most=MOST_TURNS)
         require(self.time, "time", float, least=0.0)
 
 
@@ -138,6 +148,11 @@ class MagnetEvent:
     """Its axis; both when left out."""
 
     def __post_init__(self) -> None:
+        require(self.action, "action", str, among=get_args(MagnetAction))
+        require(self.magnet, "magnet", str, none=True)
+        require(self.axis, "axis", str, none=True, among=("x", "y"))
+        for name in ("time", "below_speed", "rest_velocity"):
+            require(getattr(self, name), name, float, none=True)
         stated = [one for one in (self.time, self.below_speed, self.rest_velocity) if one is not None]
         if len(stated) != 1 or not 0.0 <= stated[0] < np.inf:
             raise SimulationError(
@@ -155,7 +170,7 @@ class MagnetEvent:
         >>> str(MagnetEvent.read("10 ms: lost NDE x"))
         'lost NDE x'
         """
-        when, _, what = (part.strip() for part in text.partition(":"))
+        when, _, what = (part.strip() for part in require(text, "event", str).partition(":"))
         actions: tuple[MagnetAction, ...] = get_args(MagnetAction)
         said = next((one for one in actions if what == one or what.startswith(f"{one} ")), None)
         where = what.removeprefix(said or "").split()
@@ -241,7 +256,7 @@ class DropCase(Case):
                 f"speed is {self.speed!r} rad/s; expected a finite number up to {FASTEST_SPIN:g}."
             )
         require(self.spin, "spin", str, among=get_args(SpinMode))
-        require(self.most_steps, "most_steps", int, least=1)
+        require(self.most_steps, "most_steps", int, least=1, most=10**12)
         require(self.jump, "jump", UnbalanceJump, none=True)
         reduction_of(self.reduction)
         if self.magnets is not None:
@@ -253,6 +268,8 @@ class DropCase(Case):
                 f"{count:.3g} of them; expected 1 to {MOST_OUTPUTS:g}, and {LONGEST:g} s at most. Give "
                 "others, or simulate a coast-down"
             )
+        for event in (*([self.jump] if self.jump else ()), *(self.magnets or ())):
+            require(event.time, "time of what comes [s]", float, none=True, most=self.duration)
         start = self.start
         if self.magnets is None or not isinstance(start, LevitatedStart):
             return
@@ -273,8 +290,9 @@ FIRST_WINDOW = 0.2
 """End of the first window of statistics of a coast-down [s]: what the paper simulates (Neisi 2020, section
 5.4)."""
 WINDOW = 1.0
-STOP_SPEED = 0.01
-"""Below this speed [rad/s], one turn in ten minutes, the rotor counts as standing and sticks."""
+DAY, STOP_SPEED = 86_400.0, 0.01
+"""Longest coast-down [s] (chosen); speed [rad/s], one turn in ten minutes, below which the rotor counts as
+standing and sticks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,7 +326,9 @@ class CoastDownCase(Case):
         given = () if self.duration is None else ("duration",)
         self._check("longest", "output_step", "stop_speed", "settled_error", *given)
         reduction_of(self.reduction)
-        require(self.rest, "rest", float, least=0.0, error=SimulationError)
+        require(self.rest, "rest", float, least=0.0, most=DAY, error=SimulationError)
+        require(self.last_time, "longest or duration", float, most=DAY, error=SimulationError)
+        require(self.settled_error, "settled_error", float, most=1e-6, error=SimulationError)
         require(self.settled_scheme, "settled_scheme", bool, error=SimulationError)
         if not self.stop_speed < abs(self.speed) <= FASTEST_SPIN:
             raise SimulationError(
@@ -316,9 +336,9 @@ class CoastDownCase(Case):
                 f"below {FASTEST_SPIN:g}. Give another speed."
             )
         per_window = FIRST_WINDOW / self.output_step
-        if per_window < 1.0 or abs(per_window - round(per_window)) > 1e-6:
+        if not 1.0 <= per_window <= 1e5 or abs(per_window - round(per_window)) > 1e-6:
             raise SimulationError(
-                f"output_step is {self.output_step:g} s; a whole number of steps must fit into "
+                f"output_step is {self.output_step:g} s; a whole number of steps, 1e5 at most, must fit into "
                 f"{FIRST_WINDOW:g} s. Choose 5e-5 s (20 kHz) or 1e-4 s (10 kHz), for example."
             )
 

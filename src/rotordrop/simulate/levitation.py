@@ -19,6 +19,10 @@ from rotordrop.simulate.case import CentredStart, LevitatedStart, PlacedStart, S
 from rotordrop.simulate.magnets import start_loop, with_springs_of
 from rotordrop.units import format_quantity
 
+DEEPEST = 1.1
+"""Distance over the air gap up to which a rotor starts [1], pressed into a race as by an impact;
+beyond it a unit is mistyped (chosen)."""
+
 _SPIN_MODES = {
     "dynamic": aerodynamics.EXPONENTIAL_IN_TIME,
     "prescribed": aerodynamics.PRESCRIBED_SPEED,
@@ -46,10 +50,26 @@ def start_of_drop(model: DropModel, case: Simulated) -> tuple[Array, KernelParam
     if looped:
         model = with_springs_of(model, case)
     state, parameters = _started(model, case)
+    if isinstance(case.start, LevitatedStart | PlacedStart):
+        _refuse_depth(model, state)
     if looped:
         _static, holding = levitated_static(model, getattr(case.start, "offset", None), case.speed)
         parameters = start_loop(model, case, holding, state, parameters)
     return state, parameters
+
+
+def _refuse_depth(model: DropModel, state: Array) -> None:
+    """Refuse a rotor that starts deeper in a race than an impact drives it."""
+    rows = model.parameters.bearing_shape
+    away = np.hypot(rows @ state[model.layout.modal_x], rows @ state[model.layout.modal_y])
+    for bearing, distance in zip(model.machine.touchdown_bearings, away, strict=True):
+        gap = float(bearing.air_gap)
+        if distance > DEEPEST * gap:
+            begins, air = format_quantity(float(distance), "length"), format_quantity(gap, "length")
+            raise SimulationError(
+                f"the rotor starts {begins} from the centre of {bearing.name}, whose air gap is {air}; "
+                "expected a start inside it. Give offset, orbit or displacement in metres"
+            )
 
 
 def _started(model: DropModel, case: Simulated) -> tuple[Array, KernelParameters]:
@@ -60,13 +80,8 @@ def _started(model: DropModel, case: Simulated) -> tuple[Array, KernelParameters
     if not isinstance(start, LevitatedStart) and any(amb.stays_on for amb in model.machine.ambs):
         parameters = _with_magnets(parameters, LevitatedStart(), levitated_static(model, None, case.speed)[1])
     if isinstance(start, StateStart):
-        state = np.array(start.state, dtype=np.float64)
-        if state.shape != (model.layout.size,):
-            raise SimulationError(
-                f"the start state has shape {state.shape}; this model expects ({model.layout.size},). "
-                "Use the layout of the same reduction."
-            )
-        return state, parameters
+        given = numbers(start.state, "state, of another layout or reduction,", (model.layout.size,))
+        return given.copy(), parameters
     state = model.at_rest()
     state[model.layout.rotor_speed] = case.speed
     if isinstance(start, CentredStart):
@@ -115,20 +130,14 @@ def rigid_amplitudes(model: DropModel, positions: Array, values: Array) -> Array
 
 def _placed(model: DropModel, start: PlacedStart, state: Array) -> Array:
     nodes = [bearing.node for bearing in model.machine.touchdown_bearings]
-    expected = (len(nodes), 2)
-    for name, value in (("displacement", start.displacement), ("velocity", start.velocity)):
-        if np.shape(value) != expected:
-            raise SimulationError(
-                f"the start {name} has shape {np.shape(value)}; expected {expected}: "
-                "x and y for each touchdown bearing."
-            )
     positions = np.asarray(model.fe.node_positions)[np.array(nodes) - 1]
     layout = model.layout
     for values, x, y in (
         (start.displacement, layout.modal_x, layout.modal_y),
         (start.velocity, layout.velocity_of(layout.modal_x), layout.velocity_of(layout.modal_y)),
     ):
-        amplitudes = rigid_amplitudes(model, positions, np.asarray(values, dtype=np.float64))
+        given = numbers(values, "displacement or velocity of the start", (len(nodes), 2))
+        amplitudes = rigid_amplitudes(model, positions, given)
         state[x], state[y] = amplitudes[:, 0], amplitudes[:, 1]
     return state
 
@@ -232,12 +241,7 @@ def _with_magnets(parameters: KernelParameters, start: LevitatedStart, holding: 
     if start.offset is not None:
         magnet[:, L.AMB_REFERENCE_X : L.AMB_REFERENCE_Y + 1] = start.offset
     if start.remanent_force is not None:
-        force = np.asarray(start.remanent_force, dtype=np.float64)
-        if force.shape != (n_a, 2):
-            raise SimulationError(
-                f"the remanent force has shape {force.shape}; expected ({n_a}, 2): "
-                "x and y for each AMB, in newtons."
-            )
+        force = numbers(start.remanent_force, "remanent_force", (n_a, 2))
         magnet[:, L.REMANENT_X : L.REMANENT_Y + 1] = force
     # a magnet that stays on has its whole force, and no remanent one beside it
     stays = magnet[:, L.AMB_STAYS] != 0.0

@@ -20,6 +20,7 @@ from rotordrop.elements.face import AXIAL_STATE
 from rotordrop.errors import SimulationError, UsageError, needing
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write
+from rotordrop.machine import Machine
 from rotordrop.physics.hertz import LineContact
 from rotordrop.require import each, require
 from rotordrop.rotor.layout import ROTOR_AXIAL
@@ -32,8 +33,6 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     import pandas
     import xarray
-
-    from rotordrop.machine import Machine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +77,7 @@ class ContactLog:
 
     def of_bearing(self, index: int) -> ContactLog:
         """The contacts of one bearing only."""
-        chosen = self.bearing == index
+        chosen = self.bearing == require(index, "index of a bearing", int)
         return ContactLog(**{f.name: getattr(self, f.name)[chosen] for f in fields(self)})
 
     def __len__(self) -> int:
@@ -170,7 +169,7 @@ class DropResult(SimulationResult):
         """
         if isinstance(bearing, str) and bearing in self.bearing_names:
             return self.bearing_names.index(bearing)
-        if isinstance(bearing, int) and -len(self.bearing_names) <= bearing < len(self.bearing_names):
+        if type(bearing) is int and -len(self.bearing_names) <= bearing < len(self.bearing_names):
             return bearing
         raise UsageError(
             f"there is no touchdown bearing {bearing!r}; there are {', '.join(self.bearing_names)}"
@@ -183,6 +182,8 @@ class DropResult(SimulationResult):
 
     def ball_loads(self, machine: Machine, bearing: int | str) -> Array:
         """Load of every ball of a bearing [N], shape (T, rows, Z); of the `machine` that was simulated."""
+        simulated = (self.machine_name,)
+        require(require(machine, "machine", Machine).name, "name of the machine", str, among=simulated)
         b = self.index_of(bearing)
         if self.heat is not None and b in self.heat.warmed:
             raise UsageError(

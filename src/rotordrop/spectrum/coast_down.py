@@ -158,8 +158,8 @@ class PlaneAnalysis:
 class CoastDownAnalysis:
     """What a coast-down shows, plane by plane and line by line."""
 
-    signal: CoastDownSignal
-    planes: Mapping[str, PlaneAnalysis]
+    signal: CoastDownSignal = field(repr=False)
+    planes: Mapping[str, PlaneAnalysis] = field(repr=False)
     lines: tuple[Line, ...]
     speed_law: SpeedLaw | None
 

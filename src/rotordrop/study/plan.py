@@ -74,7 +74,7 @@ class Until:
     """Half width of its 90 % interval relative to its value [1]."""
 
 
-_WHOLE = (TypeAdapter(Annotated[int, Field(strict=True, ge=1)]), "a whole number above zero")
+_WHOLE = (TypeAdapter(Annotated[int, Field(strict=True, ge=1, le=10**8)]), "a whole number from 1 to 1e8")
 _RULES: Mapping[str, tuple[TypeAdapter[Any], str]] = {
     "drops": _WHOLE,
     "shard": _WHOLE,

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rotordrop.errors import RotordropError, needing
+from rotordrop.errors import RotordropError, UsageError, needing
 from rotordrop.machine import Machine
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress, Shown, shown
@@ -87,7 +87,8 @@ def run_study(
     """
     require(study, "study", Study)
     require(folder, "folder", str, PathLike)
-    require(threads, "threads", int, none=True, least=1)
+    require(threads, "threads", int, none=True, least=1, most=1024)
+    require(dask, "dask", str, none=True)
     place = open_folder(study, folder)
     with alone_in(place), shown(progress, study.name) as tell:
         put_damaged_aside(place, study)
@@ -226,7 +227,10 @@ def _on_dask(place: StudyFolder, wanted: list[int], address: str, watch: _Watch)
         if address == "local":
             workers = {"n_workers": cpu_count() or 1, "threads_per_worker": 1, "dashboard_address": None}
             scheduler = stack.enter_context(distributed.LocalCluster(**workers))
-        client = stack.enter_context(distributed.Client(scheduler))
+        try:
+            client = stack.enter_context(distributed.Client(scheduler))
+        except (ValueError, OSError) as error:
+            raise UsageError(f"no Dask scheduler at {address!r}: {error}; give 'tcp://host:8786'") from error
         task = partial(work_on, str(place.path.resolve()))
         _drive(client.get_executor(pure=False), wanted, task, watch)
 

@@ -6,7 +6,7 @@ threads or the order of work.
 
 from __future__ import annotations
 
-import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -71,11 +71,11 @@ def grid(seed: int, first: int, last: int, spreads: Mapping[str, Distribution]) 
     """Cells in the order of the product, again and again until all drops are placed, shape (n, V)."""
     names = list(spreads)
     grids = [name for name in names if spreads[name].shape == "grid"]
-    cells = list(itertools.product(*(range(len(spreads[name].numbers)) for name in grids)))
+    sizes = [len(spreads[name].numbers) for name in grids]
     share = independent(seed, first, last, len(names))
-    for row, drop in enumerate(range(first, last)):
-        for name, place in zip(grids, cells[drop % len(cells)], strict=True):
-            share[row, names.index(name)] = (place + 0.5) / len(spreads[name].numbers)
+    cells = np.unravel_index(np.arange(first, last) % math.prod(sizes), sizes)
+    for name, size, places in zip(grids, sizes, cells, strict=True):
+        share[:, names.index(name)] = (places + 0.5) / size
     return share
 
 

@@ -17,6 +17,7 @@ from scipy.stats import beta, binom
 from rotordrop.arrays import Array
 from rotordrop.errors import DamagedFileError, OutputError, UsageError, needing, unknown_key
 from rotordrop.known import Known
+from rotordrop.require import require
 from rotordrop.sketch import sketch
 from rotordrop.study.folder import StudyFolder, read_plan, read_shards, study_of
 from rotordrop.study.plan import Study
@@ -82,7 +83,7 @@ class StudyResults:
 
     def column(self, name: str) -> Array:
         """A quantity or a varied value of every drop, shape (N,) [SI]."""
-        if name in self.numbers:
+        if require(name, "column", str) in self.numbers:
             return self.numbers[name]
         if name in self.varied:
             return self.varied[name]
@@ -147,7 +148,7 @@ def quantile(values: ArrayLike, share: float) -> Known:
     Source: David and Nagaraja, Order Statistics, 2003, section 7.1: the number of values below the quantile
     is binomial.
     """
-    if not 0.0 < share < 1.0:
+    if not 0.0 < require(share, "share", float) < 1.0:
         raise UsageError(f"quantile {share!r}; expected a number between 0 and 1, such as 0.99")
     x = np.sort(np.asarray(values, dtype=np.float64))
     x = x[np.isfinite(x)]
@@ -171,7 +172,7 @@ def exceedance(values: ArrayLike, limit: float) -> Known:
     Source: Clopper and Pearson, Biometrika 26, 1934. Values that are NaN count as not above.
     """
     x = np.asarray(values, dtype=np.float64)
-    n, k = len(x), int(np.count_nonzero(x > limit))
+    n, k = len(x), int(np.count_nonzero(x > require(limit, "limit", float)))
     if n == 0:
         return share_of(math.nan, 0, 0, 0)
     return share_of(k / n, k, k, n)

@@ -24,7 +24,7 @@ from rotordrop.record.record import Record
 from rotordrop.require import each, numbers, require
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.reduction import Reduction, reduce_rotor
-from rotordrop.rotor.suspension import Support, suspension_of
+from rotordrop.rotor.suspension import SUSPENSIONS, Support, suspension_of
 from rotordrop.rotor.whirl import matrices_of
 from rotordrop.track.input_state import (
     TURNED,
@@ -440,7 +440,7 @@ def _time_step(record: Record) -> float:
         )
     steps = np.diff(record.time)
     dt = float(np.mean(steps))
-    if float(np.max(np.abs(steps - dt))) > EVEN * dt:
+    if float(np.max(np.abs(steps - dt))) >= EVEN * dt:
         raise RecordError(
             f"the samples lie {steps.min():.6g} to {steps.max():.6g} s apart; expected an even clock"
         )
@@ -459,7 +459,7 @@ def _known_force(node: int, force: ArrayLike, count: int) -> Array:
 
 def _held_values(machine: Machine, held: str) -> dict[str, Known]:
     """Stiffness and damping of the AMBs by path; refuses a guess of the program, as the force hangs on it."""
-    if held != "AMBs":
+    if require(held, "held", str, among=SUSPENSIONS) != "AMBs":
         return {}
     values = {f"ambs.{amb.name}.{name}": getattr(amb, name) for amb in machine.ambs for name in AMB_VALUES}
     for path, value in values.items():

@@ -69,6 +69,8 @@ def test_histories_are_written_and_read_back(estimate, tmp_path, suffix):
 def test_a_format_nobody_knows_is_refused(estimate, tmp_path):
     with pytest.raises(OutputError, match=r"'\.xls' is not a format of histories; write one of \.h5"):
         estimate.save(tmp_path / "histories.xls")
+    with pytest.raises(UsageError, match="bearing is 'X'; expected one of NDE, DE"):
+        estimate.ball_loads("X")
 
 
 def test_without_its_package_a_table_says_what_to_install(estimate, tmp_path, monkeypatch):

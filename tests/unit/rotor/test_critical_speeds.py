@@ -151,21 +151,12 @@ def test_lines_that_cross_are_followed_through():
 @pytest.mark.parametrize(
     ("request_of", "message"),
     [
-        (
-            lambda paper, _: critical_speed_map(paper, [0.0, 1e6]),
-            r"must be positive, got 0 N/m",
-        ),
-        (
-            lambda _, fe: critical_speeds(fe, [spring(2, 1e6)], whirl="sideways"),
-            "'sideways'; expected one of stand",
-        ),
+        (lambda paper, _: critical_speed_map(paper, [0.0, 1e6]), "must be positive, got 0 N/m"),
+        (lambda _, fe: critical_speeds(fe, [spring(2, 1e6)], whirl="sideways"), "'sideways'; expected"),
         (lambda _, fe: critical_speeds(fe, []), "springs at two nodes at least"),
-        (
-            lambda paper, _: suspension_of(paper, "air"),
-            "suspension is 'air'; expected one of free-free, AMBs",
-        ),
+        (lambda paper, _: suspension_of(paper, "air"), "suspension is 'air'; expected one of free-free"),
         (lambda paper, _: campbell_diagram(paper, [10.0, 5.0]), "must increase"),
-        (lambda paper, _: campbell_diagram(paper, [0.0]), "needs a speed above standstill"),
+        (lambda paper, _: campbell_diagram(paper, [0.0]), "highest speed .* is 0.0; expected a positive"),
         (lambda paper, _: equivalent_stiffness(paper)[0].equivalent("exact"), "unknown .* 'exact'; choose"),
     ],
 )

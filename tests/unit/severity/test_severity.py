@@ -139,13 +139,6 @@ def test_doubt_of_scatter_or_of_the_condition_is_said():
     assert found.worst_condition is None
 
 
-def test_wrong_calls_are_refused():
-    with pytest.raises(UsageError, match="1 drop given, at least two"):
-        rank_drops([DropSeverity(name="a", value=1.0, standard_error=0.1)])
-    with pytest.raises(UsageError, match="'a': interval from 3 to 2 is upside down"):
-        DropSeverity.from_interval("a", 2.5, (3.0, 2.0))
-
-
 NUMBERS = st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=60)
 
 

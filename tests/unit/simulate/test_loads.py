@@ -9,7 +9,7 @@ import pytest
 from tests.validation.rigid_machine import linked, rigid_model
 
 from rotordrop import build_drop_model, example_machine, simulate_drop
-from rotordrop.errors import MachineFileError, SimulationError, UsageError
+from rotordrop.errors import MachineFileError, RotordropError, SimulationError, UsageError
 from rotordrop.evidence.free_rotor import held_by
 from rotordrop.known import NINETY
 from rotordrop.machine import loads_machine
@@ -144,10 +144,7 @@ def test_the_magnets_hold_the_load_before_the_release(paper):
     [
         (down(""), "a load needs either 'force' or 'over_time'"),
         (down('force = "3 N"').replace("node = 2", "node = 99"), "node 99 is outside the rotor"),
-        (
-            down('force = "3 N"').replace("-90 deg", "axial"),
-            r"nothing stops the rotor .* towards higher nodes",
-        ),
+        (down('force = "3 N"').replace("-90 deg", "axial"), "nothing stops the rotor .* higher nodes"),
         (
             down('over_time = [{ time = "1 s", force = "1 N" }, { time = "1 s", force = "2 N" }]'),
             "time 1 s of point 2 does not exceed 1 s before it; order them",
@@ -316,14 +313,14 @@ def test_a_delay_holds_the_rotor_first(levitated):
     [
         (LevitatedStart(orbit=np.zeros(3)), r"orbit has shape \(3,\); expected \(2,\)"),
         (
-            LevitatedStart(remanent_force=np.array([0.0, 50.0])),
-            r"remanent force has shape \(2,\); expected \(2, 2\)",
+            LevitatedStart(remanent_force=np.zeros(2)),
+            r"remanent_force has the shape \(2,\); expected \(2, 2\)",
         ),
-        (StateStart(state=np.zeros(7)), r"start state has shape \(7,\); this model expects \(54,\)"),
+        (StateStart(state=np.zeros(7)), r"state, .* has the shape \(7,\); expected \(54,\)"),
     ],
 )
 def test_starts_of_another_shape_and_machines_without_magnets_are_refused(levitated, start, message):
-    with pytest.raises(SimulationError, match=message):
+    with pytest.raises(RotordropError, match=message):
         simulate_drop(levitated, DropCase(speed=SPEED, start=start))
     without = replace(levitated, parameters=levitated.parameters._replace(magnet=np.zeros((0, 8))))
     with pytest.raises(SimulationError, match=r"at least two radial AMBs; .* has 0.*use another start"):

@@ -130,7 +130,7 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
         ('{ kind = "stop" }', r"gap"),
         ('{ kind = "stop", gap = "0 um" }', rf"^142:33: {ELEMENT}\.gap: .*a length must be positive"),
         (
-            '\n{ kind = "stop", gap = "0.1 mm" },\n{ kind = "ribbon", slip_force = "0 N" }',
+            '\n{ kind = "stop", gap = "9 um" },\n{ kind = "ribbon", slip_force = "0 N" }',
             r"^144:33: .*'515 N'",
         ),
         (
@@ -138,18 +138,9 @@ def test_a_stop_that_was_never_reached_is_larger_than_the_way_seen(foundation):
             '{ stiffness = "4e6 N/m", time = "40 ms" }] }',
             r"^145:33: touchdown_bearings\[2\]\.mount\[1\]\.branches\[2\]\.time: .*descend",
         ),
-        (
-            relaxing(8, 4, 2, 1),
-            r"4 branches; 3 .* are the most: join the two whose times are closest",
-        ),
-        (
-            '{ kind = "stop", gap = "20 um" }, { kind = "stop", gap = "30 um" }',
-            r"two elements 'stop'; keep one",
-        ),
-        (
-            '{ kind = "rubber" }',
-            r"'rubber' is no element of a mount; its kind is one of spring, ribbon, maxwell",
-        ),
+        (relaxing(8, 4, 2, 1), r"4 branches; 3 .* are the most: join the two whose times are closest"),
+        ('{ kind = "stop", gap = "9 um" }, { kind = "stop", gap = "8 um" }', "two elements 'stop'; keep one"),
+        ('{ kind = "rubber" }', "'rubber' is no element of a mount; its kind is one of spring, ribbon"),
         ('{ kind = "spring", gap = "20 um" }', r"a spring has no 'gap'"),
         ('{ kind = "ribbon", stiffness = "2e7 N/m" }', r"has a 'stiffness' already, and so does this ribbon"),
         (relaxing(3, 30), r"the relaxation times do not descend: .*3.00 ms and 30.0 ms"),

@@ -150,10 +150,7 @@ def test_springs_need_a_preload_and_are_written_and_read_again():
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        (
-            'preload_kind = "rigid"\nspring_rate = "1e7 N/m"',
-            r"'spring_rate' belongs to springs, and the preload",
-        ),
+        ('preload_kind = "rigid"\nspring_rate = "1e7 N/m"', "'spring_rate' belongs to springs, and the pre"),
         ("fit_friction = 0.2", r"'fit_friction' belongs to springs"),
         ('preload_kind = "springs"', r"preload_kind"),
         ('preload_kind = "spring"\nring_travel = "0 mm"', r"must be positive"),

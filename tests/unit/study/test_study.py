@@ -422,7 +422,7 @@ def test_a_full_disk_is_said_and_the_study_goes_on_later(serial, tmp_path):
     ("changes", "message"),
     [
         ({"drop": 3}, r"unknown key 'drop'; did you mean 'drops'"),
-        ({"drops": 0}, r"drops = 0; expected a whole number above zero"),
+        ({"drops": 0}, r"drops = 0; expected a whole number from 1 to 1e8"),
         ({"drops": 1.5}, r"drops = 1.5; expected a whole number"),
         ({"design": "latin"}, r"design = 'latin'; expected one of random"),
         ({"vary": {}}, r"has no speed"),

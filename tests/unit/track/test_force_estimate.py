@@ -275,7 +275,7 @@ def test_what_cannot_be_found_is_refused_with_the_way_out(rig):
         UsageError, match=r"the known force at node 5 has the shape \(3, 2\); expected \(1000, 2\)"
     ):
         estimate_force(rig, record, nodes=[2], known_forces={5: np.zeros((3, 2))})
-    with pytest.raises(UsageError, match=r"suspension is 'springs'; expected one of free-free, AMBs"):
+    with pytest.raises(UsageError, match=r"held is 'springs'; expected one of free-free, AMBs"):
         estimate_force(rig, record, nodes=[2], held="springs")
     guessed = loads_machine(RIG.replace(f'damping = "{DAMPING} N s/m"', ""))
     with pytest.raises(UsageError, match=r"ambs\.bearing\.damping is left out of the machine file"):
