@@ -106,8 +106,8 @@ class Record:
         each(self.notes, "notes", str)
         each(self.warnings, "warnings", str)
         shape = (numbers(self.time, "time").size, len(self.sensors))
-        if np.shape(self.signals) != shape or 0 in shape:
-            words = f"{shape[0]} times and {shape[1]} sensors need {shape}, one of each at least"
+        if np.shape(self.signals) != shape or not shape[0]:
+            words = f"{shape[0]} times and {shape[1]} sensors need {shape}, one time at least"
             raise RecordError(f"signals have the shape {np.shape(self.signals)}; {words}")
         if (m := self.missing) is not None and (np.shape(m) != shape or np.asarray(m).dtype != np.bool_):
             raise RecordError(f"missing has the shape {np.shape(m)}; expected {shape}, True or False")
@@ -118,7 +118,7 @@ class Record:
         sizes = {name: (np.size(getattr(self, name)),) for name in ("speed_time", "marks")}
         for name, length in (lengths | sizes).items():
             if getattr(self, name) is not None:
-                array = numbers(getattr(self, name), name, length, finite=name != "signals")
+                array = numbers(getattr(self, name), name, length, finite=name in ("time", "marks"))
                 array.setflags(write=False)
                 object.__setattr__(self, name, array)
 

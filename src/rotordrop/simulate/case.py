@@ -268,8 +268,8 @@ class DropCase(Case):
                 f"{count:.3g} of them; expected 1 to {MOST_OUTPUTS:g}, and {LONGEST:g} s at most. Give "
                 "others, or simulate a coast-down"
             )
-        for event in (*([self.jump] if self.jump else ()), *(self.magnets or ())):
-            require(event.time, "time of what comes [s]", float, none=True, most=self.duration)
+        for event in self.magnets or ():
+            require(event.time, "time of an event [s]", float, none=True, most=self.duration)
         start = self.start
         if self.magnets is None or not isinstance(start, LevitatedStart):
             return

@@ -175,6 +175,7 @@ def estimate_force(
         node: _known_force(node, force, len(record.time)) for node, force in (known_forces or {}).items()
     }
     speed = float(machine.speed.nominal) if record.speed is None else float(np.nanmean(record.speed))
+    require(speed, "mean speed of the record [rad/s]", float)
 
     def posed(described: Machine) -> _Posed:
         holding = [*suspension_of(described, held), *supports]
