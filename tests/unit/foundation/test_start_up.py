@@ -291,10 +291,7 @@ WRONG = {
     "an uneven clock": (lambda: rd.waterfall(MACHINE, made(time=UNEVEN)), "% of the steps of the clock are"),
     "an empty record": (lambda: plain(time=[], signals=SIGNALS[:0]), r"shape \(0, 4\).* one time"),
     "a clock that stands": (lambda: force(plain(time=0 * TIME), held="free-free"), "an even clock"),
-    "speeds that are none": (
-        lambda: force(plain(speed=np.nan * TIME), held="free-free"),
-        "mean speed .* nan",
-    ),
+    "speeds of none": (lambda: force(plain(speed=np.nan * TIME), held="free-free"), "mean speed .* nan"),
     "rest as text": (lambda: coast(rest="5 s"), "rest is '5 s'"),
     "speed in mm": (lambda: case(speed="60 mm"), "'60 mm' is not a speed"),
     "speed of nothing": (lambda: case(speed=None), r"speed is None; .* or a number \[rad/s\]"),

@@ -194,10 +194,7 @@ def test_other_values_leave_names_and_origin_of_the_calibration(origin, tmp_path
         ("consistent = true\ndrops = []", r"calibration.drops: .* one entry is needed"),
         ('drops = [{name = "a"}]', r"'consistent' is missing"),
         ('consistent = "yes"\ndrops = [{name = "a"}]', r"'yes' .* expected a valid boolean"),
-        (
-            'consistent = true\ndrops = [{name = "a"}, {name = "a"}]',
-            r"'a' stands twice .*; names must differ",
-        ),
+        ('consistent = true\ndrops = [{name = "a"}, {name = "a"}]', r"'a' stands twice .*; names must"),
     ],
 )
 def test_a_calibration_that_says_nothing_is_refused(text, message):

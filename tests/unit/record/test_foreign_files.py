@@ -258,10 +258,7 @@ def test_damage_to_a_universal_file_or_its_head_takes_no_channel_away(tmp_path):
     whole = universal(binary="<", padded=False)
     second = whole.index(b"    58b", whole.index(b"    58b") + 1)
     for damaged, said in (
-        (
-            whole[:second] + whole[second:].replace(b"58b", b"50b", 1),
-            r"where a line -1 and the type of a dat",
-        ),
+        (whole[:second] + whole[second:].replace(b"58b", b"50b", 1), r"where a line -1 and the type of a"),
         (whole[: second - 7] + whole[second - 7 :].replace(b"-1", b"-9", 1), r"stands b'-9.*where a line -1"),
     ):
         path.write_bytes(damaged)

@@ -159,10 +159,7 @@ def test_a_map_names_planes_or_sensors(mapping, read, machine):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (
-            "NDE: VE-101X 0 deg, VE-101Y 90 deg",
-            r"VE-101X at 0 deg is none of the sensors .*S_NDE_A at 135 deg",
-        ),
+        ("NDE: VE-101X 0 deg, VE-101Y 90 deg", r"VE-101X at 0 deg is none of the sensors .*S_NDE_A at 135"),
         ("middle: VE-101X, VE-101Y", r"'middle' names 2 channels; the machine has the planes NDE, DE"),
         ("NDE: VE-101X, VE-101Z", r"there is no channel 'VE-101Z'.*there are Ch1 VE-101X, Ch2 VE-101Y"),
         ("NDE VE-101X", r"is neither \"SENSOR=CHANNEL\" nor \"PLANE: CHANNEL"),

@@ -312,10 +312,7 @@ def test_a_delay_holds_the_rotor_first(levitated):
     ("start", "message"),
     [
         (LevitatedStart(orbit=np.zeros(3)), r"orbit has shape \(3,\); expected \(2,\)"),
-        (
-            LevitatedStart(remanent_force=np.zeros(2)),
-            r"remanent_force has the shape \(2,\); expected \(2, 2\)",
-        ),
+        (LevitatedStart(remanent_force=np.zeros(2)), r"remanent_force .* \(2,\); expected \(2, 2\)"),
         (StateStart(state=np.zeros(7)), r"state, .* has the shape \(7,\); expected \(54,\)"),
     ],
 )

@@ -71,11 +71,7 @@ def test_a_name_of_a_client_is_a_label_only(name, suffix):
 @pytest.mark.parametrize(
     ("role", "names", "words"),
     [
-        (
-            "record",
-            ["", "a", "a.", "a.c/v", "a.\0csv", "a.csv\n", "a.%2e%2e"],
-            "no suffix that tells its format",
-        ),
+        ("record", ["", "a", "a.", "a.c/v", "a.\0csv", "a.csv\n", "a.%2e%2e"], "no suffix that tells its"),
         (
             "beside",
             ["..", ".ssh", "../a.csv", "a\\b.csv", "C:a.csv", "CON", "machine.toml", "a/b", "x" * 121],
