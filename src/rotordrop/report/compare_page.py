@@ -335,7 +335,8 @@ def _against(drops: Sequence[ComparedDrop], number: Number, limit: float) -> tup
         return f"{words}: no drop states it with an interval", None
     over = [f"{who} ({format_chance(p)})" for p, who in beyond if p >= SURE]
     if over:
-        return f"{words}: passed by {', '.join(over)}", False
+        near = [f"{who} ({format_chance(p)})" for p, who in beyond if 1.0 - SURE < p < SURE]
+        return f"{words}: passed by {', '.join(over)}{'; open: ' * bool(near)}{', '.join(near)}", False
     if ranges:
         return f"{words}: open: {'; '.join(ranges)}", None
     worst, who = max(beyond)

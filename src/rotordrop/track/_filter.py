@@ -89,8 +89,8 @@ class Segment(NamedTuple):
     S: Array
     P: Compact
     F: Compact
-    H: Compact
-    K: Compact
+    H: Array
+    K: Array
     sigma: Array
 
     def cut(self, count: int) -> Segment:
@@ -322,9 +322,7 @@ def score_before_readings(i: int, segment: Segment, lam: Array) -> None:
     for c in range(segment.S.shape[1] - 1, -1, -1):
         S = segment.S[i, c]
         if math.isfinite(S):
-            reported = segment.e[i, c] / S
-            for a in range(lam.shape[0]):
-                reported += segment.K[i, c, a] * lam[a]
+            reported = inner(segment.K[i, c], lam) + segment.e[i, c] / S
             for a in range(lam.shape[0]):
                 lam[a] -= segment.H[i, c, a] * reported
 
@@ -347,13 +345,11 @@ def score_before_step(lam: Array, F: Array | Compact, noise_decay: Array) -> Non
 def information_before_readings(i: int, segment: Segment, Lam: Array) -> None:
     """Λ (n, n) after the readings of sample ``i`` becomes ``(I - K h)ᵀ Λ (I - K h) + hᵀ h / S`` of each."""
     n = Lam.shape[0]
-    h, K, by_gain, seen = np.empty(n), np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
+    by_gain, seen = np.empty(n), np.empty(n, dtype=np.int64)
     for c in range(segment.S.shape[1] - 1, -1, -1):
-        S = segment.S[i, c]
+        S, h, K = segment.S[i, c], segment.H[i, c], segment.K[i, c]
         if not math.isfinite(S):
             continue
-        copy_into(segment.H[i, c], h)
-        copy_into(segment.K[i, c], K)
         apply(Lam, K, by_gain)
         weight = inner(K, by_gain) + 1.0 / S
         count = 0

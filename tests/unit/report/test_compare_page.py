@@ -209,6 +209,7 @@ STRESSED = (stressed("a", 1.9e9, 2e7), stressed("b", 2.0e9, 2e7, safety=2.0))
         ([], "notice", "No limit given"),
         (["peak_stress=2.2 GPa"], "good", "kept by all drops (passed by b at NDE with 0.0 % at most)"),
         (["peak_stress=1.95 GPa"], "bad", "passed by b at NDE (> 99 %)"),
+        (["peak_stress=1.905 GPa"], "bad", "passed by b at NDE (> 99 %); open: a at NDE (34 %)"),
         (["peak_stress=2 GPa"], "warning", "open, passed by b at NDE with a probability of 50 %"),
         (["static_safety = 3"], "bad", "passed by b at NDE (> 99 %)"),  # from above
     ],
