@@ -346,10 +346,13 @@ def _digest(file: Path, *state: int) -> str:
 
 def require_place(path: str | os.PathLike[str]) -> None:
     """Refuse a place where no file can be written, before a long computation rather than after it."""
-    from rotordrop.require import require
-
     try:
-        target = Path(os.path.realpath(require(path, "path", str, os.PathLike)))
+        target = Path(os.path.realpath(path))
+    except (TypeError, ValueError):  # no path, or one with a NUL
+        from rotordrop.require import require  # loads numpy, which the first page does without
+
+        require(path, "path", str, os.PathLike)
+        raise
     except FileNotFoundError:
         raise OutputError(
             f"cannot write {path}: the folder you are in has been deleted; go to another one"
