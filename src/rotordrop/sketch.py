@@ -56,19 +56,23 @@ def sketch(
 
 
 def still(chart: Any) -> str:
-    """The curves of every pair of axes of a plotly figure as a small picture, where nothing can run."""
+    """The curves of every pair of axes of a plotly figure as a small picture, where nothing can run.
+
+    An axis without a title shares that of the one before it, a time axis that of the lowest row.
+    """
     drawn: dict[str, dict[str, Any]] = {}
     for trace in chart.data:
         if trace.type == "scatter" and trace.mode == "lines" and (trace.line.width or 0.0) > 1.0:
             drawn.setdefault(trace.yaxis or "y", {})[trace.name] = (trace.x, trace.y)
-    axes = {axis.plotly_name: axis for axis in (*chart.select_xaxes(), *chart.select_yaxes())}
-    across, up = (
-        next((a.title.text for name, a in axes.items() if name[0] == one and a.title.text), "")
-        for one in "xy"
-    )
     titles = [note.text for note in chart.layout.annotations]
-    return "".join(
-        sketch(title, across, up, drawn[axis])
-        for axis, title in zip(drawn, [*titles, *[""] * len(drawn)], strict=False)
-        if axes[axis.replace("y", "yaxis")].scaleanchor is None
-    )
+    below = [axis.title.text for axis in chart.select_xaxes() if axis.title.text]
+    pictures, up = [], ""
+    for number, axis in enumerate(chart.select_yaxes()):
+        up, name = axis.title.text or up, axis.plotly_name.replace("axis", "")
+        if name in drawn and axis.scaleanchor is None and axis.type != "log":
+            words = titles[number] if number < len(titles) else ""
+            own = chart.layout[axis.plotly_name.replace("y", "x")]
+            across = own.title.text or (below[-1] if below else "")
+            if own.type != "log":
+                pictures.append(sketch(words, across, up, drawn[name]))
+    return "".join(pictures)

@@ -36,6 +36,8 @@ def _metric(unit: str, *prefixes: str) -> tuple[tuple[float, str], ...]:
     return tuple((factors[prefix], prefix + unit) for prefix in prefixes)
 
 
+FASTEST_SPIN = 1e5
+"""Speed of a rotor [rad/s] beyond which a unit is mistyped (chosen)."""
 GRAVITY = 9.81
 """Acceleration of free fall [m/s²], where no machine file says another."""
 

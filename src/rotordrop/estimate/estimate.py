@@ -290,7 +290,13 @@ class Estimate:
         return f"{said} {failed[:1].upper()}{failed[1:]}." if failed else said
 
     def bearing(self, name: str) -> BearingDrop:
-        """What happened at the bearing of a name."""
+        """What happened at the bearing of a name.
+
+        Raises
+        ------
+        UsageError
+            If the machine has no such bearing; names those it has.
+        """
         names = [one.name for one in self.bearings]
         return self.bearings[names.index(require(name, "bearing", str, among=names))]
 

@@ -47,14 +47,14 @@ from rotordrop.record.tacho import passages, readings_of_held_signal
 from rotordrop.require import each, numbers, require
 from rotordrop.series import stride_of
 from rotordrop.sketch import sketch
-from rotordrop.units import format_quantity, in_si, parse_quantity
+from rotordrop.units import FASTEST_SPIN, format_quantity, in_si, parse_quantity
 
 SPEED_SOURCE, BY_HAND = "speed_source", "given by hand"
 """Header entry of a saved record whose speed nobody measured."""
 
 _TIME_UNITS = ("s", "ms", "us", "min")
-SLOWEST, FASTEST, FASTEST_SPIN = 1e-3, 1e9, 1e5
-"""Sampling rates [Hz] and speed [rad/s] beyond which a unit is mistyped (chosen)."""
+SLOWEST, FASTEST = 1e-3, 1e9
+"""Sampling rates [Hz] beyond which a unit is mistyped (chosen)."""
 _PART = 65536
 """Samples of a long record that are resolved at a time (chosen)."""
 

@@ -21,15 +21,14 @@ from rotordrop.rotor.critical_speeds import CriticalSpeedMap
 from rotordrop.rotor.reduction import Reduction, RotorBasis, reduce_rotor
 from rotordrop.rotor.suspension import Support, suspension_of
 from rotordrop.rotor.whirl import WhirlModes, direction_name, matrices_of, whirl_modes
+from rotordrop.units import FASTEST_SPIN
 
 TURN = 2.0 * math.pi
 REDUCTION = Reduction(modes=16, attachment=True)
 BEYOND_NOMINAL = 1.3
 """Highest speed of a diagram over the nominal one [1]: past the largest margin that API 617 asks for."""
-SPEEDS = 61
-MOST_SPEEDS, FASTEST_SPIN = 10_000, 1e5
-"""Speeds of a diagram by default, and at most, as their shapes fill some 100 MB; speed [rad/s] beyond which a
-unit is mistyped; chosen, not measured."""
+SPEEDS, MOST_SPEEDS = 61, 10_000
+"""Speeds of a diagram by default, and at most, as their shapes fill some 100 MB; chosen, not measured."""
 _SPARE_MODES = 4
 """Modes computed beyond those asked for (chosen): a line that sinks with the speed comes from above."""
 _STANDSTILL = 1e-3

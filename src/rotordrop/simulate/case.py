@@ -14,7 +14,7 @@ from rotordrop.elements.values import MOST_TURNS
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.require import each, numbers, require
 from rotordrop.rotor.reduction import Reduction, reduction_of
-from rotordrop.units import InSI, parse_quantity
+from rotordrop.units import FASTEST_SPIN, InSI, parse_quantity
 
 SpinMode: TypeAlias = Literal["dynamic", "prescribed", "function of speed", "coasting", "constant"]
 IntegratorName: TypeAlias = Literal["tsit5", "dp5"]
@@ -27,9 +27,8 @@ class CentredStart:
     """The rotor starts straight, at rest and in the centre of all bearings."""
 
 
-FARTHEST, FASTEST, FASTEST_SPIN, STRONGEST = 0.02, 100.0, 1e5, 1e7
-"""Displacement [m] and velocity [m/s] at a start, speed [rad/s] and force [N] beyond which a unit is wrong
-(chosen)."""
+FARTHEST, FASTEST, STRONGEST = 0.02, 100.0, 1e7
+"""Displacement [m], velocity [m/s] and force [N] at a start beyond which a unit is wrong (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)

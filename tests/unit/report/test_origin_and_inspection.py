@@ -5,6 +5,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+from plotly.subplots import make_subplots
 
 from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.published import LaterMotion
@@ -14,6 +15,7 @@ from rotordrop.report.estimate_page import inspection_section
 from rotordrop.report.origin import Origin, UsedFile, command_line
 from rotordrop.report.page import css_text, render_page
 from rotordrop.report.style import drawn_together
+from rotordrop.sketch import still
 
 
 def test_the_origin_names_who_when_how_and_from_what(tmp_path):
@@ -51,6 +53,17 @@ def test_without_scripts_the_first_figures_are_small_pictures():
     page = render_page(ReportContent(title="T", sections=(shown, replace(shown, folded=True))))
     assert page.count("<polyline") == 1 and "<noscript><pre>NDE</pre><svg" in page
     assert all(f">{mark}</text>" in page for mark in ("7", "1", "500", "force [N]"))
+
+
+def test_a_small_picture_has_title_and_axes_of_its_own_panel():
+    chart = make_subplots(2, 1, subplot_titles=("impacts", "stress"))
+    chart.add_scatter(x=[0, 1], y=[3, 4], mode="markers", row=1, col=1)
+    chart.add_scatter(x=[0, 1], y=[5, 6], mode="lines", line_width=1.5, name="DE", row=2, col=1)
+    chart.update_yaxes(title_text="force [N]", row=1).update_yaxes(title_text="stress [MPa]", row=2)
+    drawn = still(chart)
+    assert "<pre>stress</pre>" in drawn and ">stress [MPa]</text>" in drawn and "force [N]" not in drawn
+    chart.update_yaxes(type="log", row=2)
+    assert still(chart) == ""
 
 
 def estimate(drop_result, **changes):

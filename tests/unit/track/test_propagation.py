@@ -1,6 +1,7 @@
 """One sample of the drop model with its sensitivity, against finite differences; away from switches."""
 
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -141,6 +142,14 @@ def test_a_jacobian_is_held_for_two_steps_with_the_order_that_the_fastest_mode_a
         assert (one.substeps, one.frozen, one.terms) == steps
     single = PassSettings(substeps=1).for_sampling(DT)
     assert (single.substeps, single.frozen) == (1, 1)
+
+
+def test_the_exponential_of_a_held_jacobian_turns_the_fastest_mode_to_a_tenth():
+    for phase in np.linspace(0.2, 20.0, 100):
+        one = PassSettings(substeps=4).for_sampling(DT, phase / DT)
+        turn = 1j * phase * one.frozen / one.substeps
+        series = sum(turn**k / math.factorial(k) for k in range(one.terms + 1))
+        assert abs(series - np.exp(turn)) < 0.1
 
 
 @pytest.mark.parametrize("indentation", [-60e-6, 4e-6])
