@@ -70,17 +70,15 @@ def forward_passes(
 
 
 def _lowest(function: Callable[[int], float]) -> float:
-    """Place of the minimum of a function of whole numbers, between them by a parabola, from 0 downhill."""
+    """Place of the minimum of a function of whole numbers, between them by a parabola, from the least up."""
     least = math.floor(math.log(SMALLEST, STEP))
     most = math.ceil(math.log(LARGEST, STEP))
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
-        known = dict(zip((-1, 0), pool.map(function, (-1, 0)), strict=True))
-    best, way = (-1, -1) if known[-1] < known[0] else (0, 1)
-    while least <= best + way <= most:
-        known[best + way] = function(best + way)
-        if not known[best + way] < known[best]:
-            break
-        best += way
+        known = dict(zip((least, least + 1), pool.map(function, (least, least + 1)), strict=True))
+    best = least
+    while known[best + 1] < known[best] or (math.isinf(known[best]) and best < most):
+        best += 1
+        known[best + 1] = function(best + 1) if best < most else math.inf
     low, middle, high = (known.get(best + k, math.inf) for k in (-1, 0, 1))
     bend = low - 2.0 * middle + high
     return best + 0.5 * (low - high) / bend if math.isfinite(bend) and bend > 0.0 else float(best)
