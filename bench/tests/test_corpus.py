@@ -23,9 +23,9 @@ from rotordrop_bench.corpus.cases import (
     made,
     plan_digest,
 )
-from rotordrop_bench.corpus.compare import limits, paired, quantities
+from rotordrop_bench.corpus.compare import limits, paired
 from rotordrop_bench.corpus.run import Version, run
-from rotordrop_bench.corpus.table import Row, holds, rank, read_table, write_table
+from rotordrop_bench.corpus.table import Row, holds, quantities, rank, read_table, write_table
 from rotordrop_bench.event import stream
 from rotordrop_bench.faults import FAULTS, SIZED, spoiled
 from rotordrop_bench.rotors import ROTORS
@@ -66,9 +66,9 @@ def test_every_rotor_and_every_kind_of_departure_has_its_cases():
     spoiled = [case for case in cases if case.fault]
     assert {case.fault for case in spoiled} == {*FAULTS, *SIZED}
     assert [case.fault for case in spoiled[:8]] == [*FAULTS, next(iter(FAULTS))]
-    assert {case.clean.rotor for case in spoiled} == set(ROTORS)
+    assert {case.rotor for case in spoiled} == set(ROTORS)
     assert {case.rotor for case in cases if case.group == "prior"} == set(ROTORS)
-    assert {case.departure[0] for case in cases if case.departure} == set(KINDS)
+    assert {kind for case in cases for kind, _ in case.departures} == set(KINDS)
     assert len(list(listed(short=True))) == 60
 
 
@@ -205,7 +205,7 @@ def test_ranks_of_right_intervals_are_even():
         row(i, estimates={"force NDE": tuple(round(e + d) for d in (0, -164, 164))})
         for i, e in enumerate(errors)
     ]
-    (found,) = quantities(rows)
+    (found,) = quantities({"prior": rows})
     assert found.unevenness < 0.5
     assert set(found.ranks) <= {38, 39, 40, 41, 42}
     assert found.covered[0.9] == pytest.approx(0.9, abs=0.05)
@@ -213,12 +213,13 @@ def test_ranks_of_right_intervals_are_even():
         row(i, estimates={"force NDE": tuple(round(e + d) for d in (0, -82, 82))})
         for i, e in enumerate(errors)
     ]
-    assert quantities(narrow)[0].unevenness > 1.36
+    assert quantities({"prior": narrow})[0].unevenness > 1.36
 
 
 def test_a_run_goes_on_where_it_was_and_is_scored(tmp_path):
     case = next(listed(short=True))
-    truth = json.loads((made(case, tmp_path) / "truth.json").read_text())
+    made(case, tmp_path)
+    truth = json.loads((tmp_path / "truth" / f"{case.name}.json").read_text())
     force = truth["peak_force_N"]["NDE"]
     said = {
         "bearings": {"NDE": {"peak_force_N": {"value": 1.01 * force, "interval_90": [force, 1.02 * force]}}}
@@ -238,14 +239,15 @@ def test_a_run_goes_on_where_it_was_and_is_scored(tmp_path):
     assert run(version, [case], tmp_path / "elsewhere", [first]) == [first]
     assert (tmp_path / "calls").read_text().count("called") == 2
     assert first.estimates == {"force NDE": (100, 0, 200)}
-    assert first.digest == digest(tmp_path / "cases" / case.name)
+    assert first.digest == digest(tmp_path / "drops" / case.name)
 
 
 def test_a_faulty_record_is_that_of_its_clean_case_with_the_fault(tmp_path):
-    case = next(case for case in listed() if case.fault == "inverted polarity")
+    every = {case.name: case for case in listed()}
+    case = next(case for case in every.values() if case.fault == "inverted polarity")
     spoiled, clean = (
         np.loadtxt(made(one, tmp_path) / "record.csv", comments="#", delimiter=";", skiprows=5)
-        for one in (case, case.clean)
+        for one in (case, every[case.clean])
     )
     assert np.array_equal(spoiled[:, 1], -clean[:, 1])
     assert np.array_equal(spoiled[:, 2:], clean[:, 2:])

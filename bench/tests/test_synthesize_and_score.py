@@ -19,26 +19,19 @@ def folder(tmp_path_factory):
     return path
 
 
-def test_names_count_and_faults_are_told_in_the_truth(folder, tmp_path):
-    names = sorted(file.name for file in folder.iterdir())
-    records = [f"synthetic_060Hz_{i}{kind}.csv" for i in (1, 2) for kind in ("", "_tail")]
-    assert names == sorted([*records, "truth"])
-    assert len(list((folder / "truth").glob("*.json"))) == 2
-    arguments = ["--speed", "60 Hz", "--duration", "10 ms", "--seed", "3", "--fault", "dead channel"]
-    assert (
-        run(["synthesize", LP400, *arguments, "--output", str(tmp_path), "--json", str(tmp_path / "j")]) == 0
-    )
-    assert json.loads((tmp_path / "truth" / "synthetic_060Hz.json").read_text())["fault"] == "dead channel"
-    rows = (tmp_path / "synthetic_060Hz.csv").read_text().splitlines()
-    last = {row.split(";")[4] for row in rows if row[:1] in "-0123456789"}
-    assert len(last) == 1
+def test_names_count(folder, tmp_path):
+    names = sorted(file.name for file in (folder / "drops").iterdir())
+    assert names == [file.stem for file in sorted((folder / "truth").iterdir())]
+    assert names == ["synthetic_060Hz_1", "synthetic_060Hz_2"]
+    arguments = ["--speed", "60 Hz", "--duration", "10 ms", "--json", str(tmp_path / "j")]
+    assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
     assert json.loads((tmp_path / "j").read_text())["origin"] == "simulated, not measured"
 
 
 def test_a_violation_is_told_in_the_truth(tmp_path):
     (tmp_path / "case.toml").write_text("[contact]\nexponent = 1.5")
     case = str(tmp_path / "case.toml")
-    arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--hdf5", "--violation", case]
+    arguments = ["--speed", "100 Hz", "--duration", "10 ms", "--violation", case]
     assert run(["synthesize", LP400, *arguments, "--output", str(tmp_path)]) == 0
     truth = json.loads((tmp_path / "truth" / "synthetic_100Hz.json").read_text())
     assert truth["violations"]["contact"]["exponent"] == 1.5
@@ -49,7 +42,6 @@ def test_a_violation_is_told_in_the_truth(tmp_path):
     ("option", "message"),
     [
         (["--violation", "moon"], "cannot read the case file moon"),
-        (["--fault", "fire"], "there is no 'fire'; choose one of 'inverted polarity'"),
         (["--duration", "10"], "'10' has no unit"),
     ],
 )

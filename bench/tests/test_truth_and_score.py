@@ -11,15 +11,17 @@ from rotordrop.elements.table import published
 from rotordrop.errors import OutputError, UsageError
 from rotordrop.record.record import read_record
 from rotordrop.severity.numbers import LOADS
-from rotordrop_bench import FAULTS, read_truth, score_estimate, with_fault, write_synthetic
+from rotordrop_bench import read_truth, score_estimate
+from rotordrop_bench.faults import FAULTS, spoiled
+from rotordrop_bench.files import write_drop
 from rotordrop_bench.score import LARGE_IMPACT
 from rotordrop_bench.truth import truth_of
 
 
 @pytest.fixture(scope="module")
-def folder(synthetic, tmp_path_factory):
+def folder(synthetic, known, tmp_path_factory):
     path = tmp_path_factory.mktemp("synthetic") / "deeper"
-    write_synthetic(synthetic, path, name="drop_060", formats=("csv", "h5"))
+    write_drop(synthetic, known, path, "drop_060")
     return path
 
 
@@ -53,19 +55,16 @@ def estimate_of(truth, factor=1.01):
 
 
 def test_what_was_written_is_read_back_and_the_truth_apart(folder, synthetic, known, truth):
-    for file in ("drop_060.csv", "drop_060.h5"):
-        record = read_record(folder / file, known)
-        assert record.signals == pytest.approx(synthetic.record.signals, abs=6e-10)
-        assert record.time == pytest.approx(synthetic.record.time, abs=1e-9)
-        assert record.speed_readings == pytest.approx(synthetic.record.speed_readings, abs=1e-3)
-        assert "not measured" in record.metadata["origin"]
-    tail = read_record(folder / "drop_060_tail.csv", known)
+    record, tail = (read_record(folder / f"drops/drop_060/{name}.csv", known) for name in ("record", "tail"))
+    assert record.signals == pytest.approx(synthetic.record.signals, abs=6e-10)
+    assert record.time == pytest.approx(synthetic.record.time, abs=1e-9)
+    assert record.speed_readings == pytest.approx(synthetic.record.speed_readings, abs=1e-3)
+    assert "not measured" in record.metadata["origin"]
     assert tail.signals == pytest.approx(synthetic.tail.signals, abs=6e-10)
-    beside = [file for file in folder.iterdir() if file.is_file()]
+    beside = list((folder / "drops/drop_060").iterdir())
     assert len(beside) == 3
     stiffness = f"{synthetic.truth['support.stiffness_N_per_m']['NDE']:.6g}"
     assert not any(stiffness in file.read_text(errors="ignore") for file in beside)
-    assert truth.name == "drop_060"
     assert truth.bearing_names == ("NDE", "DE")
     assert truth.of_bearing("DE")["peak_stress_Pa"] == pytest.approx(synthetic.truth["peak_stress_Pa"]["DE"])
 
@@ -189,7 +188,7 @@ def test_an_interval_that_is_none_is_refused_and_not_a_traceback(interval, truth
         score_estimate(estimate, truth)
 
 
-def test_what_is_no_estimate_and_no_folder_is_refused(tmp_path, folder, synthetic):
+def test_what_is_no_estimate_and_no_folder_is_refused(tmp_path, folder, known, synthetic):
     file = tmp_path / "estimate.json"
     file.write_text("[1]")
     with pytest.raises(
@@ -199,28 +198,27 @@ def test_what_is_no_estimate_and_no_folder_is_refused(tmp_path, folder, syntheti
         score_estimate(file, folder / "truth" / "drop_060.json")
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot make the folder"):
-        write_synthetic(synthetic, tmp_path / "file" / "deeper")
+        write_drop(synthetic, known, tmp_path / "file" / "deeper", "one")
 
 
-def test_a_fault_changes_the_record_as_it_says_and_nothing_else(synthetic):
+def test_a_fault_changes_the_record_as_it_says_and_nothing_else(synthetic, known):
     record, signals = synthetic.record, synthetic.record.signals
-    for broken in (with_fault(record, fault) for fault in FAULTS):
-        assert broken.signals.shape == signals.shape and not np.array_equal(broken.signals, signals)
-        assert np.array_equal(broken.time, record.time)
-    assert np.array_equal(with_fault(synthetic.record, "swapped ends").signals, signals[:, [2, 3, 0, 1]])
-    assert np.array_equal(with_fault(synthetic.record, "swapped axes").signals, signals[:, [1, 0, 2, 3]])
-    assert np.array_equal(with_fault(synthetic.record, "inverted polarity").signals, signals * [-1, 1, 1, 1])
-    assert np.ptp(with_fault(synthetic.record, "dead channel").signals[:, 3]) == 0.0
-    with pytest.raises(UsageError, match="unknown fault 'fire'; choose one of 'inverted polarity'"):
-        with_fault(synthetic.record, "fire")
+    broken = {fault: spoiled(record, known, fault, "one")[0] for fault in FAULTS}
+    for one in broken.values():
+        assert one.signals.shape == signals.shape and not np.array_equal(one.signals, signals)
+        assert np.array_equal(one.time, record.time)
+    assert np.array_equal(broken["swapped ends"].signals, signals[:, [2, 3, 0, 1]])
+    assert np.array_equal(broken["swapped axes"].signals, signals[:, [1, 0, 2, 3]])
+    assert np.array_equal(broken["inverted polarity"].signals, signals * [-1, 1, 1, 1])
+    assert np.ptp(broken["dead channel"].signals[:, 3]) == 0.0
 
 
 def test_an_estimate_of_another_recording_is_refused_by_hash_or_name(folder, truth):
     own = estimate_of(truth) | {"record": "renamed.csv"}
-    for file, sha in truth.values["record_sha256"].items():
-        assert (folder / file).is_file()
-        assert score_estimate(own | {"record_sha256": sha}, truth)["name"] == "drop_060"
-    with pytest.raises(UsageError, match=r"SHA-256 abababababab….*'drop_060' belongs to drop_060\.csv \("):
+    ((file, sha),) = truth.values["record_sha256"].items()
+    assert (folder / "drops/drop_060" / file).is_file()
+    assert score_estimate(own | {"record_sha256": sha}, truth)["name"] == "drop_060"
+    with pytest.raises(UsageError, match=r"SHA-256 abababababab….*'drop_060' belongs to record\.csv \("):
         score_estimate(own | {"record_sha256": "ab" * 32, "name": "drop_060"}, truth)
     truth = truth_of({key: value for key, value in truth.values.items() if key != "record_sha256"})
     own = estimate_of(truth)

@@ -11,7 +11,6 @@ import numpy as np
 from scipy.signal import butter, lfilter, sosfilt
 
 from rotordrop.arrays import Array
-from rotordrop.errors import UsageError
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
@@ -22,49 +21,13 @@ Random = np.random.Generator
 Spoil = Callable[[Record, Machine, Random], tuple[Record, Machine]]
 
 
-def _swapped_axes(signals: Array, nodes: list[int]) -> Array:
-    columns = list(range(len(nodes)))
-    first = [i for i in columns if nodes[i] == nodes[0]]
-    for column, other in zip(first, first[::-1], strict=True):
-        columns[column] = other
-    return signals[:, columns]
-
-
-def _changed(signals: Array, where: tuple[Any, Any], value: Any) -> Array:
-    signals = signals.copy()
-    signals[where] = value
-    return signals
-
-
-EVERY = slice(None)
-FAULTS: dict[str, Callable[[Array, list[int]], Array]] = {
-    "inverted polarity": lambda s, nodes: _changed(s, (EVERY, 0), -s[:, 0]),
-    "swapped ends": lambda s, nodes: s[:, np.argsort([nodes[::-1].index(n) for n in nodes], kind="stable")],
-    "swapped axes": _swapped_axes,
-    "mil taken for micrometre": lambda s, nodes: s * 25.4,
-    "clipping": lambda s, nodes: np.clip(s, -0.6 * np.max(np.abs(s)), 0.6 * np.max(np.abs(s))),
-    "dead channel": lambda s, nodes: _changed(s, (EVERY, -1), s[0, -1]),
-    "missing sample": lambda s, nodes: _changed(s, (len(s) // 2, 0), np.nan),
-}
-"""What a mistake makes of the readings (N, S) [m] of sensors at these nodes."""
-
-
-def with_fault(record: Record, fault: str) -> Record:
-    """The record with a deliberate mistake, by name from `FAULTS`; the first or last channel is hit."""
-    if fault not in FAULTS:
-        raise UsageError(f"unknown fault {fault!r}; choose one of {', '.join(map(repr, FAULTS))}")
-    nodes = [sensor.node for sensor in record.sensors]
-    return replace(record, signals=np.ascontiguousarray(FAULTS[fault](record.signals, nodes)))
-
-
 def spoiled(record: Record, machine: Machine, fault: str, name: str) -> tuple[Record, Machine]:
     """A record and its machine file with a mistake from `FAULTS` or `SIZED`.
 
-    Place, channel and sign are drawn; they follow from the names of fault and drop.
+    Place, channel and sign of those of a fixed size are drawn; they follow from the names of fault and drop.
     """
-    if fault in FAULTS:
-        return with_fault(record, fault), machine
-    return SIZED[fault](record, machine, np.random.default_rng(zlib.crc32(f"{fault} {name}".encode())))
+    random = np.random.default_rng(zlib.crc32(f"{fault} {name}".encode()))
+    return (FAULTS | SIZED)[fault](record, machine, random)
 
 
 def _readings(change: Callable[[Array, Record, Random], Array | None]) -> Spoil:
@@ -77,6 +40,25 @@ def _readings(change: Callable[[Array, Record, Random], Array | None]) -> Spoil:
         return replace(record, signals=signals), machine
 
     return spoil
+
+
+def _changed(signals: Array, where: tuple[Any, Any], value: Any) -> Array:
+    signals[where] = value
+    return signals
+
+
+def _swapped(s: Array, record: Record, random: Random) -> Array:
+    """The channels of the first plane are exchanged."""
+    columns = list(range(len(record.sensors)))
+    first = [i for i in columns if record.sensors[i].node == record.sensors[0].node]
+    for column, other in zip(first, first[::-1], strict=True):
+        columns[column] = other
+    return s[:, columns]
+
+
+def _ends_swapped(s: Array, record: Record, random: Random) -> Array:
+    nodes = [sensor.node for sensor in record.sensors]
+    return s[:, np.argsort([nodes[::-1].index(node) for node in nodes], kind="stable")]
 
 
 def _columns(record: Record, random: Random, which: str) -> list[int]:
@@ -308,6 +290,16 @@ def _next_rotor(machine: Machine) -> Machine:
     )
 
 
+FAULTS: dict[str, Spoil] = {
+    "inverted polarity": _readings(lambda s, r, _: _changed(s, (slice(None), 0), -s[:, 0])),
+    "swapped ends": _readings(_ends_swapped),
+    "swapped axes": _readings(_swapped),
+    "mil taken for micrometre": _readings(lambda s, r, _: 25.4 * s),
+    "clipping": _readings(lambda s, r, _: np.clip(s, *(0.6 * np.max(np.abs(s)) * np.array([-1.0, 1.0])))),
+    "dead channel": _readings(lambda s, r, _: _changed(s, (slice(None), -1), s[0, -1])),
+    "missing sample": _readings(lambda s, r, _: _changed(s, (len(s) // 2, 0), np.nan)),
+}
+"""Mistakes of the first or last channel, or of all."""
 SIZED: dict[str, Spoil] = {
     "20 samples NaN in all": _block(20, np.nan, "all"),
     "1 sample infinite": _block(1, np.inf),

@@ -26,7 +26,7 @@ measured."""
 
 Score = dict[str, Any]
 """How far one value is from the truth: ``estimate``, ``truth``, ``error`` [SI], and where they are known
-``relative_error``, ``covered`` (whether the 90 % interval holds the truth), ``half_width`` over the truth."""
+``relative_error``, ``interval_90``, ``covered`` (whether that holds the truth), ``half_width`` over it."""
 
 
 def score_estimate(
@@ -137,7 +137,7 @@ def _at(fields: Any, path: str) -> Any:
 
 def _scores(entries: Mapping[str, Any], truths: Mapping[str, float]) -> dict[str, Score]:
     """Score of every true value that the estimate has."""
-    scores = {}
+    scores: dict[str, Score] = {}
     for path, truth in truths.items():
         entry = entries.get(path, _at(entries, path))
         value, interval = entry, None
@@ -150,7 +150,7 @@ def _scores(entries: Mapping[str, Any], truths: Mapping[str, float]) -> dict[str
             scores[path]["relative_error"] = (value - truth) / truth
         if interval is not None:
             low, high = _ends(interval)
-            scores[path]["covered"] = low <= truth <= high
+            scores[path]["interval_90"], scores[path]["covered"] = [low, high], low <= truth <= high
             if truth != 0.0:
                 scores[path]["half_width"] = 0.5 * (high - low) / abs(truth)
     return scores

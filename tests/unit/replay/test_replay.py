@@ -19,7 +19,7 @@ from rotordrop.estimate.published import estimate_schema
 from rotordrop.machine import example_path
 from rotordrop.replay import draws
 from rotordrop.replay.draws import mean_with_draws, whole_drop, with_draws
-from rotordrop_bench.files import write_synthetic
+from rotordrop_bench.files import write_drop
 from rotordrop_bench.score import score_estimate
 
 BEARINGS = ("NDE", "DE")
@@ -212,8 +212,9 @@ def test_replays_and_correlations_that_cannot_be_are_refused(document, known, sy
 
 
 @pytest.mark.slow
-def test_command_writes_numbers_and_report(synthetic, document, tmp_path):
-    record, tail, *_ = write_synthetic(synthetic, tmp_path, formats=("h5",))
+def test_command_writes_numbers_and_report(known, synthetic, document, tmp_path):
+    place = write_drop(synthetic, known, tmp_path, "drop_1")
+    record, tail = place / "record.csv", place / "tail.csv"
     earlier, out, page = tmp_path / "earlier.json", tmp_path / "out.json", tmp_path / "report.html"
     earlier.write_text(json.dumps(document))
     arguments = ["estimate", str(example_path("lp400")), str(record), "--tail", str(tail)]

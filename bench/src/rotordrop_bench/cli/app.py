@@ -16,7 +16,6 @@ from rotordrop.cli.app import CONTEXT, Verb, VerbTable
 NAME = "rotordrop-bench"
 
 _DROPS, _SCORES = "rotordrop_bench.cli.drops", "rotordrop_bench.cli.scores"
-_CORPUS = "rotordrop_bench.cli.corpus"
 
 
 class BenchTable(VerbTable):
@@ -33,7 +32,7 @@ class BenchTable(VerbTable):
             Verb("make", "Make the drops that are missing in a folder", _DROPS),
             Verb("score-all", "Score anybody's estimates of the drops of the bench", _SCORES),
         ),
-        "Versions": (Verb("corpus", "Run the corpus with a version, or compare two versions", _CORPUS),),
+        "Versions": (Verb("corpus", "Run the corpus with a version, or compare two versions", _SCORES),),
     }
 
 

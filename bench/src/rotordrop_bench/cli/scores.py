@@ -1,25 +1,29 @@
-"""Score an estimate against the truth of its recording, or many against DropBench."""
+"""Score an estimate, anybody's estimates of DropBench, or versions of the program on the corpus."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
 from typer import Argument, Option
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import text_option
 from rotordrop.cli._output import deliver
+from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop_bench.cli.drops import FolderArgument, OnlyOption
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from rotordrop_bench.corpus.table import Quantity, Row
+
 _OF_THE_DROP = {"drop_instant_s": ("drop instant", "time"), "speed_Hz": ("speed", "frequency")}
-SHOWN = ("peak_force_N", "peak_stress_Pa", "mean_force_0p15_0p2_N", "air_gap_m", "parameters", "structure")
 
 
 def score(
@@ -63,8 +67,8 @@ def _scored(scores: dict[str, Any]) -> Table:
 
     named = {field: (row.label, row.kind) for field, row in published().items()}
     named |= {load.field: (load.label, load.kind) for load in LOADS} | _OF_THE_DROP
-    table = new_table(f"{scores['name']}: estimate against truth", "quantity", "estimate", "truth", "error")
-    table.add_column("90 % interval")
+    columns = ("estimate", "truth", "error", "90 % interval")
+    table = new_table(f"{scores['name']}: estimate against truth", ("quantity",), columns)
     parts = {"": scores["drop"]} | {f"{name} ": fields for name, fields in scores["bearings"].items()}
     for where, fields in parts.items():
         for path, entry in fields.items():
@@ -80,62 +84,181 @@ def _scored(scores: dict[str, Any]) -> Table:
     return table
 
 
-def new_table(title: str, first: str, *others: str) -> Table:
-    """A table with a title and columns of numbers after the first."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column(first)
-    for column in others:
-        table.add_column(column, justify="right")
-    return table
-
-
 def score_all(
     folder: FolderArgument,
     estimates: Annotated[
         Path, Argument(metavar="ESTIMATES", help="Folder with NAME.json for each drop.", show_default=False)
     ],
     only: OnlyOption = None,
-    every: Annotated[bool, Option("--all-quantities", help="Also show each parameter by itself.")] = False,
     json: options.Json = None,
 ) -> None:
-    """Score anybody's estimates of the drops of the bench, family by family.
+    """Score anybody's estimates of the drops of DropBench, family by family.
 
     Example: rotordrop-bench score-all dropbench estimates
     """
     from rotordrop_bench import VERSION, score_bench
+    from rotordrop_bench.corpus.table import quantities
 
-    scores = score_bench(folder, estimates, only or [])
+    groups, unscored = score_bench(folder, estimates, only or [])
+    rows, found = groups["all drops"], quantities(groups)
 
     def summarise(out: Console) -> None:
-        columns = ("values", "missing", "median", "90 %", "worst", "> 10 %", "covered", "± (90 %)")
-        table = new_table(f"DropBench, version {VERSION}", "family", "quantity", *columns)
-        table.columns[1].justify = "left"
-        family = ""
-        for row in scores.rows:
-            if not every and row.quantity not in SHOWN:
-                continue
-            shares = (row.median, row.ninetieth, row.worst, row.lost, row.covered, row.half_width)
-            numbers = ("" if share is None else percent(share) for share in shares)
-            name = row.family if row.family != family else ""
-            table.add_row(name, row.quantity, str(row.values), str(row.missing), *numbers)
-            family = row.family
-        out.print(table)
-        flagged = sum(drop["consistent"] is False for drop in scores.drops)
-        out.print(f"Drops: {len(scores.drops)}; estimates that call themselves not consistent: {flagged}.")
-        out.print(
-            f"Of {scores.departures} departures {scores.named_rightly} were named; "
-            f"{scores.named_wrongly} estimates name one that was not there."
-        )
-        for name, why in scores.unscored.items():
+        out.print(_table(f"DropBench, version {VERSION}", found))
+        _count(out, "all drops", rows)
+        for name, why in unscored.items():
             out.print(f"{name}: no number: {why}")
 
-    deliver({"bench_version": VERSION, **asdict(scores)}, json, summarise)
+    deliver(
+        {
+            "bench_version": VERSION,
+            "quantities": [vars(one) for one in found],
+            "drops": [vars(row) for row in rows],
+            "unscored": unscored,
+        },
+        json,
+        summarise,
+    )
 
 
-def percent(share: float, *, sign: bool = False) -> str:
+def corpus(
+    what: Annotated[str, Argument(metavar="run|compare", help="Run a version, or compare two tables.")],
+    names: Annotated[
+        list[str], Argument(metavar="VERSION...", help="Checkout or Python to run; two tables to compare.")
+    ],
+    folder: Annotated[
+        Path | None, Option(metavar="FOLDER", help="Where records and answers are.", show_default="cache")
+    ] = None,
+    name: Annotated[
+        str | None, Option(metavar="NAME", help="Name of the version; by default its commit.")
+    ] = None,
+    short: Annotated[
+        bool, Option("--short", help="The 60 cases that end work early and accept nothing.")
+    ] = False,
+    json: options.Json = None,
+) -> None:
+    """Run the corpus with a version, or compare two versions by their tables; 7 where a limit is broken.
+
+    Example: rotordrop-bench corpus run . && rotordrop-bench corpus compare BEFORE.csv AFTER.csv
+    """
+    if what == "run" and len(names) == 1:
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        _run(names[0], folder or cache / "rotordrop-bench" / "corpus", name, short, json)
+    elif what == "compare" and len(names) == 2:
+        _compare(names[0], names[1], short, json)
+    else:
+        raise UsageError("say 'corpus run VERSION' or 'corpus compare TABLE TABLE'")
+
+
+def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | None) -> None:
+    from rotordrop_bench.corpus import compare
+    from rotordrop_bench.corpus.cases import listed, plan_digest
+    from rotordrop_bench.corpus.run import Version, run
+    from rotordrop_bench.corpus.table import kept_table, quantities, read_table, write_table
+
+    def keep(so_far: list[Row]) -> None:
+        write_table(so_far, plan_digest(), table)
+        typer.echo(so_far[-1].case, err=True)
+
+    version = Version.at(place, name)
+    first = {case.name for case in listed(short=True)}
+    chosen = [case for case in listed(short=short) if case.name in first]
+    chosen += [case for case in listed(short=short) if case.name not in first]
+    table = folder / f"{version.name}{'-short' if short else ''}.csv"
+    known = read_table(version.name)[1] if kept_table(version.name).is_file() else []
+    rows = run(version, chosen, folder, known, keep)
+    write_table(rows, plan_digest(), table)
+    groups = {group: [row for row in rows if row.group == group] for group in compare.WRONG}
+    found = quantities(groups)
+
+    def summarise(out: Console) -> None:
+        out.print(_table("Corpus", found))
+        for group, own in groups.items():
+            _count(out, group, own)
+        out.print(f"alarms on clean records: {percent(compare.share(rows, compare.CLEAN, compare.alarmed))}")
+        if missed := compare.missed_faults(rows):
+            out.print(f"faults caught: {len(missed) - sum(missed)} of {len(missed)}")
+        spent = sum(row.look_seconds + (row.seconds or 0.0) for row in rows)
+        out.print(f"processor time: {spent / 60.0:.1f} min; table: {table}")
+
+    deliver({"table": str(table), "quantities": [vars(one) for one in found]}, json, summarise)
+
+
+def _compare(first: str, second: str, short: bool, json: Path | None) -> None:
+    from rotordrop_bench.corpus.cases import listed
+    from rotordrop_bench.corpus.compare import limits, paired
+    from rotordrop_bench.corpus.table import read_table
+
+    wanted = {case.name for case in listed(short=short)}
+    both = [pair for pair in paired(read_table(first), read_table(second)) if pair[0].case in wanted]
+    if not both:
+        raise UsageError(f"{first} and {second} have no record in common; run both on the same ones")
+    found = limits(both)
+    broken = [one for one in found if not one.kept]
+
+    def summarise(out: Console) -> None:
+        shown = new_table(f"{second} against {first}", ("limit",), ("before", "after", "at most", ""))
+        for one in found:
+            numbers = (f"{number:.4g}" for number in (one.before, one.after, one.most))
+            verdict = "kept" if one.kept else "BROKEN" if one.before <= one.most else "BROKEN before too"
+            shown.add_row(one.name, *numbers, verdict)
+        out.print(shown)
+        out.print(
+            f"{len(both)} of {len(wanted)} cases in common; limits broken: {len(broken)} of {len(found)}"
+        )
+        if not broken and (short or len(both) < len(wanted)):
+            out.print("Only the whole corpus accepts a version.")
+
+    listing = [vars(one) | {"kept": one.kept} for one in found]
+    deliver({"cases": len(both), "kept": not broken, "limits": listing}, json, summarise)
+    if broken:
+        numbers = (f"{one.name} {one.after:.4g}, at most {one.most:.4g}" for one in broken)
+        raise ConsistencyError(f"{second} does not keep every limit against {first}: {'; '.join(numbers)}")
+
+
+def _table(title: str, quantities: Iterable[Quantity]) -> Table:
+    """Table of quantities by group."""
+    from rotordrop_bench.corpus.table import SHOWN
+
+    columns = ("values", "missing", "median", "90 %", "worst", "> 10 %", "covered", "± (90 %)", "ranks")
+    table, group = new_table(title, ("group", "quantity"), columns), ""
+    for one in quantities:
+        if one.name in SHOWN:
+            shares = (one.median_error, one.ninetieth, one.worst, one.lost, one.covered[0.9], one.half_width)
+            ranks = "" if one.unevenness is None else f"{one.unevenness:.2f}"
+            where = one.group if one.group != group else ""
+            table.add_row(where, one.name, str(one.values), str(one.missing), *map(percent, shares), ranks)
+            group = one.group
+    return table
+
+
+def _count(out: Console, group: str, rows: Sequence[Row]) -> None:
+    """How many cases were answered, silently wrong, flagged; which departures were named."""
+    from rotordrop_bench.corpus.table import answered, flagged, silent
+
+    counts = ", ".join(f"{test.__name__} {sum(map(test, rows))}" for test in (answered, silent, flagged))
+    there = sum(len(row.violated) for row in rows)
+    named = sum(len({*row.named} & {*row.violated}) for row in rows)
+    wrong = sum(bool({*row.named} - {*row.violated}) for row in rows)
+    out.print(
+        f"{group}: {len(rows)} cases, {counts}; of {there} departures {named} were named, "
+        f"and {wrong} estimates name one that was not there"
+    )
+
+
+def new_table(title: str, words: Sequence[str], numbers: Sequence[str]) -> Table:
+    """A table with a title, columns of words and, to the right, of numbers."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for column in words:
+        table.add_column(column)
+    for column in numbers:
+        table.add_column(column, justify="right")
+    return table
+
+
+def percent(share: float | None, *, sign: bool = False) -> str:
     """Write a share [1] in percent with two digits that count, never with a power of ten.
 
     Examples
@@ -144,6 +267,8 @@ def percent(share: float, *, sign: bool = False) -> str:
     >>> percent(1.53), percent(0.0231, sign=True)
     ('153 %', '+2.3 %')
     """
+    if share is None:
+        return ""
     number = 100.0 * share
     if not math.isfinite(number):
         return "– %"

@@ -1,5 +1,5 @@
-"""The corpus: cases with known truth, by which two versions of the estimator are compared.
+"""The harness: cases with known truth are synthesized, estimated and scored into one table.
 
-A case is synthesized, a version looks at it and estimates it by its own command line, and what it says is
-scored against the truth into one row of a table. Cases, seeds and limits are frozen by digest.
+DropBench, whose estimates anybody may make, and the corpus, by which two versions are compared, are groups of
+its cases. Cases, seeds and limits are frozen by digest.
 """

@@ -1,13 +1,14 @@
-"""The cases of the corpus: which there are, what is true of each, and the files that a version is given."""
+"""The cases of the harness: which there are, what is true of each, and the files an estimator is given."""
 
 from __future__ import annotations
 
 import hashlib
 import math
 import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from importlib import resources
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -26,86 +27,180 @@ from rotordrop.rotor.unknowns import (
     sensor_prior,
     smallest_gap,
 )
-from rotordrop_bench.departures import DEPARTURES, departures
-from rotordrop_bench.drops import SPEEDS
-from rotordrop_bench.event import DropConditions, HiddenMachine, drop_conditions, hidden_machine, stream
+from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT, departures
+from rotordrop_bench.event import drop_conditions, hidden_machine, stream
 from rotordrop_bench.faults import FAULTS, SIZED, spoiled
-from rotordrop_bench.files import write_drop
+from rotordrop_bench.files import drop_path, truth_path, write_drop
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 from rotordrop_bench.rotors import ROTORS, bench_rotor, scaled_rotor
 from rotordrop_bench.sensor_chain import SensorChain, fitted_to
 from rotordrop_bench.violations import Violations
 
+VERSION = "2026"
+"""Of DropBench: changes whenever one of its drops does; scores of different versions are not comparable."""
 PLAN = resources.files(__package__).joinpath("cases.toml")
 KINDS = (*(kind for kind in DEPARTURES if kind != "unbalance jump"), "unbalance jump")
-"""Departures, in turn over the cases that have one."""
+"""Departures, in turn over the cases of the corpus that have one."""
 TRIES, TRY = 20, 100_000
-"""Draws of a case until its rotor drops within the record, and what a further one adds to the seed."""
+"""Draws from the prior until a rotor drops within its record, and what a further one adds to the seed."""
 
 SCALED = {"5 kg": 5.0, "30 kg": 30.0, "140 kg": 140.0, "500 kg": 500.0, "1.6 t": 1600.0, "6 t": 6000.0}
 """Mass [kg] around which a machine file is drawn; the other rotors are as their files have them."""
+SPEEDS: dict[str, tuple[float, ...]] = {
+    "5 kg": (550.0, 320.0, 150.0),
+    "13 kg": (500.0, 260.0, 120.0),
+    "30 kg": (300.0, 180.0, 80.0),
+    "60 kg": (120.0, 210.0, 60.0),
+    "140 kg": (180.0, 110.0, 60.0),
+    "500 kg": (115.0, 70.0, 40.0),
+    "1.6 t": (80.0, 50.0, 30.0),
+    "6 t": (50.0, 35.0, 20.0),
+}
+"""Speeds at which each rotor is dropped, in turn or drawn between the extremes [Hz]."""
+
+PAIRS: tuple[tuple[str, ...], ...] = (
+    ("turned support axes", "cross-axis sensitivity"),
+    ("sensor lag", "foundation mode"),
+    ("cubic support", "long remanence"),
+    ("brackets that follow the housing", "turned support axes"),
+    ("friction", "unbalance beyond its grade"),
+    ("contact law", "sensor planes elsewhere"),
+)
+TRIPLES: tuple[tuple[str, ...], ...] = (
+    ("turned support axes", "cross-axis sensitivity", "sensor lag"),
+    ("foundation mode", "hysteretic support", "cross-axis sensitivity"),
+    ("cubic support", "turned support axes", "rotor stiffness"),
+    ("brackets that follow the housing", "long remanence", "thermal gap"),
+    ("sensor lag", "sensor planes elsewhere", "bearing centres"),
+    ("foundation mode", "turned support axes", "sensor lag"),
+)
+RATES = (10e3, 50e3, 100e3)
+SIZES = ((SLIGHT, "slight"), (LARGE, "large"))
+FIRST = 21
+"""Kinds of departures in the first family of them; the others but the last are in the second."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """One case of the corpus."""
+    """One drop with known truth; the name says nothing of what is hidden."""
 
+    name: str
     group: str
-    number: int
-    """Counted from 0 within its group."""
-    plan: dict[str, Any]
-    """What the group has in the file of the plan, over what holds for all records."""
+    """What is scored together."""
+    rotor: str
+    """Rotor, by its name in `ROTORS`."""
+    speed: float = 0.0
+    """Speed at power-off [Hz]; 0 where it is drawn."""
+    seeds: tuple[int, int]
+    """Of the hidden machine and of the drop."""
+    departures: tuple[tuple[str, int], ...] = ()
+    """Kinds and sizes of what the description of the machine does not have."""
+    tail: bool = True
+    """Whether the settled tail was recorded."""
+    sampling_rate: float = 20e3
+    """Samples per second [Hz]."""
+    fault: str = ""
+    clean: str = ""
+    """The fault of the record, and the case whose record is the same without it."""
+    plan: Mapping[str, Any] = field(default_factory=dict)
+    """How a case of the corpus is drawn; empty for a drop of DropBench."""
 
-    @property
-    def name(self) -> str:
-        """Name, which stands in the table."""
-        return f"{self.group}-{self.number:03d}"
 
-    @property
-    def rotor(self) -> str:
-        """Rotor, by its name in `ROTORS`."""
-        return list(ROTORS)[(self.number + self.number // len(KINDS)) % len(ROTORS)]
+Drop = tuple[str, int, tuple[tuple[str, int], ...], int, dict[str, Any]]
 
-    @property
-    def departure(self) -> tuple[str, int] | None:
-        """What the machine has beyond its file: kind and size."""
-        if self.group != "departures":
-            return None
-        return KINDS[self.number % len(KINDS)], self.number // len(KINDS) % 2
 
-    @property
-    def fault(self) -> str:
-        """The fault of its record; nothing where it has none."""
-        if self.group != "faults":
-            return ""
-        kinds, further = list(FAULTS), self.number - int(self.plan["plain"])
-        return kinds[self.number % len(kinds)] if further < 0 else list(SIZED)[further % len(SIZED)]
+def _dropbench() -> Iterator[Case]:
+    kinds, rotors = list(DEPARTURES), list(ROTORS)
 
-    @property
-    def clean(self) -> Case:
-        """The case whose record is the same without a fault."""
-        number = self.number % int(self.plan.get("clean", self.number + 1))
-        return replace(self, group="facts" if self.fault else self.group, number=number)
+    def single(family: str, own: list[str], seed: int, turn: int) -> Iterator[Drop]:
+        for size, word in SIZES:
+            for i, kind in enumerate(own):
+                yield f"{family}, {word}", seed + 100 * size + i, ((kind, size),), turn * size + i, {}
 
-    @property
-    def has_tail(self) -> bool:
-        """Whether the settled tail was recorded."""
-        return self.number % int(self.plan["without_tail"]) != 0
+    right = (("right", True), ("right, without tail", False))
+    first: list[Drop] = [
+        (name, 700 + i, (), i, {"tail": tail}) for i in range(len(ROTORS)) for name, tail in right
+    ]
+    # a turn longer than the kinds, else each would meet one rotor in both sizes
+    first += single("one departure", kinds[:FIRST], 800, FIRST + 1)
+    turn = 2 * (FIRST + 1)
+    for seed, family, groups in ((1000, "two departures", PAIRS), (1100, "three departures", TRIPLES)):
+        for i, named in enumerate(groups):
+            first.append((family, seed + i, tuple((kind, SLIGHT) for kind in named), turn, {}))
+            turn += 1
+    first += [
+        ("other sampling rates", 1200 + i, (), turn + i, {"sampling_rate": rate})
+        for i, rate in enumerate(RATES)
+    ]
+    later, last = kinds[FIRST:-1], kinds[-1]
+    play: list[Drop] = [
+        (f"{last}, {word}", 1500 + i, ((last, size),), i, {"speed": SPEEDS[rotor][1]})
+        for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(SIZES), strict=False))
+    ]
+    for start, drops in ((1, first), (101, single("later kinds", later, 1300, len(later))), (201, play)):
+        speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
+        for number, (group, seed, own, turn, more) in enumerate(drops, start):
+            rotor = rotors[turn % len(rotors)]
+            yield Case(
+                name=f"drop_{number:03d}",
+                group=group,
+                rotor=rotor,
+                seeds=(seed, 9000 + number),
+                departures=own,
+                **{"speed": next(speeds[rotor])} | more,
+            )
+
+
+DROPS: tuple[Case, ...] = tuple(_dropbench())
+"""All drops of DropBench, in order."""
+
+
+def chosen_drops(only: Iterable[str]) -> tuple[Case, ...]:
+    """Drops of DropBench by name, by family or by rotor; all without any."""
+    wanted = set(only)
+    keys = {drop.name: {drop.name, drop.group, drop.rotor} for drop in DROPS}
+    if unknown := sorted(wanted - set().union(*keys.values())):
+        families = ", ".join(repr(f) for f in dict.fromkeys(drop.group for drop in DROPS))
+        raise UsageError(
+            f"the bench has no drop {unknown[0]!r}; name one of {DROPS[0].name} to {DROPS[-1].name}, a rotor "
+            f"such as {DROPS[0].rotor!r}, or a family: {families}"
+        )
+    return tuple(drop for drop in DROPS if not wanted or keys[drop.name] & wanted)
 
 
 def plan_digest() -> str:
-    """SHA-256 of the plan; tables of different plans do not compare."""
+    """SHA-256 of the plan of the corpus; tables of different plans do not compare."""
     return hashlib.sha256(PLAN.read_bytes()).hexdigest()
 
 
 def listed(*, short: bool = False) -> Iterator[Case]:
     """The cases of the corpus, or those of the short one."""
     plan = tomllib.loads(PLAN.read_text(encoding="utf-8"))
-    facts = plan["groups"]["facts"]
-    plan["groups"]["faults"] = facts | {"clean": facts["count"]} | plan["groups"]["faults"]
     for group, own in plan["groups"].items():
         for number in range(own["short" if short else "count"]):
-            yield Case(group=group, number=number, plan=plan["record"] | own)
+            yield _of_corpus(plan, group, number)
+
+
+def _of_corpus(plan: Mapping[str, Any], group: str, number: int) -> Case:
+    own, kinds, rotors = plan["record"] | plan["groups"][group], list(FAULTS), list(ROTORS)
+    name, turn = f"{group}-{number:03d}", number // len(KINDS)
+    if group == "faults":
+        further = number - own["plain"]
+        fault = kinds[number % len(kinds)] if further < 0 else list(SIZED)[further % len(SIZED)]
+        clean = _of_corpus(plan, "facts", number % plan["groups"]["facts"]["count"])
+        return replace(clean, name=name, group=group, fault=fault, clean=clean.name)
+    if "durations" in own:
+        own["duration"] = own["durations"][number % len(own["durations"])]
+    return Case(
+        name=name,
+        group=group,
+        rotor=rotors[(number + turn) % len(rotors)],
+        seeds=(own["seed"] + number,) * 2,
+        departures=((KINDS[number % len(KINDS)], turn % 2),) if group == "departures" else (),
+        tail=number % own["without_tail"] != 0,
+        sampling_rate=own["sampling_rate"],
+        plan=own,
+    )
 
 
 def known_machine(rotor: str, seed: int) -> Machine:
@@ -157,86 +252,107 @@ def drawn_from_prior(known: Machine, random: np.random.Generator) -> tuple[Machi
     return known.with_values(values), {path: found[path] for path in found if "remanen" in path}
 
 
-def true_conditions(
-    hidden: HiddenMachine, speed: float, seed: int, drawn: dict[str, float]
-) -> DropConditions:
-    """Conditions of a drop whose remanent forces were drawn from the prior."""
-    conditions = drop_conditions(hidden, speed, seed)
-    force = [[drawn[f"{amb.name}.remanent_force.{axis}"] for axis in "xy"] for amb in hidden.known.ambs]
-    start = replace(
-        conditions.start,
-        remanent_force=np.array(force),
-        remanence_time_constant=drawn["remanence.time_constant"],
-    )
-    return replace(conditions, start=start)
-
-
 def synthesized(case: Case) -> tuple[SyntheticDrop, Machine]:
-    """Recording of a case with its truth, and the machine as its owner knows it."""
-    for attempt in range(TRIES):
-        seed = int(case.plan["seed"]) + case.number + TRY * attempt
+    """Recording of a case with its truth, before any fault, and the machine as its owner knows it."""
+    for attempt in range(TRIES if case.plan else 1):
         try:
-            made = _drawn(case, seed)
+            made = _from_prior(case, case.seeds[0] + TRY * attempt) if case.plan else _as_described(case)
         except (SimulationError, UsageError):  # an extreme draw that no machine stands
+            if not case.plan:
+                raise
             continue
         if made[0].reached(0.5 * made[0].record.time[-1]):
             return made
-    raise SimulationError(f"{case.name}: no draw of {TRIES} drops within its record")
+    raise SimulationError(
+        f"{case.name} is no drop here: a bearing was not reached within half of its record. Your computer "
+        "rounds differently (rotordrop doctor --fingerprint); leave it out"
+    )
 
 
-def _drawn(case: Case, seed: int) -> tuple[SyntheticDrop, Machine]:
+def _as_described(case: Case) -> tuple[SyntheticDrop, Machine]:
+    """A machine drawn around its description."""
+    known, speed = bench_rotor(case.rotor), 2.0 * math.pi * case.speed
+    hidden = hidden_machine(known, case.seeds[0], Violations.of(departures(known, speed, case.departures)))
+    chain = fitted_to(SensorChain(sampling_rate=case.sampling_rate), hidden.machine)
+    made = synthesize_drop(hidden, speed, case.seeds[1], sensor_chain=chain, tail=case.tail, name=case.name)
+    return made, known
+
+
+def _from_prior(case: Case, seed: int) -> tuple[SyntheticDrop, Machine]:
+    """A machine and a drop drawn from the estimator's prior."""
     plan, random = case.plan, stream(seed, "case")
     known = known_machine(case.rotor, seed)
     low, high = math.log(min(SPEEDS[case.rotor])), math.log(max(SPEEDS[case.rotor]))
     speed = 2.0 * math.pi * math.exp(random.uniform(low, high))
     true, drop = drawn_from_prior(known, stream(seed, "prior"))
-    kinds = () if case.departure is None else (case.departure,)
-    broken = Violations.of(departures(known, speed, kinds))
+    broken = Violations.of(departures(known, speed, case.departures))
     hidden = replace(hidden_machine(true, seed, broken, drawn=False), known=known)
+    conditions = drop_conditions(hidden, speed, seed)
+    force = [[drop[f"{amb.name}.remanent_force.{axis}"] for axis in "xy"] for amb in known.ambs]
+    start = replace(
+        conditions.start,
+        remanent_force=np.array(force),
+        remanence_time_constant=drop["remanence.time_constant"],
+    )
     row = {one.path: one for one in rows("sensor")}
-    sigma = {
-        path: sensor_prior(row[path], row[path].described(known.sensors[0]), smallest_gap(known)).sigma
+    gain, offset = (
+        sensor_prior(row[path], row[path].described(known.sensors[0]), smallest_gap(known)).sigma
         for path in ("gain", "offset")
-    }
-    rate = float(plan["sampling_rate"])
-    chain = SensorChain(sampling_rate=rate, gain_error=sigma["gain"], offset=sigma["offset"], normal=True)
-    gap = max(float(bearing.air_gap) for bearing in known.touchdown_bearings)
-    duration = round(float(plan["falls"]) * math.sqrt(2.0 * gap / float(known.gravity)), 3)
+    )
+    chain = SensorChain(sampling_rate=case.sampling_rate, gain_error=gain, offset=offset, normal=True)
     if "noise" in plan:
-        duration = float(plan["durations"][case.number % len(plan["durations"])])
         chain = replace(
             chain,
             sampling_rate=float(random.choice(plan["sampling_rates"])),
             noise=math.exp(random.uniform(*np.log(plan["noise"]))),
             bits=int(random.choice(plan["bits"])),
         )
+    gap = max(float(bearing.air_gap) for bearing in known.touchdown_bearings)
+    fall = math.sqrt(2.0 * gap / float(known.gravity))
     made = synthesize_drop(
         hidden,
         speed,
         seed,
         sensor_chain=fitted_to(chain, true),
-        duration=duration,
-        before=max(float(plan["before"]), 4.0 * math.pi / speed),
-        tail=case.has_tail,
-        conditions=true_conditions(hidden, speed, seed, drop),
-        name=case.name,
+        duration=plan.get("duration", round(plan["falls"] * fall, 3)),
+        before=max(plan["before"], 4.0 * math.pi / speed),
+        tail=case.tail,
+        conditions=replace(conditions, start=start),
+        name=case.clean or case.name,
     )
     return made, known
 
 
 def made(case: Case, folder: Path) -> Path:
-    """The folder of a case with ``machine.toml``, ``record.csv``, ``tail.csv`` and ``truth.json``, made once.
+    """The folder of a case with ``machine.toml``, ``record.csv`` and ``tail.csv``, made once.
 
-    The truth is written last: a case that has it is complete.
+    The truth stands apart and is written last: a case that has it is complete.
     """
-    place = folder / "cases" / case.name
-    if not (place / "truth.json").is_file():
-        drop, known = synthesized(case.clean)
-        if case.fault:
-            record, known = spoiled(drop.record, known, case.fault, case.name)
-            drop = replace(drop, record=record)
-        write_drop(drop, known, place, place / "truth.json")
-    return place
+    if truth_path(folder, case.name).is_file():
+        return drop_path(folder, case.name)
+    drop, known = synthesized(case)
+    if case.fault:
+        record, known = spoiled(drop.record, known, case.fault, case.name)
+        drop = replace(drop, record=record)
+    facts = {"bench_version": VERSION, "family": case.group, "rotor": case.rotor}
+    return write_drop(drop, known, folder, case.name, **facts)
+
+
+def make_bench(
+    folder: str | Path,
+    only: Iterable[str] = (),
+    report: Callable[[str, float], None] = lambda name, share: None,
+) -> list[str]:
+    """Make what is missing of DropBench in a folder, and give the names of the drops made.
+
+    ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth. ``only`` holds names
+    of drops, families or rotors; empty means all.
+    """
+    missing = [drop for drop in chosen_drops(only) if not truth_path(Path(folder), drop.name).is_file()]
+    for i, drop in enumerate(missing):
+        report(drop.name, i / len(missing))
+        made(drop, Path(folder))
+    return [drop.name for drop in missing]
 
 
 def digest(place: Path) -> str:

@@ -1,4 +1,4 @@
-"""What a table says, and whether a version keeps within the limits against another one."""
+"""Whether a version keeps within the limits against another one."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import numpy as np
 
 from rotordrop.errors import UsageError
 from rotordrop_bench.corpus.cases import listed
-from rotordrop_bench.corpus.table import ESTIMATED, PARTS, Row, Said, holds, rank
+from rotordrop_bench.corpus.table import ESTIMATED, Row, answered, flagged, holds, name_of, quantities, silent
 
-SILENT = 0.05
-"""Error from which a value outside its interval counts as a silent one [1]."""
 CUT = ("short record", "record ends before standstill")
 """What is true of every record of the corpus and is no alarm."""
 RIGHT, WRONG, CLEAN = ("prior",), ("prior", "departures"), ("prior", "facts")
@@ -22,23 +20,6 @@ FAULTY = ("faults",)
 
 Pairs = Sequence[tuple[Row, Row]]
 Test = Callable[[Row], bool]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """One quantity over the cases of a group; errors and widths are relative to the truth [1]."""
-
-    group: str
-    name: str
-    values: int
-    covered: dict[float, float]
-    """Share of the intervals that hold the truth, by their probability."""
-    median_error: float
-    half_width: float
-    ranks: tuple[int, ...]
-    """Values by the decile of the truth's rank; even where intervals are right."""
-    unevenness: float
-    """Kolmogorov's distance of the ranks from uniform, times the root of their number: 1.36 in one of 20."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,53 +37,6 @@ class Limit:
         return self.after <= self.most
 
 
-def said_of(rows: Iterable[Row], name: str) -> list[Said]:
-    """What was said of a quantity at every bearing."""
-    return [said for row in rows for key, said in row.estimates.items() if key.startswith(f"{name} ")]
-
-
-def quantities(rows: Sequence[Row]) -> list[Quantity]:
-    """The quantities of a table by group."""
-    said = {
-        (group, name): said_of((row for row in rows if row.group == group), name)
-        for group in WRONG
-        for name in ESTIMATED
-    }
-    return [_quantity(group, name, own) for (group, name), own in said.items() if own]
-
-
-def _quantity(group: str, name: str, said: Sequence[Said]) -> Quantity:
-    ranks = np.sort([rank(one) for one in said])
-    steps = np.arange(len(ranks) + 1) / len(ranks)
-    apart = max(np.max(ranks - steps[:-1]), np.max(steps[1:] - ranks))
-    return Quantity(
-        group=group,
-        name=name,
-        values=len(said),
-        covered={part: float(np.mean([holds(one, part) for one in said])) for part in (0.5, 0.8, 0.9)},
-        median_error=_median_error(said),
-        half_width=_half_width(said),
-        ranks=tuple(int(n) for n in np.histogram(ranks, 10, (0.0, 1.0))[0]),
-        unevenness=float(apart * math.sqrt(len(ranks))),
-    )
-
-
-def answered(row: Row) -> bool:
-    """Whether an estimate gave numbers."""
-    return bool(row.estimates)
-
-
-def silent(row: Row) -> bool:
-    """Whether a peak force or stress is far off, outside its interval, and the estimate does not say so."""
-    loads = [said for key, said in row.estimates.items() if key.startswith(("force", "stress"))]
-    return row.code == 0 and any(not holds(one) and abs(one[0]) > SILENT * PARTS for one in loads)
-
-
-def flagged(row: Row) -> bool:
-    """Whether an estimate says that it is not consistent with its record."""
-    return row.code == 7
-
-
 def alarmed(row: Row) -> bool:
     """Whether the gate warns of a record or refuses it."""
     kinds = [one.split(":", 1) for one in row.findings]
@@ -112,7 +46,7 @@ def alarmed(row: Row) -> bool:
 def missed_faults(rows: Iterable[Row]) -> list[bool]:
     """Whether the gate says no more of a spoiled record than of the clean one, fault by fault."""
     by_name = {row.case: row for row in rows}
-    pairs = [(by_name.get(one.name), by_name.get(one.clean.name)) for one in listed() if one.fault]
+    pairs = [(by_name.get(one.name), by_name.get(one.clean)) for one in listed() if one.fault]
     return [
         spoiled.look_code == 0 and not set(spoiled.findings) - set(clean.findings if clean else ())
         for spoiled, clean in pairs
@@ -124,14 +58,6 @@ def share(rows: Iterable[Row], groups: Sequence[str], test: Test) -> float:
     """Share of the rows of some groups for which something is so; NaN of none."""
     found = [test(row) for row in rows if row.group in groups]
     return float(np.mean(found)) if found else math.nan
-
-
-def _median_error(said: Sequence[Said]) -> float:
-    return float(np.median([abs(one[0]) for one in said])) / PARTS
-
-
-def _half_width(said: Sequence[Said]) -> float:
-    return float(np.median([one[2] - one[1] for one in said])) / 2.0 / PARTS
 
 
 def paired(first: tuple[str, list[Row]], second: tuple[str, list[Row]]) -> Pairs:
@@ -151,12 +77,14 @@ def limits(pairs: Pairs) -> list[Limit]:
     def limit(name: str, was: float, now: float, most: float) -> None:
         found.append(Limit(name=name, before=was, after=now, most=most))
 
+    both = [pair for pair in estimated if all(map(answered, pair))]
+    sides = {side: [pair[at] for pair in both] for at, side in enumerate(("before", "after"))}
+    numbers = {(one.group, one.name): one for one in quantities(sides)}
     for name in ESTIMATED:
         limit(f"not covered at 90 %, {name}", *_missed(name, [p for p in estimated if any(map(answered, p))]))
-        both = [pair for pair in estimated if all(map(answered, pair))]
-        for words, measure in (("median error", _median_error), ("median half width", _half_width)):
+        for words, field in (("median error", "median_error"), ("median half width", "half_width")):
             if both:
-                was, now = (measure(said_of(side, name)) for side in zip(*both, strict=True))
+                was, now = (getattr(numbers.get((side, name)), field, math.nan) for side in sides)
                 limit(f"{words}, {name}", was, now, 1.1 * was)
     counted: dict[str, tuple[Test, float]] = {
         "silent": (silent, len(estimated) / 150),
@@ -188,7 +116,10 @@ def _missed(name: str, pairs: Pairs) -> tuple[float, float, float]:
 
     The errors are those of the paired difference; what only one version answers is a miss of the other.
     """
-    said = [[said_of([row], name) for row in pair] for pair in pairs]
+    said = [
+        [[one for key, one in row.estimates.items() if name_of(key) == name] for row in pair]
+        for pair in pairs
+    ]
     missed = np.array(
         [[np.mean([not holds(one) for one in side]) if side else 1.0 for side in pair] for pair in said]
     ).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Give the cases of the corpus to a version, by its own command line in its own environment."""
+"""Rows of cases: of a version that is run by its own command line, or of estimates that anybody made."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rotordrop.errors import UsageError
 from rotordrop.files import make_folder, write_json
-from rotordrop_bench.corpus.cases import Case, digest, made
-from rotordrop_bench.corpus.table import Row, scored
+from rotordrop_bench.corpus.cases import VERSION, Case, chosen_drops, digest, made
+from rotordrop_bench.corpus.table import ALWAYS, SHORT, Row, judged, name_of, said_of, scored
+from rotordrop_bench.files import truth_path
+from rotordrop_bench.truth import read_truth
 
 LONGEST = 1800.0
 """Time after which a command is given up [s]."""
@@ -64,7 +66,7 @@ def run(
 ) -> list[Row]:
     """Run what is not yet there of these cases, and score all of them.
 
-    ``folder/cases`` keeps what a version is given, ``folder/said/NAME`` what it said; a run that was stopped
+    ``folder/drops`` keeps what a version is given, ``folder/said/NAME`` what it said; a run that was stopped
     goes on where it was, or from the ``known`` rows of its table. ``report`` is called with all rows so far.
     """
     rows = {row.case: row for row in known}
@@ -78,9 +80,10 @@ def run(
         looked = _said(version, ["look", machine, record], said / "look")
         estimated: dict[str, Any] = {}
         if case.plan["estimated"]:
-            more = ["--tail", tail] if case.has_tail else []
+            more = ["--tail", tail] if case.tail else []
             estimated = _said(version, ["estimate", machine, record, *more], said / "estimate")
-        rows[case.name] = scored(case.name, digest(place), place / "truth.json", looked, estimated)
+        truth = read_truth(truth_path(folder, case.name))
+        rows[case.name] = scored(case.name, digest(place), truth, looked, estimated)
         report(list(rows.values()))
     return [rows[case.name] for case in cases]
 
@@ -110,3 +113,60 @@ def _said(version: Version, command: list[str], stem: Path) -> dict[str, Any]:
     if document.is_file():
         found["document"] = json.loads(document.read_text(encoding="utf-8"))
     return found
+
+
+def score_bench(
+    folder: str | Path, estimates: str | Path, only: Iterable[str] = ()
+) -> tuple[dict[str, list[Row]], dict[str, str]]:
+    """Compare estimates with the hidden truth of the drops of DropBench that were made in a folder.
+
+    The estimates are ``NAME.json`` for each drop: the JSON of ``rotordrop estimate``, or at least
+    ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``. ``only`` holds
+    names of drops, families or rotors; all that were made when empty. What the estimator states of one drop
+    it misses where it does not state it.
+
+    Returns
+    -------
+    dict of list of Row
+        Rows of all drops and of each family.
+    dict of str
+        Drops without a usable estimate, with the reason.
+    """
+    folder, estimates = Path(folder), Path(estimates)
+    drops = [drop for drop in chosen_drops(only) if truth_path(folder, drop.name).is_file()]
+    if not drops:
+        raise UsageError(
+            f"{folder} holds no drop of the bench; make some with 'rotordrop-bench make {folder}'"
+        )
+    if not estimates.is_dir():
+        raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")
+    rows, unscored = {}, {}
+    truths = {drop.name: read_truth(truth_path(folder, drop.name)) for drop in drops}
+    for name, truth in truths.items():
+        if (version := truth.values.get("bench_version")) != VERSION:
+            raise UsageError(
+                f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make "
+                "the bench again in another folder"
+            )
+        file = estimates / f"{name}.json"
+        scores = judged(file, truth) if file.is_file() else f"there is no {file.name}"
+        row = Row(case=name, digest="", violated=truth.violated)
+        if isinstance(scores, str):
+            unscored[name] = scores
+        else:
+            code, named = (7 if scores["consistent"] is False else 0), tuple(scores["named"])
+            row = replace(row, code=code, estimates=said_of(scores), named=named)
+        rows[name] = row
+    stated = {name_of(key) for row in rows.values() for key in row.estimates}
+    for name, truth in truths.items():
+        due = [
+            f"{SHORT.get(path, path)} {bearing}"
+            for bearing in truth.bearing_names
+            for path in truth.of_bearing(bearing)
+            if path in ALWAYS or SHORT.get(path, path) in stated
+        ]
+        rows[name] = replace(rows[name], estimates=dict.fromkeys(due, ()) | dict(rows[name].estimates))
+    groups = {"all drops": list(rows.values())}
+    for drop in drops:
+        groups.setdefault(drop.group, []).append(rows[drop.name])
+    return groups, unscored

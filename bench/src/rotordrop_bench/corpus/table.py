@@ -1,22 +1,27 @@
-"""The table of a version: one row a case, rounded, with what it said against the truth."""
+"""Rows, one a case, with what was said against the truth, rounded; quantities over them; tables as files."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from rotordrop.document import read_json
+import numpy as np
+
+from rotordrop.arrays import Array
+from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
 from rotordrop.files import write_text
 from rotordrop.known import NINETY
-from rotordrop_bench.truth import truth_of
+from rotordrop.severity.numbers import LOADS
+from rotordrop_bench.score import score_estimate
+from rotordrop_bench.truth import Truth
 
 PARTS = 1e4
 """Values of the table are in units of 1e-4 of the truth, times in 0.01 ms from it."""
@@ -27,15 +32,27 @@ ESTIMATED = {
     "friction": "friction.dynamic",
 }
 """What is scored of an estimate at each bearing, by its path in the document and in the truth."""
+SHORT = {path: name for name, path in ESTIMATED.items()} | {"mean_force_0p15_0p2_N": "mean_force"}
+"""Names in keys and tables of what an estimate and a truth have by these paths."""
 LOOKED = {
     "gap": ("air_gap_m", "air_gap_interval_90_m"),
     "touch": ("first_touch_s", "first_touch_interval_90_s"),
     "largest": ("largest_displacement_m", "largest_displacement_interval_90_m"),
 }
 """Facts that are scored of a look at each plane, by the fields of value and interval."""
+ALWAYS = (*(load.field for load in LOADS), "air_gap_m")
+"""What an estimate of a drop of DropBench must have of each bearing, or else misses."""
+LOST = 0.1
+"""A value wrong by more than this share is lost [1]; chosen, not measured."""
+SILENT = 0.05
+"""Error from which a value outside its interval counts as a silent one [1]."""
+PARAMETERS = "parameters"
+SHOWN = (*SHORT.values(), PARAMETERS, "structure", "absent")
+"""Quantities that stand on the screen; parameters one by one stand in the JSON."""
 
 Said = tuple[int, ...]
-"""Value, lower and upper end of the 90 % interval, each less the truth, in units of the table."""
+"""Value and, where there is one, lower and upper end of the 90 % interval, each less the truth, in units of
+the table; empty where a value is missing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,17 +62,20 @@ class Row:
     case: str
     digest: str
     """Of record and tail."""
-    look_code: int
+    look_code: int = 0
     code: int | None = None
     """Exit codes of look and estimate."""
-    look_seconds: float
+    look_seconds: float = 0.0
     seconds: float | None = None
     """Processor time of both [s]."""
     findings: tuple[str, ...] = ()
     """Severity and kind of what the gate found, as ``warning:late channel``."""
     facts: Mapping[str, Said] = field(default_factory=dict)
     estimates: Mapping[str, Said] = field(default_factory=dict)
-    """By quantity and bearing, such as ``force NDE``; what was not found is not there."""
+    """By quantity and bearing, such as ``force NDE``; of the corpus what was not found is not there."""
+    named: tuple[str, ...] = ()
+    violated: tuple[str, ...] = ()
+    """Departures that an estimate names, and those that are there."""
 
     @property
     def group(self) -> str:
@@ -64,12 +84,11 @@ class Row:
 
 
 def scored(
-    case: str, digest: str, truth: Path, looked: Mapping[str, Any], estimated: Mapping[str, Any]
+    case: str, digest: str, truth: Truth, looked: Mapping[str, Any], estimated: Mapping[str, Any]
 ) -> Row:
-    """The row of a case, from what look and estimate said (`rotordrop_bench.corpus.run`)."""
-    true = truth_of(read_json(truth, "rotordrop-bench corpus run"))
-    values, off = true.values, float(true.values["t_off_in_record_s"])
-    look, facts, estimates = looked.get("document", {}), {}, {}
+    """The row of a case of the corpus, from what look and estimate said (`rotordrop_bench.corpus.run`)."""
+    values, off = truth.values, float(truth.values["t_off_in_record_s"])
+    look, facts = looked.get("document", {}), {}
     for drop in look.get("drops", [])[:1]:
         facts["release"] = _said(drop["release_s"], drop["release_interval_90_s"], off, 1e-5)
     for plane in look.get("planes", []):
@@ -79,13 +98,8 @@ def scored(
         at = {"gap": (gap, gap / PARTS), "touch": (touch, 1e-5), "largest": (largest, largest / PARTS)}
         for what, (value, interval) in LOOKED.items():
             facts[f"{what} {name}"] = _said(plane.get(value), plane.get(interval), *at[what])
-    for name, own in estimated.get("document", {}).get("bearings", {}).items():
-        for what, path in ESTIMATED.items():
-            entry: Any = own
-            for key in path.split("."):
-                entry = entry.get(key, {})
-            is_at, told = true.of_bearing(name)[path], (entry.get("value"), entry.get("interval_90"))
-            estimates[f"{what} {name}"] = _said(*told, is_at, is_at / PARTS)
+    scores = judged(estimated.get("document", {}), truth)
+    told = {} if isinstance(scores, str) else scores
     return Row(
         case=case,
         digest=digest,
@@ -95,8 +109,48 @@ def scored(
         seconds=estimated.get("seconds"),
         findings=tuple(sorted({f"{one['severity']}:{one['kind']}" for one in look.get("findings", [])})),
         facts={key: said for key, said in facts.items() if said},
-        estimates={key: said for key, said in estimates.items() if said},
+        estimates={
+            key: one for key, one in said_of(told).items() if name_of(key) in ESTIMATED and len(one) == 3
+        },
+        named=tuple(told.get("named", ())),
+        violated=truth.violated if estimated else (),
     )
+
+
+def judged(estimate: Mapping[str, Any] | Path, truth: Truth) -> dict[str, Any] | str:
+    """Scores of an estimate, or why there are none."""
+    try:
+        return score_estimate(estimate, truth, drop=truth.name)
+    except UsageError as error:
+        return str(error)
+
+
+def said_of(scores: Mapping[str, Any]) -> dict[str, Said]:
+    """What was said of every quantity that was scored, by quantity and place.
+
+    A structure that is absent, whose true value is zero, has half its interval as its measure.
+    """
+    every = {
+        f"{SHORT.get(path, path)} {bearing}": score
+        for bearing, own in scores.get("bearings", {}).items()
+        for path, score in own.items()
+    }
+    every |= {
+        f"{'structure' if s['truth'] else 'absent'} {at}": s for at, s in scores.get("structure", {}).items()
+    }
+    found = {}
+    for key, score in every.items():
+        ends = score.get("interval_90", ())
+        unit = abs(score["truth"]) or (0.5 * (ends[1] - ends[0]) if ends else 0.0)
+        if unit > 0.0:
+            value = (score["estimate"], *ends)
+            found[key] = tuple(round((one - score["truth"]) / (unit / PARTS)) for one in value)
+    return found
+
+
+def name_of(key: str) -> str:
+    """The quantity of a key of estimates."""
+    return key.partition(" ")[0]
 
 
 def _said(value: float | None, interval: Any, truth: float, unit: float) -> Said:
@@ -120,8 +174,90 @@ def rank(said: Said) -> float:
 
 
 def holds(said: Said, share: float = 0.9) -> bool:
-    """Whether the interval that holds this share holds the truth."""
+    """Whether the interval that holds this share holds the truth; without an interval nothing does."""
+    if len(said) < 3:
+        return False
     return said[1] <= 0 <= said[2] if share == 0.9 else abs(rank(said) - 0.5) <= 0.5 * share
+
+
+def answered(row: Row) -> bool:
+    """Whether an estimate gave numbers."""
+    return any(row.estimates.values())
+
+
+def silent(row: Row) -> bool:
+    """Whether a peak force or stress is far off, outside its interval, and the estimate does not say so."""
+    loads = [said for key, said in row.estimates.items() if key.startswith(("force", "stress")) and said]
+    return row.code == 0 and any(not holds(one) and abs(one[0]) > SILENT * PARTS for one in loads)
+
+
+def flagged(row: Row) -> bool:
+    """Whether an estimate says that it is not consistent with its record."""
+    return row.code == 7
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One quantity over the cases of a group; errors and widths are relative to the truth [1]."""
+
+    group: str
+    name: str
+    values: int
+    missing: int
+    """Values scored, and values that the estimates do not have."""
+    median_error: float | None
+    ninetieth: float | None
+    worst: float | None
+    lost: float
+    """Share of values that are wrong by more than 10 % or missing."""
+    covered: dict[float, float | None]
+    """Share of the intervals that hold the truth, by their probability."""
+    half_width: float | None
+    """Median of half the 90 % interval."""
+    ranks: tuple[int, ...]
+    """Values by the decile of the truth's rank; even where intervals are right."""
+    unevenness: float | None
+    """Kolmogorov's distance of the ranks from uniform, times the root of their number: 1.36 in one of 20."""
+
+
+def quantities(groups: Mapping[str, Sequence[Row]]) -> list[Quantity]:
+    """The quantities of every group of rows."""
+    pooled = set(published()) - set(ESTIMATED.values())
+    found = []
+    for group, rows in groups.items():
+        said: dict[str, list[Said]] = {}
+        for key, one in (entry for row in rows for entry in row.estimates.items()):
+            name = name_of(key)
+            for into in (name, PARAMETERS) if name in pooled else (name,):
+                said.setdefault(into, []).append(one)
+        found += [_quantity(group, name, own) for name, own in said.items()]
+    return found
+
+
+def _quantity(group: str, name: str, said: Sequence[Said]) -> Quantity:
+    there = [one for one in said if one]
+    within = [one for one in there if len(one) == 3]
+    errors, ranks = np.abs([one[0] for one in there]), np.sort([rank(one) for one in within])
+    steps = np.arange(len(ranks) + 1) / max(len(ranks), 1)
+
+    def over(measure: Callable[[Any], Any], numbers: Array | list[Any], unit: float = 1.0) -> float | None:
+        return float(measure(numbers)) / unit if len(numbers) else None
+
+    apart = over(lambda r: max(np.max(r - steps[:-1]), np.max(steps[1:] - r)), ranks)
+    return Quantity(
+        group=group,
+        name=name,
+        values=len(there),
+        missing=len(said) - len(there),
+        median_error=over(np.median, errors, PARTS),
+        ninetieth=over(lambda sizes: np.quantile(sizes, 0.9), errors, PARTS),
+        worst=over(np.max, errors, PARTS),
+        lost=float(np.sum(errors > LOST * PARTS) + len(said) - len(there)) / len(said),
+        covered={part: over(np.mean, [holds(one, part) for one in within]) for part in (0.5, 0.8, 0.9)},
+        half_width=over(np.median, [one[2] - one[1] for one in within], 2.0 * PARTS),
+        ranks=tuple(int(n) for n in np.histogram(ranks, 10, (0.0, 1.0))[0]),
+        unevenness=None if apart is None else apart * math.sqrt(len(ranks)),
+    )
 
 
 def write_table(rows: Iterable[Row], plan: str, path: Path) -> None:
@@ -160,6 +296,9 @@ def _read(entry: Mapping[str, str]) -> Row:
         pairs = (part.split("=") for part in cell.split("|") if part)
         return {key: tuple(map(int, said.split(":"))) for key, said in pairs}
 
+    def words(name: str) -> tuple[str, ...]:
+        return tuple(filter(None, entry.get(name, "").split("|")))
+
     return Row(
         case=entry["case"],
         digest=entry["digest"],
@@ -167,7 +306,9 @@ def _read(entry: Mapping[str, str]) -> Row:
         code=int(entry["code"]) if entry["code"] else None,
         look_seconds=float(entry["look_seconds"]),
         seconds=float(entry["seconds"]) if entry["seconds"] else None,
-        findings=tuple(filter(None, entry["findings"].split("|"))),
+        findings=words("findings"),
         facts=many(entry["facts"]),
         estimates=many(entry["estimates"]),
+        named=words("named"),
+        violated=words("violated"),
     )
