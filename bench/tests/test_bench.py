@@ -9,7 +9,7 @@ import pytest
 from rotordrop.errors import UsageError
 from rotordrop.files import digest_of_file, write_json
 from rotordrop.machine import load_machine
-from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_bench
+from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_all
 from rotordrop_bench.cli.app import run
 from rotordrop_bench.corpus.cases import chosen_drops
 from rotordrop_bench.corpus.table import quantities, silent
@@ -151,7 +151,7 @@ def _named(groups):
 
 def test_true_estimates_have_no_error(folder, estimates):
     _estimates(estimates)
-    groups, _ = score_bench(folder, estimates)
+    groups, _ = score_all(estimates, folder / "truth")
     row = _row(groups, "force")
     assert (row.values, row.missing, row.covered[0.9], row.lost) == (4, 0, 1.0, 0.0)
     assert row.worst == pytest.approx(0.0, abs=1e-12)
@@ -168,18 +168,18 @@ def test_an_estimate_counts_for_the_recording_it_was_made_of(folder, estimates):
             "record_sha256": digest_of_file(folder / "drops" / MADE[0] / "record.csv"),
         }
         file.write_text(json.dumps(json.loads(file.read_text()) | recorded))
-    _, unscored = score_bench(folder, estimates)
-    assert set(unscored) == {MADE[1]}
-    assert "belongs to record.csv" in unscored[MADE[1]]
+    _, scores = score_all(estimates, folder / "truth")
+    assert [isinstance(one, str) for one in scores.values()] == [False, True]
+    assert "belongs to record.csv" in scores[MADE[1]]
 
 
 def test_a_wrong_and_a_missing_estimate_are_lost(folder, estimates):
     _estimates(estimates, factor=1.15)
     (estimates / "drop_034.json").unlink()
-    only, _ = score_bench(folder, estimates, MADE[:1])
+    only, _ = score_all(*(place / f"{MADE[0]}.json" for place in (estimates, folder / "truth")))
     assert [row.code for row in only["all drops"]] == [0]
-    groups, unscored = score_bench(folder, estimates)
-    assert unscored == {"drop_034": "there is no drop_034.json"}
+    groups, scores = score_all(estimates, folder / "truth")
+    assert scores["drop_034"] == "there is no drop_034.json"
     assert _named(groups) == (1, 0, 1)
     row = _row(groups, "force")
     assert (row.values, row.missing, row.covered[0.9], row.lost) == (2, 2, 0.0, 1.0)
@@ -198,7 +198,7 @@ def test_parameters_of_a_lost_drop_are_missing_if_the_estimator_states_them_else
             fields["support"] = {"mass_kg": {"value": 20.0, "interval_90": [1.0, 1e4]}}
         (estimates / f"{name}.json").write_text(json.dumps(document))
     (estimates / "drop_034.json").write_text("no estimate")
-    row = _row(score_bench(folder, estimates)[0], "parameters")
+    row = _row(score_all(estimates, folder / "truth")[0], "parameters")
     assert (row.values, row.missing) == (2, 2)
     assert row.lost >= 0.5
 
@@ -208,7 +208,7 @@ def test_what_the_bench_does_not_have_is_refused(folder, estimates, tmp_path):
     old = json.loads((folder / "truth/drop_004.json").read_text()) | {"bench_version": "0"}
     write_json(tmp_path / "old/truth/drop_004.json", old, sealed=True)
     with pytest.raises(UsageError, match="is of version '0' of the bench, this is version '2026'; make"):
-        score_bench(tmp_path / "old", estimates)
+        score_all(estimates, tmp_path / "old/truth")
     with pytest.raises(
         UsageError,
         match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg', or a family",
@@ -221,12 +221,14 @@ def test_what_the_bench_does_not_have_is_refused(folder, estimates, tmp_path):
     ("call", "message"),
     [
         (["make"], "Missing argument 'FOLDER'"),
-        (["score-all", "x"], "Missing argument 'ESTIMATES'"),
-        (["score-all", "x", "y"], "x holds no drop of the bench; make some with 'rotordrop-bench make x'"),
+        (["score", "x"], "Missing argument 'TRUTH'"),
+        (["score", "x", "x"], "x holds no truth; make some with 'rotordrop-bench make'"),
+        (["score", "y", "x"], "y is no folder; give the one with the estimates"),
     ],
 )
 def test_a_call_without_folders_says_what_it_needs(call, message, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "x").mkdir()
     assert run(call) == 64
     assert message in capsys.readouterr().err.replace("\n", " ")
 
@@ -237,5 +239,6 @@ def test_list_and_table_are_printed(capsys, folder, estimates, tmp_path):
     assert out.count("two departures: ") == 6
     _estimates(estimates)
     file = tmp_path / "scores.json"
-    assert run(["score-all", str(folder), str(estimates), "--json", str(file)]) == 0
-    assert json.loads(file.read_text())["bench_version"] == VERSION
+    assert run(["score", str(estimates), str(folder / "truth"), "--json", str(file)]) == 0
+    assert set(json.loads(file.read_text())["drops"]) == set(MADE)
+    assert "two departures" not in capsys.readouterr().out

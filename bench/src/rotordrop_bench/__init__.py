@@ -6,7 +6,7 @@ apart. DropBench is a fixed list of such drops, the corpus compares versions of 
 """
 
 from rotordrop_bench.corpus.cases import DROPS, VERSION, Case, make_bench
-from rotordrop_bench.corpus.run import score_bench
+from rotordrop_bench.corpus.run import score_all
 from rotordrop_bench.event import DropConditions, HiddenMachine, hidden_machine
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 from rotordrop_bench.score import score_estimate
@@ -28,7 +28,7 @@ __all__ = [
     "load_violations",
     "make_bench",
     "read_truth",
-    "score_bench",
+    "score_all",
     "score_estimate",
     "synthesize_drop",
 ]

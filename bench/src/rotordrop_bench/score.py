@@ -9,20 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rotordrop.arrays import Array
 from rotordrop.document import read_json
 from rotordrop.errors import UsageError
 from rotordrop_bench.truth import Truth, read_truth, truth_of
 
 Estimate = Mapping[str, Any]
-
-LARGE_IMPACT = 1.7
-"""Impacts are scored whose true peak exceeds this many times the mean weight on a bearing [1]; chosen, not
-measured."""
-
-SAME_IMPACT = 5e-4
-"""An estimated impact belongs to a true one when it peaks within it, widened by this [s]; chosen, not
-measured."""
 
 Score = dict[str, Any]
 """How far one value is from the truth: ``estimate``, ``truth``, ``error`` [SI], and where they are known
@@ -39,8 +30,8 @@ def score_estimate(
     scores are ``method`` and ``consistent`` (what the estimate says of itself); ``named``, what it says the
     machine has beyond the base model, and ``violated``, what it has; ``drop``,
     ``bearings.<name>.<quantity>`` and ``structure.<path>``, each with ``estimate``, ``truth``, ``error``,
-    ``relative_error`` and, where an interval was given, ``covered`` and ``half_width``; ``impacts`` per
-    bearing where the estimate lists impacts; ``coverage`` over all intervals.
+    ``relative_error`` and, where an interval was given, ``interval_90``, ``covered`` and ``half_width``;
+    ``coverage`` over all intervals.
     """
     if not isinstance(truth, Truth):
         truth = truth_of(truth) if isinstance(truth, Mapping) else read_truth(truth)
@@ -63,7 +54,6 @@ def score_estimate(
             f"{', '.join(sorted(found)) or 'nothing'}; expected the JSON of 'rotordrop estimate'"
         )
     judged = [score["covered"] for score in every if "covered" in score]
-    impacts = {name: _impact_scores(fields, truth, name) for name, fields in told.items()}
     named = [one for one in _listed(found, "structure") if "name" in one and one.get("probability") is None]
     return {
         "name": truth.name,
@@ -74,7 +64,6 @@ def score_estimate(
         "named": [entry["name"] for entry in named],
         "violated": list(truth.violated),
         "structure": structure,
-        "impacts": {name: score for name, score in impacts.items() if score},
         "coverage": {
             "intervals": len(judged),
             "covered": sum(judged),
@@ -162,36 +151,3 @@ def _ends(interval: Any) -> tuple[float, float]:
     if not numbers or len(interval) != 2 or not interval[0] <= interval[1]:
         raise UsageError(f"interval_90 is {interval!r}; expected two numbers, the lower one first, or none")
     return float(interval[0]), float(interval[1])
-
-
-def _impact_scores(fields: Mapping[str, Any], truth: Truth, bearing: str) -> dict[str, Any]:
-    """Errors of the peaks of all large impacts that the estimate lists, and how many it missed."""
-    listed = fields.get("impacts")
-    if not isinstance(listed, list):
-        return {}
-    true, least = truth.impacts(bearing), LARGE_IMPACT * truth.bearing_load
-    true = true[true[:, 2] > least]
-    found = [(m, row[2]) for row in true if (m := _matching(listed, row)) is not None]
-    errors = [(peak - force) / force for (peak, _), force in found]
-    covered = [ends[0] <= force <= ends[1] for (_, ends), force in found if ends is not None]
-    return {
-        "true_impacts": len(true),
-        "above_N": least,
-        "found": len(errors),
-        "relative_errors": errors,
-        "median_absolute_error": float(np.median(np.abs(errors))) if errors else None,
-        "covered": float(np.mean(covered)) if covered else None,
-    }
-
-
-def _matching(listed: list[Any], row: Array) -> tuple[float, tuple[float, float] | None] | None:
-    """Peak and its interval [N] of the largest listed impact within a true one; None where there is none."""
-    peaks = []
-    for impact in listed:
-        when, peak = _at(impact, "peak_time_s"), _at(impact, "peak_force_N.value")
-        if not all(isinstance(one, int | float) for one in (when, peak)):
-            continue
-        if row[0] - SAME_IMPACT <= when <= row[1] + SAME_IMPACT:
-            interval = _at(impact, "peak_force_N.interval_90")
-            peaks.append((float(peak), None if interval is None else _ends(interval)))
-    return max(peaks, key=lambda peak: peak[0], default=None)

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from rotordrop.arrays import Array
 from rotordrop.document import read_json
 from rotordrop.elements.table import published
 from rotordrop.errors import UsageError
@@ -60,14 +57,6 @@ class Truth:
         """Names of the touchdown bearings."""
         return tuple(self.values["air_gap_m"])
 
-    @property
-    def bearing_load(self) -> float:
-        """Mean weight on a bearing [N]; where it is not stated, the mean force late in the drop."""
-        weight = self.values.get("rotor_weight_N")
-        if weight is None:
-            return float(np.mean(list(self.values.get("mean_force_0p15_0p2_N", {}).values() or [0.0])))
-        return float(weight) / len(self.bearing_names)
-
     def of_bearing(self, bearing: str) -> dict[str, float]:
         """True values of one bearing (SI) by path in an estimate, such as ``"support.mass_kg"``."""
         found = {}
@@ -91,11 +80,6 @@ class Truth:
     def structure(self) -> dict[str, float]:
         """True values of structures beyond the base model [SI], by path such as ``"NDE.support.cubic"``."""
         return {path: float(value) for path, value in self.values.get("structure", {}).items()}
-
-    def impacts(self, bearing: str) -> Array:
-        """Start [s], end [s] and peak force [N] of every contact of a bearing, shape (R, 3)."""
-        rows = self.values.get("contact_intervals_0_0p25_s", {}).get(bearing, [])
-        return np.asarray(rows, dtype=np.float64).reshape(-1, 3)
 
 
 def read_truth(path: str | Path) -> Truth:

@@ -25,12 +25,11 @@ class BenchTable(VerbTable):
     groups: ClassVar = {
         "Any machine": (
             Verb("synthesize", "Make simulated recordings of drops whose truth is known", _DROPS),
-            Verb("score", "Compare an estimate with the truth of its recording", _SCORES),
+            Verb("score", "Compare anybody's estimates with the truth of their recordings", _SCORES),
         ),
         "DropBench": (
             Verb("list", "Name the drops of the bench", _DROPS, "list_drops"),
             Verb("make", "Make the drops that are missing in a folder", _DROPS),
-            Verb("score-all", "Score anybody's estimates of the drops of the bench", _SCORES),
         ),
         "Versions": (Verb("corpus", "Run the corpus with a version, or compare two versions", _SCORES),),
     }

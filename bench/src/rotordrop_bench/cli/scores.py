@@ -1,4 +1,4 @@
-"""Score an estimate, anybody's estimates of DropBench, or versions of the program on the corpus."""
+"""Score anybody's estimates, or versions of the program on the corpus."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
@@ -15,7 +15,6 @@ from rotordrop.cli import _options as options
 from rotordrop.cli._options import text_option
 from rotordrop.cli._output import deliver
 from rotordrop.errors import ConsistencyError, UsageError
-from rotordrop_bench.cli.drops import FolderArgument, OnlyOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,101 +22,42 @@ if TYPE_CHECKING:
 
     from rotordrop_bench.corpus.table import Quantity, Row
 
-_OF_THE_DROP = {"drop_instant_s": ("drop instant", "time"), "speed_Hz": ("speed", "frequency")}
-
 
 def score(
-    estimate: Annotated[
-        Path, Argument(metavar="ESTIMATE", help="JSON of 'rotordrop estimate'.", show_default=False)
+    estimates: Annotated[
+        Path,
+        Argument(
+            metavar="ESTIMATE",
+            help="JSON of 'rotordrop estimate', or a folder with NAME.json for each drop.",
+            show_default=False,
+        ),
     ],
-    truth: Annotated[Path, Argument(metavar="TRUTH", help="Truth file, a .json.", show_default=False)],
+    truths: Annotated[
+        Path, Argument(metavar="TRUTH", help="Truth file, a .json, or folder of them.", show_default=False)
+    ],
     drop: Annotated[
         str | None, text_option("NAME", "Which recording of an estimate of several, or its new name.")
     ] = None,
     json: options.Json = None,
 ) -> None:
-    """Compare an estimate with the truth of a simulated recording, quantity by quantity.
+    """Compare estimates with the truth of simulated recordings, quantity by quantity and family by family.
 
-    Example: rotordrop-bench score estimate.json truth.json
+    Example: rotordrop-bench score estimates dropbench/truth
     """
-    from rotordrop.units import format_quantity
-    from rotordrop_bench import score_estimate
-
-    scores = score_estimate(estimate, truth, drop=drop)
-
-    def summarise(out: Console) -> None:
-        out.print(_scored(scores))
-        for name, impacts in scores["impacts"].items():
-            above = format_quantity(impacts["above_N"], "force", digits=2)
-            text = f"{name}: {impacts['found']} of {impacts['true_impacts']} impacts above {above} found"
-            median = impacts["median_absolute_error"]
-            out.print(text if median is None else f"{text}, median error of their peaks {percent(median)}")
-        held, count = scores["coverage"]["covered"], scores["coverage"]["intervals"]
-        words = f"{held} of {count} intervals of 90 % hold the true value."
-        out.print(words if count else "The estimate states no interval.")
-
-    deliver(scores, json, summarise)
-
-
-def _scored(scores: dict[str, Any]) -> Table:
-    """Table of one estimate: the drop, then bearing by bearing."""
-    from rotordrop.elements.table import published
-    from rotordrop.severity.numbers import LOADS
-    from rotordrop.units import format_quantity
-
-    named = {field: (row.label, row.kind) for field, row in published().items()}
-    named |= {load.field: (load.label, load.kind) for load in LOADS} | _OF_THE_DROP
-    columns = ("estimate", "truth", "error", "90 % interval")
-    table = new_table(f"{scores['name']}: estimate against truth", ("quantity",), columns)
-    parts = {"": scores["drop"]} | {f"{name} ": fields for name, fields in scores["bearings"].items()}
-    for where, fields in parts.items():
-        for path, entry in fields.items():
-            words, kind = named[path]
-            error = format_quantity(entry["error"], kind, digits=2)
-            relative = entry.get("relative_error")
-            if relative is not None and path != "drop_instant_s":
-                error = f"{error} ({percent(relative, sign=True)})"
-            held = {True: "holds", False: "misses", None: ""}[entry.get("covered")]
-            width = f" (± {percent(entry['half_width'])})" if "half_width" in entry else ""
-            values = (format_quantity(entry[key], kind, digits=4) for key in ("estimate", "truth"))
-            table.add_row(f"{where}{words}", *values, error, f"{held}{width}")
-    return table
-
-
-def score_all(
-    folder: FolderArgument,
-    estimates: Annotated[
-        Path, Argument(metavar="ESTIMATES", help="Folder with NAME.json for each drop.", show_default=False)
-    ],
-    only: OnlyOption = None,
-    json: options.Json = None,
-) -> None:
-    """Score anybody's estimates of the drops of DropBench, family by family.
-
-    Example: rotordrop-bench score-all dropbench estimates
-    """
-    from rotordrop_bench import VERSION, score_bench
+    from rotordrop_bench.corpus.run import score_all
     from rotordrop_bench.corpus.table import quantities
 
-    groups, unscored = score_bench(folder, estimates, only or [])
-    rows, found = groups["all drops"], quantities(groups)
+    groups, scores = score_all(estimates, truths, drop)
+    found = quantities(groups)
 
     def summarise(out: Console) -> None:
-        out.print(_table(f"DropBench, version {VERSION}", found))
-        _count(out, "all drops", rows)
-        for name, why in unscored.items():
-            out.print(f"{name}: no number: {why}")
+        out.print(_table("Estimates against truth", found))
+        _count(out, "all drops", groups["all drops"])
+        for name, why in scores.items():
+            if isinstance(why, str):
+                out.print(f"{name}: no number: {why}")
 
-    deliver(
-        {
-            "bench_version": VERSION,
-            "quantities": [vars(one) for one in found],
-            "drops": [vars(row) for row in rows],
-            "unscored": unscored,
-        },
-        json,
-        summarise,
-    )
+    deliver({"quantities": [vars(one) for one in found], "drops": scores}, json, summarise)
 
 
 def corpus(

@@ -14,9 +14,10 @@ from typing import Any
 
 from rotordrop.errors import UsageError
 from rotordrop.files import make_folder, write_json
-from rotordrop_bench.corpus.cases import VERSION, Case, chosen_drops, digest, made
+from rotordrop_bench.corpus.cases import VERSION, Case, digest, made
 from rotordrop_bench.corpus.table import ALWAYS, SHORT, Row, judged, name_of, said_of, scored
 from rotordrop_bench.files import truth_path
+from rotordrop_bench.score import score_estimate
 from rotordrop_bench.truth import read_truth
 
 LONGEST = 1800.0
@@ -115,58 +116,56 @@ def _said(version: Version, command: list[str], stem: Path) -> dict[str, Any]:
     return found
 
 
-def score_bench(
-    folder: str | Path, estimates: str | Path, only: Iterable[str] = ()
-) -> tuple[dict[str, list[Row]], dict[str, str]]:
-    """Compare estimates with the hidden truth of the drops of DropBench that were made in a folder.
+def score_all(
+    estimates: Path, truths: Path, drop: str | None = None
+) -> tuple[dict[str, list[Row]], dict[str, dict[str, Any] | str]]:
+    """Compare estimates with the truth of their recordings: a file each, or folders with ``NAME.json``.
 
-    The estimates are ``NAME.json`` for each drop: the JSON of ``rotordrop estimate``, or at least
-    ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``. ``only`` holds
-    names of drops, families or rotors; all that were made when empty. What the estimator states of one drop
-    it misses where it does not state it.
+    An estimate is the JSON of ``rotordrop estimate``, or at least
+    ``{"bearings": {"NDE": {"peak_force_N": {"value": …, "interval_90": [low, high]}}}}``; ``drop`` is the
+    recording meant of a single one. What is stated of one drop is missing where another has it not.
 
     Returns
     -------
     dict of list of Row
         Rows of all drops and of each family.
-    dict of str
-        Drops without a usable estimate, with the reason.
+    dict
+        By drop its scores (`rotordrop_bench.score`), or why its estimate cannot be used.
     """
-    folder, estimates = Path(folder), Path(estimates)
-    drops = [drop for drop in chosen_drops(only) if truth_path(folder, drop.name).is_file()]
-    if not drops:
-        raise UsageError(
-            f"{folder} holds no drop of the bench; make some with 'rotordrop-bench make {folder}'"
-        )
-    if not estimates.is_dir():
+    several = truths.is_dir()
+    read = [read_truth(file) for file in (sorted(truths.glob("*.json")) if several else [truths])]
+    if several and not estimates.is_dir():
         raise UsageError(f"{estimates} is no folder; give the one with the estimates, NAME.json each")
-    rows, unscored = {}, {}
-    truths = {drop.name: read_truth(truth_path(folder, drop.name)) for drop in drops}
-    for name, truth in truths.items():
-        if (version := truth.values.get("bench_version")) != VERSION:
+    if not read:
+        raise UsageError(f"{truths} holds no truth; make some with 'rotordrop-bench make'")
+    rows: dict[str, Row] = {}
+    found: dict[str, dict[str, Any] | str] = {}
+    for truth in read:
+        if (version := truth.values.get("bench_version", VERSION)) != VERSION:
             raise UsageError(
                 f"{truth.path} is of version {version!r} of the bench, this is version {VERSION!r}; make "
                 "the bench again in another folder"
             )
-        file = estimates / f"{name}.json"
-        scores = judged(file, truth) if file.is_file() else f"there is no {file.name}"
-        row = Row(case=name, digest="", violated=truth.violated)
-        if isinstance(scores, str):
-            unscored[name] = scores
+        name, file = truth.name, estimates / f"{truth.name}.json" if several else estimates
+        if several:
+            scores = judged(file, truth) if file.is_file() else f"there is no {file.name}"
         else:
+            scores = score_estimate(file, truth, drop=drop)
+        found[name], rows[name] = scores, Row(case=name, digest="", violated=truth.violated)
+        if not isinstance(scores, str):
             code, named = (7 if scores["consistent"] is False else 0), tuple(scores["named"])
-            row = replace(row, code=code, estimates=said_of(scores), named=named)
-        rows[name] = row
+            rows[name] = replace(rows[name], code=code, estimates=said_of(scores), named=named)
     stated = {name_of(key) for row in rows.values() for key in row.estimates}
-    for name, truth in truths.items():
+    groups: dict[str, list[Row]] = {"all drops": []}
+    for truth in read:
         due = [
             f"{SHORT.get(path, path)} {bearing}"
             for bearing in truth.bearing_names
             for path in truth.of_bearing(bearing)
             if path in ALWAYS or SHORT.get(path, path) in stated
         ]
-        rows[name] = replace(rows[name], estimates=dict.fromkeys(due, ()) | dict(rows[name].estimates))
-    groups = {"all drops": list(rows.values())}
-    for drop in drops:
-        groups.setdefault(drop.group, []).append(rows[drop.name])
-    return groups, unscored
+        row = rows[truth.name]
+        row = replace(row, estimates=dict.fromkeys(due, ()) | dict(row.estimates))
+        for group in ("all drops", *filter(None, [truth.values.get("family")])):
+            groups.setdefault(group, []).append(row)
+    return groups, found
