@@ -21,7 +21,6 @@ from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import facts_of
 from rotordrop.evidence.evidence import Evidence, read_evidence
-from rotordrop.replay import draws
 from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
 from rotordrop.track.input_state import InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.twin.calibrated import Calibration, calibrate_machine
@@ -124,20 +123,13 @@ def calibration(shared: Shared) -> Calibration:
     return calibrate_machine(known, [first.record, second.record], [first.tail, second.tail], names=names)
 
 
-def replayed(shared: Shared) -> tuple[Estimate, dict[str, Any]]:
-    """It replayed from its owner's guesses, few starts and hardly a draw; what the draws were made from."""
+def replayed(shared: Shared) -> Estimate:
+    """It replayed from its owner's guesses, with few starts."""
     drop = shared("recorded")
-    fitted: dict[str, Any] = {}
-
-    def drawing(problem: Any, x: Any, covariance: Any, **options: Any) -> Any:
-        fitted.update(problem=problem, x=x)
-        return draws.draw_drops(problem, x, covariance, **options)
-
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("rotordrop.replay.replay.FRICTION_DRAWS", 2)
-        patch.setattr("rotordrop.replay.replay.draw_drops", drawing)
-        method = Replay(starts=2, draws=2, threads=2)
-        return estimate_drop(example_machine("lp400"), drop.record, drop.tail, method=method), fitted
+        method = Replay(starts=2, threads=2)
+        return estimate_drop(example_machine("lp400"), drop.record, drop.tail, method=method)
 
 
 def begun(_: Shared) -> Estimate:

@@ -58,8 +58,8 @@ def estimate_drop(
     >>> from rotordrop.estimation import Replay, Tracked
     >>> Tracked(quick=True)
     Tracked(quick=True)
-    >>> Replay(draws=128).draws
-    128
+    >>> Replay(starts=12).starts
+    12
     """
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record

@@ -38,12 +38,11 @@ def compare_orbits(
     names: Sequence[str],
     *,
     at: Array | None = None,
-    expected_horizon: float | None = None,
 ) -> Agreement:
     """Compare a measured and a simulated orbit, shapes (T, B, 2) [m], at the times of the measured one.
 
     Times (T,) count from power-off [s], ``at`` are those of the simulated orbit where they differ; the
-    bearings have these gaps (B,) [m] and names; the expected horizon is what the spread of draws leaves [s].
+    bearings have these gaps (B,) [m] and names.
     """
     if at is not None:
         columns = simulated.reshape(len(at), -1).T
@@ -71,7 +70,6 @@ def compare_orbits(
             for b, (seen, made) in enumerate(contacts)
         },
         orbit_disagreement_m=orbit_disagreement(time[inside], apart[inside], begin),
-        expected_horizon_s=expected_horizon,
     )
 
 
@@ -101,12 +99,6 @@ def horizon(time: Array, apart: Array, gap: float) -> float:
     samples = max(1, round(RUNNING / float(time[1] - time[0])))
     smooth = np.convolve(apart, np.full(samples, 1.0 / samples), mode="same")
     beyond = np.flatnonzero(smooth > COMPARABLE_SHARE * gap)
-    return float(time[beyond[0]]) if len(beyond) else float(time[-1])
-
-
-def spread_horizon(time: Array, spread: Array, gaps: Array) -> float:
-    """Time up to which draws (T, B) [m] spread by less than a tenth of the air gap (B,) [s]."""
-    beyond = np.flatnonzero(np.any(spread > COMPARABLE_SHARE * gaps, axis=1))
     return float(time[beyond[0]]) if len(beyond) else float(time[-1])
 
 

@@ -60,8 +60,8 @@ class Verdict(Enum):
         "independent cross-check, as ranges."
     )
     OPEN_LOOP = (
-        "This is the paper's route, an open-loop replay: one drop like the recorded one. The tracked twin "
-        "follows the record and gives narrower intervals."
+        "This is the paper's route, an open-loop replay: one drop like the recorded one, without intervals "
+        "of force. The tracked twin follows the record and gives them."
     )
 
     @property
@@ -198,9 +198,6 @@ class ReplaySteps:
     """Simulated speed [rad/s] against time [s], shape (T,)."""
     fixed: str
     """Where supports and friction were taken from; empty when they were identified."""
-    draws: int | None
-    rejected: int | None
-    """Draws behind the intervals, and those that did not keep to the record; None where none were made."""
     identified: Machine
     """The machine with what was identified."""
     document: Mapping[str, Any]

@@ -28,8 +28,6 @@ class Replay:
 
     fixed: str | Path | Mapping[str, Any] | None = None
     """An earlier estimate whose supports and friction are used as they are (Neisi 2020, section 5.1)."""
-    draws: int = 64
-    """Draws behind the intervals of force and stress; fewer than 64 give no interval."""
     starts: int = 8
     """Starts of the search for the supports."""
     threads: int | None = None
@@ -37,7 +35,6 @@ class Replay:
 
     def __post_init__(self) -> None:
         require(self.fixed, "fixed", str, PathLike, Mapping, none=True)
-        require(self.draws, "draws", int, least=0, most=100_000)
         require(self.starts, "starts", int, least=1, most=1_000)
         require(self.threads, "threads", int, least=1, none=True)
 

@@ -354,19 +354,11 @@ class FrictionSweep(Document):
     window_s: Pair
 
 
-class Draws(Document):
-    """Draws behind the intervals."""
-
-    count: Annotated[int, Of(len)]
-    rejected: int
-
-
 class Identification(Document):
     """What a replay searched for."""
 
     support: Annotated[Supports, Of("support")] = ABSENT
     friction_sweep: Annotated[FrictionSweep, Of("friction")] = ABSENT
-    draws: Draws = ABSENT
 
 
 class Settled(Document):
@@ -421,7 +413,6 @@ class Agreement(Document):
     windows: list[Window]
     bearings: dict[str, BearingAgreement]
     orbit_disagreement_m: float
-    expected_horizon_s: float | None
 
 
 class Drop(Document):

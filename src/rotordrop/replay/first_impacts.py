@@ -1,7 +1,7 @@
 """The recorded drop run again with other parameters, from just before the first contact, and its unknowns.
 
 The fit of the fall leaves some sixty unknowns with their covariance. A few combinations of them matter to the
-impacts: the fit of the supports follows those, and the draws of its uncertainty add the others.
+impacts: the fit of the supports follows those.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from rotordrop.evidence.initial_state import (
     MAGNET_FORCES,
     InitialState,
     build_free_fall,
-    covariance_root,
     kernel_state,
 )
 from rotordrop.evidence.sensing import build_sensing
@@ -69,8 +68,6 @@ class Directions:
     """Change of the state at the start of the simulation, shape (n, K)."""
     unbalances: Array
     """Change of the modal unbalance, shape (2, m, K)."""
-    remaining: Array
-    """A square root of what is left of the covariance: too little to be fitted along, shape (u, u)."""
 
 
 class Trial(NamedTuple):
@@ -177,14 +174,10 @@ class FirstImpacts:
             value = unknown.kernel_value(float(number))
             for target in unknown.targets:
                 rows[target.row, target.entry.column] = target.factor * value
-        down = self.rest_error(trial)[:, 1]
+        down = trial.fall[self.initial.unknowns.rest].reshape(-1, 2)[:, 1]
         sag = static_sag(rows, self.race_sag, np.asarray(self.model.load_shares)).total
         rows[:, L.AIR_GAP] = self.radius - down - sag
         return rows
-
-    def rest_error(self, trial: Trial) -> Array:
-        """Error of the rest position [m], shape (B, 2)."""
-        return trial.fall[self.initial.unknowns.rest].reshape(-1, 2)
 
     @cached_property
     def start_state(self) -> Array:
@@ -334,18 +327,12 @@ def influential_directions(initial: InitialState, start: float, count: int = DIR
     changes, turned_mass = np.column_stack(states) @ root, np.stack(unbalances, axis=-1) @ root
     seen_by_sensors = [root[initial.unknowns.gain] / 5e-3, root[initial.unknowns.rest] / 5e-6]
     effects = np.vstack([*_effects(initial, changes, turned_mass), *seen_by_sensors])
-    _, _, turned = np.linalg.svd(effects, full_matrices=True)
-    leading = turned[:count].T
-    unknowns, left = root @ leading, root @ turned[count:].T
+    leading = np.linalg.svd(effects)[2][:count].T
+    unknowns = root @ leading
     largest = np.argmax(np.abs(unknowns) / np.sqrt(np.diag(initial.covariance))[:, None], axis=0)
     signs = np.sign(unknowns[largest, np.arange(count)])
     leading = leading * signs
-    return Directions(
-        unknowns=unknowns * signs,
-        states=changes @ leading,
-        unbalances=turned_mass @ leading,
-        remaining=covariance_root(left @ left.T),
-    )
+    return Directions(unknowns=unknowns * signs, states=changes @ leading, unbalances=turned_mass @ leading)
 
 
 def _effects(initial: InitialState, changes: Array, unbalances: Array) -> list[Array]:

@@ -1,24 +1,22 @@
 """The paper's route: identify step by step, then replay the drop open loop (Neisi 2020, section 3, Fig. 4).
 
 A replay cannot follow a chaotic drop for long: after some contacts its force is that of *a* drop like the
-recorded one. What it can say is said with draws over everything uncertain; the tracked twin says more.
+recorded one, and has no interval. The tracked twin says more.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Role, Step
 from rotordrop.elements.table import rows
 from rotordrop.elements.touchdown_bearing import AIR_GAP, TouchdownBearing
-from rotordrop.estimate.agreement import compare_orbits, spread_horizon
+from rotordrop.errors import IdentificationError
+from rotordrop.estimate.agreement import compare_orbits
 from rotordrop.estimate.assumptions import evidence_assumptions
 from rotordrop.estimate.bearing_drop import (
     AirGap,
@@ -34,7 +32,6 @@ from rotordrop.estimate.estimate import Estimate, FittedParameter, FrictionSweep
 from rotordrop.estimate.fixed_values import machine_with_fixed, read_fixed
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimate.published import Draws as DrawsMade
 from rotordrop.estimate.published import Drop, Identification, InitialState, Speed, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.evidence import Evidence, known, read_evidence
@@ -44,16 +41,14 @@ from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
 from rotordrop.progress import Progress
 from rotordrop.record.record import Record
-from rotordrop.replay.draws import (
-    FEWEST_DRAWS,
-    Draws,
-    draw_drops,
-    mean_with_draws,
-    seen_at_bearings,
-    whole_drop,
-    with_draws,
+from rotordrop.replay.first_impacts import (
+    FirstImpacts,
+    Trial,
+    drop_parameters,
+    first_impacts,
+    start_state,
+    with_bearing,
 )
-from rotordrop.replay.first_impacts import FirstImpacts, first_impacts
 from rotordrop.replay.modal_expansion import expand_initial_state
 from rotordrop.replay.support_and_friction import (
     LONGEST_WINDOW,
@@ -64,6 +59,8 @@ from rotordrop.replay.support_and_friction import (
     sweep_friction,
 )
 from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.simulate.case import DropCase, StateStart
+from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
 
 DURATION = 0.2
@@ -71,15 +68,10 @@ DURATION = 0.2
 IDENTIFIED_UNTIL = 0.06
 """Part of the drop that supports and friction are identified from at most [s]."""
 
-KEPT_UNTIL = 7.5e-3
-"""Draws must keep to the record this long after the later of the first contacts [s]."""
-
-FORCE_LEFT_OUT, STRESS_LEFT_OUT, MEAN_FORCE_LEFT_OUT = 0.012, 0.004, 0.004
-"""Relative standard deviations of peak force, peak stress and mean force by what the model leaves out [1]
-(chosen: those that an earlier tracked twin needed)."""
 FRICTION_DRAWS = 6
 """Supports drawn about the fit, with each of which friction is swept too (chosen)."""
-STAGES = {"supports": 0.06, "friction": 0.6, "replay": 0.68, "draws": 0.7}
+MEANS = "mean_stress_Pa", "mean_force_0p15_0p2_N"
+STAGES = {"supports": 0.06, "friction": 0.85, "replay": 0.95}
 """Share of the time at which each step begins [1]."""
 
 
@@ -116,8 +108,6 @@ class Replayed:
     measured: Array
     """Measured displacement at the bearings, along the straight rotor, from the rest position [m], shape (N,
     B, 2)."""
-    draws: Draws | None
-    """Draws behind the intervals."""
 
 
 def replay_drop(
@@ -139,7 +129,7 @@ def replay_drop(
     -----
     Source: Neisi 2020, Fig. 4. Differs from the paper: the initial state comes from a fit over the whole
     fall, with gravity sag and remanent lift; the supports from windows that grow, with everything uncertain
-    marginalised; the friction from a number; the intervals from draws.
+    marginalised; the friction from a number.
     """
     say = progress or (lambda text, share: None)
     fixed, origin = (None, "") if method.fixed is None else read_fixed(method.fixed)
@@ -152,19 +142,7 @@ def replay_drop(
     settled = replace(evidence.model, parameters=evidence.model.parameters._replace(bearing=rows_found))
     gap = identify_air_gap(known(evidence.rest), settled, known(evidence.sensing))
     say("replay of the whole drop", STAGES["replay"])
-    draws = None
-    if method.draws >= 2:
-        draws = draw_drops(
-            impacts.problem,
-            impacts.x,
-            impacts.covariance,
-            window=0.0 if fixed is not None else evidence.latest_first_contact + KEPT_UNTIL,
-            duration=DURATION,
-            count=method.draws,
-            threads=method.threads,
-            progress=lambda text, share: say(text, STAGES["draws"] + (1.0 - STAGES["draws"]) * share),
-        )
-    replayed = _replay(impacts, evidence, gap, draws)
+    replayed = _replay(impacts, evidence, gap)
     found = _parameters(start, impacts, gap)
     noise = float(np.mean(known(evidence.fall).noise))
     later = later_motion(replayed.result.bearing_names, *evidence.measured(np.inf), DURATION, noise)
@@ -189,9 +167,6 @@ def replay_drop(
             gap.value,
             replayed.result.bearing_names,
             at=replayed.result.time,
-            expected_horizon=None
-            if draws is None
-            else spread_horizon(draws.spread_time, draws.spread, gap.value),
         ),
         replay=ReplaySteps(
             speed=evidence.speed,
@@ -201,14 +176,12 @@ def replay_drop(
             speed_time=replayed.result.time,
             speed_simulated=replayed.result.speed,
             fixed=origin,
-            draws=None if draws is None else len(draws),
-            rejected=None if draws is None else draws.rejected,
             identified=_identified_machine(start, impacts, gap),
             document=_document(evidence, impacts, gap, replayed),
         ),
         later=later,
         findings=facts.findings,
-        warnings=facts.warnings_with(*_warnings(evidence, impacts, draws), later_warning(later, DURATION)),
+        warnings=facts.warnings_with(*_warnings(evidence, impacts), later_warning(later, DURATION)),
         notes=_notes(evidence, gap),
         simulated_record=facts.simulated,
     )
@@ -265,14 +238,11 @@ def _identified(evidence: Evidence, method: Replay, say: Progress) -> Identified
     )
 
 
-def _replay(impacts: Identified, evidence: Evidence, gap: IdentifiedGap, draws: Draws | None) -> Replayed:
+def _replay(impacts: Identified, evidence: Evidence, gap: IdentifiedGap) -> Replayed:
     """The whole drop with the identified values, for the air gap and for its two limits."""
     problem, trial = impacts.problem, impacts.problem.trial(impacts.x)
-    result = whole_drop(problem, trial, duration=DURATION)
-    limits = [
-        whole_drop(problem, trial, duration=DURATION, gap_change=limit - gap.value)
-        for limit in (gap.lower, gap.upper)
-    ]
+    result = whole_drop(problem, trial)
+    limits = [whole_drop(problem, trial, limit - gap.value) for limit in (gap.lower, gap.upper)]
     time, measured = evidence.measured(DURATION)
     middle, lower, upper = (seen_at_bearings(problem, trial, one) for one in (result, *limits))
     return Replayed(
@@ -282,8 +252,34 @@ def _replay(impacts: Identified, evidence: Evidence, gap: IdentifiedGap, draws: 
         upper=upper,
         time=time,
         measured=measured,
-        draws=draws,
     )
+
+
+def whole_drop(problem: FirstImpacts, trial: Trial, gap_change: Array | None = None) -> DropResult:
+    """Simulate the whole drop from power-off, its air gaps (B,) changed by so much [m]."""
+    initial = replace(problem.initial, mean=trial.fall)
+    rows = problem.rows(trial)
+    if gap_change is not None:
+        rows[:, 0] += gap_change
+    parameters = with_bearing(drop_parameters(problem.model, initial, 0.0), rows)
+    case = DropCase(
+        speed=initial.fall.speed,
+        duration=DURATION,
+        start=StateStart(state=start_state(initial, 0.0, trial.fall)[0]),
+    )
+    result = simulate_drop(replace(problem.model, parameters=parameters), case)
+    if not result.finished:
+        raise IdentificationError(f"a simulation with the identified values ended early. {result.outcome}")
+    return result
+
+
+def seen_at_bearings(problem: FirstImpacts, trial: Trial, result: DropResult) -> Array:
+    """Displacement of a simulated drop as the sensors would show it at the bearings [m], shape (T, B, 2).
+
+    With fitted gains, counted from the rest position, like the measured one.
+    """
+    initial = problem.initial
+    return initial.sensing.at_bearings(problem.predicted(result.state, trial.fall) + initial.settled)
 
 
 def _parameters(machine: Machine, impacts: Identified, gap: IdentifiedGap) -> tuple[FittedParameter, ...]:
@@ -335,7 +331,7 @@ def _bearing(
     simulated: BearingDrop,
     b: int,
 ) -> BearingDrop:
-    """One bearing: histories of the replay, loads with intervals of the draws, identified values."""
+    """One bearing: histories of the replay, loads, identified values."""
     contact = known(evidence.contacts)[b]
     measured = Motion(
         label="measured", time=replayed.time, displacement=replayed.measured[:, b], role="measured"
@@ -345,29 +341,7 @@ def _bearing(
         return Motion(label=label, time=replayed.result.time, displacement=displacement[:, b], role=role)
 
     values = bearing_values(evidence.model.machine, b, float(evidence.model.load_shares[b]), found)
-    count = 0 if replayed.draws is None else len(replayed.draws)
-    draws = replayed.draws if count >= FEWEST_DRAWS else None
-    stress_sigma = math.hypot(STRESS_LEFT_OUT, numbers_of(bearing).stress_sigma)
-
-    def drawn(sample: Callable[[Draws], Array]) -> Array | None:
-        return None if draws is None else sample(draws)[:, b]
-
-    means = {
-        name: mean_with_draws(simulated.values[name], sample, model)
-        for name, sample, model in (
-            ("mean_stress_Pa", drawn(lambda d: d.mean_stress), stress_sigma),
-            ("mean_force_0p15_0p2_N", drawn(lambda d: d.mean_force), MEAN_FORCE_LEFT_OUT),
-        )
-        if name in simulated.values
-    }
-    force, stress = (
-        replace(peak, known=with_draws(peak.known, sample, model), origin=Origin.REPLAY)
-        for peak, sample, model in (
-            (simulated.peak_force, drawn(lambda d: d.peak_force), FORCE_LEFT_OUT),
-            (simulated.peak_stress, drawn(lambda d: d.peak_stress), stress_sigma),
-        )
-    )
-    reason = f"no interval: {count} draws, at least {FEWEST_DRAWS} are needed"
+    means = {name: simulated.values[name] for name in MEANS if name in simulated.values}
     return replace(
         simulated,
         motions=(measured, shown("simulated", replayed.middle)),
@@ -377,12 +351,9 @@ def _bearing(
             shown("simulated, upper gap", replayed.upper),
         ),
         air_gap=AirGap(lower=float(gap.lower[b]), upper=float(gap.upper[b])),
-        peak_force=force,
-        peak_stress=stress,
+        peak_force=replace(simulated.peak_force, origin=Origin.REPLAY),
+        peak_stress=replace(simulated.peak_stress, origin=Origin.REPLAY),
         values={**values, **means},
-        missing={}
-        if draws is not None
-        else dict.fromkeys(("peak_force_N", "peak_stress_Pa", *means), reason),
         first_contact=replace(
             deepest(measured, contact.start, contact.end, 0.0), indentation=contact.indentation
         ),
@@ -425,9 +396,7 @@ def _document(
                 "velocity_m_per_s": by_bearing(expanded.velocity_at_bearings),
             },
         ),
-        "identification": Identification.of_result(
-            impacts, **({} if replayed.draws is None else {"draws": DrawsMade.of_result(replayed.draws)})
-        ),
+        "identification": Identification.of_result(impacts),
         "settled": {
             name: {key: float(values[b]) for key, values in settled.items()} for b, name in enumerate(names)
         },
@@ -458,7 +427,7 @@ def _identified_machine(machine: Machine, impacts: Identified, gap: IdentifiedGa
     return machine.with_values(values)
 
 
-def _warnings(evidence: Evidence, impacts: Identified, draws: Draws | None) -> tuple[str, ...]:
+def _warnings(evidence: Evidence, impacts: Identified) -> tuple[str, ...]:
     said = [*evidence.power_off.notes, *known(evidence.fall).notes]
     if impacts.support is not None:
         search = impacts.support.search
@@ -472,8 +441,6 @@ def _warnings(evidence: Evidence, impacts: Identified, draws: Draws | None) -> t
         supports = [impacts.problem.paths[k] for k in impacts.problem.supports]
         status = {path: impacts.values[path].status for path in supports}
         said += [f"{path}: {found}" for path, found in status.items() if found != "determined"]
-    if draws is not None and len(draws) < FEWEST_DRAWS:
-        said.append(f"{len(draws)} draws keep to the record; {FEWEST_DRAWS} are needed for intervals")
     return tuple(said)
 
 
@@ -484,6 +451,4 @@ def _notes(evidence: Evidence, gap: IdentifiedGap) -> tuple[str, ...]:
         "the settled tail cannot tell air gap from vertical sensor zero: a zero that is 1 µm off reads as "
         f"1 µm of air gap (standard error {zero} µm); the fall height, and so the force, is hardly touched "
         "by it",
-        "an open-loop replay is one drop like the recorded one: after some contacts its force is statistics "
-        "only",
     )

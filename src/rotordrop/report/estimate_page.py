@@ -25,6 +25,7 @@ from rotordrop.estimate.estimate import (
     FittedParameter,
     ReplaySteps,
     TimedContact,
+    Verdict,
 )
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Agreement
@@ -319,9 +320,6 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
         "power-off": f"{power_off.text} in record time (90 %: {power_off.interval_text})",
         "method": method,
     }
-    if steps is not None:
-        drawn = f"{steps.draws} drops, {steps.rejected} rejected"
-        facts["intervals"] = "none" if steps.draws is None else drawn
     facts |= {
         "estimated part": f"0 to {1e3 * estimate.until:.0f} ms after power-off",
         "sampling": f"{record.sampling_rate:g} Hz, {len(record.sensors)} sensors",
@@ -668,10 +666,10 @@ def _remedies(estimate: Estimate) -> Iterator[str]:
 
 def _loads(estimate: Estimate) -> Table:
     """Loads of every bearing, one line each."""
-    certain = estimate.consistent
+    certain, open_loop = estimate.consistent, estimate.verdict is Verdict.OPEN_LOOP
 
     def number(known: Known | None, kind: str) -> str:
-        if known is None or known.interval_90 is None:
+        if known is None or (known.interval_90 is None and not open_loop):
             return NO_INTERVAL
         one = Quantity.of(known, kind, range_only=not certain)
         return f"{one.text} ({one.interval_text})" if one.interval_text else one.text
@@ -695,7 +693,7 @@ def _loads(estimate: Estimate) -> Table:
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
     }
     names = [name for name in lines if certain or name not in ONLY_CERTAIN]
-    what = "90 % intervals" if certain else "90 % ranges"
+    what = "open loop" if open_loop else "90 % intervals" if certain else "90 % ranges"
     columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
     cells = [{name: lines[name](bearing) for name in names} for bearing in estimate.bearings]
     columns += [Column(b.name, own.__getitem__) for b, own in zip(estimate.bearings, cells, strict=True)]
@@ -759,7 +757,4 @@ def agreement_section(agreement: Agreement) -> Section:
         f"Replay and record stay within a tenth of the air gap for {1e3 * horizon:.0f} ms. A drop is "
         "chaotic: small differences grow tenfold in about 33 ms, so later only statistics can be compared."
     )
-    if agreement.expected_horizon_s is not None:
-        expected = 1e3 * agreement.expected_horizon_s
-        text += f" With everything that is uncertain here, {expected:.0f} ms are to be expected."
     return Section("Agreement with the record", (text,))

@@ -13,7 +13,6 @@ from rotordrop.estimate.agreement import (
     TENFOLD,
     compare_orbits,
     orbit_disagreement,
-    spread_horizon,
 )
 from rotordrop.estimate.bearing_drop import (
     AirGap,
@@ -335,9 +334,6 @@ def test_drops_are_compared_at_the_times_of_the_record():
     found = compare_orbits(times, measured, finer, GAPS, NAMES, at=fine)
     for one in found.bearings.values():
         assert (len(one.measured_contacts_s), len(one.simulated_contacts_s)) == (1, 2)
-    assert found.expected_horizon_s is None
-    spread = np.where(times < 0.07, 1e-6, 0.2 * GAP)[:, None] * np.ones(2)
-    assert spread_horizon(times, spread, GAPS) == pytest.approx(0.07, abs=6e-5)
 
 
 def test_a_difference_counts_ten_times_less_33_ms_later():

@@ -2,14 +2,12 @@
 
 import json
 import math
-from types import SimpleNamespace
-from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
 
-from rotordrop import Known, Replay, estimate_drop
+from rotordrop import Replay, estimate_drop
 from rotordrop.cli.app import run
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.document import estimate_document
@@ -17,8 +15,6 @@ from rotordrop.estimate.estimate import Verdict
 from rotordrop.estimate.fixed_values import read_fixed
 from rotordrop.estimate.published import estimate_schema
 from rotordrop.machine import example_path
-from rotordrop.replay import draws
-from rotordrop.replay.draws import mean_with_draws, whole_drop, with_draws
 from rotordrop_bench.files import write_drop
 from rotordrop_bench.score import score_estimate
 
@@ -28,8 +24,8 @@ LOADS = ("peak_force_N", "mean_force_0p15_0p2_N", "peak_stress_Pa", "mean_stress
 
 @pytest.fixture
 def replayed(bank):
-    """The recorded drop replayed from its owner's guesses, with few starts and hardly a draw."""
-    return bank("replayed")[0]
+    """The recorded drop replayed from its owner's guesses, with few starts."""
+    return bank("replayed")
 
 
 @pytest.fixture
@@ -57,35 +53,15 @@ def test_supports_friction_and_force_come_near_the_truth(document, synthetic):
     assert abs(entry["start"] / synthetic.truth["support.stiffness_N_per_m"]["DE"] - 1.0) > 0.1
 
 
-def test_the_document_follows_its_schema_and_says_why_intervals_miss(document, replayed):
+def test_the_document_follows_its_schema_and_gives_loads_without_intervals(document, replayed):
     jsonschema.Draft202012Validator(estimate_schema()).validate(document)
     assert document["method"] == "replay" and document["fixed"] is None
     broken = {**document, "method": "guess"}
     assert not jsonschema.Draft202012Validator(estimate_schema()).is_valid(broken)
     assert replayed.replay is not None and replayed.verdict is Verdict.OPEN_LOOP
-    reason = f"no interval: {replayed.replay.draws} draws, at least 64 are needed"
     for name in BEARINGS:
         entry = document["bearings"][name]
-        assert all("interval_90" not in entry[field] for field in LOADS)
-        assert entry["not_stated"] == dict.fromkeys(LOADS, reason)
-
-
-def test_draws_of_the_rest_position_fall_on_one_path(bank):
-    _, fitted = bank("replayed")
-    problem = fitted["problem"]
-    best = problem.trial(fitted["x"])
-    initial = problem.initial
-
-    def orbit(fall):
-        trial = best._replace(fall=fall)
-        moved = whole_drop(problem, trial, duration=6e-3).displacement
-        return np.asarray(moved - problem.rest_error(trial))
-
-    for height in range(initial.unknowns.rest.start + 1, initial.unknowns.rest.stop, 2):
-        column = initial.covariance[:, height]
-        drawn = best.fall + column / math.sqrt(column[height])
-        assert drawn[height] - best.fall[height] > 5e-6
-        assert np.max(np.abs(orbit(drawn) - orbit(best.fall))) < 0.05e-6
+        assert all(entry[field]["value"] > 0.0 and "interval_90" not in entry[field] for field in LOADS)
 
 
 def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed):
@@ -160,7 +136,7 @@ def test_orbit_and_found_machine_follow_the_record(replayed):
 
 
 def test_fixed_takes_supports_and_friction_with_their_errors(known, synthetic, document):
-    method = Replay(fixed=document, draws=0)
+    method = Replay(fixed=document)
     again = estimate_drop(known, synthetic.record, synthetic.tail, method=method)
     assert again.replay is not None
     assert "support" not in again.replay.document["identification"] and again.replay.friction is None
@@ -188,7 +164,7 @@ def test_a_bearing_with_clearance_is_replayed_without_a_preload(known, synthetic
     earlier = json.loads(json.dumps(document))
     for bearing in earlier["bearings"].values():
         del bearing["preload_N"]
-    method = Replay(fixed=earlier, draws=0)
+    method = Replay(fixed=earlier)
     found = estimate_drop(loose, synthetic.record, synthetic.tail, method=method)
     for name in BEARINGS:
         values = found.bearing(name).values
@@ -224,11 +200,8 @@ def test_command_writes_numbers_and_report(known, synthetic, document, tmp_path)
     jsonschema.Draft202012Validator(estimate_schema()).validate(written)
     for name in BEARINGS:
         entry = written["bearings"][name]["peak_force_N"]
-        low, high = entry["interval_90"]
-        assert low < high and 0.0 < entry["time_s"] < 0.2
-        assert math.isfinite(entry["value"])
+        assert math.isfinite(entry["value"]) and 0.0 < entry["time_s"] < 0.2
     assert written["fixed"] == str(earlier)
-    assert written["identification"]["draws"]["count"] >= 64
     html = page.read_text(encoding="utf-8")
     assert 'src="http' not in html
 
@@ -237,31 +210,3 @@ def test_fixed_belongs_to_the_replay(tmp_path, capsys):
     machine = str(example_path("lp400"))
     assert run(["estimate", machine, str(tmp_path / "r.csv"), "--fixed", str(tmp_path / "e.json")]) != 0
     assert "--fixed belongs to --method replay" in " ".join(capsys.readouterr().err.split())
-
-
-def test_no_number_lies_outside_its_own_interval():
-    sample = np.linspace(400.0, 430.0, 64)
-    mean = mean_with_draws(Known(value=415.0, status="determined", unit="N"), sample, 0.01)
-    assert mean.value == np.median(sample)
-    peak = with_draws(Known(value=470.0, status="determined", unit="N"), sample, 0.01)
-    for value in (mean, peak):
-        low, high = value.interval_90 or (math.nan, math.nan)
-        assert low < value.value < high
-    assert high == pytest.approx(470.0 + 1.6448536 * 4.7)
-
-
-def test_a_fit_whose_draws_do_not_keep_to_the_record_is_no_basis():
-    best = np.zeros(2)
-
-    def residual(x, window):
-        if np.any(x != best):
-            raise IdentificationError("beside the record")
-        return np.zeros(3)
-
-    table = SimpleNamespace(lower=np.full(2, -9.0), upper=np.full(2, 9.0), sigma=np.ones(2))
-    problem: Any = SimpleNamespace(
-        residual=residual, table=table, directions=SimpleNamespace(remaining=np.zeros((1, 1)))
-    )
-    message = r"of 64 draws of the uncertain values only 0 keep to the record up to 7.5 ms"
-    with pytest.raises(IdentificationError, match=message):
-        draws.draw_drops(problem, best, np.eye(2), window=7.5e-3, duration=0.2, count=16)

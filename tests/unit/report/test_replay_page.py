@@ -34,20 +34,19 @@ CONTACT = TimedContact(
 def agreement(drop_result):
     measured = drop_result.displacement + 3e-6
     made, names = drop_result.displacement, drop_result.bearing_names
-    return compare_orbits(drop_result.time, measured, made, GAPS, names, expected_horizon=0.028)
+    return compare_orbits(drop_result.time, measured, made, GAPS, names)
 
 
 @pytest.fixture
 def drop(bank):
-    """The recorded drop replayed with hardly a draw."""
-    return bank("replayed")[0]
+    """The recorded drop replayed."""
+    return bank("replayed")
 
 
 def test_headline_route_warnings_and_horizon(drop):
     content = estimate_page(drop)
     for figure in content.cards[0].figures[:2]:
         assert figure.value.interval_90 is None
-        assert "at least 64 are needed" in figure.note
         assert " ms" not in figure.note  # of a time that a replay finds no error is known
     assert "open-loop replay" in content.verdict[0].text
     assert set(drop.warnings) <= {one.text for one in content.verdict if one.level == "warning"}
