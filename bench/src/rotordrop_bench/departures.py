@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from importlib import resources
 from typing import Any
 
 from scipy.constants import g as standard_gravity
@@ -21,69 +23,10 @@ PEAK_LOADS = 10.0
 
 MIDDLE, LAW = "middle node", "law"
 
-DEPARTURES: dict[str, dict[str, Any]] = {
-    "turned support axes": {
-        "support.axes_angle": "30 deg",
-        "support.stiffness_ratio": (0.8, 0.65),
-        "support.damping_ratio": (0.8, 0.65),
-    },
-    "cubic support": {
-        "support.hardening": (0.15, 0.5),
-        "support.hardening_force": (PEAK_LOADS, PEAK_LOADS, "load"),
-    },
-    "hysteretic support": {
-        "support.slip_force": (0.2, 0.6, "load"),
-        "support.slip_travel": (1.0, 1.0, "static travel"),
-    },
-    "foundation mode": {
-        "foundation.mass": (20.0, 9.0, "support mass"),
-        "foundation.frequency": (0.35, 0.35, "support frequency"),
-        "foundation.frequency_horizontal": (0.28, 0.28, "support frequency"),
-    },
-    "contact exponent": {"contact.exponent": (1.25, 1.5)},
-    "contact law": {"contact.law": ((1.25, 0.95), (1.6, 0.85), LAW)},
-    "race tilt": {
-        "race.tilt_stiffness": (4.0, 1.5, "tangent"),
-        "race.tilt_frequency": (2.0, math.sqrt(1.5), "tilt frequency"),
-    },
-    "friction": {"friction.dynamic": (0.23, 0.3)},
-    "gap drift": {"gap.drift": (-0.01, -0.04, "gap"), "gap.drift_time": "0.2 s"},
-    "thermal gap": {"gap.closing": (0.01, 0.04, "gap"), "gap.heat": (1.0, 1.0, "heat")},
-    "ball phase": {"balls.turn": True},
-    "bearing centres": {"centre.x": (0.04, 0.1, "gap"), "centre.y": (-0.03, -0.07, "gap")},
-    "sensor lag": {"sensors.time_constant": ("16 us", "80 us")},
-    "cross-axis sensitivity": {"sensors.cross_axis": (0.01, 0.05)},
-    "sensor planes elsewhere": {"sensors.plane_shift": (0.005, 0.02, "length")},
-    "brackets that follow the housing": {"sensors.follows_housing": (0.1, 0.3)},
-    "anti-alias filter": {"sensors.anti_alias_frequency": ("8 kHz", "4 kHz")},
-    "long remanence": {"magnets.remanence_time": ("10 ms", "50 ms")},
-    "unbalance beyond its grade": {"rotor.unbalance": (1.5, 3.0)},
-    "rotor stiffness": {"rotor.youngs_modulus": (0.99, 0.97)},
-    # a piece comes off in the middle of the rotor at the first contact
-    "unbalance jump": {"unbalance_jump.node": MIDDLE, "unbalance_jump.amount": (4.0, 15.0, "unbalance")},
-    "ring masses": {"race.mass": (1.5, 2.3)},
-    "side force": {"side_force.node": MIDDLE, "side_force.force": (0.1, 0.3, "load")},
-    "tilted machine": {"stand.tilt": ("1 deg", "3 deg")},
-    "coloured noise": {"sensors.flicker": ("1 um", "3 um")},
-    "sampling clock": {"sensors.clock_error": (0.001, 0.005)},
-    "late speed signal": {"sensors.speed_delay": ("20 ms", "50 ms")},
-    "curved sensors": {"sensors.curvature": (0.01, 0.03), "sensors.curvature_at": (1.0, 1.0, "gap")},
-    "asymmetric magnet decay": {"magnets.pull": (0.1, 0.2), "magnets.pull_time": (1.0, 3.0, "fall")},
-    "rubbing seal": {
-        "seal.node": MIDDLE,
-        "seal.gap": 1.02,
-        "seal.stiffness": (0.05, 0.25, "support stiffness"),
-    },
-    "eccentric sleeve": {"sleeve.eccentricity": (0.01, 0.04, "gap")},
-    "oval sleeve": {"sleeve.ovality": (0.006, 0.018, "gap")},
-    "wear": {"friction.wear": (0.3, 0.6), "friction.wear_heat": (1.0, 1.0, "heat")},
-    "bowed shaft": {"rotor.bow": (0.01, 0.04, "gap"), "rotor.bow_speed": (1.0, 1.0, "speed")},
-    "seat play": {"balls.seat_play": (0.01, 0.04, "gap")},
-}
-"""Every departure by the name of its kind, in the order of the list of drops: keys of a case file with a
-value, one for each size, or one for each size as a share of a measure of the machine. Sizes are chosen, not
-measured, but for those found when recordings of other code were estimated (masses of rings, speed signal,
-clock, noise, tilt) and for play (from fits h6/H7 to worn seats)."""
+DEPARTURES: dict[str, Parts] = tomllib.loads(
+    resources.files(__package__).joinpath("departures.toml").read_text(encoding="utf-8")
+)
+"""Every departure by the name of its kind, in the order of the list of drops."""
 
 
 def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...]) -> Parts:
@@ -118,7 +61,7 @@ def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...
     def written(size: int, value: Any) -> Any:
         if value == MIDDLE:
             return (nodes + 1) // 2
-        if not isinstance(value, tuple):
+        if not isinstance(value, list):
             return value
         if len(value) == 2:
             return value[size]
@@ -134,9 +77,9 @@ def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...
 
     parts: Parts = {}
     for kind, size in kinds:
-        for path, value in DEPARTURES[kind].items():
-            part, key = path.split(".")
-            parts.setdefault(part, {})[key] = written(size, value)
+        for part, keys in DEPARTURES[kind].items():
+            own = {key: written(size, value) for key, value in keys.items()}
+            parts[part] = parts.get(part, {}) | own
     if "centre" in parts:  # the bearings stand apart from each other, or nothing would change
         parts["bearing"] = {machine.touchdown_bearings[0].name: {"centre": parts.pop("centre")}}
     return parts

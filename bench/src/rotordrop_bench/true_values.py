@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.levitation import levitated_orbit, levitated_static
 from rotordrop.simulate.result import DropResult
-from rotordrop_bench.departures import DEPARTURES
+from rotordrop_bench.departures import DEPARTURES, Parts
 from rotordrop_bench.event import DropConditions, HiddenMachine
 from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places
 from rotordrop_bench.structure import support_matrices
@@ -197,16 +196,25 @@ def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[st
     }
 
 
-KINDS: dict[str, Collection[str]] = {"one end held": ("magnets.stays_on",), **DEPARTURES}
-"""Names of the kinds of violations, with the keys of a case file that make them."""
+KINDS: dict[str, Parts] = {"one end held": {"magnets": {"stays_on": ()}}, **DEPARTURES}
+"""Names of the kinds of violations, with the parts and keys of a case file that make them."""
 
 
 def violated_kinds(violations: Violations) -> tuple[str, ...]:
     """Names of the kinds of violations that a case holds, in the order of `KINDS`."""
     alone = violations.given.get("bearing", {}).values()
-    parts = [part for own in (violations.given, *alone) for part in own.items() if part[0] != "bearing"]
-    given = {f"{part}.{key}" for part, keys in parts for key in keys}
-    return tuple(kind for kind, keys in KINDS.items() if given & set(keys))
+    given = {
+        (part, key)
+        for own in (violations.given, *alone)
+        for part, keys in own.items()
+        if part != "bearing"
+        for key in keys
+    }
+    return tuple(
+        kind
+        for kind, parts in KINDS.items()
+        if any((part, key) in given for part, keys in parts.items() for key in keys)
+    )
 
 
 def true_structure(

@@ -1,4 +1,4 @@
-"""What is true of a hidden machine and stands in no description: a table of keys, and case files of them."""
+"""What is true of a hidden machine and stands in no description: case files of the keys of a table."""
 
 from __future__ import annotations
 
@@ -6,167 +6,60 @@ import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import resources
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from rotordrop.elements.values import (
-    Angle,
-    ContactExponent,
-    Force,
-    Length,
-    NonNegative,
-    Physical,
-    Positive,
-    PositiveForce,
-    PositiveFrequency,
-    PositiveLength,
-    PositiveMass,
-    PositiveTime,
-    Share,
-    Stiffness,
-    Time,
-    Unbalance,
-)
+from rotordrop.elements import values
+from rotordrop.elements.values import Physical, PositiveForce, PositiveLength
 from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop_bench import departure as D
 
-CrossAxis = Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)]
-Pull = Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)]
-ClockError = Annotated[Known, Physical("dimensionless", least=-0.1, most=0.1)]
-AboveOne = Annotated[Known, Physical("dimensionless", above=1.0)]
-Energy = Annotated[Known, Physical("energy", above=0.0)]
 MOST_POINTS = D.MOST_PIECES + 1
 """Points of a contact law."""
 
 LAW = {"depth": PositiveLength, "force": PositiveForce}
 """A point of a contact law: indentation [m] and normal force at rest [N]."""
+OWN: dict[str, Any] = {
+    "CrossAxis": Annotated[Known, Physical("dimensionless", least=-0.5, most=0.5)],
+    "Pull": Annotated[Known, Physical("dimensionless", least=0.0, most=0.95)],
+    "ClockError": Annotated[Known, Physical("dimensionless", least=-0.1, most=0.1)],
+    "AboveOne": Annotated[Known, Physical("dimensionless", above=1.0)],
+    "Energy": Annotated[Known, Physical("energy", above=0.0)],
+    "law": LAW,
+    "names": tuple,
+    "bool": bool,
+    "int": int,
+}
+"""Ways to write a value that no machine file has."""
 
 Keys = dict[str, tuple[Any, Any, str]]
 
-OF_BEARINGS: dict[str, Keys] = {
-    "support": {
-        "axes_angle": (Angle, 0.0, "from horizontal to the first principal axis, from x towards y"),
-        "stiffness_ratio": (Positive, 1.0, "factor on the stiffness along the first axis"),
-        "damping_ratio": (Positive, 1.0, "factor on the damping along the first axis"),
-        "hardening": (NonNegative, 0.0, "by how much a spring exceeds a linear one at the force below"),
-        "hardening_force": (PositiveForce, 1.0, "force of the linear spring at which that holds"),
-        "slip_force": (Force, 0.0, "friction that slips in the support: a hysteresis"),
-        "slip_travel": (PositiveLength, 1.0, "deflection over which that friction builds up"),
-    },
-    "foundation": {
-        "mass": (PositiveMass, None, "modal mass of a mode of the foundation at the support"),
-        "frequency": (PositiveFrequency, None, "its vertical natural frequency without support"),
-        "frequency_horizontal": (PositiveFrequency, None, "the same horizontally; as vertically"),
-        "damping_ratio": (NonNegative, 0.03, "its damping ratio; of a bolted steel frame"),
-    },
-    "contact": {
-        "exponent": (ContactExponent, None, "another exponent, equally deep at five times the mean load"),
-        "law": (LAW, (), "points of a law, straight between them where both scales are log"),
-    },
-    "race": {
-        "mass": (Positive, 1.0, "factor on mass and inertia, as of a carrier that turns along"),
-        "tilt_stiffness": (Stiffness, None, "of a tilt where the rotor touches, in series with the contact"),
-        "tilt_frequency": (PositiveFrequency, None, "natural frequency of the tilt"),
-        "tilt_damping_ratio": (NonNegative, 0.02, "damping ratio of the tilt; of steel on balls"),
-    },
-    "friction": {
-        "dynamic": (Positive, None, "dynamic coefficient; the static one keeps its ratio to it"),
-        "wear": (Share, 0.0, "share of the friction that is lost as the surfaces run in"),
-        "wear_heat": (Energy, 1.0, "heat of friction at which 63 % of that is lost"),
-    },
-    "gap": {
-        "drift": (Length, 0.0, "change of the gap that stays, at an even rate within the time below"),
-        "drift_time": (PositiveTime, 1.0, "time it takes"),
-        "closing": (Length, 0.0, "largest closing by the heat of friction, gone when all is cold again"),
-        "heat": (Energy, 1.0, "heat of friction that closes 63 % of it"),
-    },
-    "balls": {
-        "turn": (bool, False, "the balls turn with the cage as the race spins up"),
-        "seat_play": (Length, 0.0, "way of the bearing in its seat, from the middle, before it holds"),
-    },
-    "sleeve": {
-        "eccentricity": (Length, 0.0, "centre of the landing sleeve off the axis of the rotor"),
-        "ovality": (Length, 0.0, "amplitude of its radius twice per turn"),
-        "angle": (Angle, 0.0, "of both from +x at rotor angle zero"),
-    },
-    "centre": {
-        "x": (Length, 0.0, "centre of the bearing in the axes of magnets and sensors"),
-        "y": (Length, 0.0, "centre of the bearing in the axes of magnets and sensors"),
-    },
-}
-"""Keys of what may be violated at touchdown bearings: how a value is written, the value at which nothing is
-violated [SI], and what it is."""
+TABLE = tomllib.loads(resources.files(__package__).joinpath("violations.toml").read_text(encoding="utf-8"))
 
-SENSORS: Keys = {
-    "time_constant": (Time, 0.0, "time constant of first order with which they follow the shaft"),
-    "cross_axis": (CrossAxis, 0.0, "reading per motion across; drawn from half of it on, with either sign"),
-    "plane_shift": (Length, 0.0, "how much nearer to the middle of the rotor they stand than stated"),
-    "follows_housing": (Share, 0.0, "share of the motion of the housing that a bracket follows"),
-    "curvature": (Share, 0.0, "share by which they read too little at the displacement below, squared"),
-    "curvature_at": (PositiveLength, 1.0, "that displacement"),
-}
-CHAIN: Keys = {
-    "anti_alias_frequency": (PositiveFrequency, None, "corner of a filter that nobody mentions"),
-    "flicker": (Length, 0.0, "noise (rms) whose power falls as one over the frequency, beside the white"),
-    "clock_error": (ClockError, 0.0, "how much longer seconds of the recorder are than true ones"),
-    "speed_delay": (Time, 0.0, "how late the speed signal is"),
-}
-"""Keys of all sensors alike, and of what is behind them."""
 
+def _keys(part: str) -> Keys:
+    """Keys of a part: how a value is written, the value at which nothing is violated [SI], and what it is."""
+    found = {}
+    at: Mapping[str, Any] = TABLE["bearing"].get(part) or TABLE[part]
+    for key, (kind, *default, words) in at.items():
+        found[key] = (OWN.get(kind) or getattr(values, kind), default[0] if default else None, words)
+    return found
+
+
+OF_BEARINGS: dict[str, Keys] = {part: _keys(part) for part in TABLE["bearing"]}
+SENSORS, CHAIN = _keys("sensors"), _keys("chain")
 KEYS: dict[str, Keys] = {
     **OF_BEARINGS,
-    "sensors": {**SENSORS, **CHAIN},
-    "magnets": {
-        "remanence_time": (PositiveTime, None, "time constant of the remanent lift"),
-        "pull": (Pull, 0.0, "horizontal pull at power-off over the magnet's share of the weight, besides"),
-        "pull_time": (PositiveTime, 1.0, "time constant with which that decays"),
-        "stays_on": (tuple, (), "magnets that hold on: a drop of one end, of which there is no tail"),
-    },
-    "rotor": {
-        "youngs_modulus": (Positive, 1.0, "factor on Young's modulus of every section"),
-        "unbalance": (Positive, 1.0, "factor on the drawn unbalances, which may leave the grade"),
-        "bow": (Length, 0.0, "middle of the shaft off the line of its ends, towards +x at rotor angle zero"),
-        "bow_speed": (PositiveFrequency, 1.0, "speed at which it bends so; elsewhere it is an unbalance"),
-    },
-    "stand": {"tilt": (Angle, 0.0, "of the machine about its axis: gravity has a part towards +x")},
-    "unbalance_jump": {
-        "node": (int, None, "node of an unbalance that comes during the drop, counted from 1"),
-        "amount": (Unbalance, None, "its amount"),
-        "phase": (Angle, 0.0, "its phase, counted from +y at rotor angle zero"),
-        "time": (Time, None, "when it comes, from power-off; at the first contact when left out"),
-    },
-    "side_force": {
-        "node": (int, None, "node of a force towards +x that stays, as of a belt"),
-        "force": (Force, None, "the force"),
-    },
-    "seal": {
-        "node": (int, None, "node of a seal that the rotor rubs on"),
-        "gap": (AboveOne, None, "its gap over the widest air gap of the touchdown bearings"),
-        "stiffness": (Stiffness, None, "stiffness of its housing"),
-    },
+    **{part: _keys(part) for part in TABLE if part not in ("bearing", "chain", "together")},
+    "sensors": SENSORS | CHAIN,
 }
-"""Keys of everything that may be violated, by part."""
+"""Keys of everything that may be violated, by part: what may be at touchdown bearings, then the rest."""
 
 PLACED = {"unbalance_jump": "unbalance comes", "side_force": "side force acts", "seal": "seal sits"}
-TOGETHER: tuple[tuple[str, ...], ...] = (
-    ("support", "hardening", "hardening_force"),
-    ("support", "slip_force", "slip_travel"),
-    ("foundation", "mass", "frequency"),
-    ("race", "tilt_stiffness", "tilt_frequency"),
-    ("friction", "wear", "wear_heat"),
-    ("gap", "drift", "drift_time"),
-    ("gap", "closing", "heat"),
-    ("sensors", "curvature", "curvature_at"),
-    ("magnets", "pull", "pull_time"),
-    ("rotor", "bow", "bow_speed"),
-    ("unbalance_jump", "node", "amount"),
-    ("side_force", "node", "force"),
-    ("seal", "node", "gap", "stiffness"),
-)
-"""Parts and keys of which none says anything without the others."""
 WHOLE = (*PLACED, "foundation")
 """Parts of which nothing says anything without these keys."""
 
@@ -225,7 +118,7 @@ def _read(parts: Mapping[str, Any], known: Mapping[str, Keys], place: str) -> di
                 given[part][key] = _value(known[part][key][0], raw)
             except UsageError as error:
                 raise UsageError(f"{place}{part}.{key}: {error}") from None
-    for part, *group in TOGETHER:
+    for part, *group in TABLE["together"]:
         there = [key for key in group if key in given.get(part, {})]
         missing = [key for key in group if key not in there]
         if missing and (there or (part in WHOLE and given.get(part))):
