@@ -17,7 +17,7 @@ from rotordrop_bench.sensor_chain import (
     readings,
     shape_at,
 )
-from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
+from rotordrop_bench.settled import settled_coordinates, swinging_amplitudes
 
 SPEED = 2.0 * np.pi * 60.0
 
@@ -53,8 +53,8 @@ def test_perfect_sensors_read_the_true_motion_and_others_with_their_errors(perfe
             np.column_stack([true[:, s], np.ones(len(true))]), signals[:, s], rcond=None
         )
         assert gain == pytest.approx(truth["sensor_gain"][s], abs=2e-3)
-        assert offset == pytest.approx(truth["sensor_offset_m"][s], abs=3e-7)
-        rest = signals[:, s] - truth["sensor_gain"][s] * true[:, s] - truth["sensor_offset_m"][s]
+        assert offset == pytest.approx(truth["sensor_offset"][s], abs=3e-7)
+        rest = signals[:, s] - truth["sensor_gain"][s] * true[:, s] - truth["sensor_offset"][s]
         assert np.std(rest) == pytest.approx(0.45e-6, rel=0.25)
 
 
@@ -66,7 +66,7 @@ def test_the_same_seed_makes_the_same_bits_and_another_one_does_not(hidden, synt
     other = synthesize_drop(hidden, SPEED, 9, duration=0.05, tail=False)
     assert other.truth["peak_force_N"] != synthetic.truth["peak_force_N"]
     assert other.tail is None
-    for key in ("sensor_gain", "sensor_offset_m"):  # these belong to the machine
+    for key in ("sensor_gain", "sensor_offset"):  # these belong to the machine
         assert other.truth[key] == synthetic.truth[key]
 
 
@@ -128,10 +128,9 @@ def test_settled_place_of_the_supplied_machine(known):
 
 def test_swinging_ends_stay_on_their_circles(hidden):
     rest = settled_coordinates(hidden.model)
-    swing = Swing(amplitude=np.array([0.2, 0.0]), phase=np.zeros(2), decay_time=1e9)
     time = np.linspace(0.0, 0.2, 500)
     m = hidden.model.layout.n_modes
-    amplitudes = swinging_amplitudes(hidden.model, rest, swing, time)
+    amplitudes = swinging_amplitudes(hidden.model, rest, np.array([0.2, 0.0]), np.zeros(2), 1e9, time)
     shape = hidden.model.parameters.bearing_shape
     x, y = amplitudes[:, :m] @ shape.T, amplitudes[:, m:] @ shape.T
     assert np.hypot(x, y)[:, 0] == pytest.approx(np.abs(shape[0] @ rest[m : 2 * m]), rel=1e-9)
@@ -154,7 +153,7 @@ def test_a_shifted_plane_reads_what_is_there_and_a_filter_is_late(known, perfect
     """30 mm nearer to the middle of the rotor the sensors see another point of the shaft."""
     shifted = hidden_machine(known, 3, Violations.of({"sensors": {"plane_shift": "30 mm"}}))
     one, two = perfect, synthesize_drop(shifted, SPEED, 8, sensor_chain=PERFECT, duration=0.05, tail=False)
-    assert two.truth["sensor_plane_shift_m"] == [0.03] * 4
+    assert two.truth["sensor_plane_shift"] == [0.03] * 4
     assert two.truth["peak_force_N"] == one.truth["peak_force_N"]
     difference = np.max(np.abs(two.record.signals - one.record.signals))
     assert 2e-6 < difference < 6e-5

@@ -281,11 +281,11 @@ def test_what_a_machine_file_says_is_not_lost_beside_violations():
     bearings = tuple(one.changed(mount={"maxwell": [branch]}) for one in machine.touchdown_bearings)
     mounted = machine.changed(touchdown_bearings=bearings)
     assert hidden_machine(mounted, 1).model.layout.further[0][1] == ((POSITION,) * 2,) * 2
-    with pytest.raises(UsageError, match=r"states NDE\.mount .* leave the mount or the violations out"):
+    with pytest.raises(UsageError, match=r"states NDE\.mount, .* leave it out of the machine file"):
         hidden_machine(mounted, 1, Violations.of({"support": {"axes_angle": "20 deg"}}))
     coupled = example_machine("small").with_values({"NDE.support.coupling": 0.4})
     assert not len(departures_in(hidden_machine(coupled, 1).model))
-    with pytest.raises(UsageError, match=r"states NDE\.support\.coupling = 0\.4 .*support\.axes_angle"):
+    with pytest.raises(UsageError, match=r"states NDE\.support\.coupling, .*support\.axes_angle"):
         hidden_machine(coupled, 1, Violations.of({"support": {"axes_angle": "20 deg"}}))
 
 
@@ -298,4 +298,3 @@ def test_a_magnet_that_stays_on_holds_its_end_and_leaves_no_tail(known):
     made = synthesize_drop(hidden, SPEED, 8, duration=0.05)
     assert made.tail is None
     assert set(made.truth["first_contact_time_s"]) == {"NDE"}
-    assert "settled_radius_um" not in made.truth

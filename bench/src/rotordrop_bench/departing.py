@@ -14,7 +14,6 @@ import numpy as np
 
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.bearing_numbers import numbers_of
-from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.physics import columns as L
 from rotordrop.physics import touch
 from rotordrop.physics._compile import Form, inner_kernel, lean_kernel
@@ -80,11 +79,6 @@ class _Layout(StateLayout):
         """Places of the states of each bearing, shape (B, 10): those of its departure last."""
         first = self.work_in + 1 + D.N_STATES * np.arange(self.n_bearings)
         return np.column_stack([super().bearing_at(), first])
-
-    def names(self, bearings: tuple[TouchdownBearing, ...]) -> tuple[str, ...]:
-        """Name of every state, in order."""
-        count = range(1, D.N_STATES + 1)
-        return *super().names(bearings), *(f"departure {one.name} {k}" for one in bearings for k in count)
 
 
 class DepartingModel(DropModel):

@@ -86,19 +86,15 @@ def hidden_machine(
     if len(rows):
         # a departing support does not have the structures that a machine file may state
         for bearing in true.touchdown_bearings:
-            lost = "and the drop has violations too, which would take its place; leave"
-            if bearing.mount.present:
+            stated = {row.path: row.stated(bearing) for row in structure_rows_of("bearing")}
+            lost = ["mount"] if bearing.mount.present else []
+            lost += [path for path, own in stated.items() if own is not None and float(own) != 0.0]
+            if lost:
                 raise UsageError(
-                    f"the machine file states {bearing.name}.mount {lost} the mount or the violations out"
+                    f"the machine file states {bearing.name}.{lost[0]}, and the drop has violations too, "
+                    "which would take its place; leave it out of the machine file, or give it as one of them "
+                    "(support.axes_angle, support.hardening, foundation)"
                 )
-            for row in structure_rows_of("bearing"):
-                own = row.stated(bearing)
-                if own is not None and float(own) != 0.0:
-                    raise UsageError(
-                        f"the machine file states {bearing.name}.{row.path} = {float(own):.4g} {lost} it out "
-                        "of the machine file and give it as a violation (support.axes_angle, "
-                        "support.hardening or foundation)"
-                    )
     return HiddenMachine(
         machine=true,
         known=machine,
@@ -108,7 +104,7 @@ def hidden_machine(
     )
 
 
-def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: bool = True) -> DropConditions:
+def drop_conditions(hidden: HiddenMachine, speed: float, seed: int) -> DropConditions:
     """Draw rotor angle, levitated position, remanent force and trigger error of one drop."""
     if not speed > 0.0:
         raise UsageError(f"a drop at {speed:g} rad/s cannot be synthesized; give a speed above zero")
@@ -129,8 +125,8 @@ def drop_conditions(hidden: HiddenMachine, speed: float, seed: int, *, jitter: b
     )
     if (lasts := hidden.violations["magnets.remanence_time"]) is not None:
         start = replace(start, remanence_time_constant=lasts)
-    late = float(random.uniform(-LARGEST_JITTER, LARGEST_JITTER))
-    return DropConditions(speed=speed, start=start, jitter=late if jitter else 0.0)
+    jitter = float(random.uniform(-LARGEST_JITTER, LARGEST_JITTER))
+    return DropConditions(speed=speed, start=start, jitter=jitter)
 
 
 def _drawn_values(machine: Machine, random: np.random.Generator) -> dict[str, float]:

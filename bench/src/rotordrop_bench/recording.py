@@ -26,7 +26,7 @@ from rotordrop_bench.sensor_chain import (
     speed_readings,
     true_rows,
 )
-from rotordrop_bench.settled import Swing, settled_coordinates, swinging_amplitudes
+from rotordrop_bench.settled import settled_coordinates, swinging_amplitudes
 from rotordrop_bench.true_values import housing_motion, true_motion, true_values
 from rotordrop_bench.violations import CHAIN, SENSORS
 
@@ -87,20 +87,11 @@ def synthesize_drop(
     result = true_drop(hidden, case)
     errors = _true_errors(hidden, chain)
     record = _record(hidden, result, conditions, chain, errors, seed, before, duration, name)
-    angle = float(stream(seed, "tail").uniform(0.0, 2.0 * np.pi))
-    rest = settled_coordinates(hidden.model, angle)
-    random, count = stream(seed, "swing"), len(hidden.machine.touchdown_bearings)
-    swing = Swing(
-        amplitude=np.exp(random.uniform(np.log(0.003), np.log(0.1), count)),
-        phase=random.uniform(0.0, 2.0 * np.pi, count),
-        decay_time=float(random.uniform(2.0, 20.0)),
-    )
     held = hidden.violations["magnets.stays_on"]  # a rotor with one end held does not settle
-    truth = true_values(hidden, result, conditions, chain, errors, rest, name)
     return SyntheticDrop(
         record=record,
-        tail=_tail(hidden, rest, swing, chain, errors, seed, name) if tail and not held else None,
-        truth=truth,
+        tail=_tail(hidden, chain, errors, seed, name) if tail and not held else None,
+        truth=true_values(hidden, result, conditions, chain, errors, name),
         result=result,
     )
 
@@ -178,20 +169,21 @@ def _along(hidden: HiddenMachine, errors: SensorErrors, amplitudes: Array, suppo
     return np.asarray(amplitudes @ rows.T - errors.follows_housing * moved)
 
 
-def _tail(
-    hidden: HiddenMachine,
-    rest: Array,
-    swing: Swing,
-    chain: SensorChain,
-    errors: SensorErrors,
-    seed: int,
-    name: str,
-) -> Record:
-    random = stream(seed, "tail")
+def _tail(hidden: HiddenMachine, chain: SensorChain, errors: SensorErrors, seed: int, name: str) -> Record:
+    random, swinging, count = (
+        stream(seed, "tail"),
+        stream(seed, "swing"),
+        len(hidden.machine.touchdown_bearings),
+    )
+    at = float(random.uniform(0.0, 2.0 * np.pi))
+    rest = settled_coordinates(hidden.model, at)
+    amplitude = np.exp(swinging.uniform(np.log(0.003), np.log(0.1), count))
+    phase, decay = swinging.uniform(0.0, 2.0 * np.pi, count), float(swinging.uniform(2.0, 20.0))
     slow = replace(chain, sampling_rate=TAIL_RATE, anti_alias_frequency=None)
     time = np.arange(round(TAIL_DURATION * TAIL_RATE)) / TAIL_RATE
-    amplitudes = swinging_amplitudes(hidden.model, rest, swing, (1.0 + chain.clock_error) * time)
-    angle = np.full(len(time), random.uniform(0.0, 2.0 * np.pi))
+    true_time = (1.0 + chain.clock_error) * time
+    amplitudes = swinging_amplitudes(hidden.model, rest, amplitude, phase, decay, true_time)
+    angle = np.full(len(time), at)
     along = _along(hidden, errors, amplitudes, rest[hidden.model.layout.support].reshape(1, -1, 2))
     # a swing of some hertz is no matter for a lag that a drop survives
     prompt = replace(errors, time_constant=np.zeros(len(errors.gain)))

@@ -18,6 +18,8 @@ USUAL_FULL_SCALE = 600e-6
 """Largest reading of an eddy-current system [m]; chosen, not measured."""
 OVERSAMPLING = 5
 """How much denser than the samples a signal is made before a filter or a lag; chosen, not measured."""
+MAINS, SPEED_INTERVAL = 50.0, 0.01
+"""Frequency of the hum [Hz]; time between two readings of the speed [s]."""
 FILTER_ORDER = 4
 """Order of the Butterworth filter before the sampling; chosen, not measured."""
 
@@ -37,13 +39,10 @@ class SensorChain:
     noise: float = 0.45e-6
     """Noise [m rms]."""
     hum: float = 0.1e-6
-    hum_frequency: float = 50.0
-    """Amplitude of the mains hum [m] and its frequency [Hz]."""
+    """Amplitude of the mains hum [m]."""
     runout_1x: float = 0.3e-6
     runout_2x: float = 0.15e-6
     """Largest amplitude of electrical runout at once and twice per turn [m]."""
-    angle_error: float = 0.0
-    """Largest error of a sensor's direction [rad]."""
     bits: int = 16
     """Bits of the converter; 0 for none."""
     full_scale: float | None = None
@@ -57,8 +56,6 @@ class SensorChain:
     """How much longer the seconds of the recorder are than true ones [1]."""
     speed_delay: float = 0.0
     """How late the speed signal is [s]."""
-    speed_interval: float = 0.01
-    """Time between two readings of the speed [s]."""
     speed_noise: float = 2.0 * math.pi * 0.02
     """Noise of a speed reading [rad/s rms]."""
     speed_resolution: float = 2.0 * math.pi * 0.01
@@ -99,8 +96,6 @@ class SensorErrors:
     """Reading over true displacement [1]."""
     offset: Array
     """Reading of the centred rotor [m]."""
-    angle: Array
-    """True minus stated direction [rad]."""
     runout_1x: NDArray[np.complex128]
     runout_2x: NDArray[np.complex128]
     """Complex amplitude of the runout [m] at rotor angle zero."""
@@ -121,14 +116,13 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
     drawn = random.standard_normal if chain.normal else lambda count: random.uniform(-1.0, 1.0, count)
     gain = 1.0 + chain.gain_error * drawn(sensors)
     offset = chain.offset * drawn(sensors)
-    angle = chain.angle_error * random.uniform(-1.0, 1.0, sensors)
+    random.uniform(-1.0, 1.0, sensors)  # what was drawn of directions once
     size = random.uniform(0.3, 1.0, (2, sensors))
     turn = np.exp(2j * np.pi * random.uniform(0.0, 1.0, (2, sensors)))
     nothing = ("plane_shift", "cross_axis", "follows_housing", "time_constant", "curvature")
     return SensorErrors(
         gain=gain,
         offset=offset,
-        angle=angle,
         runout_1x=chain.runout_1x * size[0] * turn[0],
         runout_2x=chain.runout_2x * size[1] * turn[1],
         **{name: np.zeros(sensors) for name in nothing},
@@ -137,7 +131,7 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
 
 def directions(machine: Machine, errors: SensorErrors) -> Array:
     """Reading per displacement in x and in y of every sensor before its gain, shape (S, 2) [1]."""
-    angle = np.array([float(sensor.angle) for sensor in machine.sensors]) + errors.angle
+    angle = [float(sensor.angle) for sensor in machine.sensors]
     polarity = np.array([sensor.polarity for sensor in machine.sensors])
     c, s = np.array([(math.cos(a), math.sin(a)) for a in angle]).T
     across = errors.cross_axis
@@ -201,7 +195,7 @@ def readings(
     signal = signal + (errors.runout_1x * turn + errors.runout_2x * turn**2).real
     signal = lagging(signal, errors.time_constant, chain.sampling_rate * oversampling(chain, errors))
     phase = random.uniform(0.0, 2.0 * np.pi, along.shape[1])
-    signal = signal + chain.hum * np.cos(2.0 * np.pi * chain.hum_frequency * time[:, None] + phase)
+    signal = signal + chain.hum * np.cos(2.0 * np.pi * MAINS * time[:, None] + phase)
     if chain.anti_alias_frequency is not None:
         from scipy.signal import butter, sosfilt, sosfilt_zi
 
@@ -259,7 +253,7 @@ def speed_readings(
     time: Array, speed: Array, chain: SensorChain, random: np.random.Generator
 ) -> tuple[Array, Array]:
     """Times [s] and readings [rad/s] of the tacho, shape (K,): one per interval, with noise, rounded."""
-    interval = max(1, round(chain.speed_interval * chain.sampling_rate))
+    interval = max(1, round(SPEED_INTERVAL * chain.sampling_rate))
     first = int(random.integers(0, interval))
     chosen = np.arange(first, len(time), interval)
     values = speed[chosen] + chain.speed_noise * random.standard_normal(len(chosen))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,7 +17,6 @@ from rotordrop.physics.pendulum import small_frequency
 from rotordrop.rotor.parameters import DropModel, sag_of_model
 from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
-from rotordrop.simulate._sensitivity import drop_jacobian
 from rotordrop.simulate.levitation import rigid_amplitudes
 from rotordrop_bench import departure as D
 from rotordrop_bench.departing import STATES_AT, DepartingParameters, departing, departures_in
@@ -28,20 +26,9 @@ SMALLEST_CHANGE = 1e-15
 LONG_AFTER = 1e9
 """Time [s] at which all that drifts has come to its end."""
 DIFFERENCE = 1e-9
-"""Step of the difference quotients of a departing machine [√kg m, m]; small against every indentation."""
+"""Step of the difference quotients [√kg m, m]; small against every indentation."""
 LEAST_DAMPING = 1e-6
 """Damping of the steps that is always there [weight over gap], for a direction in which nothing holds."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Swing:
-    """Remaining swing of the rotor ends in the clearance circles."""
-
-    amplitude: Array
-    phase: Array
-    """Angle of the swing at the first instant and its phase [rad], shape (B,)."""
-    decay_time: float
-    """Time constant of its decay [s]."""
 
 
 def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
@@ -80,14 +67,9 @@ def settled_coordinates(model: DropModel, angle: float = 0.0) -> Array:
         return np.asarray(mass * rates[velocities])
 
     def stiffness_at(place: Array) -> Array:
-        if departs:
-            steps = DIFFERENCE * np.eye(len(place))
-            columns = [(force_at(place - s) - force_at(place + s)) / (2.0 * DIFFERENCE) for s in steps]
-            found = np.column_stack(columns)
-            return np.asarray(0.5 * (found + found.T))
-        jacobian = np.zeros((layout.n_dynamic, layout.n_dynamic))
-        drop_jacobian(LONG_AFTER, completed(place), parameters, jacobian)
-        return -mass[:, None] * jacobian[n_q : 2 * n_q, :n_q]
+        steps = DIFFERENCE * np.eye(len(place))
+        found = np.array([(force_at(place - s) - force_at(place + s)) / (2.0 * DIFFERENCE) for s in steps])
+        return np.asarray(0.5 * (found + found.T))
 
     # Damping by mass holds a step back by the energy it costs, so that no step needs a limit of its own: not
     # that of a heavy rotor, which sags far, nor one that nothing holds, as of a rotor just off its race.
@@ -202,8 +184,13 @@ def _guess(model: DropModel) -> Array:
     return _rigid(model, -down[:, None])[:, 0]
 
 
-def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time: Array) -> Array:
-    """Modal amplitudes, shape (N, 2m), of a settled rotor whose ends swing like pendulums."""
+def swinging_amplitudes(
+    model: DropModel, coordinates: Array, amplitude: Array, phase: Array, decay_time: float, time: Array
+) -> Array:
+    """Modal amplitudes, shape (N, 2m), of a settled rotor whose ends swing like pendulums.
+
+    Each with an amplitude and a phase (B,) [rad], which decay with a time constant [s].
+    """
     layout = model.layout
     rest = coordinates[layout.modal_y]
     shape = model.parameters.bearing_shape
@@ -211,9 +198,9 @@ def swinging_amplitudes(model: DropModel, coordinates: Array, swing: Swing, time
     if len(model.parameters.load):  # the swing is about where the rotor lies, not about straight below
         across = shape @ coordinates[layout.modal_x]
         depth, aside = np.hypot(depth, across), np.arctan2(across, depth)
-    decay = np.exp(-time / swing.decay_time)[:, None]
+    decay = np.exp(-time / decay_time)[:, None]
     turn = 2.0 * np.pi * np.array([small_frequency(d, float(model.machine.gravity)) for d in depth])
-    angle = swing.amplitude * decay * np.cos(turn * time[:, None] + swing.phase)
+    angle = amplitude * decay * np.cos(turn * time[:, None] + phase)
     per_end = _rigid(model, np.eye(len(shape)))
     x = coordinates[layout.modal_x] + (depth * (np.sin(aside + angle) - np.sin(aside))) @ per_end.T
     y = rest + (depth * (np.cos(aside) - np.cos(aside + angle))) @ per_end.T

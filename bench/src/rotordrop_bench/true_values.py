@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import published
 from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
+from rotordrop.machine.saving import machine_text
 from rotordrop.rotor.statics import bearing_load_shares
 from rotordrop.simulate.certificate import refined_peak
 from rotordrop.simulate.levitation import levitated_orbit, levitated_static
@@ -26,16 +28,6 @@ WHOLE, SETTLING = 0.2, (0.15, 0.2)
 CONTACT_WINDOW = 0.25
 """Windows of loads, of the settled force and of contacts [s], by definition."""
 MPA = 1e-6
-SENSORS = {
-    "gain": "gain",
-    "offset_m": "offset",
-    "angle_error_rad": "angle",
-    "plane_shift_m": "plane_shift",
-    "cross_axis": "cross_axis",
-    "follows_housing": "follows_housing",
-    "time_constant_s": "time_constant",
-}
-"""What a truth file holds of the sensors, and what it is of their errors."""
 STATED = {path: row for path, row in published().items() if path != "equivalent_stiffness_N_per_m"}
 """Values that the description of a bearing has, by their path in an estimate."""
 
@@ -80,7 +72,6 @@ def true_values(
     conditions: DropConditions,
     chain: SensorChain,
     errors: SensorErrors,
-    rest: Array,
     name: str,
 ) -> dict[str, Any]:
     """Everything that is true about a drop, ready for JSON; times from the true power-off."""
@@ -93,26 +84,22 @@ def true_values(
         "fs": chain.sampling_rate,
         "t_off_in_record_s": conditions.jitter,
         **_loads(result),
-        **_motion(hidden, result, rest),
+        **_motion(result),
         **machine_truth(hidden.machine, hidden.violations),
         "structure": true_structure(hidden, conditions, errors),
         "violated": list(violated_kinds(hidden.violations)),
         "rotor_angle_at_power_off_rad": start.rotor_angle,
-        "levitated_offset_m": None if start.offset is None else np.asarray(start.offset).tolist(),
         "remanent_force": [
             {"vertical_N": float(y), "x_N": float(x), "time_constant_s": start.remanence_time_constant}
             for x, y in np.asarray(force)
         ],
-        **{f"sensor_{key}": getattr(errors, name).tolist() for key, name in SENSORS.items()},
-        "noise_rms_m": chain.noise,
-        "hum_50hz_m": chain.hum,
-        "runout_1x_m": np.abs(errors.runout_1x).tolist(),
-        "runout_2x_m": np.abs(errors.runout_2x).tolist(),
-        "bits": chain.bits,
-        "anti_alias_hz": chain.anti_alias_frequency,
+        **{
+            f"sensor_{key}": (abs(one) if "runout" in key else one).tolist()
+            for key, one in vars(errors).items()
+        },
+        "sensor_chain": asdict(chain),
         "violations": {**hidden.violations.given, "machine_seed": hidden.seed},
-        "time_note": "times are from power-off; record time = t_off_in_record_s + t; unbalance phases are "
-        "relative to the (unknown) rotor mark; axes x horizontal, y up",
+        "machine": machine_text(hidden.machine),
     }
 
 
@@ -139,9 +126,8 @@ def _each(names: tuple[str, ...], numbers: Array) -> dict[str, float]:
     return {name: float(number) for name, number in zip(names, numbers, strict=True)}
 
 
-def _motion(hidden: HiddenMachine, result: DropResult, rest: Array) -> dict[str, Any]:
-    names, layout = result.bearing_names, hidden.model.layout
-    shape = hidden.model.parameters.bearing_shape
+def _motion(result: DropResult) -> dict[str, Any]:
+    names = result.bearing_names
     end = min(CONTACT_WINDOW, result.time[-1])
     intervals: dict[str, list[list[float]]] = {}
     for index, name in enumerate(names):
@@ -151,12 +137,11 @@ def _motion(hidden: HiddenMachine, result: DropResult, rest: Array) -> dict[str,
         intervals[name] = found[found[:, 0] < CONTACT_WINDOW].tolist()
     first = {name: rows[0] for name, rows in intervals.items() if rows}
     furthest = np.linalg.norm(result.displacement, axis=-1).max(axis=0)
-    values: dict[str, Any] = {"max_radial_displacement_m": _each(names, furthest)}
-    if not hidden.violations["magnets.stays_on"]:  # with one end held nobody knows how long it stays so
-        radius = np.hypot(shape @ rest[layout.modal_x], shape @ rest[layout.modal_y])
-        values["settled_radius_um"] = _each(names, 1e6 * radius)
-    values["first_contact_time_s"] = {name: row[0] for name, row in first.items()}
-    return values | {"contact_intervals_0_0p25_s": intervals}
+    return {
+        "max_radial_displacement_m": _each(names, furthest),
+        "first_contact_time_s": {name: row[0] for name, row in first.items()},
+        "contact_intervals_0_0p25_s": intervals,
+    }
 
 
 def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[str, Any]:
@@ -165,7 +150,7 @@ def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[st
     A contact whose law is no power has neither stiffness nor exponent; of a support with turned axes it is
     stiffness and damping in y that are published, and their ratio.
     """
-    bearings, constant = machine.touchdown_bearings, machine.speed.aero_time_constant
+    bearings = machine.touchdown_bearings
     values = {path: {b.name: float(row.described(b)) for b in bearings} for path, row in STATED.items()}
     series = values["equivalent_stiffness_N_per_m"] = {}  # by the tangent of the bearing at its static load
     for bearing, load in zip(bearings, bearing_load_shares(machine), strict=True):
@@ -180,20 +165,7 @@ def machine_truth(machine: Machine, broken: Violations | None = None) -> dict[st
             values["support.stiffness_N_per_m"][bearing.name] = matrix["K_yy"]
             values["support.damping_N_s_per_m"][bearing.name] = matrix["C_yy"]
             values["support.anisotropy"][bearing.name] = matrix["K_xx"] / matrix["K_yy"]
-    return {
-        **values,
-        "rotor_weight_N": machine.rotor.mass * float(machine.gravity),
-        "aero_time_constant_s": None if constant is None else float(constant),
-        "modal_damping": float(machine.rotor.modal_damping),
-        "unbalance": [
-            {"node": u.node, "amount_kg_m": float(u.amount), "phase_rad": float(u.phase)}
-            for u in machine.unbalances
-        ],
-        "ambs": [
-            {"node": a.node, "stiffness_N_per_m": float(a.stiffness), "damping_N_s_per_m": float(a.damping)}
-            for a in machine.ambs
-        ],
-    }
+    return values
 
 
 KINDS: dict[str, Parts] = {"one end held": {"magnets": {"stays_on": ()}}, **DEPARTURES}

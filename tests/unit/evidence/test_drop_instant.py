@@ -56,7 +56,7 @@ def test_power_off_where_one_end_bounces_before_the_other_has_sunk():
     found = power_off(made.record, lp400)
     assert found.value == pytest.approx(made.truth["t_off_in_record_s"], abs=0.5 * SAMPLE)
     assert found.levitated.end < found.value
-    np.testing.assert_allclose(found.levitated.noise, made.truth["noise_rms_m"], rtol=0.05)
+    np.testing.assert_allclose(found.levitated.noise, made.truth["sensor_chain"]["noise"], rtol=0.05)
 
 
 def test_power_off_of_a_heavy_rotor_that_bends_at_low_frequencies():

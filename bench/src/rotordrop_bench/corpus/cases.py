@@ -36,48 +36,15 @@ from rotordrop_bench.rotors import ROTORS, bench_rotor, scaled_rotor
 from rotordrop_bench.sensor_chain import SensorChain, fitted_to
 from rotordrop_bench.violations import Violations
 
-VERSION = "2026"
-"""Of DropBench: changes whenever one of its drops does; scores of different versions are not comparable."""
-PLAN = resources.files(__package__).joinpath("cases.toml")
+PLAN, LIST = (resources.files(__package__).joinpath(f"{name}.toml") for name in ("cases", "dropbench"))
+DROPBENCH = tomllib.loads(LIST.read_text(encoding="utf-8"))
+VERSION, SPEEDS = DROPBENCH["version"], DROPBENCH["speeds"]
 KINDS = (*(kind for kind in DEPARTURES if kind != "unbalance jump"), "unbalance jump")
 """Departures, in turn over the cases of the corpus that have one."""
 TRIES, TRY = 20, 100_000
 """Draws from the prior until a rotor drops within its record, and what a further one adds to the seed."""
 
-SCALED = {"5 kg": 5.0, "30 kg": 30.0, "140 kg": 140.0, "500 kg": 500.0, "1.6 t": 1600.0, "6 t": 6000.0}
-"""Mass [kg] around which a machine file is drawn; the other rotors are as their files have them."""
-SPEEDS: dict[str, tuple[float, ...]] = {
-    "5 kg": (550.0, 320.0, 150.0),
-    "13 kg": (500.0, 260.0, 120.0),
-    "30 kg": (300.0, 180.0, 80.0),
-    "60 kg": (120.0, 210.0, 60.0),
-    "140 kg": (180.0, 110.0, 60.0),
-    "500 kg": (115.0, 70.0, 40.0),
-    "1.6 t": (80.0, 50.0, 30.0),
-    "6 t": (50.0, 35.0, 20.0),
-}
-"""Speeds at which each rotor is dropped, in turn or drawn between the extremes [Hz]."""
-
-PAIRS: tuple[tuple[str, ...], ...] = (
-    ("turned support axes", "cross-axis sensitivity"),
-    ("sensor lag", "foundation mode"),
-    ("cubic support", "long remanence"),
-    ("brackets that follow the housing", "turned support axes"),
-    ("friction", "unbalance beyond its grade"),
-    ("contact law", "sensor planes elsewhere"),
-)
-TRIPLES: tuple[tuple[str, ...], ...] = (
-    ("turned support axes", "cross-axis sensitivity", "sensor lag"),
-    ("foundation mode", "hysteretic support", "cross-axis sensitivity"),
-    ("cubic support", "turned support axes", "rotor stiffness"),
-    ("brackets that follow the housing", "long remanence", "thermal gap"),
-    ("sensor lag", "sensor planes elsewhere", "bearing centres"),
-    ("foundation mode", "turned support axes", "sensor lag"),
-)
-RATES = (10e3, 50e3, 100e3)
 SIZES = ((SLIGHT, "slight"), (LARGE, "large"))
-FIRST = 21
-"""Kinds of departures in the first family of them; the others but the last are in the second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +77,7 @@ Drop = tuple[str, int, tuple[tuple[str, int], ...], int, dict[str, Any]]
 
 
 def _dropbench() -> Iterator[Case]:
-    kinds, rotors = list(DEPARTURES), list(ROTORS)
+    kinds, rotors, split = list(DEPARTURES), list(ROTORS), DROPBENCH["first"]
 
     def single(family: str, own: list[str], seed: int, turn: int) -> Iterator[Drop]:
         for size, word in SIZES:
@@ -122,17 +89,17 @@ def _dropbench() -> Iterator[Case]:
         (name, 700 + i, (), i, {"tail": tail}) for i in range(len(ROTORS)) for name, tail in right
     ]
     # a turn longer than the kinds, else each would meet one rotor in both sizes
-    first += single("one departure", kinds[:FIRST], 800, FIRST + 1)
-    turn = 2 * (FIRST + 1)
-    for seed, family, groups in ((1000, "two departures", PAIRS), (1100, "three departures", TRIPLES)):
+    first += single("one departure", kinds[:split], 800, split + 1)
+    turn = 2 * (split + 1)
+    for seed, (family, groups) in zip((1000, 1100), DROPBENCH["groups"].items(), strict=True):
         for i, named in enumerate(groups):
             first.append((family, seed + i, tuple((kind, SLIGHT) for kind in named), turn, {}))
             turn += 1
     first += [
         ("other sampling rates", 1200 + i, (), turn + i, {"sampling_rate": rate})
-        for i, rate in enumerate(RATES)
+        for i, rate in enumerate(DROPBENCH["rates"])
     ]
-    later, last = kinds[FIRST:-1], kinds[-1]
+    later, last = kinds[split:-1], kinds[-1]
     play: list[Drop] = [
         (f"{last}, {word}", 1500 + i, ((last, size),), i, {"speed": SPEEDS[rotor][1]})
         for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(SIZES), strict=False))
@@ -205,10 +172,11 @@ def _of_corpus(plan: Mapping[str, Any], group: str, number: int) -> Case:
 
 def known_machine(rotor: str, seed: int) -> Machine:
     """The machine as its owner knows it, drawn around a rotor of the bench."""
-    if rotor not in SCALED:
+    scale = ROTORS[rotor]
+    if isinstance(scale, str):
         return bench_rotor(rotor)
     random = stream(seed, "nominal")
-    mass = SCALED[rotor] * math.exp(random.uniform(-0.2, 0.2))
+    mass = scale[0] * math.exp(random.uniform(-0.2, 0.2))
     return scaled_rotor(
         float(f"{mass:.4g}"), float(random.uniform(1.0, 1.3)), float(random.uniform(0.0, 0.4))
     )
