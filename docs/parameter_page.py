@@ -98,16 +98,15 @@ def _limits(row: Parameter) -> str:
 
 def _published() -> list[str]:
     lines = [
-        "A nuisance is fitted beside what is sought; what is only considered keeps its prior in the replay.",
-        "The errors of both enter the intervals.",
+        "A nuisance is fitted beside what is sought.",
         "",
-        "| field | what | unit | in the replay |",
+        "| field | what | unit | part |",
         "|---|---|---|---|",
     ]
     for load in LOADS:
         lines.append(f"| `{load.field}` | {load.label} | | |")
     for row in rows("bearing"):
-        lines.append(f"| `{row.field}` | {row.label} | {row.unit} | {row.role.value}, {row.step.value} |")
+        lines.append(f"| `{row.field}` | {row.label} | {row.unit} | {row.role.value} |")
     return lines
 
 

@@ -21,6 +21,7 @@ from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.record_facts import facts_of
 from rotordrop.evidence.evidence import Evidence, read_evidence
+from rotordrop.replay.replay import replayed_drop
 from rotordrop.track.calibration import CALIBRATED_SCHEDULE, track
 from rotordrop.track.input_state import InputEstimate, corrections_by_record, input_state_estimate
 from rotordrop.twin.calibrated import Calibration, calibrate_machine
@@ -124,12 +125,8 @@ def calibration(shared: Shared) -> Calibration:
 
 
 def replayed(shared: Shared) -> Estimate:
-    """It replayed from its owner's guesses, with few starts."""
-    drop = shared("recorded")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rotordrop.replay.replay.FRICTION_DRAWS", 2)
-        method = Replay(starts=2, threads=2)
-        return estimate_drop(example_machine("lp400"), drop.record, drop.tail, method=method)
+    """It replayed open loop from there."""
+    return replayed_drop(shared("workshop"), Replay(), facts_of(shared("workshop").evidence))
 
 
 def begun(_: Shared) -> Estimate:

@@ -38,9 +38,9 @@ def estimate_drop(
     record : Record
         The recorded drop.
     tail : Record, optional
-        The settled tail; the replay needs it when the record does not reach standstill.
+        The settled tail, where it is a recording of its own.
     method : Tracked or Replay
-        A drop model that follows the record, or the paper's open-loop replay, with options.
+        A drop model that follows the record, or with that the paper's open-loop replay.
     name : str, optional
         Name of the drop; the file's by default.
     progress : callable or False, optional
@@ -55,11 +55,9 @@ def estimate_drop(
 
     Examples
     --------
-    >>> from rotordrop.estimation import Replay, Tracked
+    >>> from rotordrop.estimation import Tracked
     >>> Tracked(quick=True)
     Tracked(quick=True)
-    >>> Replay(starts=12).starts
-    12
     """
     from rotordrop.machine import Machine
     from rotordrop.record.record import Record
@@ -131,14 +129,7 @@ def estimate_drops(
         for record, tail, stem in zip(records, tails, stems, strict=True)
     ]
     facts = [facts_of(one) for one in evidence]
-    if isinstance(method, Replay):
-        from rotordrop.replay.replay import replay_drop
-
-        with shown(progress, "estimating") as tell:
-            return Estimates(
-                replay_drop(machine, record, tail, method, one, name=stem, progress=tell)
-                for record, tail, stem, one in zip(records, tails, stems, facts, strict=True)
-            )
+    from rotordrop.replay.replay import replayed_drop
     from rotordrop.rotor.parameters import build_drop_model
     from rotordrop.twin.tracked import followed_drops
     from rotordrop.twin.tracked_estimate import estimate_of
@@ -146,5 +137,9 @@ def estimate_drops(
     model = build_drop_model(machine)
     evidence = [insisted(one.with_facts(base=model)) for one in evidence]
     with shown(progress, "estimating") as tell:
-        drops = followed_drops(machine, evidence, quick=method.quick, progress=tell)
-        return Estimates(estimate_of(drop, method, one) for drop, one in zip(drops, facts, strict=True))
+        quick = isinstance(method, Tracked) and method.quick
+        drops = followed_drops(machine, evidence, quick=quick, progress=tell)
+        return Estimates(
+            replayed_drop(drop, method, one) if isinstance(method, Replay) else estimate_of(drop, method, one)
+            for drop, one in zip(drops, facts, strict=True)
+        )

@@ -112,12 +112,3 @@ class Known:
         """Give the fields that are known, ready for JSON."""
         known = {name: value for name, value in vars(self).items() if value is not None and value != ""}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in known.items()}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Correlation:
-    """Two parameters by their paths, and how their errors correlate [1]."""
-
-    first: str
-    second: str
-    value: float

@@ -32,9 +32,6 @@ def estimate(
     records: options.Records,
     tail: options.Tail = None,
     method: Annotated[Method, Option("--method", help="How the force is found.")] = Method.tracked,
-    fixed: Annotated[
-        Path | None, file_option("--fixed", "Replay: use the support of this earlier estimate.")
-    ] = None,
     quick: Annotated[bool, Option("--quick", help="One pass; for a calibrated machine.")] = False,
     mapping: options.Planes = None,
     profile: options.Profile = None,
@@ -69,10 +66,6 @@ def estimate(
     from rotordrop.report.page import write_page
     from rotordrop.twin.search import is_calibrated
 
-    if fixed is not None and method is not Method.replay:
-        raise UsageError(
-            "--fixed belongs to --method replay; the tracked twin uses a calibrated machine file instead."
-        )
     machine, *records = options.machine_first(machine, *records)
     description = load_machine(machine)
     if quick and method is Method.tracked and not is_calibrated(description):
@@ -86,7 +79,7 @@ def estimate(
         require_format(output)
     require_places(json, *reports, *outputs)
     read, tails = _read(description, records, tail or [], mapping or (), profile, tail_profile)
-    chosen = Tracked(quick=quick) if method is Method.tracked else Replay(fixed=fixed)
+    chosen = Tracked(quick=quick) if method is Method.tracked else Replay()
     with progress_bar("estimating") as progress:
         # in a thread of its own: compiled code would keep Ctrl-C waiting
         estimates = interruptible(

@@ -21,7 +21,7 @@ from rotordrop.elements.catalog.boundary import (
     clearance_range,
 )
 from rotordrop.elements.description import Misfit, Text, Usual
-from rotordrop.elements.parameter import Measure, Parameter, Role, Step, bearing_entries, stated_only
+from rotordrop.elements.parameter import Measure, Parameter, bearing_entries, stated_only
 from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
@@ -575,10 +575,8 @@ PARAMETERS: tuple[Parameter, ...] = (
         kind="force",
         measured_by="the preload of the bearing at {owner}, from its drawing",
         logarithmic=False,  # by the axial offset of the ball rows, which is what the ball forces depend on
-        role=Role.CONSIDERED,
         guess_sigma=0.15,
         entries=bearing_entries(L.AXIAL_OFFSET),
-        step=Step.IMPACTS,
         stored="bearing.preload",
         estimated_by=_by_offset,
     ),

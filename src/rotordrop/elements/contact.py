@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from rotordrop.arrays import Array
 from rotordrop.elements import values as V
 from rotordrop.elements.description import Description, Misfit, Usual
-from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, Values, bearing_entries
+from rotordrop.elements.parameter import Entry, Parameter, Rule, Values, bearing_entries
 from rotordrop.elements.values import default, follows
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -175,7 +175,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         guess_sigma=0.3,
         drift=0.2,
         entries=bearing_entries(L.CONTACT_STIFFNESS),
-        step=Step.IMPACTS,
         separated_by={"air_gap": "a static push with a known force gives the contact stiffness"},
     ),
     EXPONENT,
@@ -183,10 +182,8 @@ PARAMETERS: tuple[Parameter, ...] = (
         path="contact.damping",
         label="contact damping",
         kind="contact_damping",
-        role=Role.CONSIDERED,
         guess_sigma=0.6,
         entries=bearing_entries(L.CONTACT_DAMPING),
-        step=Step.IMPACTS,
     ),
 )
 """Unknowns of a contact."""

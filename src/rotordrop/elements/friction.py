@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from rotordrop.elements.description import Description, Usual
-from rotordrop.elements.parameter import Parameter, Role, Step, bearing_entries
+from rotordrop.elements.parameter import Parameter, Role, bearing_entries
 from rotordrop.elements.values import NonNegative, Velocity, default, follows, scaled
 from rotordrop.known import Known
 from rotordrop.physics import columns as L
@@ -85,7 +85,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         label="static friction coefficient",
         kind="dimensionless",
         role=Role.DERIVED,
-        step=Step.SWEEP,
     ),
     Parameter(
         path="friction.dynamic",
@@ -98,7 +97,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=1.0,
         late_drift_factor=5.0,
         entries=bearing_entries(L.FRICTION_DYNAMIC, L.FRICTION_STATIC),
-        step=Step.SWEEP,
         separated_by={"race.inertia": "a speed sensor on the inner race gives its spin-up"},
     ),
     Parameter(

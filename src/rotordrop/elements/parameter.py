@@ -26,26 +26,11 @@ Values = Mapping[str, Known]
 
 
 class Role(Enum):
-    """What the identification does with a parameter.
-
-    Nuisances are fitted beside what is sought; considered ones keep their prior in the replay. The errors of
-    both enter the intervals.
-    """
+    """What the identification does with a parameter; nuisances are fitted beside what is sought."""
 
     SOUGHT = "sought"
     NUISANCE = "nuisance"
-    CONSIDERED = "considered"
     DERIVED = "follows from other parameters"
-
-
-class Step(Enum):
-    """Step of the replay that finds a parameter (Neisi 2020, Fig. 4)."""
-
-    TAIL = "settled tail"
-    FIRST_CONTACT = "first contact"
-    IMPACTS = "first impacts"
-    SWEEP = "friction sweep"
-    NONE = "tracked twin only"
 
 
 class Rule(Enum):
@@ -136,8 +121,6 @@ class Parameter:
     """Factor on the drift late in a drop [1], when creep decides between rotor and race."""
     entries: tuple[Entry, ...] = ()
     """Kernel entries it sets; empty where it is no parameter of the drop model."""
-    step: Step = Step.NONE
-    """Step of the replay that finds it."""
     spin_up_only: bool = False
     """Whether it only says when a race catches up with the rotor: it may go far without moving a force."""
     common_sigma: float = 0.0

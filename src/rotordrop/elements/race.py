@@ -11,8 +11,6 @@ from rotordrop.elements.description import Description
 from rotordrop.elements.parameter import (
     Extension,
     Parameter,
-    Role,
-    Step,
     Values,
     bearing_entries,
     in_words,
@@ -99,7 +97,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         label="race inertia",
         kind="inertia",
         measured_by="a speed sensor on the inner race of {owner}",
-        role=Role.CONSIDERED,
         guess_sigma=0.12,
         # Rings that carry a sleeve have 2.5 times the inertia inferred from the bearing alone: the end of the
         # inferred range is no bound.
@@ -107,7 +104,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         drift=0.1,
         late_drift_factor=5.0,
         entries=bearing_entries(L.RACE_INERTIA),
-        step=Step.IMPACTS,
         spin_up_only=True,
     ),
     Parameter(

@@ -16,7 +16,6 @@ from rotordrop.elements.parameter import (
     Parameter,
     Role,
     Rule,
-    Step,
     Values,
     bearing_entries,
     derived,
@@ -270,7 +269,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         given_sigma=0.05,
         drift=0.02,
         entries=bearing_entries(L.SUPPORT_STIFFNESS_Y, L.SUPPORT_STIFFNESS_X),
-        step=Step.IMPACTS,
         separated_by={
             "support.mass": (
                 "a hammer test of the touchdown-bearing housing gives support frequency and stiffness"
@@ -295,7 +293,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         given_sigma=0.05,
         drift=0.02,
         entries=bearing_entries(L.SUPPORT_MASS_Y, L.SUPPORT_MASS_X),
-        step=Step.IMPACTS,
     ),
     Parameter(
         path="support.damping",
@@ -307,7 +304,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         given_sigma=0.3,
         drift=0.1,
         entries=bearing_entries(L.SUPPORT_DAMPING_Y, L.SUPPORT_DAMPING_X),
-        step=Step.IMPACTS,
     ),
 )
 """Unknowns of a support."""

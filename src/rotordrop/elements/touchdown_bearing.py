@@ -17,7 +17,7 @@ from rotordrop.elements.face import Face
 from rotordrop.elements.friction import Friction
 from rotordrop.elements.landing_sleeve import LandingSleeve
 from rotordrop.elements.mount import Mount, mounted
-from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, Step, bearing_entries
+from rotordrop.elements.parameter import Entry, Parameter, Role, Rule, bearing_entries
 from rotordrop.elements.race import Race
 from rotordrop.elements.race_bearing import RaceBearing
 from rotordrop.elements.sleeve import Sleeve
@@ -203,7 +203,6 @@ AIR_GAP = Parameter(
     lower=0.0,
     drift=0.032,
     entries=bearing_entries(L.AIR_GAP),
-    step=Step.TAIL,
     separated_by={"offset": "a lift test of the rotor in its magnets gives the diametral clearance"},
 )
 
@@ -214,7 +213,6 @@ PARAMETERS: tuple[Parameter, ...] = (
         label="equivalent stiffness, bearing and support",
         kind="stiffness",
         role=Role.DERIVED,
-        step=Step.FIRST_CONTACT,
     ),
 )
 """Unknowns of the clearance, and of bearing and support together."""
@@ -228,7 +226,6 @@ DAMPING: tuple[Parameter, ...] = (
         guess_sigma=0.5,
         drift=0.2,
         entries=(Entry(array="bearing", column=L.BEARING_DAMPING, rule=Rule.RATIO),),
-        step=Step.IMPACTS,
     ),
 )
 """Unknowns of the damping of the bearing."""

@@ -143,18 +143,19 @@ def changes(first: Drop, second: Drop) -> Changes:
     prior), so that two records of an unchanged machine differ by their own errors alone, and a tight prior
     does not hide a change. Of m parameters the level of each is `FALSE_ALARM` over m (Bonferroni).
 
-    Where both documents hold their joint estimate, it is one fit to both records: everything is shared but
-    what changed, sensors too, so that what confounds a parameter in both records alike does not blur its
-    change. Parameters are let change one after the other, the surest first, while one is beyond chance.
-    Else every parameter is compared by itself.
+    It is one fit to both records: everything is shared but what changed, sensors too, so that what confounds
+    a parameter in both records alike does not blur its change. Parameters are let change one after the other,
+    the surest first, while one is beyond chance.
 
     Raises
     ------
     UsageError
         If the drops are not of one machine (see `unlike`), or a model does not fit its record.
     """
+    joints: list[Joint] = []
     for drop in each((first, second), "drops", Drop):
-        if not drop.consistent:
+        joints.append(drop.joint)
+        if not drop.consistent or drop.joint is None:
             raise UsageError(
                 f"{drop.record}: the model is not consistent with this record, so its parameters say "
                 "nothing of a change; expected two estimates that fit"
@@ -168,14 +169,9 @@ def changes(first: Drop, second: Drop) -> Changes:
         raise UsageError(apart)
     both = [{one.path: one for one in drop.parameters} for drop in (first, second)]
     paths = [path for path in both[0] if path in both[1] and _watched(path) is not None]
-    pairs = {path: [_alone(one[path], row_of(path)) for one in both] for path in paths}
-    if first.joint is not None and second.joint is not None:
-        # a parameter that hardly leaves its prior is one that the linearised fit knows least of
-        seen = [path for path, pair in pairs.items() if None not in pair]
-        found = _jointly(first.joint, second.joint, both, seen, paths)
-    else:
-        level = _level(sum(None not in pair for pair in pairs.values()))
-        found = [_compared(path, both, pair, level) for path, pair in pairs.items()]
+    # a parameter that hardly leaves its prior is one that the linearised fit knows least of
+    seen = [path for path in paths if all(_leaves_prior(one[path], row_of(path)) for one in both)]
+    found = _jointly(joints, both, seen, paths)
     return Changes(
         first=first.record,
         second=second.record,
@@ -213,49 +209,30 @@ def _watched(path: str) -> float | None:
     return None if row is None else WATCHED.get(row.path)
 
 
-def _alone(entry: published.Parameter, row: Parameter) -> tuple[float, float] | None:
-    """Mean and deviation by the record alone, in the measure of the estimate; None where it says nothing.
+def _leaves_prior(entry: published.Parameter, row: Parameter) -> bool:
+    """Whether the record says something of a parameter beside what was known before.
 
     While a race slides, its spin-up tells (friction less drag) over inertia and none of the two alone: an
     estimate of the drag is one of the inertia's error, however sure it looks.
     """
-    if row.spin_up_only:
-        return None
-    value, prior = entry.estimate, entry.prior
-    mean, sigma = _measured(value, row)
-    if prior is None:
-        return mean, sigma
-    before, width = _measured(prior, row)
-    if sigma >= BY_PRIOR * width:
-        return None
-    own = 1.0 / (sigma**-2 - width**-2)
-    return own * (mean / sigma**2 - before / width**2), math.sqrt(own)
+    if row.spin_up_only or entry.prior is None:
+        return not row.spin_up_only
+    return _deviation(entry.estimate, row) < BY_PRIOR * _deviation(entry.prior, row)
 
 
-def _measured(known: Value, row: Parameter) -> tuple[float, float]:
-    """Middle and standard deviation, of the logarithm where the parameter is logarithmic."""
+def _deviation(known: Value, row: Parameter) -> float:
+    """Standard error, of the logarithm where the parameter is logarithmic."""
     low, high = known.interval or (known.value, known.value)
     if not row.logarithmic:
-        return known.value, max((high - low) / (2.0 * NINETY), 1e-300)
+        return max((high - low) / (2.0 * NINETY), 1e-300)
     if low <= 0.0:
-        return math.log(known.value), max(math.log(high / known.value) / NINETY, 1e-12)
-    return math.log(known.value), max(math.log(high / low) / (2.0 * NINETY), 1e-12)
+        return max(math.log(high / known.value) / NINETY, 1e-12)
+    return max(math.log(high / low) / (2.0 * NINETY), 1e-12)
 
 
 def _level(count: int) -> float:
     """Standard deviations beyond which one of so many changes is no chance."""
     return float(-ndtri(0.5 * FALSE_ALARM / max(count, 1)))
-
-
-def _compared(
-    path: str, both: Sequence[ByPath], pair: Sequence[tuple[float, float] | None], level: float
-) -> Change:
-    one, other = pair
-    if one is None or other is None:
-        return _change(path, both, 0.0, math.inf, smallest=math.inf, named=False)
-    moved, sigma = other[0] - one[0], math.hypot(one[1], other[1])
-    named = abs(moved) > level * sigma
-    return _change(path, both, moved, sigma, smallest=(level + FOUND) * sigma, named=named)
 
 
 def _change(
@@ -299,8 +276,7 @@ def _change(
 
 
 def _jointly(
-    first: Joint,
-    second: Joint,
+    joints: Sequence[Joint],
     both: Sequence[ByPath],
     seen: Sequence[str],
     paths: Sequence[str],
@@ -310,6 +286,7 @@ def _jointly(
     What one of them has not seen may still have changed, within its prior, and must not look like a change of
     something else.
     """
+    first, second = joints
     common = [path for path in first.paths if path in second.paths]
     unseen = [common.index(path) for path in paths if path in common and path not in seen]
     fit = _CommonFit([_own(one, common) for one in (first, second)], unseen)

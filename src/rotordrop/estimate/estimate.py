@@ -30,7 +30,7 @@ from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json
-from rotordrop.known import Correlation, Known
+from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.record.record import Record
 from rotordrop.require import require
@@ -60,8 +60,8 @@ class Verdict(Enum):
         "independent cross-check, as ranges."
     )
     OPEN_LOOP = (
-        "This is the paper's route, an open-loop replay: one drop like the recorded one, without intervals "
-        "of force. The tracked twin follows the record and gives them."
+        "This is the paper's route, an open-loop replay: one drop like the recorded one, without intervals. "
+        "The tracked twin follows the record and states them."
     )
 
     @property
@@ -165,23 +165,6 @@ class SensorMotion:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrictionSweep:
-    """Orbit agreement over friction coefficients; K coefficients, D draws."""
-
-    coefficients: Array
-    """Dynamic coefficients [1], shape (K,)."""
-    disagreement: Array
-    """Distance of simulated and measured orbit [m rms], each moment weighted by how well it can be known,
-    shape (K,)."""
-    best: Array
-    """Best coefficient with the best parameters, then with each draw of them [1], shape (D + 1,)."""
-    value: Known
-    """The dynamic coefficient."""
-    window: tuple[float, float]
-    """Compared part of the drop [s from power-off]."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class ReplaySteps:
     """The steps of the paper's route beside the common result."""
 
@@ -189,19 +172,11 @@ class ReplaySteps:
     """Speed at power-off and how it falls."""
     contacts: tuple[TimedContact, ...]
     """First contact of every bearing in the record, with the stiffness of eq. (17)."""
-    friction: FrictionSweep | None
-    """Sweep of the friction coefficient; None when it was taken over."""
-    correlations: tuple[Correlation, ...]
-    """Correlations of support values."""
     speed_time: Array
     speed_simulated: Array
     """Simulated speed [rad/s] against time [s], shape (T,)."""
-    fixed: str
-    """Where supports and friction were taken from; empty when they were identified."""
-    identified: Machine
-    """The machine with what was identified."""
     document: Mapping[str, Any]
-    """Initial state, settled rest and search, ready for the published document."""
+    """Initial state and speed law, ready for the published document."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -320,57 +320,9 @@ class InitialState(Document):
 
     displacement_m: dict[str, list[float]]
     velocity_m_per_s: dict[str, list[float]]
-    remanent_force_N: list[Any]
-    remanence_time_constant_s: Annotated[float, Of("decay")]
-    misfit: float
-    modal_expansion: Expansion
-
-
-class Correlation(Document):
-    """How the errors of two parameters correlate."""
-
-    first: str
-    second: str
-    value: float
-
-
-class Supports(Document):
-    """The search for the supports."""
-
-    starts: Annotated[int, Of("coarse.starts")]
-    agreeing: Annotated[int, Of("coarse.agreeing")]
-    windows_s: Annotated[list[float], Of(lambda fit: (*fit.coarse.windows, *fit.search.windows))]
-    misfit: Annotated[float, Of("search.best.misfit")]
-    simulations: Annotated[int, Of(lambda fit: fit.coarse.evaluations + fit.search.evaluations)]
-    ended_early: Annotated[str | None, Of(lambda fit: fit.search.ended_early or None)]
-    correlations: list[Correlation]
-
-
-class FrictionSweep(Document):
-    """The sweep of the friction coefficient."""
-
-    dynamic: Annotated[list[float], Of("coefficients")]
-    disagreement_m: list[float]
-    window_s: Pair
-
-
-class Identification(Document):
-    """What a replay searched for."""
-
-    support: Annotated[Supports, Of("support")] = ABSENT
-    friction_sweep: Annotated[FrictionSweep, Of("friction")] = ABSENT
-
-
-class Settled(Document):
-    """The settled rest at one bearing."""
-
-    radius_m: float
-    sideways_m: float
-    sway_m: float
-    indentation_m: float
-    race_deflection_m: float
-    support_deflection_m: float
-    vertical_zero_sigma_m: float
+    remanent_force_N: list[list[float]]
+    remanence_time_constant_s: float
+    modal_expansion: Expansion = ABSENT
 
 
 class FirstContact(Document):
@@ -455,12 +407,8 @@ class Drop(Document):
     """How the errors of what belongs to the machine hang together."""
     sensors: Annotated[dict[str, Sensor], Of(lambda made: {one.sensor: one for one in made.sensors})]
     unbalance: list[Unbalance]
-    fixed: str | None = ABSENT
-    """Where supports and friction of a replay were taken from; null where they were identified."""
     speed: Speed = ABSENT
     initial_state: InitialState = ABSENT
-    identification: Identification = ABSENT
-    settled: dict[str, Settled] = ABSENT
     first_contact: dict[str, FirstContact] = ABSENT
     agreement: Annotated[Agreement, Of("agreement")] = ABSENT
     document_sha256: str = ABSENT
@@ -489,14 +437,6 @@ class Drop(Document):
     def went_on(self) -> frozenset[str]:
         """Bearings where the rotor went further out after the part that was estimated."""
         return frozenset(one.bearing for one in self.later_motion if one.larger)
-
-    @property
-    def correlations(self) -> list[Correlation]:
-        """How the errors of support values correlate; empty where a method did not search for them."""
-        found = self.model_fields_set
-        if "identification" not in found or "support" not in self.identification.model_fields_set:
-            return []
-        return self.identification.support.correlations
 
 
 class Drops(Document):

@@ -364,7 +364,7 @@ def corrected_stiffness(duration: float, mass: float, speed: float, gravity: flo
 
 def local_polynomial(
     time: Array, values: Array, at: float, *, width: float = 2e-3, order: int = 2
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array]:
     """Displacement and velocity at one instant from a polynomial through the samples on both sides.
 
     Parameters
@@ -382,8 +382,8 @@ def local_polynomial(
 
     Returns
     -------
-    value, slope, slope_error : array
-        Displacement [m], velocity [m/s] and its standard error [m/s], shape of one sample.
+    value, slope : array
+        Displacement [m] and velocity [m/s], shape of one sample.
     """
     near = np.abs(time - at) <= width / 2
     if int(near.sum()) <= order + 1:
@@ -396,12 +396,5 @@ def local_polynomial(
     design = np.vander(scaled, order + 1, increasing=True)
     flat = values[near].reshape(int(near.sum()), -1)
     solution = np.linalg.lstsq(design, flat, rcond=None)[0]
-    rest = flat - design @ solution
-    scatter = np.sqrt(np.sum(rest**2, axis=0) / (len(flat) - order - 1))
-    spread = float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]))
     shape = values.shape[1:]
-    return (
-        solution[0].reshape(shape),
-        (solution[1] / (width / 2)).reshape(shape),
-        (scatter * spread / (width / 2)).reshape(shape),
-    )
+    return solution[0].reshape(shape), (solution[1] / (width / 2)).reshape(shape)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -18,7 +18,6 @@ from rotordrop.errors import IdentificationError, RecordError, RotordropError, U
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.ends import falling, held_bearings
 from rotordrop.evidence.events import (
-    AFTER_FALL,
     Beginning,
     DropInstant,
     beginning_of,
@@ -29,19 +28,17 @@ from rotordrop.evidence.events import (
 )
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.measured_speed import RotorAngle, rotor_angle
-from rotordrop.evidence.rest import identify_air_gap, rest_of, resting_record
+from rotordrop.evidence.rest import rest_of, resting_record
 from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
 
 if TYPE_CHECKING:
-    from rotordrop.evidence.contacts import TimedContact
     from rotordrop.evidence.events import PowerOff
     from rotordrop.evidence.fall import Fall
     from rotordrop.evidence.free_rotor import FreeRotor
-    from rotordrop.evidence.initial_state import InitialState
     from rotordrop.evidence.paths import Motion
     from rotordrop.evidence.quality.flight import Weighed
-    from rotordrop.evidence.rest import AirGap, Rest
+    from rotordrop.evidence.rest import Rest
     from rotordrop.evidence.sensing import Sensing
     from rotordrop.evidence.speed import SpeedFit
     from rotordrop.machine import Machine
@@ -277,55 +274,6 @@ class Evidence:
         return level * sensor_polarity(sensors)
 
     @cached_property
-    def gap(self) -> AirGap | Missing:
-        """Air gaps with the sag of the machine's supports."""
-        return sought(lambda: identify_air_gap(known(self.rest), self.base, known(self.sensing)))
-
-    @cached_property
-    def _landing(self) -> tuple[InitialState | Missing, tuple[TimedContact, ...] | Missing]:
-        """Fall and first contacts: from the first seconds after the fall, or from all of a record."""
-        from rotordrop.evidence.contacts import identify_first_contacts
-        from rotordrop.evidence.initial_state import initial_state_of
-
-        def fall_in(part: Record) -> InitialState:
-            gap, sensing = known(self.gap), known(self.sensing)
-            off, turning = self.power_off, self.speed.initial
-            return initial_state_of(part, self.model, off, turning, self.angle, gap, sensing)
-
-        def contacts_in(part: Record, fall: InitialState) -> tuple[TimedContact, ...]:
-            return identify_first_contacts(
-                part.time - fall.drop_instant,
-                fall.sensing.at_bearings(fall.deviation_of(part) + fall.settled),
-                known(self.gap).value,
-                np.asarray(self.model.load_shares),
-                float(self.machine.gravity),
-                float(np.mean(fall.noise)),
-            )
-
-        # a coast-down lasts a minute, its first contacts milliseconds: all of it only where they come late
-        until = max(self.power_off.value, float(self.record.time[0])) + AFTER_FALL
-        first = [self.record.window(-np.inf, until)] if self.record.time[-1] > until else []
-        for part in (*first, self.record):
-            fall = sought(partial(fall_in, part))
-            if isinstance(fall, Missing):
-                contacts: tuple[TimedContact, ...] | Missing = fall
-                continue
-            contacts = sought(partial(contacts_in, part, fall))
-            if not isinstance(contacts, Missing):
-                break
-        return fall, contacts
-
-    @cached_property
-    def fall(self) -> InitialState | Missing:
-        """State of the rotor at power-off with its covariance, and the fall up to the first contact."""
-        return self._landing[0]
-
-    @cached_property
-    def contacts(self) -> tuple[TimedContact, ...] | Missing:
-        """First contact of every bearing."""
-        return self._landing[1]
-
-    @cached_property
     def reach(self) -> Array | Missing:
         """Distance from the bearing centre at which the first force acts [m], shape (B,); NaN without one.
 
@@ -367,16 +315,6 @@ class Evidence:
 
         damaged = damaged_samples(self.record.signals)
         return damaged if self.record.missing is None else damaged | self.record.missing
-
-    @property
-    def earliest_contact(self) -> float:
-        """When the first bearing is touched [s from power-off]."""
-        return min(contact.start for contact in known(self.contacts))
-
-    @property
-    def latest_first_contact(self) -> float:
-        """When the last bearing is touched for the first time [s from power-off]."""
-        return max(contact.start for contact in known(self.contacts))
 
     def noise(self, until: float) -> Array:
         """Noise of each channel [m], shape (S,), until a time from power-off [s]; NaN where it is not known.
@@ -423,16 +361,6 @@ class Evidence:
             return np.full(np.count_nonzero(near), np.nan)
         return np.asarray(speed[near])
 
-    def measured(self, until: float) -> tuple[Array, Array]:
-        """Samples from power-off [s], shape (K,), and displacement at the bearings [m], shape (K, B, 2).
-
-        As the sensors show it: the straight rotor through them, counted from the rest position.
-        """
-        fall = known(self.fall)
-        inside = (self.time >= 0.0) & (self.time <= until)
-        along = fall.deviation_of(self.record)[inside] + fall.settled
-        return self.time[inside], fall.sensing.at_bearings(along)
-
 
 _OF_ALL = (
     "base",
@@ -443,9 +371,6 @@ _OF_ALL = (
     "sensing",
     "rest",
     "still",
-    "gap",
-    "fall",
-    "contacts",
     "reach",
 )
 """Facts found with all sensors, which evidence of some of them keeps."""

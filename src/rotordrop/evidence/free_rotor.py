@@ -53,8 +53,6 @@ class Held:
     """Static lift [N], shape (A,)."""
     aside: Array
     """Horizontal force that kept loads from pushing the rotor aside [N], shape (A,)."""
-    sag: Array
-    """Static shape of the rotor in y [m, rad], shape (2N,)."""
     words: str
     """By what, in words."""
     by_magnets: bool
@@ -72,17 +70,17 @@ def held_by(machine: Machine, planes: tuple[Plane, ...], fe: RotorFE) -> Held:
     if len({amb.node for amb in ambs}) >= 2:
         compliance = [0.0 if amb.integral_action else 1.0 / float(amb.stiffness) for amb in ambs]
         nodes = tuple(amb.node for amb in ambs)
-        sag, lift = rest_on(fe, nodes, gravity, compliance, upright)
+        lift = rest_on(fe, nodes, gravity, compliance, upright)[1]
         aside = rest_on(fe, nodes, 0.0, compliance, across)[1]
         words = f"{len(nodes)} magnetic bearings"
-        return Held(nodes=nodes, lift=lift, aside=aside, sag=sag, words=words, by_magnets=True)
+        return Held(nodes=nodes, lift=lift, aside=aside, words=words, by_magnets=True)
     bearings = tuple(bearing.node for bearing in machine.touchdown_bearings)
     guesses = (tuple(plane.node for plane in planes), bearings, (1, len(machine.rotor.node_positions)))
     nodes = next(guess for guess in guesses if len(set(guess)) >= 2)
-    sag, lift = rest_on(fe, nodes, gravity, beside=upright)
+    lift = rest_on(fe, nodes, gravity, beside=upright)[1]
     aside = rest_on(fe, nodes, 0.0, beside=across)[1]
     words = f"forces at nodes {', '.join(map(str, nodes))} (the AMB planes are not known)"
-    return Held(nodes=nodes, lift=lift, aside=aside, sag=sag, words=words, by_magnets=False)
+    return Held(nodes=nodes, lift=lift, aside=aside, words=words, by_magnets=False)
 
 
 @dataclass(frozen=True, kw_only=True)

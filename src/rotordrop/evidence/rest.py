@@ -186,21 +186,14 @@ class Rest:
 
     radius: Array
     """Mean distance of the rotor centre from the centre of the arc of its sway, at the bearings [m], (B,)."""
-    radius_lower: Array
-    radius_upper: Array
-    """Smallest and largest mean over a block (the paper's two windows) [m], shape (B,)."""
     standard_error: Array
     """Standard error of the mean radius by the scatter of the blocks, widened as they are few [m], (B,)."""
     sideways: Array
     """Mean horizontal reading at the bearings [m]; taken as horizontal sensor zero, shape (B,)."""
     sway: Array
     """Half the swing around the lowest point [m], shape (B,)."""
-    spread: Array
-    """Standard deviation of the radius [m], shape (B,)."""
     along: Array
     """Readings along the sensors [m] with the rotor at the lowest point of its sway, shape (S,)."""
-    settled: Array
-    """Displacement along the sensors at that point by radius and bend of the rotor [m], shape (S,)."""
     start: float
     end: float
     """Part of the record that was used [s]."""
@@ -249,14 +242,10 @@ def rest_of(record: Record, sensing: Sensing, *, turning: bool = False) -> Rest:
     raised = np.einsum("sb,b->s", sensing.from_bearings[..., 1], mean + height)
     return Rest(
         radius=mean,
-        radius_lower=means.min(axis=0),
-        radius_upper=means.max(axis=0),
         standard_error=of_few(means.std(axis=0, ddof=1) / np.sqrt(blocks), blocks - 1),
         sideways=sideways,
         sway=sway,
-        spread=spread,
         along=along.mean(axis=0) - raised,
-        settled=np.asarray(-sensing.from_bearings[..., 1] @ mean + sensing.settled_bend),
         start=float(time[0]),
         end=float(time[-1]),
     )
@@ -268,22 +257,10 @@ class AirGap:
 
     value: Array
     """Air gap: the radius of the rest less the sag."""
-    lower: Array
-    upper: Array
-    """Limits from the smallest and largest block of the tail (the paper's two windows)."""
-    sag: StaticSag
-    """What was taken off the settled radius."""
-    zero_sigma: Array
-    gain_sigma: Array
-    """Standard deviation of the gap by the vertical zero and by the gain of the sensors; the tail cannot
-    separate them from the gap."""
+    standard_error: Array
+    """With vertical zero and gain of the sensors, which the tail cannot separate from the gap."""
     rest: Rest
     """The rest behind it."""
-
-    @property
-    def standard_error(self) -> Array:
-        """Standard error with everything the tail cannot separate; `NINETY` of it hold 90 %."""
-        return np.asarray(np.sqrt(self.zero_sigma**2 + self.gain_sigma**2 + self.rest.standard_error**2))
 
 
 def identify_air_gap(rest: Rest, model: DropModel, sensing: Sensing) -> AirGap:
@@ -300,15 +277,10 @@ def identify_air_gap(rest: Rest, model: DropModel, sensing: Sensing) -> AirGap:
     """
     from rotordrop.rotor.parameters import sag_of_model
 
-    sag = sag_of_model(model)
-    gain = np.sqrt(np.sum((sensing.to_bearings[:, 1, :] * rest.along * sensing.gain_sigma) ** 2, axis=1))
+    by_gain = np.sum((sensing.to_bearings[:, 1, :] * rest.along * sensing.gain_sigma) ** 2, axis=1)
     return AirGap(
-        value=rest.radius - sag.total,
-        lower=rest.radius_lower - sag.total,
-        upper=rest.radius_upper - sag.total,
-        sag=sag,
-        zero_sigma=sensing.height_sigma,
-        gain_sigma=gain,
+        value=rest.radius - sag_of_model(model).total,
+        standard_error=np.sqrt(sensing.height_sigma**2 + by_gain + rest.standard_error**2),
         rest=rest,
     )
 

@@ -9,7 +9,6 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError
 from rotordrop.evidence.contacts import local_polynomial
-from rotordrop.evidence.sensing import Sensing
 from rotordrop.rotor.parameters import DropModel
 
 SMOOTHING = 2e-3
@@ -20,14 +19,10 @@ SMOOTHING = 2e-3
 class ExpandedState:
     """Initial state by modal expansion; m modes per plane, B bearings."""
 
-    displacement: Array
-    velocity: Array
-    """Amplitudes (x, y) and their velocities; zero beyond the modes used, shape (m, 2)."""
+    amplitudes: Array
+    """Amplitudes (x, y) and their velocities; zero beyond the modes used, shape (2, m, 2)."""
     at_bearings: Array
-    velocity_at_bearings: Array
-    """Displacement [m] and velocity [m/s] at the bearing nodes, shape (B, 2)."""
-    modes: int
-    """Modes per plane used in the expansion."""
+    """Displacement [m] and velocity [m/s] at the bearing nodes, shape (2, B, 2)."""
 
 
 def expansion_matrix(rows: Array, modes: int) -> Array:
@@ -59,27 +54,21 @@ def expansion_matrix(rows: Array, modes: int) -> Array:
 
 
 def expand_initial_state(
-    time: Array, along: Array, power_off: float, model: DropModel, sensing: Sensing, *, modes: int = 2
+    time: Array, along: Array, rows: Array, model: DropModel, *, modes: int = 2
 ) -> ExpandedState:
     """Initial displacement and velocity at all degrees of freedom by modal expansion.
 
-    Displacements along the sensors (N, S) [m] have their zeros taken off, times (N,) and power-off are those
-    of the record [s]; 2 modes per plane are the rigid ones of the paper.
+    Displacements along the sensors (N, S) [m] have their zeros taken off, times (N,) count from power-off
+    [s], ``rows`` (S, s) give the former from the states; 2 modes per plane are the rigid ones of the paper.
 
     Source: Neisi 2020, section 3.1. The velocity comes from a local polynomial through samples on both sides
     of power-off. Sensors need not sit at the bearing nodes.
     """
-    at_off, slope, _ = local_polynomial(time, along, power_off, width=SMOOTHING, order=2)
-    inverse = expansion_matrix(sensing.rows, modes)
-    m = sensing.rows.shape[1] // 2
-    displacement, velocity = np.zeros((m, 2)), np.zeros((m, 2))
-    displacement[:modes] = (inverse @ at_off).reshape(2, modes).T
-    velocity[:modes] = (inverse @ slope).reshape(2, modes).T
-    shapes = model.parameters.bearing_shape
-    return ExpandedState(
-        displacement=displacement,
-        velocity=velocity,
-        at_bearings=shapes @ displacement,
-        velocity_at_bearings=shapes @ velocity,
-        modes=modes,
-    )
+    live = np.isfinite(along).any(axis=0)
+    known = np.isfinite(along[:, live]).all(axis=1)
+    seen = local_polynomial(time[known], along[known][:, live], 0.0, width=SMOOTHING, order=2)
+    x, y = model.layout.modal_x, model.layout.modal_y
+    inverse = expansion_matrix(np.hstack([rows[live][:, x], rows[live][:, y]]), modes)
+    amplitudes = np.zeros((2, model.basis.size, 2))
+    amplitudes[:, :modes] = [(inverse @ one).reshape(2, modes).T for one in seen]
+    return ExpandedState(amplitudes=amplitudes, at_bearings=model.parameters.bearing_shape @ amplitudes)

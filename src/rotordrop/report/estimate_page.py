@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,9 +22,7 @@ from rotordrop.estimate.estimate import (
     CrossCheck,
     Estimate,
     FittedParameter,
-    ReplaySteps,
     TimedContact,
-    Verdict,
 )
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Agreement
@@ -303,15 +300,13 @@ def _next(estimate: Estimate) -> Section:
 
 
 def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
-    record, machine, steps = estimate.record, estimate.machine, estimate.replay
+    record, machine = estimate.record, estimate.machine
     instant = estimate.drop_instant
     power_off = Quantity(value=instant.value, kind="time", interval_90=instant.interval_90)
     path = machine.source_path
-    if steps is None:
-        quick = not isinstance(estimate.method, Replay) and estimate.method.quick
-        method = "tracked twin, one pass" if quick else "tracked twin"
-    else:
-        method = f"replay with the supports of {steps.fixed}" if steps.fixed else "replay"
+    method = "replay" if isinstance(estimate.method, Replay) else "tracked twin"
+    if not isinstance(estimate.method, Replay) and estimate.method.quick:
+        method = "tracked twin, one pass"
     facts = {
         "machine": machine.name if path is None else f"{machine.name} ({path.name})",
         "record": estimate.name if record.path is None else record.path.name,
@@ -319,8 +314,6 @@ def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
         "event": format_second(record.event_date),
         "power-off": f"{power_off.text} in record time (90 %: {power_off.interval_text})",
         "method": method,
-    }
-    facts |= {
         "estimated part": f"0 to {1e3 * estimate.until:.0f} ms after power-off",
         "sampling": f"{record.sampling_rate:g} Hz, {len(record.sensors)} sensors",
         "rotordrop": __version__,
@@ -435,7 +428,6 @@ def _rows(estimate: Estimate, scope: str) -> list[ParameterRow]:
     if scope == "drop":
         return rows
     told = {(row.name, row.bearing) for row in rows}
-    fixed = estimate.replay.fixed if estimate.replay else ""
     for parameter in published().values():
         for bearing in estimate.bearings:
             known = bearing.values.get(parameter.field)
@@ -444,10 +436,8 @@ def _rows(estimate: Estimate, scope: str) -> list[ParameterRow]:
                 continue
             kind = parameter.display_kind
             found = Quantity.of(known, kind, range_only=uncertain)
-            taken = fixed and known.status == "taken over"
-            verdict = f"taken over from {Path(fixed).name}" if taken else known.status
             none = Quantity.of(None, kind)
-            rows.append(ParameterRow(parameter.label, none, found, verdict, bearing.name))
+            rows.append(ParameterRow(parameter.label, none, found, known.status, bearing.name))
     return rows
 
 
@@ -513,16 +503,7 @@ def _parameters(estimate: Estimate) -> Section:
             verdict_column(lambda o: (o.phase or o.amount).status),
         )
         tables.append(table(estimate.unbalance, columns, "Unbalance", PHASE_NOTE))
-    return Section("Parameters", (*_of_replay(estimate.replay),), tables=tuple(tables))
-
-
-def _of_replay(steps: ReplaySteps | None) -> Iterator[str]:
-    """Where supports were taken from, and which parameters the record cannot tell apart."""
-    if steps is not None and steps.fixed:
-        yield f"The supports were taken from {steps.fixed}; this drop did not change them."
-    for pair in () if steps is None else steps.correlations:
-        if abs(pair.value) >= CONFOUNDED:
-            yield f"{pair.first} and {pair.second} are confounded: only their combination is known."
+    return Section("Parameters", tables=tuple(tables))
 
 
 def _checks(estimate: Estimate) -> Section:
@@ -666,10 +647,10 @@ def _remedies(estimate: Estimate) -> Iterator[str]:
 
 def _loads(estimate: Estimate) -> Table:
     """Loads of every bearing, one line each."""
-    certain, open_loop = estimate.consistent, estimate.verdict is Verdict.OPEN_LOOP
+    certain = estimate.consistent
 
     def number(known: Known | None, kind: str) -> str:
-        if known is None or (known.interval_90 is None and not open_loop):
+        if known is None or (known.interval_90 is None and estimate.replay is None):
             return NO_INTERVAL
         one = Quantity.of(known, kind, range_only=not certain)
         return f"{one.text} ({one.interval_text})" if one.interval_text else one.text
@@ -693,7 +674,7 @@ def _loads(estimate: Estimate) -> Table:
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
     }
     names = [name for name in lines if certain or name not in ONLY_CERTAIN]
-    what = "open loop" if open_loop else "90 % intervals" if certain else "90 % ranges"
+    what = "open loop" if estimate.replay else "90 % intervals" if certain else "90 % ranges"
     columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
     cells = [{name: lines[name](bearing) for name in names} for bearing in estimate.bearings]
     columns += [Column(b.name, own.__getitem__) for b, own in zip(estimate.bearings, cells, strict=True)]
@@ -719,8 +700,6 @@ def _over_gap(b: BearingDrop, *, certain: bool) -> str:
     return with_interval(ratio, "dimensionless", (ratio - doubt, ratio + doubt))
 
 
-CONFOUNDED = 0.9
-"""Correlation from which two parameters count as confounded [1]; chosen, not measured."""
 HALF_PERIOD = (
     "Eq. (17) takes the contact for half a period; gravity lengthens it, and one contact can be two. Both "
     "stiffnesses serve as a start of the search only."

@@ -143,11 +143,11 @@ class Run:
     """What is kept of every window, by name, and of instants at which bearings that warm were looked at."""
 
     @classmethod
-    def begun(cls, setup: Setup, state: Array, last_sample: int, time: float = 0.0) -> Run:
-        """A run from a state (n,) at a time [s]."""
+    def begun(cls, setup: Setup, state: Array, last_sample: int) -> Run:
+        """A run from a state (n,) at time zero."""
         p, y = setup.parameters, np.array(state, dtype=np.float64)
         progress, watched, n_b = np.zeros(_loop.N_PROGRESS), _loop.number_watched(p), len(p.bearing)
-        progress[[_loop.TIME, _loop.STEP]] = time, min(FIRST_STEP, setup.control.largest_step)
+        progress[_loop.STEP] = min(FIRST_STEP, setup.control.largest_step)
         progress[_loop.PREVIOUS_ERROR] = float(not setup.control.logarithmic)
         running, log = np.zeros((watched, _loop.N_RUN_COLUMNS)), np.zeros((watched, _loop.N_LOG_COLUMNS))
         status = np.zeros(7)
@@ -165,7 +165,7 @@ class Run:
             status=status,
         )
         if setup.warming is not None:
-            run.rows["heat"].append(setup.warming.row(run.memory, time, y, warmed(p, run.memory, y)))
+            run.rows["heat"].append(setup.warming.row(run.memory, 0.0, y, warmed(p, run.memory, y)))
         return run
 
     @property
@@ -231,23 +231,20 @@ def held(parameters: KernelParameters) -> KernelParameters:
     return parameters._replace(flags=flags, spin=spin)
 
 
-def follow(
-    setup: Setup, run: Run, times: Array, *, with_histories: bool = True, may_settle: bool = False
-) -> Window:
+def follow(setup: Setup, run: Run, times: Array, *, may_settle: bool = False) -> Window:
     """Take a run to the last of the times (T,) [s], the first being that of the sample it has got to.
 
     The window is shorter where the run ends before. ``may_settle``: with the scheme for settled rotors.
     """
     status, first, dissipated = run.status, int(run.status[SAMPLE]), setup.parameters.rotor_at[L.DISSIPATED]
     states, settled = np.empty((len(times), len(run.state))), np.zeros(3)
-    histories = np.empty((len(times), len(run.whirl) * with_histories, H.N_HISTORIES))
+    histories = np.empty((len(times), len(run.whirl), H.N_HISTORIES))
     rows = len(run.log) + 100 + int(LOG_ROWS_PER_SECOND * (times[-1] - times[0]))
     log = np.zeros((rows, _loop.N_LOG_COLUMNS))
     log[: len(run.log)] = run.log
 
     def fill(part: slice, now: KernelParameters) -> None:
-        if with_histories:
-            now.form.of(H.bearing_histories)(times[part], states[part], now, histories[part])
+        now.form.of(H.bearing_histories)(times[part], states[part], now, histories[part])
 
     states[0], parts, filled = run.state, [(slice(0, 1), present(setup, run))], 1
     fill(*parts[0])

@@ -99,7 +99,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
     problem, evidence = drop.problem, drop.evidence
     judged = _judge(drop, check)
     until = float(problem.time[-1])
-    later = _later(drop, judged)
+    later = motion_later(drop, believed=judged.fits)
     advice = _advice(drop, judged)
     unbalance = plane_unbalances(
         problem,
@@ -267,7 +267,7 @@ def _refuse_unchecked(drop: TrackedDrop) -> None:
 
 
 def _bearings(drop: TrackedDrop, judged: _Judgement) -> tuple[BearingDrop, ...]:
-    measured = _measured(drop, judged, drop.problem.readings)
+    measured = measured_motion(drop, drop.problem.readings, believed=judged.fits)
     low, high = drop.evidence.power_off.interval_90
     found = []
     for b in range(len(drop.problem.model.bearing_names)):
@@ -324,19 +324,23 @@ def _comparisons(drop: TrackedDrop, judged: _Judgement) -> tuple[CrossCheck, ...
     return tuple(found)
 
 
-def _measured(drop: TrackedDrop, judged: _Judgement, readings: Array) -> Array:
-    """Motion at the bearings [m], shape (N, B, 2), sensor errors as estimated or by the record alone."""
-    estimate = drop.smoothed.means[-1] if judged.fits else drop.problem.mean
+def measured_motion(drop: TrackedDrop, readings: Array, *, believed: bool) -> Array:
+    """Motion at the bearings [m], shape (N, B, 2), of readings (N, C) [m].
+
+    ``believed``: sensor errors as the twin found them, else by the record alone.
+    """
+    estimate = drop.smoothed.means[-1] if believed else drop.problem.mean
     gain_errors, offsets = drop.problem.sensor_errors(estimate)
     return at_bearings(drop.problem, (readings - offsets) / (1.0 + gain_errors))
 
 
-def _later(drop: TrackedDrop, judged: _Judgement) -> tuple[LaterMotion, ...]:
+def motion_later(drop: TrackedDrop, *, believed: bool) -> tuple[LaterMotion, ...]:
+    """What the rest of the record says after the estimated part; ``believed`` as for `measured_motion`."""
     evidence = drop.evidence
     return later_motion(
         drop.problem.model.bearing_names,
         evidence.time,
-        _measured(drop, judged, evidence.readings(np.inf)),
+        measured_motion(drop, evidence.readings(np.inf), believed=believed),
         until=float(drop.problem.time[-1]),
         noise=float(np.sqrt(np.mean(drop.problem.variances))),
     )

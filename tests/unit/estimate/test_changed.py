@@ -51,7 +51,7 @@ def entry(path, mean, sigma):
 
 def document(random, truth, name, spread=1.0):
     """An estimate: the record's own error, drawn together with a prior whose centre is drawn once."""
-    parameters = []
+    parameters, rows = [], []
     for end in ("NDE", "DE"):
         for path, value in truth.items():
             middle, usual = (at if path == "air_gap" else math.log(at) for at in (value, TRUTH[path]))
@@ -62,7 +62,13 @@ def document(random, truth, name, spread=1.0):
             prior, found = entry(path, before, PRIOR[path]), entry(path, mean, spread * precision**-0.5)
             one = Parameter(path=f"{end}.{path}", scope="machine", prior=prior, estimate=found)
             parameters.append(one)
-    return published(record=name, parameters=parameters)
+            rows.append((one.path, mean, precision**-0.5, before, PRIOR[path]))
+    paths, mean, sigma, before, wide = map(list, zip(*rows, strict=True))
+    covariance = np.diag(np.square(sigma))[np.tril_indices(len(paths))].tolist()
+    joint = Joint(
+        paths=paths, mean=mean, covariance=covariance, prior_mean=before, prior_standard_deviation=wide
+    )
+    return published(record=name, parameters=parameters, joint=joint)
 
 
 def pair(seed, **moved):

@@ -1,7 +1,5 @@
 """The report on a replayed drop shows what the replay found, step by step."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +7,6 @@ from tests.unit.report.conftest import section
 
 from rotordrop.estimate.agreement import compare_orbits
 from rotordrop.evidence.contacts import TimedContact
-from rotordrop.known import Correlation, Known
 from rotordrop.report.estimate_page import (
     estimate_page,
     first_contact_table,
@@ -83,22 +80,3 @@ def test_table_3_has_the_paper_s_value_and_the_corrected_one():
     texts = [cell.text if isinstance(cell, Quantity) else cell for cell in table.rows[0]]
     assert texts[:5] == ["NDE", "7.500 ms", "9.500 ms", "2.00 ms", "15.2 µm"]
     assert texts[5:] == ["17.80 kg", "43.9 N/µm", "31.0 N/µm"]
-
-
-def test_confounded_parameters_are_called_so(drop):
-    pairs = (Correlation(first="a", second="b", value=-0.35), Correlation(first="K", second="M", value=0.99))
-    page = estimate_page(replace(drop, replay=replace(drop.replay, correlations=pairs)))
-    said = section(page, "Parameters").text
-    assert said == ("K and M are confounded: only their combination is known.",)
-
-
-def test_values_of_an_earlier_estimate_are_called_so(drop):
-    taken = Known(value=2e7, status="taken over", unit="N/m")
-    undetermined = replace(taken, status="the record does not determine it")
-    values = {"support.stiffness_N_per_m": taken, "equivalent_stiffness_N_per_m": undetermined}
-    bearings = tuple(replace(bearing, values=values) for bearing in drop.bearings)
-    steps = replace(drop.replay, fixed="a/drop_1.json")
-    told = replace(drop, bearings=bearings, parameters=(), replay=steps)
-    verdicts = {row[0]: row[-1] for row in section(estimate_page(told), "Parameters").tables[0].rows}
-    assert verdicts["support stiffness"] == "taken over from drop_1.json"
-    assert verdicts["equivalent stiffness, bearing and support"] == "the record does not determine it"

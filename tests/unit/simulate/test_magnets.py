@@ -165,7 +165,7 @@ def test_a_growing_motion_of_the_loop_is_that_of_the_simulation():
 
     control = Control(1e-6 * error_scale(model), 1e-6, 1e-3, 10**7, -1.0, 0.0, 0.0, True)
     setup = Setup(parameters=p, control=control, stepped=stepped)
-    states = follow(setup, Run.begun(setup, start, len(times) - 1), times, with_histories=False).states
+    states = follow(setup, Run.begun(setup, start, len(times) - 1), times).states
     size = np.linalg.norm(states[:, model.layout.modal_y], axis=1)
     half = len(size) // 2
     rate = math.log(np.max(size[half:]) / np.max(size[half // 2 : half])) / (times[-1] - times[half])

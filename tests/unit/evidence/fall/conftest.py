@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from rotordrop import Known, build_drop_model, example_machine
@@ -55,15 +54,3 @@ def evidence(drop, model):
 @pytest.fixture(scope="session")
 def rest(evidence):
     return known(evidence.rest)
-
-
-@pytest.fixture(scope="session")
-def initial(evidence):
-    return known(evidence.fall)
-
-
-@pytest.fixture(scope="session")
-def contacts(drop):
-    """True times of the first contact at every bearing [s from power-off]."""
-    log = drop.result.contacts
-    return np.array([log.of_bearing(b).start[0] for b in range(2)])
