@@ -44,7 +44,7 @@ from rotordrop.report.style import (
     words,
 )
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
-from rotordrop.spectrum.indentation import DisplacementHistory, held_clearly, held_maximum
+from rotordrop.spectrum.indentation import DisplacementHistory
 from rotordrop.spectrum.lines import Line
 from rotordrop.spectrum.orders import LEAST_APART, STANDARD_SETTINGS, STEADY_APART, OrderTrack
 from rotordrop.spectrum.waterfall import Waterfall
@@ -146,7 +146,7 @@ def _covered(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
 
 def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     histories = {name: plane.history for name, plane in analysis.planes.items()}
-    clear = [name for name, history in histories.items() if held_clearly(history)]
+    clear = [name for name, history in histories.items() if history.held_clearly]
     said: list[Statement] = []
     if clear:
         window = histories[clear[0]].window
@@ -154,7 +154,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
         said.append(Statement(text, "good"))
     for name, history in histories.items():
         if name not in clear:
-            held = held_maximum(history)
+            held = history.held_maximum
             said.append(Statement(f"{name}: {history.statement}", "good" if held else "warning"))
     said += _covered(analysis)
     lines = analysis.lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from rotordrop.spectrum._views import (
     smooth,
 )
 from rotordrop.spectrum.detection import (
-    LineSettings,
     Peak,
     clearest_peak,
     frame_power,
@@ -34,7 +33,6 @@ from rotordrop.spectrum.detection import (
     stretches_of,
 )
 from rotordrop.spectrum.naming import LineKind
-from rotordrop.spectrum.speed import SpeedProfile
 
 LASTING = 4
 """Fewest frames [1] in which a line must be seen (chosen)."""
@@ -93,26 +91,10 @@ class _Refused:
 class LineSearch:
     """What is left of the signal while lines are found one after the other."""
 
-    def __init__(
-        self,
-        signal: Array,
-        sampling_rate: float,
-        profile: SpeedProfile | None,
-        *,
-        start_time: float,
-        settings: LineSettings,
-        highest_frequency: float,
-    ) -> None:
-        self.settings = settings
-        self._clock = Clock(
-            len(signal),
-            sampling_rate,
-            profile,
-            start_time=start_time,
-            settings=settings,
-            highest_frequency=highest_frequency,
-        )
-        self._rest = signal - smooth(signal, round(sampling_rate / settings.lowest_frequency))
+    def __init__(self, signal: Array, clock: Clock) -> None:
+        self.settings = clock.settings
+        self._clock = clock
+        self._rest = signal - smooth(signal, round(clock.signal_rate / self.settings.lowest_frequency))
         self._refused: list[_Refused] = []
         self._views: dict[tuple[bool, float], View] = {}
         self._after: tuple[Array, View] | None = None
@@ -136,7 +118,7 @@ class LineSearch:
         while len(self._refused) < MOST_REFUSED and self._clock.angle is not None:
             view = self._view(SHORT_FRAME, of_orders=False)
             assert view is not None
-            usual = np.median(view.frames.power, axis=0)
+            usual = np.median(view.power, axis=0)
             peak = self._clearest(view, 0.0, usual)
             if peak is None or peak.ratio < BURST:
                 break
@@ -182,21 +164,21 @@ class LineSearch:
         self._after = None
 
     def _refuse(self, peak: Peak, view: View) -> None:
-        first, last = view.frames.time[[peak.first, peak.last - 1]]
+        first, last = view.time[[peak.first, peak.last - 1]]
         self._refused.append(_Refused(view.of_orders, peak.coordinate, float(first), float(last)))
 
     def _clearest(self, view: View, speed_change: float, usual: Array | None = None) -> Peak | None:
-        speed = self._clock.at(view.frames.time, self._clock.speed)
+        speed = self._clock.at(view.time, self._clock.speed)
         stretches = [
             (first, last)
             for first, last in stretches_of(len(speed), LASTING)
             if speed[first] - speed[last - 1] >= speed_change * speed[first:last].mean()
         ]
-        return clearest_peak(view.frames, self._free(view), self.settings.detection, stretches, usual)
+        return clearest_peak(view, self._free(view), self.settings.detection, stretches, usual)
 
     def _free(self, view: View) -> Mask:
         """Where a new line may be: not at low frequency, not on the path of a line already taken out."""
-        time, place, reach = view.frames.time, view.frames.coordinate, self._reach
+        time, place, reach = view.time, view.coordinate, self._reach
         unit = np.ones((len(time), len(FIVE_MOMENTS)))
         if view.of_orders:
             moments = [
@@ -280,11 +262,11 @@ class LineSearch:
         row = slice(peak.first, peak.last)
         seen = self._clock.same_view(view, self._rest - taken)
         self._after = (taken, seen)
-        after = seen.frames.power[row, :, peak.channel]
-        line = int(np.argmin(np.abs(view.frames.coordinate - peak.coordinate)))
+        after = seen.power[row, :, peak.channel]
+        line = int(np.argmin(np.abs(view.coordinate - peak.coordinate)))
         near = slice(max(line - 1, 0), line + 2)
         left = median_of_known(after[:, near].max(axis=1))
-        whole = median_of_known(view.frames.power[row, near, peak.channel].max(axis=1))
+        whole = median_of_known(view.power[row, near, peak.channel].max(axis=1))
         return bool(left < LEFT_OVER * whole)
 
     def _better_otherwise(self, envelope: Envelope, view: View, coordinate: float, spoken: Mask) -> bool:
@@ -306,7 +288,7 @@ class LineSearch:
 
     def _spoken(self, peak: Peak, view: View) -> Mask:
         """The part of the signal in which a peak was seen."""
-        times, length = view.frames.time, view.length
+        times, length = view.time, view.length
         first = times[peak.first] - 0.5 * length[peak.first]
         last = times[peak.last - 1] + 0.5 * length[peak.last - 1]
         return np.asarray((self._clock.time >= first) & (self._clock.time <= last))
@@ -357,32 +339,16 @@ class LineSearch:
         mean = float(np.sum(weight * frequency))
         speed = float(np.sum(weight * self._clock.speed))
         decided = self._decided(weight, mean, view.resolution)
-        width = math.sqrt(max(peak.width**2 - (1.44 * view.frames.spacing) ** 2, 0.0))
+        width = math.sqrt(max(peak.width**2 - (1.44 * view.spacing) ** 2, 0.0))
+        order: tuple[float | None, float | None] = (None, None)
+        scale, drift = 1.0, self._drift(frequency, present)
         if view.of_orders:
-            order: float | None = coordinate
-            order_error: float | None = error
-            scale = mean / coordinate
-            drift = (mean, mean)
-        else:
-            known = not decided and speed > 0.0
-            order, order_error = (mean / speed, error / speed) if known else (None, None)
-            scale = 1.0
-            low, high = np.percentile(frequency[present], [5.0, 95.0])
-            drift = (float(low), float(high))
+            order, scale, drift = (coordinate, error), mean / coordinate, (mean, mean)
+        elif not decided and speed > 0.0:
+            order = (mean / speed, error / speed)
         kind: LineKind = ("order" if view.of_orders else "steady") if decided else "undecided"
-        return self._line(
-            envelope,
-            present,
-            part,
-            peak,
-            kind=kind,
-            frequency=mean,
-            frequency_error=error * scale,
-            order=order,
-            order_error=order_error,
-            drift=drift,
-            width=width * scale,
-        )
+        seen = {"kind": kind, "frequency": mean, "frequency_error": error * scale, "width": width * scale}
+        return self._line(envelope, present, part, peak, order=order, drift=drift, **seen)
 
     def _line(
         self,
@@ -391,26 +357,15 @@ class LineSearch:
         part: NDArray[np.complex128],
         peak: Peak,
         *,
-        kind: LineKind,
-        frequency: float,
-        frequency_error: float,
-        order: float | None,
-        order_error: float | None,
-        drift: tuple[float, float],
-        width: float,
-        parent: FoundLine | None = None,
-        multiple: float = 0.0,
+        order: tuple[float | None, float | None] = (None, None),
+        **known: Any,
     ) -> FoundLine:
+        """A line of which the further fields are known; ``order`` comes with its error."""
         there = envelope.value[present]
         when = self._clock.time[present]
         return FoundLine(
-            kind=kind,
-            frequency=frequency,
-            frequency_error=frequency_error,
-            order=order,
-            order_error=order_error,
-            drift=drift,
-            width=width,
+            order=order[0],
+            order_error=order[1],
             amplitude=np.sqrt(np.mean(np.abs(there) ** 2, axis=0)),
             forward=radius(there, 1.0),
             backward=radius(there, -1.0),
@@ -423,21 +378,22 @@ class LineSearch:
             path=np.abs(self._clock.rate_of(envelope.phase)),
             power=0.5 * np.sum(np.abs(part) ** 2, axis=1),
             brief=bool(when[-1] - when[0] < BRIEF * (self._clock.time[-1] - self._clock.time[0])),
-            parent=parent,
-            multiple=multiple,
+            **known,
         )
+
+    def _drift(self, frequency: Array, present: Mask) -> tuple[float, float]:
+        """Lowest and highest frequency of a line [Hz] where it is present, extremes left out."""
+        low, high = np.percentile(frequency[present], [5.0, 95.0])
+        return float(low), float(high)
 
     def _decided(self, weight: Array, frequency: float, resolution: float) -> bool:
         """Whether the speed changed enough, while the line was seen, to say whether the line follows it."""
         if self._clock.angle is None:
             return False
-        first, last = np.searchsorted(np.cumsum(weight), [0.1, 0.9])
-        early, late = (
-            float(self._clock.speed[first]),
-            float(self._clock.speed[min(last, len(self._clock.speed) - 1)]),
-        )
+        ends = np.searchsorted(np.cumsum(weight), [0.1, 0.9])
+        early, late = self._clock.speed[np.minimum(ends, len(weight) - 1)].tolist()
         middle = 0.5 * (early + late)
-        return middle <= 0.0 or frequency / middle * abs(late - early) > DECIDED * resolution
+        return bool(middle <= 0.0 or frequency / middle * abs(late - early) > DECIDED * resolution)
 
     def _combinations(self) -> None:
         """Lines at a steady one plus or minus an order: look along every such path."""
@@ -499,7 +455,6 @@ class LineSearch:
         envelope = self._clock.extract(self._combined(partner_phase, k))
         present = self._present(envelope, peak, self._clock.reachable(envelope.phase))
         frequency = np.abs(self._clock.rate_of(envelope.phase))
-        low, high = np.percentile(frequency[present], [5.0, 95.0])
         part = self._part(envelope, present)
         line = self._line(
             envelope,
@@ -509,9 +464,7 @@ class LineSearch:
             kind="combination",
             frequency=float(np.sum(power_share(envelope, present) * frequency)),
             frequency_error=partner.frequency_error,
-            order=None,
-            order_error=None,
-            drift=(float(low), float(high)),
+            drift=self._drift(frequency, present),
             width=0.0,
             parent=partner,
             multiple=k,

@@ -57,13 +57,6 @@ def smooth(values: Array, samples: int) -> Array:
     return np.ascontiguousarray(rows.T).reshape(values.shape)
 
 
-def smooth_complex(values: ComplexArray, samples: int) -> ComplexArray:
-    """Smooth real and imaginary part of a series, shape (N,), alike."""
-    rows = np.stack([values.real, values.imag])
-    _smooth_rows(rows, samples)
-    return cast(ComplexArray, rows[0] + 1j * rows[1])
-
-
 def _smooth_rows(rows: Array, samples: int) -> None:
     """Smooth every row in place."""
     size = max(samples, 1)
@@ -110,14 +103,14 @@ def _share_thinned(count: int, factor: int) -> Array:
     return _thinned(np.ones(count), factor)
 
 
-def extract(near: Near, sampling_rate: float, turn: Array, *, bandwidth: float) -> Envelope:
+def extract(near: Near, sampling_rate: float, turn: Array | float, *, bandwidth: float) -> Envelope:
     """Take the part out that follows a path and a further phase, with an amplitude that changes slowly.
 
     ``turn`` (M,) is what the phase of the line has more than that of the path [rad], the bandwidth the
     distance from the line up to which amplitude changes are followed [Hz].
     """
     samples = round(0.5 * sampling_rate / bandwidth)
-    back = (near.value * np.exp(-1j * turn)[:, None]).T
+    back = (near.value * np.exp(-1j * np.broadcast_to(turn, near.phase.shape))[:, None]).T
     turned = np.concatenate([back.real, back.imag])
     value = np.zeros_like(turned)
     for _ in range(SHARPENING):
@@ -180,8 +173,10 @@ def drift_phase(
     lag = max(round(0.05 * sampling_rate), 1)
     product = (envelope[lag:] * envelope[:-lag].conj()).sum(axis=1)
     product = np.where(present[:-lag] & present[lag:], product, 0.0)
+    rows = np.stack([product.real, product.imag])
     for _ in range(2):
-        product = smooth_complex(product, round(0.5 * span * sampling_rate))
+        _smooth_rows(rows, round(0.5 * span * sampling_rate))
+    product = rows[0] + 1j * rows[1]
     size = np.abs(product)
     if not size.any():
         return np.zeros(len(envelope))
@@ -197,10 +192,9 @@ BESIDE = 25.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class View(FramePower):
     """One way to look at a signal: over frequency, or over order."""
 
-    frames: FramePower
     of_orders: bool
     length: Array
     """Length of the frames [s], shape (F,)."""
@@ -262,8 +256,7 @@ class Clock:
 
     def extract(self, near: Near, turn: Array | float = 0.0) -> Envelope:
         """The part that follows a path and a further phase [rad]."""
-        further = np.broadcast_to(turn, self.time.shape)
-        return extract(near, self.rate, further, bandwidth=self.settings.bandwidth)
+        return extract(near, self.rate, turn, bandwidth=self.settings.bandwidth)
 
     def line(self, envelope: Envelope, size: NDArray[np.complex128]) -> Array:
         """A line with a complex amplitude [m] at every sample of the signal, shape (N, C)."""
@@ -286,7 +279,8 @@ class Clock:
         frames = frame_power(
             signal, self.signal_rate, start_time=self.start, frame=length, highest=self.highest_frequency
         )
-        return View(frames=frames, of_orders=False, length=np.full(len(frames.time), length), share=share)
+        lengths = np.full(len(frames.time), length)
+        return View(**vars(frames), of_orders=False, length=lengths, share=share)
 
     def order_view(self, signal: Array, share: float) -> View | None:
         """Power over order, in frames of equal rotor angle; None without speed or whole frame."""
@@ -307,4 +301,4 @@ class Clock:
         if frames is None:
             return None
         lengths = turns / np.maximum(self.at(frames.time, self.speed), 0.1)
-        return View(frames=frames, of_orders=True, length=lengths, share=share)
+        return View(**vars(frames), of_orders=True, length=lengths, share=share)

@@ -25,7 +25,6 @@ from rotordrop.spectrum.indentation import (
     DisplacementHistory,
     displacement_history,
     find_settling,
-    held_maximum,
 )
 from rotordrop.spectrum.lines import Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
@@ -321,7 +320,7 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
         "largest_displacement_time_s=largest_time largest_indentation_m "
         "largest_indentation_interval_90_m largest_later_m largest_later_interval_90_m largest_later_time_s "
         "first_0.2_s_held_the_maximum statement",
-        **{"first_0.2_s_held_the_maximum": held_maximum(history)},
+        **{"first_0.2_s_held_the_maximum": history.held_maximum},
         **later,
     ) | stated(
         plane,

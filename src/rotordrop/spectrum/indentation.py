@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,6 +60,16 @@ class DisplacementHistory:
     statement: str
     """Whether the window held the maximum."""
 
+    @property
+    def held_maximum(self) -> bool:
+        """Whether the largest displacement fell into the first window (0.2 s in the paper)."""
+        return self.largest_time <= self.window
+
+    @property
+    def held_clearly(self) -> bool:
+        """The same where the signal goes on after the window and noise leaves no doubt."""
+        return self.held_maximum and self.largest - self.largest_later > 2.0 * self.noise
+
 
 def displacement_history(
     displacement: PlanarSignal,
@@ -86,13 +95,17 @@ def displacement_history(
     if samples < 2:
         raise RecordError(f"displacement: {samples} samples, at least 2 are needed")
     per_interval = max(1, -(-samples // intervals))
-    envelope = _Envelope(per_interval)
     boundary = int(np.ceil((window - start_time) * sampling_rate))
     early, late = (-np.inf, 0), (-np.inf, 0)
     noise: list[float] = []
-    for start, xy in _blocks(displacement, per_interval):
+    ends: list[list[Array]] = [[], []]
+    block = max(BLOCK // per_interval, 1) * per_interval
+    for start in range(0, samples, block):
+        xy = np.asarray(displacement[start : start + block], dtype=np.float64)
         radius = np.hypot(xy[:, 0], xy[:, 1])
-        envelope.add(xy, radius)
+        values, first = np.column_stack([radius, xy]), np.arange(0, len(xy), per_interval)
+        for kept, of in zip(ends, (np.minimum, np.maximum), strict=True):
+            kept.append(of.reduceat(values, first))
         cut = min(max(boundary - start, 0), radius.size)
         early = max(early, _peak(radius[:cut], start))
         late = max(late, _peak(radius[cut:], start + cut))
@@ -102,8 +115,7 @@ def displacement_history(
     largest_time = start_time + at / sampling_rate
     later_time = start_time + late[1] / sampling_rate
     later = float(late[0]) if np.isfinite(late[0]) else float("nan")
-    lowest, highest = envelope.radius()
-    lowest_xy, highest_xy = envelope.directions()
+    lowest, highest = map(np.concatenate, ends)
     spread = float(np.median(noise))
     half = None if error is None else NINETY * error
 
@@ -112,13 +124,13 @@ def displacement_history(
             return None
         return value - wide * half, value + wide * half
 
-    middles = (np.arange(lowest.size, dtype=np.float64) + 0.5) * per_interval / sampling_rate
+    middles = (np.arange(len(lowest), dtype=np.float64) + 0.5) * per_interval / sampling_rate
     return DisplacementHistory(
         time=start_time + middles,
-        lowest=lowest,
-        highest=highest,
-        lowest_xy=lowest_xy,
-        highest_xy=highest_xy,
+        lowest=lowest[:, 0],
+        highest=highest[:, 0],
+        lowest_xy=lowest[:, 1:],
+        highest_xy=highest[:, 1:],
         air_gap=air_gap,
         largest=float(largest),
         largest_interval_90=between(float(largest)),
@@ -158,34 +170,6 @@ def find_settling(
     return Settling.of(begun, surely, perhaps, start_time + samples / sampling_rate)
 
 
-class _Envelope:
-    """Smallest and largest values per interval, gathered block by block."""
-
-    def __init__(self, per_interval: int) -> None:
-        self._per = per_interval
-        self._low: list[Array] = []
-        self._high: list[Array] = []
-
-    def add(self, xy: Array, radius: Array) -> None:
-        values = np.column_stack([radius, xy])
-        for start in range(0, len(values), self._per):
-            cut = values[start : start + self._per]
-            self._low.append(cut.min(axis=0))
-            self._high.append(cut.max(axis=0))
-
-    def radius(self) -> tuple[Array, Array]:
-        return np.array(self._low)[:, 0], np.array(self._high)[:, 0]
-
-    def directions(self) -> tuple[Array, Array]:
-        return np.array(self._low)[:, 1:], np.array(self._high)[:, 1:]
-
-
-def _blocks(displacement: PlanarSignal, per_interval: int) -> Iterator[tuple[int, Array]]:
-    step = max(BLOCK // per_interval, 1) * per_interval
-    for start in range(0, displacement.shape[0], step):
-        yield start, np.asarray(displacement[start : start + step], dtype=np.float64)
-
-
 def _peak(radius: Array, start: int) -> tuple[float, int]:
     if radius.size == 0:
         return -np.inf, start
@@ -209,13 +193,3 @@ def _window_statement(
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     did = "held" if held else "did not hold"
     return f"{first}; {second}: the first {window:g} s {did} the largest displacement"
-
-
-def held_maximum(history: DisplacementHistory) -> bool:
-    """True when the largest displacement fell into the first window (0.2 s in the paper)."""
-    return history.largest_time <= history.window
-
-
-def held_clearly(history: DisplacementHistory) -> bool:
-    """The same where the signal goes on after the window and noise leaves no doubt."""
-    return held_maximum(history) and history.largest - history.largest_later > 2.0 * history.noise

@@ -11,6 +11,7 @@ from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
+from rotordrop.spectrum._views import Clock
 from rotordrop.spectrum.candidates import (
     CONICAL,
     PENDULUM,
@@ -101,15 +102,15 @@ def find_lines(
         first = round(skip * rate)
         if len(thin) - first < FEWEST_POINTS:  # the record ends while the rotor bounces
             return []
-        search = LineSearch(
-            thin[first:],
+        clock = Clock(
+            len(thin) - first,
             rate,
             profile,
             start_time=start_time + first / rate,
             settings=settings,
             highest_frequency=highest,
         )
-        return search.run()
+        return LineSearch(thin[first:], clock).run()
 
     # One plane after the other: side by side they would hold twice the memory for a third less time.
     found = [(plane, line) for plane, moved in planes.items() for line in lines_of(moved)]

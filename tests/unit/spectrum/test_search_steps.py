@@ -13,7 +13,7 @@ from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.spectrum._search import BRIEF, LineSearch
-from rotordrop.spectrum._views import View
+from rotordrop.spectrum._views import Clock, View
 from rotordrop.spectrum.candidates import (
     bearing_defect_candidates,
     mode_candidate,
@@ -36,7 +36,8 @@ SETTINGS = LineSettings(highest_frequency=450.0)
 
 
 def search(signal, rate, profile=None, settings=SETTINGS):
-    return LineSearch(signal, rate, profile, start_time=0.0, settings=settings, highest_frequency=450.0)
+    clock = Clock(len(signal), rate, profile, start_time=0.0, settings=settings, highest_frequency=450.0)
+    return LineSearch(signal, clock)
 
 
 @pytest.mark.parametrize("length", [0.25, 4.0])
@@ -46,8 +47,8 @@ def test_no_line_is_looked_for_where_one_was_taken_out(length, kind, widths):
     passes leaves what its strength leaves."""
     seeker = search(np.zeros((8000, 2)), 1000.0)
     place = np.arange(0.0, 200.0, 0.05)
-    frames = FramePower(time=np.array([2.0, 4.0]), coordinate=place, power=np.ones((2, len(place), 2)))
-    view = View(frames=frames, of_orders=False, length=np.full(2, length), share=1.0)
+    frames = {"time": np.array([2.0, 4.0]), "coordinate": place, "power": np.ones((2, len(place), 2))}
+    view = View(**frames, of_orders=False, length=np.full(2, length), share=1.0)
     line = found_line(kind, 100.0, seeker._clock.time, ratio=1e4)
     seeker.found = [line]
     free = seeker._free(view)
