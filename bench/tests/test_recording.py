@@ -209,17 +209,9 @@ def test_the_shape_between_nodes_is_that_of_the_nodes_at_the_nodes(hidden):
     assert rigid == pytest.approx(0.5 * (basis.node_row(5) + basis.node_row(6))[:2], rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"sampling_rate": 0.0}, "the sampling rate is 0.0 Hz"),
-        ({"anti_alias_frequency": 1e6}, "corner frequency 1000000.0 Hz does not fit"),
-        ({"bits": 40}, "40 bits are no converter"),
-    ],
-)
-def test_impossible_chains_are_refused(changes, message):
-    with pytest.raises(UsageError, match=message):
-        SensorChain(**changes)
+def test_an_impossible_filter_is_refused():
+    with pytest.raises(UsageError, match=r"corner frequency 1000000.0 Hz does not fit"):
+        SensorChain(anti_alias_frequency=1e6)
 
 
 def test_sensors_see_the_whole_gap_of_a_large_machine():

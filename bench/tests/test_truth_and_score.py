@@ -12,7 +12,7 @@ from rotordrop.errors import OutputError, UsageError
 from rotordrop.record.record import read_record
 from rotordrop.severity.numbers import LOADS
 from rotordrop_bench import read_truth, score_estimate
-from rotordrop_bench.faults import FAULTS, spoiled
+from rotordrop_bench.faults import FAULTS, PLAIN, spoiled
 from rotordrop_bench.files import write_drop
 from rotordrop_bench.truth import truth_of
 
@@ -187,7 +187,7 @@ def test_what_is_no_estimate_and_no_folder_is_refused(tmp_path, folder, known, s
 
 def test_a_fault_changes_the_record_as_it_says_and_nothing_else(synthetic, known):
     record, signals = synthetic.record, synthetic.record.signals
-    broken = {fault: spoiled(record, known, fault, "one")[0] for fault in FAULTS}
+    broken = {fault: spoiled(record, known, fault, "one")[0] for fault in list(FAULTS)[:PLAIN]}
     for one in broken.values():
         assert one.signals.shape == signals.shape and not np.array_equal(one.signals, signals)
         assert np.array_equal(one.time, record.time)

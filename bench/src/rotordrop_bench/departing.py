@@ -37,8 +37,6 @@ from rotordrop.simulate._rhs import (
     add_race,
     add_rings,
     landing_torque,
-    modal_parts,
-    project,
     relative_motion,
 )
 from rotordrop.simulate._rhs import ball_force as force_of_balls
@@ -214,12 +212,11 @@ def sleeve_torque(b: int, y: Array, p: KernelParameters, dy: Array) -> float:
     s, own = departing_at(b, y, p)
     if s[D.SLEEVE_OFF] == 0.0 and s[D.SLEEVE_OVAL] == 0.0:
         return 0.0
-    body = p.contact_at[p.bearing_at[b, L.CONTACTS], L.CONTACT_BODY]
-    qx, qy, _sx, _sy = modal_parts(y, p)
-    x = project(p.bearing_shape[b], qx) - y[body] - own[D.TILT] - s[D.CENTRE_X]
-    z = project(p.bearing_shape[b], qy) - y[body + 1] - own[D.TILT + 1] - s[D.CENTRE_Y]
+    c = p.bearing_at[b, L.CONTACTS]
+    x, z, _vx, _vz = motion_in_bearing(c, b, y, p)
+    x, z = x - own[D.TILT] - s[D.CENTRE_X], z - own[D.TILT + 1] - s[D.CENTRE_Y]
     _x, _z, by_x, by_z = D.sleeve(s, y[p.rotor_at[L.ROTOR_ANGLE]], x, z)
-    at = p.rotor_at[L.N_COORDINATES] + body
+    at = p.rotor_at[L.N_COORDINATES] + p.contact_at[c, L.CONTACT_BODY]
     torque: float = -by_x * dy[at] - by_z * dy[at + 1]
     return torque
 

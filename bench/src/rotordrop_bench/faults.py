@@ -22,12 +22,11 @@ Spoil = Callable[[Record, Machine, Random], tuple[Record, Machine]]
 
 
 def spoiled(record: Record, machine: Machine, fault: str, name: str) -> tuple[Record, Machine]:
-    """A record and its machine file with a mistake from `FAULTS` or `SIZED`.
+    """A record and its machine file with a mistake from `FAULTS`.
 
-    Place, channel and sign of those of a fixed size are drawn; they follow from the names of fault and drop.
+    Place, channel and sign are drawn; they follow from the names of fault and drop.
     """
-    random = np.random.default_rng(zlib.crc32(f"{fault} {name}".encode()))
-    return (FAULTS | SIZED)[fault](record, machine, random)
+    return FAULTS[fault](record, machine, np.random.default_rng(zlib.crc32(f"{fault} {name}".encode())))
 
 
 def _readings(change: Callable[[Array, Record, Random], Array | None]) -> Spoil:
@@ -298,9 +297,6 @@ FAULTS: dict[str, Spoil] = {
     "clipping": _readings(lambda s, r, _: np.clip(s, *(0.6 * np.max(np.abs(s)) * np.array([-1.0, 1.0])))),
     "dead channel": _readings(lambda s, r, _: _changed(s, (slice(None), -1), s[0, -1])),
     "missing sample": _readings(lambda s, r, _: _changed(s, (len(s) // 2, 0), np.nan)),
-}
-"""Mistakes of the first or last channel, or of all."""
-SIZED: dict[str, Spoil] = {
     "20 samples NaN in all": _block(20, np.nan, "all"),
     "1 sample infinite": _block(1, np.inf),
     "channel dead, 0.2 µm noise": _each(lambda s, r, d: s[0] + d.normal(0.0, 0.2e-6, s.shape), "one"),
@@ -375,4 +371,6 @@ SIZED: dict[str, Spoil] = {
     "file: heaviest disc missing": _file(_no_disc),
     "file: gaps × 2": _file(_gaps_doubled),
 }
-"""Mistakes of a fixed size; nothing here knows how the gate finds them."""
+"""Mistakes, the plain ones first; nothing here knows how the gate finds them."""
+PLAIN = 7
+"""Mistakes that have no size: of the first or last channel, or of all."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import resources
+from string import Template
 
 from rotordrop.machine import Machine, example_machine, loads_machine
 
@@ -21,39 +23,22 @@ def scaled_rotor(mass: float, slenderness: float, overhang: float) -> Machine:
     k = (mass / MASS_AT_ONE) ** (1.0 / 3.0)
     long, wide = k * slenderness, k * slenderness**-0.5
     wheel, disc = 4.3 * k**3 * overhang, 4.3 * k**3 * (1.0 - overhang)
-    discs = "".join(
-        f"""
-[[rotor.discs]]
-node = {node}
-mass = "{m:.6g} kg"
-polar_inertia = "{m * (0.083 * k) ** 2:.6g} kg m^2"
-diametral_inertia = "{m * (0.068 * k) ** 2:.6g} kg m^2"
-"""
+    discs = (
+        f'{{ node = {node}, mass = "{m:.6g} kg", polar_inertia = "{m * (0.083 * k) ** 2:.6g} kg m^2", '
+        f'diametral_inertia = "{m * (0.068 * k) ** 2:.6g} kg m^2" }}'
         for node, m in ((11, disc), (21, wheel))
         if m > 0.0
     )
-    ends = _bearing("NDE", 3, k, 1.0) + _bearing("DE", 19, k, 2.5)
-    magnets = "".join(f'[[ambs]]\nname = "{n}"\nnode = {i}\n' for n, i in (("NDE", 5), ("DE", 17)))
-    sensors = "".join(
-        f'[[sensors]]\nname = "{end}{side}"\nnode = {node}\nangle = "{angle} deg"\n'
-        for end, node in (("NDE", 4), ("DE", 18))
-        for side, angle in (("A", 135), ("B", 45))
-    )
-    return loads_machine(
-        f"""
-name = "bench rotor of {mass:g} kg (invented)"
-notes = ["gaps, supports, preload, contact, friction: nominal values or first guesses, not measured"]
-speed = {{ nominal = "{300.0 / k:.6g} Hz", aero_time_constant = "8 s" }}
-balance_grade = {{ grade = "G 1", at_speed = "{300.0 / k:.6g} Hz" }}
-
-[rotor]
-sections = [{{ length = "{720.0 * long:.8g} mm", elements = 20, outer_diameter = "{80.0 * wide:.8g} mm" }}]
-{discs}
-{ends}
-{magnets}
-{sensors}
-"""
-    )
+    text = resources.files(__package__).joinpath("rotor.toml").read_text(encoding="utf-8")
+    numbers = {
+        "mass": f"{mass:g}",
+        "speed": f"{300.0 / k:.6g}",
+        "length": f"{720.0 * long:.8g}",
+        "diameter": f"{80.0 * wide:.8g}",
+        "discs": ", ".join(discs),
+        "bearings": f"{_bearing('NDE', 3, k, 1.0)}, {_bearing('DE', 19, k, 2.5)}",
+    }
+    return loads_machine(Template(text).substitute(numbers))
 
 
 def _guess(value: float, unit: str, spread: float) -> str:
@@ -65,31 +50,18 @@ def _guess(value: float, unit: str, spread: float) -> str:
 
 
 def _bearing(name: str, node: int, k: float, stiffer: float) -> str:
-    return f"""
-[[touchdown_bearings]]
-name = "{name}"
-node = {node}
-air_gap = {_guess(250.0 * k**0.5, "um", 1.3)}
-bore_radius = "{30.0 * k:.8g} mm"
-
-[touchdown_bearings.bearing]
-ball_diameter = "{9.525 * k:.8g} mm"
-ball_count = 21
-pitch_diameter = "{85.0 * k:.8g} mm"
-contact_angle = "15 deg"
-preload = {_guess(150.0 * k**2, "N", 1.45)}
-
-[touchdown_bearings.contact]
-stiffness = {_guess(0.8e9 * k**0.9, "N/m^1.111", 1.7)}
-
-[touchdown_bearings.friction]
-dynamic = {{ guess = 0.1, range = [0.05, 0.2], source = "only the range is known" }}
-
-[touchdown_bearings.support]
-mass = {_guess(25.0 * k**3, "kg", 2.0)}
-stiffness = {_guess(0.8e8 * k * stiffer, "N/m", 2.0)}
-damping_ratio = {{ guess = 0.03, range = [0.012, 0.08], source = "first guess" }}
-"""
+    parts = (
+        f'name = "{name}", node = {node}, bore_radius = "{30.0 * k:.8g} mm"',
+        f"air_gap = {_guess(250.0 * k**0.5, 'um', 1.3)}",
+        f'bearing = {{ ball_diameter = "{9.525 * k:.8g} mm", ball_count = 21, contact_angle = "15 deg", '
+        f'pitch_diameter = "{85.0 * k:.8g} mm", preload = {_guess(150.0 * k**2, "N", 1.45)} }}',
+        f"contact = {{ stiffness = {_guess(0.8e9 * k**0.9, 'N/m^1.111', 1.7)} }}",
+        'friction = { dynamic = { guess = 0.1, range = [0.05, 0.2], source = "only the range is known" } }',
+        f"support = {{ mass = {_guess(25.0 * k**3, 'kg', 2.0)}, "
+        f"stiffness = {_guess(0.8e8 * k * stiffer, 'N/m', 2.0)}, "
+        'damping_ratio = { guess = 0.03, range = [0.012, 0.08], source = "first guess" } }',
+    )
+    return f"{{ {', '.join(parts)} }}"
 
 
 ROTORS: dict[str, str | tuple[float, float, float]] = {

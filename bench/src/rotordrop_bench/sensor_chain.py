@@ -62,16 +62,12 @@ class SensorChain:
     """Step of the speed readings [rad/s]."""
 
     def __post_init__(self) -> None:
-        if not self.sampling_rate > 0.0:
-            raise UsageError(f"the sampling rate is {self.sampling_rate!r} Hz; expected a positive number")
         corner = self.anti_alias_frequency
         if corner is not None and not 0.0 < corner < 0.5 * OVERSAMPLING * self.sampling_rate:
             raise UsageError(
                 f"the corner frequency {corner!r} Hz does not fit a sampling rate of "
                 f"{self.sampling_rate:g} Hz"
             )
-        if not 0 <= self.bits <= 32:
-            raise UsageError(f"{self.bits} bits are no converter; expected 0 (none) to 32")
 
 
 _SIZES = ("gain_error", "offset", "noise", "hum", "runout_1x", "runout_2x", "speed_noise", "speed_resolution")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import brentq
 
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.bearing_numbers import numbers_of
@@ -164,12 +163,9 @@ def _on_their_tables(model: DropModel, coordinates: Array) -> Array:
     ways = (coordinates[layout.support] - coordinates[layout.race])[1::2]
     for b, load in enumerate(model.load_shares):
         if rows[b, D.LOOSE_WAY] > 0.0:
-            reach = rows[b, D.TABLE_WAY_STEP] * (D.TABLE_POINTS - 3)
-
-            def lacking(way: float, b: int = b, load: float = float(load)) -> float:
-                return float(D.from_table(rows[b], D.TABLE_FORCE, way)) - load
-
-            down[b] = max(brentq(lacking, 0.0, reach) - ways[b], 0.0)
+            places = np.linspace(0.0, rows[b, D.TABLE_WAY_STEP] * (D.TABLE_POINTS - 3), 10 * D.TABLE_POINTS)
+            forces = [D.from_table(rows[b], D.TABLE_FORCE, way) for way in places]
+            down[b] = max(np.interp(load, forces, places) - ways[b], 0.0)
     found = coordinates.copy()
     found[layout.race][1::2] -= down
     found[layout.modal_y] += _rigid(model, -down[:, None])[:, 0]

@@ -192,7 +192,7 @@ def violated_kinds(violations: Violations) -> tuple[str, ...]:
 def true_structure(
     hidden: HiddenMachine, conditions: DropConditions, errors: SensorErrors
 ) -> dict[str, float]:
-    """True values of all structures [SI] by path, absent ones with the value that means absent."""
+    """True values of the structures of an estimate [SI] by path; absent ones as that means them."""
     values: dict[str, float] = {}
     for bearing in hidden.machine.touchdown_bearings:
         mine = _of_bearing(bearing, hidden.violations.of_bearing(bearing.name))
@@ -220,26 +220,10 @@ def _of_bearing(bearing: TouchdownBearing, v: Violations) -> dict[str, float]:
     values = {
         "support.coupling": matrix["K_xy"] / math.sqrt(matrix["K_xx"] * matrix["K_yy"]),
         "support.damping_coupling": matrix["C_xy"] / math.sqrt(damped) if damped > 0.0 else 0.0,
-        "support.axes_ratio": float(support.stiffness_horizontal) / float(support.stiffness),
         "support.cubic": v["support.hardening"] / deflection**2,
-        "support.foundation_share": 0.0,
+        "support.foundation_share": 0.0 if mass is None else float(support.mass) / mass,
     }
-    as_given = (
-        "support.axes_angle",
-        "support.slip_force",
-        "gap.drift",
-        "gap.closing",
-        "centre.x",
-        "centre.y",
-    )
-    values |= {path: v[path] for path in as_given}
     if mass is not None:
-        values |= {
-            "support.foundation_share": float(support.mass) / mass,
-            "support.foundation_frequency": 2.0 * math.pi * v["foundation.frequency"],
-            "support.foundation_damping_ratio": v["foundation.damping_ratio"],
-            "foundation.mass": mass,
-        }
-    if v["race.tilt_stiffness"] is not None:
-        values["race.tilt_stiffness"] = v["race.tilt_stiffness"]
+        values["support.foundation_frequency"] = 2.0 * math.pi * v["foundation.frequency"]
+        values["support.foundation_damping_ratio"] = v["foundation.damping_ratio"]
     return values

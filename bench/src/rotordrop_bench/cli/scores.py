@@ -93,7 +93,7 @@ def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | N
     from rotordrop_bench.corpus import compare
     from rotordrop_bench.corpus.cases import listed, plan_digest
     from rotordrop_bench.corpus.run import Version, run
-    from rotordrop_bench.corpus.table import kept_table, quantities, read_table, write_table
+    from rotordrop_bench.corpus.table import quantities, write_table
 
     def keep(so_far: list[Row]) -> None:
         write_table(so_far, plan_digest(), table)
@@ -101,11 +101,9 @@ def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | N
 
     version = Version.at(place, name)
     first = {case.name for case in listed(short=True)}
-    chosen = [case for case in listed(short=short) if case.name in first]
-    chosen += [case for case in listed(short=short) if case.name not in first]
+    chosen = sorted(listed(short=short), key=lambda case: case.name not in first)
     table = folder / f"{version.name}{'-short' if short else ''}.csv"
-    known = read_table(version.name)[1] if kept_table(version.name).is_file() else []
-    rows = run(version, chosen, folder, known, keep)
+    rows = run(version, chosen, folder, keep)
     write_table(rows, plan_digest(), table)
     groups = {group: [row for row in rows if row.group == group] for group in compare.WRONG}
     found = quantities(groups)

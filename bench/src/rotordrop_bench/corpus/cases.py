@@ -29,7 +29,7 @@ from rotordrop.rotor.unknowns import (
 )
 from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT, departures
 from rotordrop_bench.event import drop_conditions, hidden_machine, stream
-from rotordrop_bench.faults import FAULTS, SIZED, spoiled
+from rotordrop_bench.faults import FAULTS, PLAIN, spoiled
 from rotordrop_bench.files import drop_path, truth_path, write_drop
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
 from rotordrop_bench.rotors import ROTORS, bench_rotor, scaled_rotor
@@ -153,7 +153,7 @@ def _of_corpus(plan: Mapping[str, Any], group: str, number: int) -> Case:
     name, turn = f"{group}-{number:03d}", number // len(KINDS)
     if group == "faults":
         further = number - own["plain"]
-        fault = kinds[number % len(kinds)] if further < 0 else list(SIZED)[further % len(SIZED)]
+        fault = kinds[number % PLAIN] if further < 0 else kinds[PLAIN + further % (len(kinds) - PLAIN)]
         clean = _of_corpus(plan, "facts", number % plan["groups"]["facts"]["count"])
         return replace(clean, name=name, group=group, fault=fault, clean=clean.name)
     if "durations" in own:

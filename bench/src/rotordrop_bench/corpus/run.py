@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -62,18 +62,15 @@ def run(
     version: Version,
     cases: Sequence[Case],
     folder: Path,
-    known: Iterable[Row] = (),
     report: Callable[[list[Row]], None] = lambda rows: None,
 ) -> list[Row]:
     """Run what is not yet there of these cases, and score all of them.
 
     ``folder/drops`` keeps what a version is given, ``folder/said/NAME`` what it said; a run that was stopped
-    goes on where it was, or from the ``known`` rows of its table. ``report`` is called with all rows so far.
+    goes on where it was. ``report`` is called with all rows so far.
     """
-    rows = {row.case: row for row in known}
+    rows: list[Row] = []
     for case in cases:
-        if case.name in rows:
-            continue
         place = made(case, folder)
         said = folder / "said" / version.name / case.name
         make_folder(said)
@@ -84,9 +81,9 @@ def run(
             more = ["--tail", tail] if case.tail else []
             estimated = _said(version, ["estimate", machine, record, *more], said / "estimate")
         truth = read_truth(truth_path(folder, case.name))
-        rows[case.name] = scored(case.name, digest(place), truth, looked, estimated)
-        report(list(rows.values()))
-    return [rows[case.name] for case in cases]
+        rows.append(scored(case.name, digest(place), truth, looked, estimated))
+        report(rows)
+    return rows
 
 
 def _said(version: Version, command: list[str], stem: Path) -> dict[str, Any]:

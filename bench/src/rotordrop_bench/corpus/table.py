@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +45,7 @@ LOST = 0.1
 """A value wrong by more than this share is lost [1]; chosen, not measured."""
 SILENT = 0.05
 """Error from which a value outside its interval counts as a silent one [1]."""
-PARAMETERS = "parameters"
-SHOWN = (*SHORT.values(), PARAMETERS, "structure", "absent")
+SHOWN = (*SHORT.values(), "parameters", "structure", "absent")
 """Quantities that stand on the screen; parameters one by one stand in the JSON."""
 
 Said = tuple[int, ...]
@@ -228,7 +226,7 @@ def quantities(groups: Mapping[str, Sequence[Row]]) -> list[Quantity]:
         said: dict[str, list[Said]] = {}
         for key, one in (entry for row in rows for entry in row.estimates.items()):
             name = name_of(key)
-            for into in (name, PARAMETERS) if name in pooled else (name,):
+            for into in (name, "parameters") if name in pooled else (name,):
                 said.setdefault(into, []).append(one)
         found += [_quantity(group, name, own) for name, own in said.items()]
     return found
@@ -276,14 +274,9 @@ def _cell(value: Any) -> str:
     return "|".join(value) if isinstance(value, tuple) else "" if value is None else str(value)
 
 
-def kept_table(version: str) -> Traversable:
-    """Where the bench keeps the table of a version, or would."""
-    return resources.files(__package__).joinpath("tables", f"{version}.csv")
-
-
 def read_table(place: str) -> tuple[str, list[Row]]:
     """Digest of the plan and rows of a table: a file, or the version of one that the bench keeps."""
-    kept = kept_table(place)
+    kept = resources.files(__package__).joinpath("tables", f"{place}.csv")
     file = kept if kept.is_file() else Path(place)
     if not file.is_file():
         raise UsageError(f"there is no table {place}; make one with 'rotordrop-bench corpus run'")
@@ -292,23 +285,15 @@ def read_table(place: str) -> tuple[str, list[Row]]:
 
 
 def _read(entry: Mapping[str, str]) -> Row:
-    def many(cell: str) -> dict[str, Said]:
+    return Row(**{one.name: _value(str(one.type), entry.get(one.name, "")) for one in fields(Row)})
+
+
+def _value(kind: str, cell: str) -> Any:
+    if kind.startswith("Mapping"):
         pairs = (part.split("=") for part in cell.split("|") if part)
         return {key: tuple(map(int, said.split(":"))) for key, said in pairs}
-
-    def words(name: str) -> tuple[str, ...]:
-        return tuple(filter(None, entry.get(name, "").split("|")))
-
-    return Row(
-        case=entry["case"],
-        digest=entry["digest"],
-        look_code=int(entry["look_code"]),
-        code=int(entry["code"]) if entry["code"] else None,
-        look_seconds=float(entry["look_seconds"]),
-        seconds=float(entry["seconds"]) if entry["seconds"] else None,
-        findings=words("findings"),
-        facts=many(entry["facts"]),
-        estimates=many(entry["estimates"]),
-        named=words("named"),
-        violated=words("violated"),
-    )
+    if kind.startswith("tuple"):
+        return tuple(filter(None, cell.split("|")))
+    if kind != "str" and not cell:
+        return None
+    return {"str": str, "int": int}.get(kind.partition(" ")[0], float)(cell)
