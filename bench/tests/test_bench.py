@@ -9,14 +9,13 @@ import pytest
 from rotordrop.errors import UsageError
 from rotordrop.files import digest_of_file, write_json
 from rotordrop.machine import load_machine
-from rotordrop_bench import DROPS, VERSION, Violations, make_bench, read_truth, score_all
+from rotordrop_bench import DROPS, VERSION, Violations, chosen_drops, made, read_truth, score_all
 from rotordrop_bench.cli.app import run
-from rotordrop_bench.corpus.cases import chosen_drops
 from rotordrop_bench.corpus.table import quantities, silent
 from rotordrop_bench.departures import departures
 from rotordrop_bench.rotors import ROTORS, bench_rotor
+from rotordrop_bench.score import Truth
 from rotordrop_bench.true_values import KINDS, violated_kinds
-from rotordrop_bench.truth import Truth
 
 MADE = ("drop_004", "drop_034")
 
@@ -24,7 +23,8 @@ MADE = ("drop_004", "drop_034")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("bench")
-    assert make_bench(path, MADE) == list(MADE)
+    for drop in chosen_drops(MADE):
+        assert made(drop, path) == path / "drops" / drop.name
     return path
 
 
@@ -96,15 +96,17 @@ def test_no_drop_says_what_is_hidden(folder):
     assert load_machine(folder / "drops/drop_034/machine.toml") == bench_rotor("13 kg")
 
 
-def test_what_is_cut_off_comes_back_the_same_and_the_truth_says_where_it_belongs(folder):
+def test_what_is_cut_off_comes_back_the_same_and_the_truth_says_where_it_belongs(folder, capsys):
     record = folder / "drops/drop_004/record.csv"
     truth = folder / "truth/drop_004.json"
     before, when = (record.read_bytes(), truth.read_bytes()), record.stat().st_mtime_ns
-    assert make_bench(folder, MADE) == []
+    assert run(["make", str(folder), "--only", "drop_004", "--only", "drop_034"]) == 0
+    assert "drops made: 0, there already: 2" in capsys.readouterr().out
     assert record.stat().st_mtime_ns == when
     truth.unlink()
     record.write_text("half")
-    assert make_bench(folder, MADE) == ["drop_004"]
+    assert run(["make", str(folder), "--only", "drop_004", "--only", "drop_034"]) == 0
+    assert "drops made: 1, there already: 1" in capsys.readouterr().out
     assert (record.read_bytes(), truth.read_bytes()) == before
     truth = read_truth(folder / "truth/drop_034.json")
     assert truth.values["bench_version"] == VERSION

@@ -5,13 +5,12 @@ with a finer model than any estimator uses, and a sensor chain makes a recording
 apart. DropBench is a fixed list of such drops, the corpus compares versions of the estimator.
 """
 
-from rotordrop_bench.corpus.cases import DROPS, VERSION, make_bench
+from rotordrop_bench.corpus.cases import DROPS, VERSION, chosen_drops, made
 from rotordrop_bench.corpus.run import score_all
 from rotordrop_bench.event import HiddenMachine, hidden_machine
 from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
-from rotordrop_bench.score import score_estimate
+from rotordrop_bench.score import read_truth, score_estimate
 from rotordrop_bench.sensor_chain import SensorChain
-from rotordrop_bench.truth import read_truth
 from rotordrop_bench.violations import Violations, load_violations
 
 __all__ = [
@@ -21,9 +20,10 @@ __all__ = [
     "SensorChain",
     "SyntheticDrop",
     "Violations",
+    "chosen_drops",
     "hidden_machine",
     "load_violations",
-    "make_bench",
+    "made",
     "read_truth",
     "score_all",
     "score_estimate",

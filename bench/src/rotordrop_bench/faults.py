@@ -48,11 +48,8 @@ def _changed(signals: Array, where: tuple[Any, Any], value: Any) -> Array:
 
 def _swapped(s: Array, record: Record, random: Random) -> Array:
     """The channels of the first plane are exchanged."""
-    columns = list(range(len(record.sensors)))
-    first = [i for i in columns if record.sensors[i].node == record.sensors[0].node]
-    for column, other in zip(first, first[::-1], strict=True):
-        columns[column] = other
-    return s[:, columns]
+    first = [i for i, sensor in enumerate(record.sensors) if sensor.node == record.sensors[0].node]
+    return _changed(s, (slice(None), first), s[:, first[::-1]])
 
 
 def _ends_swapped(s: Array, record: Record, random: Random) -> Array:
@@ -124,18 +121,12 @@ def _coupled(s: Array, record: Record, random: Random, corner: float) -> Array:
     return np.asarray(lfilter(upper, lower, s - np.mean(s[:50], axis=0), axis=0))
 
 
-def _added(
-    s: Array,
-    record: Record,
-    random: Random,
-    drift: float = 0.0,
-    noise: float = 0.0,
-    hum: float = 0.0,
-    at: float = 0.0,
-) -> Array:
-    """Drift [m/s], noise [m rms], hum of a size [m] and frequency [Hz]."""
-    slow = drift * (record.time - record.time[0]) + hum * np.sin(2 * np.pi * at * record.time)
-    return np.asarray(s + slow[:, None] + random.normal(0.0, noise, s.shape))
+def _drifted(s: Array, record: Record, random: Random, by: float) -> Array:
+    return np.asarray(s + by * (record.time - record.time[0])[:, None])
+
+
+def _hum(s: Array, record: Record, random: Random, size: float, at: float) -> Array:
+    return np.asarray(s + size * np.sin(2 * np.pi * at * record.time)[:, None])
 
 
 def _lost(lasts: float, since: float = 0.0, until: float = 0.2) -> Spoil:
@@ -224,10 +215,8 @@ def _turned(s: Array, record: Record, random: Random) -> None:
 def _crossed(s: Array, record: Record, random: Random) -> Array:
     """The first channels of the first and last plane are exchanged."""
     nodes = [one.node for one in record.sensors]
-    order = list(range(len(nodes)))
-    a, b = order[0], nodes.index(nodes[-1])
-    order[a], order[b] = b, a
-    return s[:, order]
+    pair = [0, nodes.index(nodes[-1])]
+    return _changed(s, (slice(None), pair), s[:, pair[::-1]])
 
 
 def _part(since: float, until: float) -> Spoil:
@@ -318,14 +307,14 @@ FAULTS: dict[str, Spoil] = {
     "AC coupling 3 Hz": _each(_coupled, corner=3.0),
     "low-pass 100 Hz": _each(_low_pass, corner=100.0),
     "low-pass 400 Hz": _each(_low_pass, corner=400.0),
-    "hum 10 µm, 50 Hz": _each(_added, "all", hum=10e-6, at=50.0),
+    "hum 10 µm, 50 Hz": _each(_hum, size=10e-6, at=50.0),
     "steps of 8 µm": _each(lambda s, r, d: 8e-6 * np.round(s / 8e-6)),
     "AC coupling 1 Hz": _each(_coupled, corner=1.0),
-    "hum 100 µm, 60 Hz": _each(_added, "all", hum=100e-6, at=60.0),
-    "drift of one by 100 µm/s": _each(_added, "one", drift=100e-6),
-    "drift of all by 100 µm/s": _each(_added, "all", drift=100e-6),
-    "noise 10 µm in one": _each(_added, "one", noise=10e-6),
-    "noise 5 µm in all": _each(_added, "all", noise=5e-6),
+    "hum 100 µm, 60 Hz": _each(_hum, size=100e-6, at=60.0),
+    "drift of one by 100 µm/s": _each(_drifted, "one", by=100e-6),
+    "drift of all by 100 µm/s": _each(_drifted, by=100e-6),
+    "noise 10 µm in one": _each(lambda s, r, d: s + d.normal(0.0, 10e-6, s.shape), "one"),
+    "noise 5 µm in all": _each(lambda s, r, d: s + d.normal(0.0, 5e-6, s.shape)),
     "1 sample lost": _lost(1),
     "5 samples lost": _lost(5),
     "5 samples lost in the first 5 ms": _lost(5, 2e-3, 5e-3),

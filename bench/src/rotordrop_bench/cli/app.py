@@ -31,7 +31,10 @@ class BenchTable(VerbTable):
             Verb("list", "Name the drops of the bench", _DROPS, "list_drops"),
             Verb("make", "Make the drops that are missing in a folder", _DROPS),
         ),
-        "Versions": (Verb("corpus", "Run the corpus with a version, or compare two versions", _SCORES),),
+        "Versions": (
+            Verb("corpus run", "Run the corpus with a version of the program", _SCORES),
+            Verb("corpus compare", "Tell whether a version keeps every limit against another", _SCORES),
+        ),
     }
 
 

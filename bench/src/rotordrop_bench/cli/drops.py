@@ -95,14 +95,19 @@ def make(folder: FolderArgument, only: OnlyOption = None, json: options.Json = N
 
     Example: rotordrop-bench make dropbench
     """
-    from rotordrop_bench.corpus.cases import chosen_drops, make_bench
+    from rotordrop_bench.corpus.cases import chosen_drops, made
+    from rotordrop_bench.files import truth_path
 
+    drops = chosen_drops(only or [])
+    missing = [drop for drop in drops if not truth_path(folder, drop.name).is_file()]
     with progress_bar("making drops") as report:
-        made = make_bench(folder, only or [], report)
-    there = len(chosen_drops(only or [])) - len(made)
+        for i, drop in enumerate(missing):
+            report(drop.name, i / len(missing))
+            made(drop, folder)
+    there = len(drops) - len(missing)
 
     def summarise(out: Console) -> None:
-        out.print(f"drops made: {len(made)}, there already: {there} (simulated, not measured)")
+        out.print(f"drops made: {len(missing)}, there already: {there} (simulated, not measured)")
         out.print(f"for estimators: {folder / 'drops'}; hidden truth, not for them: {folder / 'truth'}")
 
-    deliver({"made": made, "there": there}, json, summarise)
+    deliver({"made": [drop.name for drop in missing], "there": there}, json, summarise)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from rotordrop_bench.corpus.table import Quantity, Row
 
+ShortOption = Annotated[bool, Option("--short", help="The 60 cases that end work early and accept nothing.")]
+
 
 def score(
     estimates: Annotated[
@@ -60,10 +62,9 @@ def score(
     deliver({"quantities": [vars(one) for one in found], "drops": scores}, json, summarise)
 
 
-def corpus(
-    what: Annotated[str, Argument(metavar="run|compare", help="Run a version, or compare two tables.")],
-    names: Annotated[
-        list[str], Argument(metavar="VERSION...", help="Checkout or Python to run; two tables to compare.")
+def corpus_run(
+    place: Annotated[
+        str, Argument(metavar="VERSION", help="Checkout, or Python with rotordrop.", show_default=False)
     ],
     folder: Annotated[
         Path | None, Option(metavar="FOLDER", help="Where records and answers are.", show_default="cache")
@@ -71,25 +72,13 @@ def corpus(
     name: Annotated[
         str | None, Option(metavar="NAME", help="Name of the version; by default its commit.")
     ] = None,
-    short: Annotated[
-        bool, Option("--short", help="The 60 cases that end work early and accept nothing.")
-    ] = False,
+    short: ShortOption = False,
     json: options.Json = None,
 ) -> None:
-    """Run the corpus with a version, or compare two versions by their tables; 7 where a limit is broken.
+    """Run the corpus with a version of the program.
 
-    Example: rotordrop-bench corpus run . && rotordrop-bench corpus compare BEFORE.csv AFTER.csv
+    Example: rotordrop-bench corpus run .
     """
-    if what == "run" and len(names) == 1:
-        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        _run(names[0], folder or cache / "rotordrop-bench" / "corpus", name, short, json)
-    elif what == "compare" and len(names) == 2:
-        _compare(names[0], names[1], short, json)
-    else:
-        raise UsageError("say 'corpus run VERSION' or 'corpus compare TABLE TABLE'")
-
-
-def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | None) -> None:
     from rotordrop_bench.corpus import compare
     from rotordrop_bench.corpus.cases import listed, plan_digest
     from rotordrop_bench.corpus.run import Version, run
@@ -100,6 +89,8 @@ def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | N
         typer.echo(so_far[-1].case, err=True)
 
     version = Version.at(place, name)
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = folder or cache / "rotordrop-bench" / "corpus"
     first = {case.name for case in listed(short=True)}
     chosen = sorted(listed(short=short), key=lambda case: case.name not in first)
     table = folder / f"{version.name}{'-short' if short else ''}.csv"
@@ -121,7 +112,16 @@ def _run(place: str, folder: Path, name: str | None, short: bool, json: Path | N
     deliver({"table": str(table), "quantities": [vars(one) for one in found]}, json, summarise)
 
 
-def _compare(first: str, second: str, short: bool, json: Path | None) -> None:
+def corpus_compare(
+    first: Annotated[str, Argument(metavar="TABLE", help="Table of the version before.", show_default=False)],
+    second: Annotated[str, Argument(metavar="TABLE", help="That of the version after.", show_default=False)],
+    short: ShortOption = False,
+    json: options.Json = None,
+) -> None:
+    """Compare two versions by their tables of the corpus; 7 where a limit is broken.
+
+    Example: rotordrop-bench corpus compare BEFORE.csv AFTER.csv
+    """
     from rotordrop_bench.corpus.cases import listed
     from rotordrop_bench.corpus.compare import limits, paired
     from rotordrop_bench.corpus.table import read_table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from itertools import cycle
@@ -304,23 +304,6 @@ def made(case: Case, folder: Path) -> Path:
         drop = replace(drop, record=record)
     facts = {"bench_version": VERSION, "family": case.group, "rotor": case.rotor}
     return write_drop(drop, known, folder, case.name, **facts)
-
-
-def make_bench(
-    folder: str | Path,
-    only: Iterable[str] = (),
-    report: Callable[[str, float], None] = lambda name, share: None,
-) -> list[str]:
-    """Make what is missing of DropBench in a folder, and give the names of the drops made.
-
-    ``drops/NAME`` gets machine file, recording and tail; ``truth/NAME.json`` the truth. ``only`` holds names
-    of drops, families or rotors; empty means all.
-    """
-    missing = [drop for drop in chosen_drops(only) if not truth_path(Path(folder), drop.name).is_file()]
-    for i, drop in enumerate(missing):
-        report(drop.name, i / len(missing))
-        made(drop, Path(folder))
-    return [drop.name for drop in missing]
 
 
 def digest(place: Path) -> str:

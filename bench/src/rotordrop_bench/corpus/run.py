@@ -17,8 +17,7 @@ from rotordrop.files import make_folder, write_json
 from rotordrop_bench.corpus.cases import VERSION, Case, digest, made
 from rotordrop_bench.corpus.table import ALWAYS, SHORT, Row, judged, name_of, said_of, scored
 from rotordrop_bench.files import truth_path
-from rotordrop_bench.score import score_estimate
-from rotordrop_bench.truth import read_truth
+from rotordrop_bench.score import read_truth, score_estimate
 
 LONGEST = 1800.0
 """Time after which a command is given up [s]."""

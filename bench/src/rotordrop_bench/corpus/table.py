@@ -19,8 +19,7 @@ from rotordrop.errors import UsageError
 from rotordrop.files import write_text
 from rotordrop.known import NINETY
 from rotordrop.severity.numbers import LOADS
-from rotordrop_bench.score import score_estimate
-from rotordrop_bench.truth import Truth
+from rotordrop_bench.score import Truth, score_estimate
 
 PARTS = 1e4
 """Values of the table are in units of 1e-4 of the truth, times in 0.01 ms from it."""
