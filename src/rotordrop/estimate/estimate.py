@@ -317,7 +317,7 @@ class Estimate:
         _above("rotordrop.report.page", "write_page")(page, path)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row per bearing with peaks, intervals and air gap, for a table of many drops [SI]."""
+        """One row per bearing: peaks, mean force and air gap with their intervals [SI]."""
         found = []
         for bearing in self.bearings:
             row: dict[str, Any] = {
@@ -329,6 +329,7 @@ class Estimate:
             for name, known in (
                 ("peak force [N]", bearing.peak_force.known),
                 ("peak stress [Pa]", bearing.peak_stress.known),
+                ("mean force, 150 to 200 ms [N]", bearing.values.get("mean_force_0p15_0p2_N")),
                 ("air gap [m]", bearing.values.get("air_gap_m")),
             ):
                 low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
@@ -357,7 +358,7 @@ class Estimates(tuple[Estimate, ...]):
     __slots__ = ()
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """One row per drop and bearing: verdict, peaks with intervals, air gap [SI]."""
+        """One row per drop and bearing: verdict, and `Estimate.rows` [SI]."""
         with needing("tables"):
             import pandas
 
