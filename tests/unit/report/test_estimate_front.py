@@ -36,8 +36,7 @@ def test_the_table_of_histories_and_that_of_drops_hold_the_same_peaks(estimate):
     peak = estimate.bearing("DE").peak_force
     assert rows["peak force [N]"][1] == peak.value
     assert rows["peak force [N] 95 %"][1] == peak.interval_90[1]
-    mean = estimate.bearing("DE").values["mean_force_0p15_0p2_N"]
-    assert rows["mean force, 150 to 200 ms [N] 5 %"][1] == mean.interval_90[0]
+    assert np.isnan(rows["mean force, 150 to 200 ms [N]"]).all(), "the record ends before"
 
 
 @pytest.mark.parametrize("suffix", [".h5", ".nc", ".csv", ".mat", ".parquet"])
