@@ -10,6 +10,7 @@ import numpy as np
 from rotordrop.elements.race import RACE_MASS
 from rotordrop.elements.table import parameter
 from rotordrop.evidence.evidence import Evidence, Missing, strongest_slowing
+from rotordrop.evidence.one_end import LEVITATED
 from rotordrop.evidence.quality import not_seen
 from rotordrop.known import NINETY
 from rotordrop.physics import columns as L
@@ -51,7 +52,9 @@ def twin_assumptions(evidence: Evidence, problem: DropProblem) -> tuple[str, ...
 
 def left_to_assumption(problem: DropProblem) -> dict[str, str]:
     """What most machine files do not state, in a few words, by the note that says more."""
-    return {note: words for part in (_gains, _lag, _races, _thrust, _air) for note, words in part(problem)}
+    return {
+        note: words for part in (_zeros, _gains, _lag, _races, _thrust, _air) for note, words in part(problem)
+    }
 
 
 def _taken_along(problem: DropProblem) -> Iterator[str]:
@@ -91,6 +94,21 @@ def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
         "such as 0.8 to 1.2, has it estimated",
         f"gains ±{percent(within, 1)}",
     )
+
+
+def _zeros(problem: DropProblem) -> Iterator[tuple[str, str]]:
+    """Zeros of sensors on their DC gap voltage, which nobody stated."""
+    known = next(
+        (one.offset for one in problem.model.machine.sensors if one.offset.source == LEVITATED), None
+    )
+    if known is not None:
+        half = format_quantity(0.5 * (known.high - known.low), "length")
+        yield (
+            "the levitated rotor reads more than half the air gap beside zero, as probes on their DC gap "
+            f"voltage do: where it levitates counts as zero, ±{half} (90 %); the offset of every sensor in "
+            "the machine file, by a lift check, says it better",
+            f"zero where it levitates ±{half}",
+        )
 
 
 SMALL_LOSS = 0.01

@@ -97,6 +97,14 @@ class Evidence:
     name: str = ""
     """Name of the drop."""
 
+    def __post_init__(self) -> None:
+        """The sensors of record and tail are those of the machine, whatever machine they were read for."""
+        of_name = {sensor.name: sensor for sensor in self.machine.sensors}
+        for name, read in (("record", self.record), ("tail", self.tail)):
+            sensors = () if read is None else tuple(of_name.get(one.name, one) for one in read.sensors)
+            if read is not None and sensors != read.sensors:
+                object.__setattr__(self, name, replace(read, sensors=sensors))
+
     def with_facts(self, **facts: Any) -> Evidence:
         """The same with some facts taken as given in place of what the record says."""
         other = replace(self)

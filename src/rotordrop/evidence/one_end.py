@@ -6,13 +6,17 @@ the tilt and the swing of its magnet; a plane that fell lies, bounces or whirls 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.evidence.events import FALLEN_SHARE, nominal_gaps
+from rotordrop.evidence.events import FALLEN_SHARE, beginning_of, nominal_gaps
+from rotordrop.evidence.evidence import Missing, sought
+from rotordrop.evidence.wall import CENTRED
+from rotordrop.known import NINETY, Known
+from rotordrop.record.axes import planar_of
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -29,6 +33,12 @@ nothing holds a rotor up for longer than some rebounds (chosen)."""
 
 SHORTEST = 30e-3
 """Length of that span needed at least [s] (chosen)."""
+
+OFF_ZERO = 0.5
+"""Distance from the centre over the air gap at which no rotor levitates [1]: limit C/D of ISO 14839-2."""
+
+LEVITATED = "where the rotor levitates"
+"""Source of a zero that the record shows."""
 
 BEFORE = 8e-3
 """Time before a plane is low in which it may fall already [s] (chosen)."""
@@ -96,18 +106,56 @@ def one_end(record: Record, gaps: Array | None = None) -> OneEnd | None:
 
 
 def as_dropped(record: Record, machine: Machine) -> Machine:
-    """The machine as it dropped: with the magnets on of an end that the record shows to be held.
+    """The machine as it dropped and was read: with the magnets on of an end that the record shows to be held,
+    and with the zeros of its sensors where the rotor levitated, if they cannot stand at zero.
 
     A machine that says itself which magnets stay on is left as it is, and so is one whose magnets are not
     known at both ends.
     """
-    nodes = {amb.node for amb in machine.ambs}
-    if len(nodes) < 2 or any(amb.stays_on for amb in machine.ambs):
-        return machine
-    if not len(record.time):
-        return machine  # the gate says so
     whole = record.whole
-    if len(whole.planes) < 2 or not np.isfinite(whole.signals).any(axis=0).all():
+    if len(whole.time) and np.isfinite(whole.signals).any(axis=0).all():
+        return with_zeros(record, _with_held(whole, machine))
+    return machine  # the gate says so
+
+
+def with_zeros(record: Record, machine: Machine) -> Machine:
+    """The machine with zeros of its sensors where the rotor of a record levitates, if that is `OFF_ZERO` from
+    the zero of the readings and the machine states none.
+    """
+    first = np.median(record.signals[: max(int(0.01 * record.sampling_rate), 8)], axis=0)
+    stated = any(sensor.offset.status != "default" for sensor in machine.sensors)
+    unread = record.speed_readings is None or not np.isfinite(record.speed_readings).all()
+    if stated or unread or off_zero(record, machine, first)[1] < 0.5 * OFF_ZERO:
+        return machine
+    begun = sought(lambda: beginning_of(record, machine))
+    if isinstance(begun, Missing) or off_zero(record, machine, begun.levitated.mean)[1] < OFF_ZERO:
+        return machine
+    half = NINETY * CENTRED * min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
+    zeros = {}
+    for sensor, mean in zip(record.sensors, begun.levitated.mean.tolist(), strict=True):
+        known = Known(value=mean, status="guess", interval_90=(mean - half, mean + half), unit="m")
+        zeros[f"sensors.{sensor.name}.offset"] = replace(known, source=LEVITATED)
+    return machine.with_values(zeros)
+
+
+def off_zero(
+    record: Record, machine: Machine, mean: Array, offsets: float | None = None
+) -> tuple[float, float]:
+    """How far from zero sensors (S,) read a levitated rotor in the plane where it is farthest, [m] and over
+    the air gap there [1]; with their offsets unless others are given [m].
+    """
+    whole = record.whole
+    at = [record.sensors.index(sensor) for sensor in whole.sensors]
+    zeros = [float(one.offset) if offsets is None else offsets for one in record.sensors]
+    along = (mean - zeros) * record.gains
+    away = np.hypot(*planar_of(along[at], whole.planes).T)
+    share = away / nominal_gaps(machine, whole)
+    return float(away[np.argmax(share)]), float(np.max(share))
+
+
+def _with_held(whole: Record, machine: Machine) -> Machine:
+    nodes = {amb.node for amb in machine.ambs}
+    if len(nodes) < 2 or any(amb.stays_on for amb in machine.ambs) or len(whole.planes) < 2:
         return machine
     found = one_end(whole, nominal_gaps(machine, whole))
     if found is None:

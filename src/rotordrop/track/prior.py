@@ -61,7 +61,6 @@ def prior_at_power_off(
     sigma = np.zeros_like(mean)
     mean[:s] = model.at_rest()[:s]
     gap, fall = smallest_gap(model.machine), fall_time(model.machine)
-    _rotor_prior(model, rows, level, speed[0], mean, sigma)
     for part in (layout.race, layout.support):
         sigma[part] = RACE_POSITION_SIGMA * gap
         sigma[layout.velocity_of(part)] = RACE_VELOCITY_SIGMA * float(model.machine.gravity) * fall
@@ -74,7 +73,9 @@ def prior_at_power_off(
         known = sensor_prior(parameter("gain", "sensor"), sensor.gain, gap)
         mean[c], sigma[c] = 1.0 / known.mean - 1.0, known.sigma
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
-        mean[n_c + c], sigma[n_c + c] = known.mean, known.sigma
+        mean[n_c + c], sigma[n_c + c] = sensor.polarity * known.mean, known.sigma
+    gains, offsets = mean[s + n_p : s + n_p + n_c], mean[s + n_p + n_c : s + n_p + 2 * n_c]
+    _rotor_prior(model, rows, (level - offsets) / (1.0 + gains), speed[0], mean, sigma)
     sigma[s + n_p + 2 * n_c : s + n_p + 4 * n_c] = RUNOUT_SIGMA
     sigma[s + n_p + 4 * n_c :] = np.sqrt(noise.variance)
     sigma[layout.further_at(L.MOUNT_STATES)] = RACE_POSITION_SIGMA * gap

@@ -19,6 +19,7 @@ from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.evidence.given import given_drops
+from rotordrop.evidence.one_end import with_zeros
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, RecordedLift
@@ -128,6 +129,7 @@ def calibrate_machine(
         The machine with estimates, what the records determine and what not.
     """
     records, tails, stems = given_drops(machine, records, tails, names)
+    machine = with_zeros(records[0], machine)
     model = build_drop_model(machine)
     evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
     drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=True)
@@ -255,7 +257,7 @@ def values_of(problem: DropProblem, mean: Array, covariance: Array, widening: fl
             f"sensors.{sensor.name}.{name}": symmetric(value, error, "determined", unit, widening)
             for name, value, error, unit in (
                 ("gain", 1.0 / reading, float(sigma[gain]) / reading**2, "1"),
-                ("offset", float(mean[offset]), float(sigma[offset]), "m"),
+                ("offset", sensor.polarity * float(mean[offset]), float(sigma[offset]), "m"),
             )
         }
     return values

@@ -15,6 +15,7 @@ from rotordrop.elements.touchdown_bearing import AIR_GAP, MODEL_GAP_ERROR
 from rotordrop.estimate.estimate import FittedParameter, SensorErrors
 from rotordrop.estimate.published import Joint
 from rotordrop.known import NINETY, Known, Status
+from rotordrop.record.axes import sensor_polarity
 from rotordrop.rotor.unknowns import Unknown, sensor_prior, smallest_gap
 from rotordrop.track.consistency import DEPARTURE_LIMIT
 from rotordrop.track.problem import DropProblem
@@ -185,7 +186,7 @@ def prior_of(problem: DropProblem) -> tuple[Array, Array]:
     for c, sensor in enumerate(problem.model.machine.sensors):
         known = sensor_prior(parameter("offset", "sensor"), sensor.offset, gap)
         offset = first + problem.n_channels + c
-        mean[offset], sigma[offset] = known.mean, known.sigma
+        mean[offset], sigma[offset] = sensor.polarity * known.mean, known.sigma
     return mean, sigma
 
 
@@ -257,12 +258,14 @@ def _sensor_values(
 
     The gains have a further standard deviation by the form of the rotor [1].
     """
+    gains, offsets = problem.sensor_errors(mean)
+    found = gains, offsets * sensor_polarity(problem.model.machine.sensors)
     return [
         [
             symmetric(float(value), math.hypot(error, more), status, unit)
             for value, error in zip(values, errors, strict=True)
         ]
         for values, errors, unit, more in zip(
-            problem.sensor_errors(mean), problem.sensor_errors(sigma), ("1", "m"), (form, 0.0), strict=True
+            found, problem.sensor_errors(sigma), ("1", "m"), (form, 0.0), strict=True
         )
     ]

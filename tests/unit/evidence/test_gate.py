@@ -14,6 +14,7 @@ from rotordrop.evidence.events import Beginning, beginning_of, find_fall
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
+from rotordrop.evidence.one_end import as_dropped
 from rotordrop.evidence.quality import (
     Finding,
     check_record,
@@ -29,7 +30,7 @@ from rotordrop.evidence.quality.low_pass import check_low_pass
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
 from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_coupling, check_speed
 from rotordrop.evidence.quality.tail import check_rest_in_record
-from rotordrop.known import Known
+from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import sensor_planes
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.sensor_chain import PERFECT
@@ -334,6 +335,23 @@ def test_what_touches_several_channels_is_named_at_each_and_nothing_else_is(case
     found = check_record(edit(request.getfixturevalue(name)), machine, tail)
     named = [(one.kind, one.channel) for one in found if one.severity != "note"]
     assert named == [(kind, channel) for kind, channels in expected.items() for channel in channels]
+
+
+@pytest.mark.parametrize("bias", [300e-6, -1206e-6])
+def test_the_levitated_place_counts_as_zero_of_probes_on_a_gap_voltage(bias, drop, tail, machine):
+    moved, lying = (replace(one, signals=one.signals + bias) for one in (drop, tail))
+    (said, *others) = check_record(moved, machine, lying)
+    assert (said.kind, said.severity, others) == ("zero of the sensors", "note", [])
+    zeroed = as_dropped(moved, machine)
+    plain, read = (
+        Evidence(record=r, machine=m, tail=t) for r, m, t in ((drop, machine, tail), (moved, zeroed, lying))
+    )
+    assert np.all(np.abs(read.gap.value - plain.gap.value) < NINETY * read.gap.zero_sigma)
+    stated = machine.with_values({f"sensors.{name}.offset": bias for name in drop.channel_names})
+    assert as_dropped(moved, stated) is stated
+    assert [one.kind for one in check_record(moved, stated, lying)] == []
+    (wrong,) = [one for one in check_record(drop, stated, tail) if one.severity == "stop"]
+    assert wrong.kind == "zero of the sensors"
 
 
 def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):

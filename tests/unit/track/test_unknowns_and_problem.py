@@ -397,3 +397,22 @@ def test_bending_on_the_orbit_of_the_levitated_rotor_lies_in_the_prior(speed, mo
         for amplitudes, modes in zip(bent.T, (model.layout.modal_x, model.layout.modal_y), strict=True):
             sigma = np.sqrt(np.diag(covariance)[modes])[model.basis.n_rigid :]
             assert np.all(np.abs(amplitudes[:2]) < 3.0 * sigma[:2])
+
+
+@pytest.mark.parametrize(("gain", "polarity"), [(1.0, 1), (1.25, 1), (1.25, -1)])
+def test_the_rotor_begins_where_gain_offset_and_polarity_put_its_readings(gain, polarity, lp400, model):
+    """With an offset of 1.2 mm the filter began 1.2 mm from the bearing, and diverged after one sample."""
+    rows, along = sensor_rows(model), np.array([10e-6, -20e-6, 15e-6, 5e-6])
+
+    def began(sensors, readings):
+        machine = model_with(sensors)
+        return prior_at_power_off(machine, (), rows, readings, (600.0, 0.1), SlowNoise())[0]
+
+    def model_with(sensors):
+        return build_drop_model(lp400.model_copy(update={"sensors": tuple(sensors)}), COARSE_BASIS)
+
+    plain = began(lp400.sensors, along)
+    changed = [one.changed(gain=gain, polarity=polarity, offset="-1206 um") for one in lp400.sensors]
+    read = began(changed, polarity * (polarity * along / gain - 1206e-6))
+    dynamic = slice(0, model.layout.n_dynamic)
+    assert read[dynamic] == pytest.approx(plain[dynamic], abs=1e-12)

@@ -140,7 +140,8 @@ def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem, do
 def test_a_calibrated_gain_undoes_the_error_of_the_sensor():
     """A sensor that reads (1 + g) times the motion needs the gain 1 / (1 + g); its error by differences."""
     names = ("A", "B")
-    machine = SimpleNamespace(sensors=tuple(SimpleNamespace(name=name) for name in names))
+    signs = {"A": 1, "B": -1}
+    machine = SimpleNamespace(sensors=tuple(SimpleNamespace(name=n, polarity=signs[n]) for n in names))
     only: Any = SimpleNamespace(
         unknowns=(),
         n_dynamic=3,
@@ -158,7 +159,10 @@ def test_a_calibrated_gain_undoes_the_error_of_the_sensor():
         step = 1e-4
         slope = (1.0 / (1.0 + errors[c] - step) - 1.0 / (1.0 + errors[c] + step)) / (2.0 * step)
         assert gain.standard_error == pytest.approx(1.5 * slope * sigma[3 + c], rel=1e-6)
-        assert (offset.value, offset.standard_error) == (offsets[c], pytest.approx(1.5 * sigma[5 + c]))
+        assert (offset.value, offset.standard_error) == (
+            signs[name] * offsets[c],
+            pytest.approx(1.5 * sigma[5 + c]),
+        )
         for value in (gain, offset):
             low, high = value.interval_90 or (math.nan, math.nan)
             assert high - value.value == pytest.approx(value.value - low)

@@ -19,7 +19,7 @@ from rotordrop.evidence.events import nominal_gaps
 from rotordrop.evidence.evidence import Evidence, Missing, known
 from rotordrop.evidence.given import require_drop, require_tail
 from rotordrop.evidence.levitated import LevitatedModel, fit_levitated
-from rotordrop.evidence.one_end import as_dropped, one_end
+from rotordrop.evidence.one_end import LEVITATED, OFF_ZERO, as_dropped, off_zero, one_end
 from rotordrop.evidence.paths import Motion
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes, fall_of
 from rotordrop.evidence.quality.channels import check_channels
@@ -208,6 +208,21 @@ def _filters(evidence: Evidence) -> list[Finding]:
     return check_low_pass(record, evidence.base, turning, start.coarse.instant)
 
 
+def _zero(evidence: Evidence) -> list[Finding]:
+    """Say what counts as zero where the rotor levitates too far from that of the readings."""
+    if isinstance(evidence.beginning, Missing):
+        return []
+    mean, read = evidence.beginning.levitated.mean, evidence.record
+    away, share = off_zero(read, evidence.machine, mean)
+    if share >= OFF_ZERO:
+        return [found("zero-given", away=away, ratio=share)]
+    known = read.sensors[0].offset
+    if known.source != LEVITATED:
+        return []
+    away, share = off_zero(read, evidence.machine, mean, offsets=0.0)
+    return [found("zero", away=away, ratio=share, half=0.5 * (known.high - known.low))]
+
+
 def _again(evidence: Evidence) -> list[Finding]:
     motion = _motion(evidence)
     return [] if motion is None else check_again(motion)
@@ -278,7 +293,7 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
     {"blocks": lambda e: check_blocks(e.record), "units": _units, "speed": _speed},
     {"line": _line},
     {"wiring": _wiring},
-    {"beginning": _begins},
+    {"beginning": _begins, "zero": _zero},
     {"filters": _filters, "again": _again},
     {
         "levitated": lambda e: check_levitated(e.floating, e.record.whole),
