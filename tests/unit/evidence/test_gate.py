@@ -432,6 +432,17 @@ class TestSpeed:
             (found,) = check_rotation_line(drop, -0.01, way * 3600.0 * HZ)
             assert "rpm taken for Hz" in found.message
 
+    @pytest.mark.parametrize("phase", [0.0, 1.5, 3.0, 4.5])
+    @pytest.mark.parametrize("factor", [0.5, 2.0])
+    def test_a_wide_orbit_makes_no_wrong_clock_of_a_wrong_tacho(self, phase, factor, fast_drop):
+        """An orbit of 37 µm moves faster than a fall: a tacho of half the pulses was called a wrong clock."""
+        turns = 2.0 * np.pi * 150.0 * fast_drop.time
+        angles = np.array([float(sensor.angle) for sensor in fast_drop.sensors])
+        orbit = 37e-6 * np.cos(turns[:, None] + phase - angles)
+        wide = replace(fast_drop, signals=fast_drop.signals + orbit)
+        (found,) = check_rotation_line(wide, -0.01, factor * 150.0 * HZ)
+        assert found.kind == "wrong speed" or "hardly tells" in found.message
+
     @pytest.mark.parametrize(("size", "seen"), [(0.0, False), (0.6, True), (3.0, True)])
     def test_a_line_counts_from_50_times_the_power_beside_it(self, drop, size, seen):
         """Amplitude against the noise; 0.24 s at 20 kHz gather 800 times the square of it in one line."""

@@ -49,6 +49,9 @@ _FASTEST_FALL = 2.0
 _FEWEST_TURNS = 4.0
 """Turns of a line before the drop from which it is a speed [1]."""
 
+_LAST_TURNS = 20.0
+"""Turns before the drop by which its orbit is taken on [1] (chosen)."""
+
 _MERGED = 0.75
 """Distance over the resolution by which the peak of a line and of another beside it may lie off the line [1]:
 half of it where both merge, and what the grid of frequencies leaves open."""
@@ -62,8 +65,9 @@ _USUAL_FALL = 0.7
 _POSSIBLE_FALL = (5e-3, 200.0)
 """Acceleration over gravity outside of which what is seen is no fall by any clock [1]."""
 
-_CLEAR = 0.25
-"""Logarithm of a factor from which on the fall tells a wrong clock from a wrong speed [1]."""
+_CLEAR = 0.5
+"""Logarithm by which a fall is nearer to that of a wrong clock, or of a wrong speed, where it tells the two
+apart [1]: it is known to about a third."""
 
 _UNITS_OF_SPEED = {
     60.0: "rpm taken for Hz",
@@ -270,24 +274,30 @@ def check_rotation_line(record: Record, end: float, speed: float) -> list[Findin
             return []  # hum, which has its own name, above the line of the rotor
     if frequency * (end - float(record.time[0])) < _FEWEST_TURNS:
         return []
-    return [_other_frequency(record, frequency, expected)]
+    return [_other_frequency(record, end, frequency, expected)]
 
 
-def _other_frequency(record: Record, frequency: float, expected: float) -> Finding:
+def _other_frequency(record: Record, end: float, frequency: float, expected: float) -> Finding:
     """Say which of clock and speed is wrong: by a clock that is off by a factor a rotor falls by its square.
 
     The fall alone is known to about a third, by what remains of the lift; near a factor of 1 both stay open.
     """
     ratio = frequency / expected
     why = next((text for factor, text in _UNITS_OF_SPEED.items() if abs(ratio * factor - 1) < 0.05), "")
-    away = np.abs(record.signals - first_motion(record)[1])
+    # the orbit, which a released rotor keeps, may be faster than its fall
+    waves = np.exp(2j * np.pi * frequency * (record.time - end))
+    design = np.column_stack([np.ones(len(waves)), waves.real, waves.imag])
+    late = (record.time < end) & (record.time > end - _LAST_TURNS / frequency)
+    away = np.abs(
+        record.signals - design @ np.linalg.lstsq(design[late], record.signals[late], rcond=None)[0]
+    )
     reach = np.percentile(away, 98, axis=0)
     falls = [fall_accelerations(a, r, record.sampling_rate)[0] for a, r in zip(away.T, reach, strict=True)]
     share = float(np.median(falls)) / GRAVITY
     possible = _POSSIBLE_FALL[0] < share < _POSSIBLE_FALL[1]
     fallen = math.log(share / _USUAL_FALL) if possible else 0.0
-    of_clock = not possible or abs(fallen - 2.0 * math.log(ratio)) < abs(fallen)
-    clear = possible and abs(math.log(ratio)) > _CLEAR
+    for_clock = abs(fallen) - abs(fallen - 2.0 * math.log(ratio))
+    of_clock = not possible or for_clock > 0.0
     return found(
         "line",
         channel=None if of_clock else "speed",
@@ -299,7 +309,7 @@ def _other_frequency(record: Record, frequency: float, expected: float) -> Findi
         guess=f" ({why})" if why else "",
         share=share,
         which="clock" if of_clock else "speed",
-        doubt="" if clear else ", though the fall hardly tells the two apart",
+        doubt="" if possible and abs(for_clock) > _CLEAR else ", though the fall hardly tells the two apart",
     )
 
 
