@@ -98,16 +98,12 @@ def _gains(problem: DropProblem) -> Iterator[tuple[str, str]]:
 
 def _zeros(problem: DropProblem) -> Iterator[tuple[str, str]]:
     """Zeros of sensors on their DC gap voltage, which nobody stated."""
-    known = next(
-        (one.offset for one in problem.model.machine.sensors if one.offset.source == LEVITATED), None
-    )
-    if known is not None:
-        half = format_quantity(0.5 * (known.high - known.low), "length")
+    known = problem.model.machine.sensors[0].offset
+    if known.source == LEVITATED:
+        words = f"zero where it levitates ±{format_quantity(0.5 * (known.high - known.low), 'length')}"
         yield (
-            "the levitated rotor reads more than half the air gap beside zero, as probes on their DC gap "
-            f"voltage do: where it levitates counts as zero, ±{half} (90 %); the offset of every sensor in "
-            "the machine file, by a lift check, says it better",
-            f"zero where it levitates ±{half}",
+            f"{words} (90 %); an offset of every sensor in the machine file, by a lift check, is better",
+            words,
         )
 
 

@@ -17,6 +17,7 @@ from rotordrop.evidence.evidence import Missing, sought
 from rotordrop.evidence.wall import CENTRED
 from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import planar_of
+from rotordrop.rotor.unknowns import smallest_gap
 
 if TYPE_CHECKING:
     from rotordrop.machine import Machine
@@ -130,12 +131,15 @@ def with_zeros(record: Record, machine: Machine) -> Machine:
     begun = sought(lambda: beginning_of(record, machine))
     if isinstance(begun, Missing) or off_zero(record, machine, begun.levitated.mean)[1] < OFF_ZERO:
         return machine
-    half = NINETY * CENTRED * min(float(bearing.air_gap) for bearing in machine.touchdown_bearings)
-    zeros = {}
-    for sensor, mean in zip(record.sensors, begun.levitated.mean.tolist(), strict=True):
-        known = Known(value=mean, status="guess", interval_90=(mean - half, mean + half), unit="m")
-        zeros[f"sensors.{sensor.name}.offset"] = replace(known, source=LEVITATED)
-    return machine.with_values(zeros)
+    half = NINETY * CENTRED * smallest_gap(machine)
+    known = Known(value=0.0, status="guess", unit="m", source=LEVITATED)
+    zeros = zip(record.sensors, begun.levitated.mean.tolist(), strict=True)
+    return machine.with_values(
+        {
+            f"sensors.{sensor.name}.offset": replace(known, value=at, interval_90=(at - half, at + half))
+            for sensor, at in zeros
+        }
+    )
 
 
 def off_zero(

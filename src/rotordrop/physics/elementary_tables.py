@@ -1,6 +1,6 @@
 """Polynomials and tables behind `rotordrop.physics.elementary`.
 
-The polynomials have the least largest relative error on their interval; ``tools/minimax.py`` computes them.
+The polynomials have the least largest relative error on their interval; Remez gives them.
 The tables, powers of two and logarithms in steps of a 128th, are computed from whole numbers in fixed point
 when the module is loaded, so that they have the same bits everywhere; it takes a millisecond.
 """

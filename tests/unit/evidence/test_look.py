@@ -239,27 +239,6 @@ def test_a_second_drop_is_told(span, tmp_path):
     assert all(impact.time < span + 0.01 for impact in seen.impacts), "impacts are those of the first drop"
 
 
-def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
-    time, path, _ = fall_and_bounce()
-    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path})
-    text = (
-        file.read_text()
-        .replace("NDE_X", "alpha")
-        .replace("NDE_Y", "bravo")
-        .replace("DE_X", "c")
-        .replace("DE_Y", "d")
-    )
-    file.write_text(text)
-    alone = look(file, gap=GAP)
-    assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
-    seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
-    assert [plane.plane for plane in seen.planes] == ["left", "right"]
-    with pytest.raises(UsageError, match=r"there is no channel 'e'; write \"PLANE: .*there are alpha, bravo"):
-        look(file, mapping=["left: e 0 deg, alpha 90 deg"])
-    with pytest.raises(UsageError, match=r"'alpha' is neither \"SENSOR=CHANNEL\" nor \"PLANE: CHANNEL angle"):
-        look(file, mapping=["alpha"])
-
-
 def test_a_levitated_record_shows_levels_and_no_contact(tmp_path):
     time, _, _ = fall_and_bounce()
     still = 5e-6 * np.column_stack([np.cos(377 * time), np.sin(377 * time)])
@@ -458,24 +437,6 @@ def test_the_map_that_odd_names_are_asked_with_can_be_given_as_it_stands(tmp_pat
     assert np.degrees(hits) == pytest.approx(-90.0, abs=3.0)
 
 
-@pytest.mark.parametrize("unit", ["um", "mil", "mm"])
-def test_a_unit_in_which_the_shaft_falls_faster_than_gravity_is_doubted(tmp_path, unit):
-    """Nothing else is known without a machine file; 25.4 times the gap passed without a word."""
-    time, path, _ = fall_and_bounce()
-    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
-    file.write_text(file.read_text().replace("[um]", f"[{unit}]"))
-    found = [one for one in look(file).findings if one.kind == "wrong unit factor"]
-    if unit == "um":
-        assert found == []
-        return
-    factor = {"mil": 25.4, "mm": 1e3}[unit]
-    told = re.search(
-        r"falls (\S+) times as fast as gravity .* a unit factor of (\d+\.?\d*)", found[0].message
-    )
-    assert float(told[1]) == pytest.approx(factor, rel=0.4) and float(told[2]) == factor
-    assert found[0].severity == "stop" and "which unit is it?" in found[0].remedy
-
-
 @pytest.mark.parametrize("known", [True, False], ids=["machine file", "alone"])
 @pytest.mark.parametrize(("unit", "said"), [("mil", r"25\.4 "), ("mm", "1000 "), ("nm", r"0\.001 ")])
 def test_no_number_of_a_drop_is_shown_in_a_unit_that_gravity_contradicts(unit, said, known, tmp_path, capsys):
@@ -538,47 +499,26 @@ def test_the_bundled_drop_with_and_without_its_machine(machine):
     jsonschema.validate(alone.as_json(), look_schema())
 
 
-def test_every_number_of_the_document_is_that_of_what_was_seen(machine):
+def test_the_document_holds_what_was_seen_with_intervals_about_it(machine):
     seen = look(example_record_path("lp400_drop_060"), machine=machine)
     written = json.loads(json.dumps(seen.as_json(), allow_nan=False))
     assert written["speed_rad_per_s"] == pytest.approx(2.0 * np.pi * 60.0, rel=2e-3)
-    assert [(one["name"], one["plane"]) for one in written["channels"]] == [
-        (sensor.name, sensor.bearing) for sensor in machine.sensors
-    ]
     (drop,) = written["drops"]
-    assert drop["release_s"] == seen.drops[0].release == pytest.approx(0.0, abs=2e-3)
-    for entry, plane in zip(written["planes"], seen.planes, strict=True):
-        assert entry["beyond_air_gap_m"] == pytest.approx(
-            entry["largest_displacement_m"] - entry["air_gap_m"]
-        )
-        assert (entry["plane"], entry["largest_displacement_m"]) == (plane.plane, plane.largest)
-        assert entry["largest_displacement_time_s"] == plane.largest_time
-        assert entry["position_index"] == plane.position_index
-        assert entry["velocity_index"] == plane.velocity_index
-    assert [plane.plane for plane in seen.planes if seen.first_end == plane.plane] == ["DE"]
-    names = ("plane", "time", "azimuth", "depth", "approach", "rebound")
-    keys = ("plane", "time_s", "azimuth_rad", "depth_m", "approach_m_per_s", "rebound_m_per_s")
+    for plane in written["planes"]:
+        beyond = plane["largest_displacement_m"] - plane["air_gap_m"]
+        assert plane["beyond_air_gap_m"] == pytest.approx(beyond)
     assert len(written["impacts"]) == len(seen.impacts) > 4
-    for entry, impact in zip(written["impacts"], seen.impacts, strict=True):
-        assert tuple(entry[key] for key in keys) == tuple(getattr(impact, name) for name in names)
-        for key in ("time_interval_90_s", "azimuth_interval_90_rad", "depth_interval_90_m"):
-            low, high = entry[key]
-            named = key.replace("_interval_90", "")
-            assert low < entry[named] < high and entry[named] == pytest.approx(0.5 * (low + high))
+    for entry in written["impacts"]:
+        for named in ("time_s", "azimuth_rad", "depth_m"):
+            low, high = entry["_interval_90_".join(named.rsplit("_", 1))]
+            assert low < entry[named] < high
         for velocity in ("approach", "rebound"):
             low, high = entry[f"{velocity}_bounds_m_per_s"]
             assert (low, high) == pytest.approx(entry[f"{velocity}_m_per_s"] + np.array([0.0, 5e-3]))
-    assert drop["release_interval_90_s"] == pytest.approx(drop["release_s"] + np.array([-2e-3, 2e-3]))
-    begun = seen.drops[0].permanent_contact_interval_90
-    assert drop["permanent_contact_interval_90_s"] == list(begun)
     first = next(hit for hit in written["impacts"] if hit["plane"] == "DE")
-    assert {entry["plane"]: entry["first_touch_s"] for entry in written["planes"]}["DE"] == pytest.approx(
-        7.11e-3 - 0.25e-3, abs=0.3e-3
-    )
     gap = next(one["air_gap_m"] for one in written["planes"] if one["plane"] == "DE")
     assert 0.8 * np.sqrt(2.0 * gap / G) < first["time_s"] - drop["release_s"] < 1.5 * np.sqrt(2.0 * gap / G)
     assert 0.5 * np.sqrt(2.0 * gap * G) < first["approach_m_per_s"] < 1.05 * np.sqrt(2.0 * gap * G)
-    assert [one["event"] for one in written["timeline"]] == [words for _, words in seen.timeline()]
 
 
 def test_the_command_writes_page_and_json_and_needs_no_compiler(tmp_path):

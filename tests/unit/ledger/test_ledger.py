@@ -407,23 +407,6 @@ def test_a_role_that_may_only_read_reads_and_writes_nothing(postgresql):
     assert number not in logged_drops(reader)
 
 
-@pytest.mark.slow
-def test_a_server_that_stops_in_between_keeps_what_was_acknowledged(postgresql):
-    import psycopg
-
-    before, one = {add_drop(postgresql, DROP)}, writer(postgresql, 7, 400)
-    for _ in range(20):
-        one.stdout.readline()
-    with psycopg.connect(postgresql, autocommit=True) as connection:
-        connection.execute(
-            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
-            "WHERE pid <> pg_backend_pid() AND datname = 'postgres'"
-        )
-    told = killed_after(one, 0) | {f"7{i:063d}" for i in range(20)}
-    there = {drop.sha256 for n, drop in logged_drops(postgresql).items() if n not in before}
-    assert told <= there and len(there) <= len(told) + 1
-
-
 @pytest.mark.parametrize(
     "url",
     [

@@ -134,7 +134,7 @@ def _unit_finding(
     words = " or ".join(f"{factor:.4g} ({_FACTORS[factor]})" for factor in _explaining(ratio))
     gaps = (f"{1e6 * float(b.air_gap):.0f} µm" for b in machine.touchdown_bearings)
     return found(
-        "estimated-gap" if source else "unit",
+        "unit",
         channel=(name for name, _ in suspects),
         kind=None if words and not source else "wrong air gap",
         record=record.name,
