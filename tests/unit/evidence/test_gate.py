@@ -346,7 +346,7 @@ def test_the_levitated_place_counts_as_zero_of_probes_on_a_gap_voltage(bias, dro
     plain, read = (
         Evidence(record=r, machine=m, tail=t) for r, m, t in ((drop, machine, tail), (moved, zeroed, lying))
     )
-    assert np.all(np.abs(read.gap.value - plain.gap.value) < NINETY * read.gap.zero_sigma)
+    assert np.all(np.abs(read.rest.radius - plain.rest.radius) < NINETY * read.sensing.height_sigma)
     stated = machine.with_values({f"sensors.{name}.offset": bias for name in drop.channel_names})
     assert as_dropped(moved, stated) is stated
     assert [one.kind for one in check_record(moved, stated, lying)] == []
