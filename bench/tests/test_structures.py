@@ -19,7 +19,7 @@ from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.case import CentredStart, DropCase, LevitatedStart, PlacedStart, UnbalanceJump
 from rotordrop.simulate.losses import losses
 from rotordrop_bench import Violations, hidden_machine
-from rotordrop_bench import departure as D
+from rotordrop_bench import departing as D
 from rotordrop_bench.departing import STATES_AT
 from rotordrop_bench.recording import true_drop
 from rotordrop_bench.settled import settled_coordinates

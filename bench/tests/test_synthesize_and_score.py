@@ -63,11 +63,10 @@ def test_a_score_is_a_table(folder, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("share", "sign", "text"),
-    [(1.53, False, "153 %"), (0.0231, True, "+2.3 %"), (-25.4, True, "-2540 %"), (0.0, False, "0 %")],
+    ("share", "text"), [(1.53, "153 %"), (0.0231, "2.3 %"), (-25.4, "-2540 %"), (0.0, "0 %"), (None, "")]
 )
-def test_a_percentage_is_a_plain_number(share, sign, text):
-    assert percent(share, sign=sign) == text
+def test_a_percentage_is_a_plain_number(share, text):
+    assert percent(share) == text
 
 
 def test_errors_name_program_and_files(capsys, folder, tmp_path):

@@ -13,7 +13,7 @@ from rotordrop.record.record import read_record
 from rotordrop.severity.numbers import LOADS
 from rotordrop_bench import read_truth, score_estimate
 from rotordrop_bench.faults import FAULTS, PLAIN, spoiled
-from rotordrop_bench.files import write_drop
+from rotordrop_bench.recording import write_drop
 from rotordrop_bench.score import truth_of
 
 

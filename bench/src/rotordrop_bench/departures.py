@@ -21,8 +21,6 @@ SLIGHT, LARGE = 0, 1
 PEAK_LOADS = 10.0
 """A typical peak force over the static load of a bearing [1]; chosen, not measured."""
 
-MIDDLE, LAW = "middle node", "law"
-
 DEPARTURES: dict[str, Parts] = tomllib.loads(
     resources.files(__package__).joinpath("departures.toml").read_text(encoding="utf-8")
 )
@@ -59,13 +57,13 @@ def departures(machine: Machine, speed: float, kinds: tuple[tuple[str, int], ...
     nodes = len(machine.rotor.node_positions)
 
     def written(size: int, value: Any) -> Any:
-        if value == MIDDLE:
+        if value == "middle node":
             return (nodes + 1) // 2
         if not isinstance(value, list):
             return value
         if len(value) == 2:
             return value[size]
-        if value[2] != LAW:
+        if value[2] != "law":
             measure, unit = measures[value[2]]
             return f"{value[size] * measure:.6g} {unit}"
         # softer when light, stiffer when heavy, as a race that is not round comes to bear

@@ -17,7 +17,7 @@ from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate.case import LevitatedStart
 from rotordrop_bench.departing import departing
-from rotordrop_bench.structure import departures_of, loosened, pushed, violated
+from rotordrop_bench.structure import departures_of, pushed, violated
 from rotordrop_bench.violations import Violations
 
 FINER = Reduction(modes=14, attachment=True)
@@ -100,7 +100,7 @@ def hidden_machine(
         known=machine,
         seed=seed,
         violations=broken,
-        model=pushed(loosened(departing(model, rows)), broken),
+        model=pushed(departing(model, rows), broken),
     )
 
 

@@ -1,16 +1,19 @@
-"""Make a recording of a drop of a hidden machine, in memory, together with its truth."""
+"""Make a recording of a drop of a hidden machine together with its truth, and write both apart."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rotordrop._version import __version__
-from rotordrop.arrays import Array
 from rotordrop.errors import SimulationError
-from rotordrop.record.record import Record
+from rotordrop.files import digest_of_file, make_folder, write_json, write_text
+from rotordrop.machine import Machine
+from rotordrop.machine.saving import save_machine
+from rotordrop.record.record import Record, as_recording
 from rotordrop.simulate.case import DropCase, UnbalanceJump
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
@@ -18,13 +21,12 @@ from rotordrop_bench.event import LARGEST_JITTER, DropConditions, HiddenMachine,
 from rotordrop_bench.sensor_chain import (
     SensorChain,
     SensorErrors,
-    directions,
+    along_sensors,
     drawn_errors,
     fitted_to,
     oversampling,
     readings,
     speed_readings,
-    true_rows,
 )
 from rotordrop_bench.settled import settled_coordinates, swinging_amplitudes
 from rotordrop_bench.true_values import housing_motion, true_motion, true_values
@@ -142,7 +144,7 @@ def _record(
     time = np.arange(start * dense, stop * dense + 1) / (rate * dense)
     true_time = (1.0 + chain.clock_error) * (time - conditions.jitter)
     amplitudes, angle, speed = true_motion(hidden, result, conditions, true_time)
-    along = _along(hidden, errors, amplitudes, housing_motion(result, true_time))
+    along = along_sensors(hidden.model, errors, amplitudes, housing_motion(result, true_time))
     signals = readings(along, time, angle, chain, errors, stream(seed, "noise"))
     time, speed = time[::dense], speed[::dense]
     if chain.speed_delay > 0.0:
@@ -160,21 +162,9 @@ def _record(
     )
 
 
-def _along(hidden: HiddenMachine, errors: SensorErrors, amplitudes: Array, supports: Array) -> Array:
-    """Displacement along the sensors [m], shape (N, S), less that of a bracket with the support (N, B, 2)."""
-    rows = true_rows(hidden.machine, hidden.model.basis, errors)
-    names = [bearing.name for bearing in hidden.machine.touchdown_bearings]
-    at = [names.index(sensor.bearing) for sensor in hidden.machine.sensors]
-    moved = np.einsum("nsa,sa->ns", supports[:, at], directions(hidden.machine, errors))
-    return np.asarray(amplitudes @ rows.T - errors.follows_housing * moved)
-
-
 def _tail(hidden: HiddenMachine, chain: SensorChain, errors: SensorErrors, seed: int, name: str) -> Record:
-    random, swinging, count = (
-        stream(seed, "tail"),
-        stream(seed, "swing"),
-        len(hidden.machine.touchdown_bearings),
-    )
+    random, swinging = stream(seed, "tail"), stream(seed, "swing")
+    count = len(hidden.machine.touchdown_bearings)
     at = float(random.uniform(0.0, 2.0 * np.pi))
     rest = settled_coordinates(hidden.model, at)
     amplitude = np.exp(swinging.uniform(np.log(0.003), np.log(0.1), count))
@@ -184,7 +174,8 @@ def _tail(hidden: HiddenMachine, chain: SensorChain, errors: SensorErrors, seed:
     true_time = (1.0 + chain.clock_error) * time
     amplitudes = swinging_amplitudes(hidden.model, rest, amplitude, phase, decay, true_time)
     angle = np.full(len(time), at)
-    along = _along(hidden, errors, amplitudes, rest[hidden.model.layout.support].reshape(1, -1, 2))
+    supports = rest[hidden.model.layout.support].reshape(1, -1, 2)
+    along = along_sensors(hidden.model, errors, amplitudes, supports)
     # a swing of some hertz is no matter for a lag that a drop survives
     prompt = replace(errors, time_constant=np.zeros(len(errors.gain)))
     signals = readings(along, TAIL_START + time, angle, slow, prompt, random)
@@ -204,3 +195,49 @@ def _metadata(hidden: HiddenMachine, name: str) -> dict[str, str]:
         "origin": f"simulated by rotordrop {__version__}, not measured",
         "event": "AMB power off",
     }
+
+
+def drop_path(folder: Path, name: str) -> Path:
+    """Where an estimator finds a drop."""
+    return folder / "drops" / name
+
+
+def truth_path(folder: Path, name: str) -> Path:
+    """Where the truth of a drop stands."""
+    return folder / "truth" / f"{name}.json"
+
+
+def write_drop(drop: SyntheticDrop, known: Machine, folder: str | Path, name: str, **more: Any) -> Path:
+    """Write a drop into a folder, its truth last, and give the folder for an estimator.
+
+    That is ``drops/NAME`` with ``machine.toml``, ``record.csv`` and ``tail.csv``; ``truth/NAME.json`` gets
+    ``more`` too.
+    """
+    place, truth = drop_path(Path(folder), name), truth_path(Path(folder), name)
+    make_folder(place)
+    make_folder(truth.parent)
+    save_machine(known, place / "machine.toml")
+    write_record(drop.record, place / "record.csv")
+    if drop.tail is not None:
+        write_record(drop.tail, place / "tail.csv")
+    sums = {"record.csv": digest_of_file(place / "record.csv")}
+    write_json(truth, {**drop.truth, **more, "name": name, "record_sha256": sums}, sealed=True)
+    return place
+
+
+def write_record(record: Record, path: Path) -> None:
+    """Write a record as text, displacements in micrometres; a speed that is read less often is held."""
+    recording = as_recording(replace(record, marks=None, notes=(), warnings=()))
+    clock = recording.channels[0].time
+    step = float(np.median(np.diff(clock)))
+    # two digits beyond the step, so that the even clock is found again on reading
+    names, columns, formats = ["Time [s]"], [clock], [f"%.{max(int(np.ceil(-np.log10(step))) + 2, 3)}f"]
+    for channel in recording.channels:
+        length = channel.unit == "m"
+        held = np.clip(np.searchsorted(channel.time, clock, side="right") - 1, 0, len(channel.time) - 1)
+        names.append(f"{channel.name} [{'um' if length else channel.unit}]")
+        columns.append(channel.values[held] * (1e6 if length else 1.0))
+        formats.append("%.3f" if length else "%.4f")
+    lines = [";".join(formats) % tuple(row) for row in np.column_stack(columns)]
+    header = [f"# {key}: {value}" for key, value in recording.metadata.items()]
+    write_text(path, "\n".join([*header, ";".join(names), *lines]) + "\n")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from rotordrop.arrays import Array
 from rotordrop.errors import UsageError
 from rotordrop.machine import Machine
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.reduction import RotorBasis
 
 USUAL_FULL_SCALE = 600e-6
@@ -125,23 +125,24 @@ def drawn_errors(chain: SensorChain, sensors: int, random: np.random.Generator) 
     )
 
 
-def directions(machine: Machine, errors: SensorErrors) -> Array:
-    """Reading per displacement in x and in y of every sensor before its gain, shape (S, 2) [1]."""
+def along_sensors(model: DropModel, errors: SensorErrors, amplitudes: Array, supports: Array) -> Array:
+    """Displacement along every true sensor before its gain [m], shape (N, S).
+
+    From modal amplitudes (N, 2m), x amplitudes, then y; a bracket follows its support's motion (N, B, 2).
+    """
+    machine = model.machine
     angle = [float(sensor.angle) for sensor in machine.sensors]
     polarity = np.array([sensor.polarity for sensor in machine.sensors])
     c, s = np.array([(math.cos(a), math.sin(a)) for a in angle]).T
     across = errors.cross_axis
-    return np.asarray(polarity[:, None] * np.column_stack([c - across * s, s + across * c]))
-
-
-def true_rows(machine: Machine, basis: RotorBasis, errors: SensorErrors) -> Array:
-    """Displacement along every true sensor per modal amplitude, shape (S, 2m): x amplitudes, then y."""
+    directions = polarity[:, None] * np.column_stack([c - across * s, s + across * c])
     positions = np.asarray(machine.rotor.node_positions)
-    rows = []
-    for place, (x, y) in zip(true_places(machine, errors), directions(machine, errors), strict=True):
-        shape = shape_at(positions, basis, place)
-        rows.append(np.concatenate([x * shape, y * shape]))
-    return np.array(rows)
+    shapes = [shape_at(positions, model.basis, place) for place in true_places(machine, errors)]
+    rows = [np.concatenate([x * shape, y * shape]) for shape, (x, y) in zip(shapes, directions, strict=True)]
+    names = [bearing.name for bearing in machine.touchdown_bearings]
+    at = [names.index(sensor.bearing) for sensor in machine.sensors]
+    moved = np.einsum("nsa,sa->ns", supports[:, at], directions)
+    return np.asarray(amplitudes @ np.array(rows).T - errors.follows_housing * moved)
 
 
 def true_places(machine: Machine, errors: SensorErrors) -> Array:

@@ -17,7 +17,7 @@ from rotordrop.rotor.parameters import DropModel, sag_of_model
 from rotordrop.simulate._histories import stored_energy
 from rotordrop.simulate._rhs import drop_derivative, scratch_of
 from rotordrop.simulate.levitation import rigid_amplitudes
-from rotordrop_bench import departure as D
+from rotordrop_bench import departing as D
 from rotordrop_bench.departing import STATES_AT, DepartingParameters, departing, departures_in
 
 MOST_ITERATIONS = 100

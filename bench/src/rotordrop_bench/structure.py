@@ -21,8 +21,7 @@ from rotordrop.physics import columns as L
 from rotordrop.physics.contact import contact_law, stiffness_of_exponent
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop_bench import departure as D
-from rotordrop_bench.departing import departures_in
+from rotordrop_bench import departing as D
 from rotordrop_bench.violations import Violations
 
 PULL_LASTS, PULL_POINTS = 6.0, 61
@@ -183,50 +182,32 @@ def _seat_table(bearing: TouchdownBearing, play: float, load: float) -> Array:
     return np.concatenate([[step], *np.array(found).T])
 
 
-def loosened(model: DropModel) -> DropModel:
-    """The model whose races, where they are loose in their seats, lie in them by their weight."""
-    bearing = model.parameters.bearing.copy()
-    for row, own in zip(bearing, departures_in(model), strict=False):
-        if own[D.LOOSE_WAY] > 0.0:
-            row[L.RACE_WEIGHT] = row[L.RACE_MASS] * float(model.machine.gravity)
-    return replace(model, parameters=model.parameters._replace(bearing=bearing))
-
-
 def pushed(model: DropModel, violations: Violations) -> DropModel:
     """The model with what pushes its rotor beside level gravity and the drawn unbalance."""
     p, machine = model.parameters, model.machine
-    rows: list[tuple[Array, Array, Array]] = []  # entries, course, shape over the modes
     side, tilt, bow = (violations[path] for path in ("side_force.force", "stand.tilt", "rotor.bow"))
-
-    def steady(x: float, y: float, shape: Array) -> None:
-        entries = np.zeros(L.N_LOAD_COLUMNS)
-        entries[[L.LOAD_X, L.LOAD_Y]] = x, y
-        rows.append((entries, np.zeros((0, 3)), shape))
-
+    none = np.zeros((0, 3))
+    rows: list[tuple[float, float, Array, Array]] = []  # steady force [N], course, shape over the modes
     if side:
-        steady(side, 0.0, model.basis.node_row(violations["side_force.node"]))
+        rows.append((side, 0.0, none, model.basis.node_row(violations["side_force.node"])))
     if tilt != 0.0:  # gravity alone acts along -y
-        steady(-math.sin(tilt), math.cos(tilt) - 1.0, p.gravity)
+        rows.append((-math.sin(tilt), math.cos(tilt) - 1.0, none, p.gravity))
     pull = violations["magnets.pull"]
     if pull > 0.0:
         share = pull * machine.rotor.mass * float(machine.gravity) / len(machine.ambs)
         times = np.append(np.linspace(0.0, PULL_LASTS, PULL_POINTS), PULL_LASTS + 1.0)
         left = np.append(np.exp(-times[:-1]), 0.0)
         course = np.column_stack([violations["magnets.pull_time"] * times, share * left, 0.0 * left])
-        rows += [(np.zeros(L.N_LOAD_COLUMNS), course, shape) for shape in p.magnet_shape]
+        rows += [(0.0, 0.0, course, shape) for shape in p.magnet_shape]
     if rows:
-        points = np.zeros((0, 3))
-        for entries, course, _ in rows:
+        load, shapes, points = np.zeros((len(rows), L.N_LOAD_COLUMNS)), [shape for *_, shape in rows], none
+        for entries, (x, y, course, _) in zip(load, rows, strict=True):
+            entries[[L.LOAD_X, L.LOAD_Y]] = x, y
             entries[[L.LOAD_FIRST, L.LOAD_END]] = len(points), len(points) + len(course)
             points = np.vstack([points, course])
         flags = p.flags.copy()
         flags[L.LOADS_ACT] = 1
-        p = p._replace(
-            load=np.array([entries for entries, _, _ in rows]),
-            load_shape=np.array([shape for _, _, shape in rows]),
-            load_points=points,
-            flags=flags,
-        )
+        p = p._replace(load=load, load_shape=np.array(shapes), load_points=points, flags=flags)
     if bow != 0.0:
         # the force that would straighten it turns with the rotor
         place = np.asarray(model.fe.node_positions)

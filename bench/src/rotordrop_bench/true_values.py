@@ -11,7 +11,6 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.table import published
-from rotordrop.elements.touchdown_bearing import TouchdownBearing
 from rotordrop.machine import Machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.rotor.statics import bearing_load_shares
@@ -195,8 +194,19 @@ def true_structure(
     """True values of the structures of an estimate [SI] by path; absent ones as that means them."""
     values: dict[str, float] = {}
     for bearing in hidden.machine.touchdown_bearings:
-        mine = _of_bearing(bearing, hidden.violations.of_bearing(bearing.name))
-        values |= {f"{bearing.name}.{path}": value for path, value in mine.items()}
+        v, support = hidden.violations.of_bearing(bearing.name), bearing.support
+        matrix, mass, own = support_matrices(bearing, v), v["foundation.mass"], f"{bearing.name}.support."
+        deflection = v["support.hardening_force"] / float(support.stiffness)
+        damped = matrix["C_xx"] * matrix["C_yy"]
+        values |= {
+            own + "coupling": matrix["K_xy"] / math.sqrt(matrix["K_xx"] * matrix["K_yy"]),
+            own + "damping_coupling": matrix["C_xy"] / math.sqrt(damped) if damped > 0.0 else 0.0,
+            own + "cubic": v["support.hardening"] / deflection**2,
+            own + "foundation_share": 0.0 if mass is None else float(support.mass) / mass,
+        }
+        if mass is not None:
+            values[own + "foundation_frequency"] = 2.0 * math.pi * v["foundation.frequency"]
+            values[own + "foundation_damping_ratio"] = v["foundation.damping_ratio"]
     stated = hidden.machine.rotor.node_positions
     places = true_places(hidden.machine, errors)
     for i, sensor in enumerate(hidden.machine.sensors):
@@ -210,20 +220,4 @@ def true_structure(
     if (side := hidden.violations["side_force.force"]) is not None:
         values["side_force"] += side / (hidden.machine.rotor.mass * float(hidden.machine.gravity))
     values["remanence.time_constant"] = conditions.start.remanence_time_constant
-    return values
-
-
-def _of_bearing(bearing: TouchdownBearing, v: Violations) -> dict[str, float]:
-    matrix, support, mass = support_matrices(bearing, v), bearing.support, v["foundation.mass"]
-    deflection = v["support.hardening_force"] / float(support.stiffness)
-    damped = matrix["C_xx"] * matrix["C_yy"]
-    values = {
-        "support.coupling": matrix["K_xy"] / math.sqrt(matrix["K_xx"] * matrix["K_yy"]),
-        "support.damping_coupling": matrix["C_xy"] / math.sqrt(damped) if damped > 0.0 else 0.0,
-        "support.cubic": v["support.hardening"] / deflection**2,
-        "support.foundation_share": 0.0 if mass is None else float(support.mass) / mass,
-    }
-    if mass is not None:
-        values["support.foundation_frequency"] = 2.0 * math.pi * v["foundation.frequency"]
-        values["support.foundation_damping_ratio"] = v["foundation.damping_ratio"]
     return values

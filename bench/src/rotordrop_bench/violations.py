@@ -16,9 +16,9 @@ from rotordrop.elements.values import Physical, PositiveForce, PositiveLength
 from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
 from rotordrop.machine import Machine
-from rotordrop_bench import departure as D
+from rotordrop_bench.departing import MOST_PIECES
 
-MOST_POINTS = D.MOST_PIECES + 1
+MOST_POINTS = MOST_PIECES + 1
 """Points of a contact law."""
 
 LAW = {"depth": PositiveLength, "force": PositiveForce}

@@ -18,7 +18,7 @@ from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimate.record_facts import facts_of
 from rotordrop.machine import example_path
 from rotordrop.replay.replay import replayed_drop
-from rotordrop_bench.files import write_drop
+from rotordrop_bench.recording import write_drop
 from rotordrop_bench.score import score_estimate
 
 BEARINGS = ("NDE", "DE")

@@ -39,7 +39,7 @@ def synthesize(
     """
     from rotordrop.machine import load_machine
     from rotordrop_bench import hidden_machine, load_violations, synthesize_drop
-    from rotordrop_bench.files import write_drop
+    from rotordrop_bench.recording import write_drop
     from rotordrop_bench.violations import KEYS
 
     if violation == "list":
@@ -47,15 +47,13 @@ def synthesize(
         typer.echo("\n".join(lines))
         return
     broken = None if violation is None else load_violations(violation)
-    names = [f"synthetic_{round(value / (2.0 * math.pi)):03d}Hz" for value in speed]
     written: list[dict[str, Any]] = []
     with progress_bar("synthesizing") as report:
         known = load_machine(machine)
         hidden = hidden_machine(known, seed, broken)
         for index, value in enumerate(speed):
-            # numbered where a speed comes more than once; no bundled recording is named so
-            stem, number = names[index], names[: index + 1].count(names[index])
-            name = stem if names.count(stem) == 1 else f"{stem}_{number}"
+            name = f"synthetic_{round(value / (2.0 * math.pi)):03d}Hz"  # no bundled recording is named so
+            name += f"_{index + 1}" if len(speed) > 1 else ""
             report(name, index / len(speed))
             drop = synthesize_drop(hidden, value, index, duration=duration, name=name)
             place = write_drop(drop, known, folder, name)
@@ -96,7 +94,7 @@ def make(folder: FolderArgument, only: OnlyOption = None, json: options.Json = N
     Example: rotordrop-bench make dropbench
     """
     from rotordrop_bench.corpus.cases import chosen_drops, made
-    from rotordrop_bench.files import truth_path
+    from rotordrop_bench.recording import truth_path
 
     drops = chosen_drops(only or [])
     missing = [drop for drop in drops if not truth_path(folder, drop.name).is_file()]

@@ -196,19 +196,12 @@ def new_table(title: str, words: Sequence[str], numbers: Sequence[str]) -> Table
     return table
 
 
-def percent(share: float | None, *, sign: bool = False) -> str:
-    """Write a share [1] in percent with two digits that count, never with a power of ten.
-
-    Examples
-    --------
-    >>> from rotordrop_bench.cli.scores import percent
-    >>> percent(1.53), percent(0.0231, sign=True)
-    ('153 %', '+2.3 %')
-    """
+def percent(share: float | None) -> str:
+    """Write a share [1] in percent with two digits that count, never with a power of ten."""
     if share is None:
         return ""
     number = 100.0 * share
     if not math.isfinite(number):
         return "– %"
     places = 0 if number == 0.0 else min(max(0, 1 - math.floor(math.log10(abs(number)))), 3)
-    return f"{number:{'+' if sign else ''}.{places}f} %"
+    return f"{number:.{places}f} %"

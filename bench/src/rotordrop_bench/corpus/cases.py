@@ -30,8 +30,7 @@ from rotordrop.rotor.unknowns import (
 from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT, departures
 from rotordrop_bench.event import drop_conditions, hidden_machine, stream
 from rotordrop_bench.faults import FAULTS, PLAIN, spoiled
-from rotordrop_bench.files import drop_path, truth_path, write_drop
-from rotordrop_bench.recording import SyntheticDrop, synthesize_drop
+from rotordrop_bench.recording import SyntheticDrop, drop_path, synthesize_drop, truth_path, write_drop
 from rotordrop_bench.rotors import ROTORS, bench_rotor, scaled_rotor
 from rotordrop_bench.sensor_chain import SensorChain, fitted_to
 from rotordrop_bench.violations import Violations
@@ -127,10 +126,9 @@ def chosen_drops(only: Iterable[str]) -> tuple[Case, ...]:
     wanted = set(only)
     keys = {drop.name: {drop.name, drop.group, drop.rotor} for drop in DROPS}
     if unknown := sorted(wanted - set().union(*keys.values())):
-        families = ", ".join(repr(f) for f in dict.fromkeys(drop.group for drop in DROPS))
         raise UsageError(
             f"the bench has no drop {unknown[0]!r}; name one of {DROPS[0].name} to {DROPS[-1].name}, a rotor "
-            f"such as {DROPS[0].rotor!r}, or a family: {families}"
+            f"such as {DROPS[0].rotor!r}, or a family, as 'rotordrop-bench list' prints them"
         )
     return tuple(drop for drop in DROPS if not wanted or keys[drop.name] & wanted)
 

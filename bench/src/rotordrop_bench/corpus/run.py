@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from rotordrop.errors import UsageError
 from rotordrop.files import make_folder, write_json
 from rotordrop_bench.corpus.cases import VERSION, Case, digest, made
 from rotordrop_bench.corpus.table import ALWAYS, SHORT, Row, judged, name_of, said_of, scored
-from rotordrop_bench.files import truth_path
+from rotordrop_bench.recording import truth_path
 from rotordrop_bench.score import read_truth, score_estimate
 
 LONGEST = 1800.0
@@ -44,12 +43,8 @@ class Version:
                 f"{place} is neither a Python nor a checkout with src/rotordrop; give one of them"
             )
         own = path / ".venv" / "bin" / "python"
-        said = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--exclude=*"],
-            cwd=path,
-            capture_output=True,
-            text=True,
-        )
+        asked = ["git", "-C", str(path), "describe", "--always", "--dirty", "--exclude=*"]
+        said = subprocess.run(asked, capture_output=True, text=True)
         return cls(
             name=name or said.stdout.strip() or path.name,
             python=str(own if own.is_file() else sys.executable),
@@ -90,7 +85,7 @@ def _said(version: Version, command: list[str], stem: Path) -> dict[str, Any]:
     kept, document = stem.with_suffix(".run.json"), stem.with_suffix(".json")
     if not kept.is_file():
         document.unlink(missing_ok=True)
-        begun, before = time.monotonic(), os.times()
+        before = os.times()
         try:
             done = subprocess.run(
                 [version.python, "-m", "rotordrop", *command, "--json", str(document)],
@@ -104,8 +99,7 @@ def _said(version: Version, command: list[str], stem: Path) -> dict[str, Any]:
             code, words = -1, f"given up after {LONGEST:g} s"
         after = os.times()
         spent = after.children_user + after.children_system - before.children_user - before.children_system
-        ran = {"code": code, "seconds": round(spent, 2), "lasted_s": round(time.monotonic() - begun, 1)}
-        write_json(kept, {**ran, "stderr": words})
+        write_json(kept, {"code": code, "seconds": round(spent, 2), "stderr": words})
     found: dict[str, Any] = json.loads(kept.read_text(encoding="utf-8"))
     if document.is_file():
         found["document"] = json.loads(document.read_text(encoding="utf-8"))
@@ -162,6 +156,7 @@ def score_all(
         ]
         row = rows[truth.name]
         row = replace(row, estimates=dict.fromkeys(due, ()) | dict(row.estimates))
-        for group in ("all drops", *filter(None, [truth.values.get("family")])):
-            groups.setdefault(group, []).append(row)
+        groups["all drops"].append(row)
+        if several and (family := truth.values.get("family")):
+            groups.setdefault(family, []).append(row)
     return groups, found
