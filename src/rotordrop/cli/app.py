@@ -8,6 +8,7 @@ anything else.
 from __future__ import annotations
 
 import atexit
+import ctypes
 import errno
 import logging
 import os
@@ -15,6 +16,7 @@ import signal
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib import import_module
@@ -36,6 +38,8 @@ from rotordrop.one_thread import ENVIRONMENT
 BROKEN_PIPE = 141
 """Exit code when the reader has gone: 128 plus the number of the signal, the standard of shells."""
 
+_MMAP_THRESHOLD, _ARENA_MAX = -3, -8
+"""Numbers of the options of mallopt(3)."""
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EBADF)
 
 
@@ -252,8 +256,17 @@ def _print_log() -> None:
     log.setLevel(logging.INFO)
 
 
+def _give_memory_back() -> None:
+    """Have glibc return large arrays when they go: else it keeps what a fit once needed."""
+    if sys.platform == "linux":
+        with suppress(AttributeError):  # another C library
+            ctypes.CDLL(None).mallopt(_MMAP_THRESHOLD, 1 << 20)
+            ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
+
+
 def main(program: typer.Typer = app, name: str = "rotordrop") -> None:
     """Entry point of the command ``rotordrop``, or of another program with verbs of its own."""
+    _give_memory_back()
     for variable, number in ENVIRONMENT.items():
         os.environ.setdefault(variable, number)
     open_streams()

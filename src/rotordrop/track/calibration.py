@@ -102,8 +102,8 @@ MOST_REPEATS, SMALL_CHANGE = 6, 5.0
 A fall does not end them: on a rotor of 6 t it fell by 48 in one pass of the whole drop and rose by 194 in the
 next three, and the peak moved by 9 %.
 """
-FIT_MEMORY = 128_000_000
-"""Memory [B] for the segments that the passes of a fit keep, shared by its drops (chosen): two thirds of a
+FIT_MEMORY = 120_000_000
+"""Memory [B] for the segments that the passes of a fit keep, shared by its drops (chosen): three fifths of a
 whole drop at 20 kHz, 128 estimated; the rest is filtered again."""
 THREADS = 2
 """Passes over the same drops that run side by side [1]."""
