@@ -13,8 +13,7 @@ from rotordrop_bench.departing import departures_in
 from rotordrop_bench.event import drop_conditions
 from rotordrop_bench.score import truth_of
 from rotordrop_bench.sensor_chain import PERFECT, lagging
-from rotordrop_bench.true_values import KINDS, violated_kinds
-from rotordrop_bench.violations import KEYS
+from rotordrop_bench.true_values import violated_kinds
 
 SPEED = 2.0 * np.pi * 60.0
 
@@ -75,19 +74,16 @@ def test_a_case_file_says_what_is_violated(tmp_path):
         ('[supports]\naxes_angle = "3 deg"', r"supports: unknown key .* mean 'support'"),
         ("[unbalance_jump]\nnode = 3.5", r"unbalance_jump.node: 3.5 is no int"),
         ("[support", r"cannot read the case file .*case.toml: Expected"),
+        (None, r"cannot read the case file .*case.toml: .* No such file"),
         ('[unbalance_jump]\namount = "3 g mm"', r"'amount' needs 'node' beside it; add it"),
     ],
 )  # fmt: skip
 def test_a_case_file_is_refused_with_place_value_and_way_out(text, message, tmp_path):
     path = tmp_path / "case.toml"
-    path.write_text(text)
+    if text is not None:
+        path.write_text(text)
     with pytest.raises(UsageError, match=message):
         load_violations(path)
-
-
-def test_a_missing_case_file_is_named(tmp_path):
-    with pytest.raises(UsageError, match=r"cannot read the case file .*none.toml: .* No such file"):
-        load_violations(tmp_path / "none.toml")
 
 
 @pytest.mark.parametrize(
@@ -101,10 +97,6 @@ def test_a_missing_case_file_is_named(tmp_path):
 def test_what_a_machine_does_not_have_or_the_bench_cannot_make_is_refused(known, parts, message):
     with pytest.raises(UsageError, match=message):
         hidden_machine(known, 3, violations(**parts))
-
-
-def test_every_kind_of_departure_has_its_keys():
-    assert all(set(keys) <= set(KEYS[part]) for parts in KINDS.values() for part, keys in parts.items())
 
 
 @pytest.fixture(scope="module")
@@ -150,40 +142,26 @@ def test_a_bracket_on_the_housing_takes_its_motion_off_the_reading(known, perfec
 
 
 LATER = {
-    "race": ({"mass": 1.0}, {"mass": 2.3}),
-    "side_force": ({"node": 17, "force": "0 N"}, {"node": 17, "force": "80 N"}),
-    "stand": ({"tilt": "0 deg"}, {"tilt": "3 deg"}),
-    "magnets": ({"pull": 0.0, "pull_time": "10 ms"}, {"pull": 0.2, "pull_time": "10 ms"}),
-    "rotor": ({"bow": "0 um", "bow_speed": "60 Hz"}, {"bow": "10 um", "bow_speed": "60 Hz"}),
-    "seal": (
-        {"node": 17, "gap": 9.0, "stiffness": "20 N/um"},
-        {"node": 17, "gap": 1.02, "stiffness": "20 N/um"},
-    ),
-    "sleeve": ({"eccentricity": "0 um", "ovality": "0 um"}, {"eccentricity": "12 um", "ovality": "5 um"}),
-    "friction": ({"wear": 0.0, "wear_heat": "20 J"}, {"wear": 0.6, "wear_heat": "20 J"}),
-    "sensors": (
-        {"flicker": "0 um", "clock_error": 0.0, "speed_delay": "0 s"}
-        | {"curvature": 0.0, "curvature_at": "1 mm"},
-        {"curvature": 0.03, "curvature_at": "300 um"},
-    ),
+    "race": {"mass": 2.3},
+    "side_force": {"node": 17, "force": "80 N"},
+    "stand": {"tilt": "3 deg"},
+    "magnets": {"pull": 0.2, "pull_time": "10 ms"},
+    "rotor": {"bow": "10 um", "bow_speed": "60 Hz"},
+    "seal": {"node": 17, "gap": 1.02, "stiffness": "20 N/um"},
+    "sleeve": {"eccentricity": "12 um", "ovality": "5 um"},
+    "friction": {"wear": 0.6, "wear_heat": "20 J"},
+    "sensors": {"curvature": 0.03, "curvature_at": "300 um"},
 }
 
 
-def test_what_came_later_leaves_every_reading_where_it_is_absent(known, perfect):
-    drop = _recorded(known, **{part: absent for part, (absent, _) in LATER.items()})
-    for record, plain in ((drop.record, perfect.record), (drop.tail, perfect.tail)):
-        assert np.array_equal(record.signals, plain.signals)
-    assert np.array_equal(drop.record.speed_readings, perfect.record.speed_readings)
-
-
 @pytest.mark.parametrize("part", LATER)
-def test_what_came_later_moves_the_readings_where_it_is_present(known, perfect, part):
-    drop = _recorded(known, **{part: LATER[part][1]})
+def test_what_came_later_moves_the_readings(known, perfect, part):
+    drop = _recorded(known, **{part: LATER[part]})
     assert np.max(np.abs(drop.record.signals - perfect.record.signals)) > 0.2e-6
 
 
 def test_curved_sensors_read_too_little_and_flicker_noise_has_its_size(known, perfect):
-    drop = _recorded(known, sensors=LATER["sensors"][1])
+    drop = _recorded(known, sensors=LATER["sensors"])
     shaft = perfect.record.signals
     assert drop.record.signals == pytest.approx(shaft - 0.03 * shaft**3 / 300e-6**2, abs=1e-15)
     drop = _recorded(known, sensors={"flicker": "1 um"})
@@ -222,18 +200,14 @@ def test_a_lagging_sensor_reads_the_shaft_of_a_while_ago(known, rate):
     assert lagging(ramp, np.array([80e-6]), rate)[2000:] == pytest.approx(ramp[2000:] - 80e-6, abs=1e-12)
 
 
-def test_remanence_unbalance_and_friction_leave_their_ranges(known):
-    v = violations(magnets={"remanence_time": "50 ms"}, rotor={"unbalance": 1.6}, friction={"dynamic": 0.28})
+def test_remanence_and_unbalance_leave_their_ranges(known):
+    v = violations(magnets={"remanence_time": "50 ms"}, rotor={"unbalance": 1.6})
     hidden, plain = hidden_machine(known, 3, v), hidden_machine(known, 3)
     start, other = (drop_conditions(h, SPEED, 5).start for h in (hidden, plain))
     assert start.remanence_time_constant == 0.05
     assert np.array_equal(start.remanent_force, other.remanent_force)
     for mine, drawn in zip(hidden.machine.unbalances, plain.machine.unbalances, strict=True):
         assert float(mine.amount) == pytest.approx(1.6 * float(drawn.amount))
-    for mine, drawn in zip(hidden.machine.touchdown_bearings, plain.machine.touchdown_bearings, strict=True):
-        assert float(mine.friction.dynamic) == pytest.approx(0.28)
-        ratio = float(drawn.friction.static) / float(drawn.friction.dynamic)
-        assert float(mine.friction.static) == pytest.approx(0.28 * ratio)
 
 
 def test_a_law_takes_the_place_of_stiffness_and_exponent(known):
