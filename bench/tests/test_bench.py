@@ -211,36 +211,4 @@ def test_what_the_bench_does_not_have_is_refused(folder, estimates, tmp_path):
     write_json(tmp_path / "old/truth/drop_004.json", old, sealed=True)
     with pytest.raises(UsageError, match="is of version '0' of the bench, this is version '2026'; make"):
         score_all(estimates, tmp_path / "old/truth")
-    with pytest.raises(
-        UsageError,
-        match=r"no drop 'drop_999'; name one of drop_001 to drop_\d+, a rotor .* '5 kg', or a family",
-    ):
-        chosen_drops(["drop_999"])
     assert {drop.rotor for drop in chosen_drops(["6 t"])} == {"6 t"}
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (["make"], "Missing argument 'FOLDER'"),
-        (["score", "x"], "Missing argument 'TRUTH'"),
-        (["score", "x", "x"], "x holds no truth; make some with 'rotordrop-bench make'"),
-        (["score", "y", "x"], "y is no folder; give the one with the estimates"),
-    ],
-)
-def test_a_call_without_folders_says_what_it_needs(call, message, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "x").mkdir()
-    assert run(call) == 64
-    assert message in capsys.readouterr().err.replace("\n", " ")
-
-
-def test_list_and_table_are_printed(capsys, folder, estimates, tmp_path):
-    assert run(["list", "--only", "two departures"]) == 0
-    out = capsys.readouterr().out
-    assert out.count("two departures: ") == 6
-    _estimates(estimates)
-    file = tmp_path / "scores.json"
-    assert run(["score", str(estimates), str(folder / "truth"), "--json", str(file)]) == 0
-    assert set(json.loads(file.read_text())["drops"]) == set(MADE)
-    assert "two departures" not in capsys.readouterr().out
