@@ -48,6 +48,10 @@ _COUNTER = re.compile(
 )
 """A number of the channel in front of its tag, as in "Ch1 VE-101X", "3:NDE X", "[2] X"."""
 
+_ANGLE = re.compile(r"(?P<angle>(?:(?<![^\s(@])[+-])?\d{1,3}(?:\.\d+)?) ?(?:°|deg\b)", re.IGNORECASE)
+"""An angle in a name, as in "DE 45°", "NDE_135deg", "DE (-45°)"."""
+_BESIDE = " _-,:;/@()"
+
 _SENSOR = re.compile(r"^(?:S|P|CH|SENSOR|PROBE)[ _-]", re.IGNORECASE)
 _LONGEST_UNIT = 30
 """Characters of a unit of displacements that is not known (chosen)."""
@@ -91,8 +95,11 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         named = {name: fitting(recording.channels, label) for name, label in profile.channels.items()}
         called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
         pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
-        planes = [(name, [(channel, None) for channel in pair]) for name, pair, _ in pairs]
-        notes = (f"planes guessed by the {guessed} of the channels, sensors 90° apart",)
+        told = {id(channel): told_by(channel) for channel in recording.channels}
+        planes = [(name, [(one, told[id(one)][1]) for one in pair]) for name, pair, _ in pairs]
+        known = all(angle is not None for _, entries in planes for _, angle in entries)
+        how = "and angles by" if known else f"guessed by the {guessed} of the channels, sensors 90° apart"
+        notes = (f"planes {how} the names of the channels" if known else f"planes {how}",)
         paired = {id(channel) for _, pair, _ in pairs for channel in pair}
         left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
         left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
@@ -154,6 +161,9 @@ def seats(channels: Sequence[Channel], sensors: Sequence[Sensor]) -> list[Sensor
     """
     if len(channels) != len(sensors) or len(sensors) != 2:
         return list(sensors)
+    by_angle = [_at_angle(sensors, told_by(channel)[1]) for channel in channels]
+    if all(by_angle) and by_angle[0] != by_angle[1]:
+        return [one for found in by_angle for one in found]
     (pair, axes), (own, said) = _axes_of(channels, channels), _axes_of(channels, sensors)
     one, other = sensors
     if axes and axes == said:
@@ -163,6 +173,33 @@ def seats(channels: Sequence[Channel], sensors: Sequence[Sensor]) -> list[Sensor
     elif (math.sin(float(other.angle) - float(one.angle)) > 0.0) != (axes != "LR"):
         one, other = other, one
     return [one, other] if channels[0] is pair[0] else [other, one]
+
+
+def told_by(channel: Channel) -> tuple[str, float | None]:
+    """Plane and angle [rad] that the name of a channel tells, as "DE 45°" does; None without an angle."""
+    angle = _ANGLE.search(channel.name)
+    plane = _tag(_ANGLE.sub("", channel.name).strip(_BESIDE)).strip(_BESIDE)
+    return plane, angle and math.radians(float(angle["angle"]))
+
+
+def _at_angle(sensors: Sequence[Sensor], angle: float | None) -> list[Sensor]:
+    """The sensors that stand at an angle [rad]."""
+    return [
+        one
+        for one in sensors
+        if angle is not None and abs(math.remainder(angle - float(one.angle), 2 * math.pi)) < _SAME_ANGLE
+    ]
+
+
+def by_plane_and_angle(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Channel]:
+    """The channel of every sensor whose plane and angle are told by the name of one channel alone."""
+    found: dict[str, list[Channel]] = {}
+    for channel in recording.channels:
+        plane, angle = told_by(channel)
+        at = _at_angle([one for one in sensors if plain_name(one.bearing) == plain_name(plane)], angle)
+        if len(at) == 1:
+            found.setdefault(at[0].name, []).append(channel)
+    return {name: hits[0] for name, hits in found.items() if len(hits) == 1}
 
 
 def _axes_of(channels: Sequence[Channel], named: Sequence[Channel | Sensor]) -> tuple[Sequence[Channel], str]:
@@ -285,7 +322,8 @@ def pairs_of(
     if counted := _counted(left, called):
         pairs = zip(counted[::2], counted[1::2], strict=False)
         return [(f"plane {k}", pair, "") for k, pair in enumerate(pairs, start=1)], "order"
-    found: list[tuple[str, tuple[Channel, Channel], str]] = []
+    found = _pairs_by_angle(left)
+    left = [one for one in left if not any(one is member for _, pair, _ in found for member in pair)]
     for strip in (False, True):
         names = {}
         for channel in left:
@@ -307,6 +345,17 @@ def pairs_of(
     found = far_end_first(found, lambda entry: entry[0] or "")
     numbered = enumerate(found, start=1)
     return [(name or f"plane {number}", pair, axes) for number, (name, pair, axes) in numbered], "names"
+
+
+def _pairs_by_angle(channels: Sequence[Channel]) -> list[tuple[str, tuple[Channel, Channel], str]]:
+    """Channels whose names tell one plane and two angles, without letters of axes."""
+    told: dict[str, dict[float, Channel]] = {}
+    for channel in channels:
+        plane, angle = told_by(channel)
+        if angle is not None:
+            told.setdefault(plane, {})[angle] = channel
+    pairs = ((plane, list(members.values())) for plane, members in told.items())
+    return [(plane, (two[0], two[1]), "") for plane, two in pairs if len(two) == 2]
 
 
 def _common(first: str, second: str, axes: str) -> str | None:

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UnmatchedError, UsageError, mapped
-from rotordrop.record.arrangement import fitting, pairs_of, seats, sensors_of_planes
+from rotordrop.record.arrangement import by_plane_and_angle, fitting, pairs_of, seats, sensors_of_planes
 from rotordrop.record.profile import LIKELY, Profile
 from rotordrop.record.recording import (
     FULL_SCALE,
@@ -21,6 +21,7 @@ from rotordrop.record.recording import (
     Channel,
     Recording,
     listed,
+    plain_name,
     sensitivities_in,
     spelled,
 )
@@ -45,6 +46,8 @@ def match_sensors(
     said = profile.channels | sensors_of_planes(recording, sensors, profile)
     wanted = {sensor.name: said.get(sensor.name, sensor.name) for sensor in sensors}
     hits = {name: fitting(recording.channels, channel) for name, channel in wanted.items()}
+    for name, channel in by_plane_and_angle(recording, sensors).items():
+        hits[name] = hits[name] or [channel]
     if profile.likely and not all(hits.values()):
         found = likeliest(recording, sensors)
         hits |= {name: [channel] for name, channel in found.items() if not hits[name]}
@@ -106,6 +109,9 @@ def likeliest(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Chan
     members = _by_plane(sensors)
     if len(pairs) != len(members) or any(len(found) != 2 for found in members):
         return {}
+    of_end = {plain_name(found[0].bearing): found for found in members}
+    if len(of_end) == len(members) and of_end.keys() == {plain_name(name) for name, _, _ in pairs}:
+        members = [of_end[plain_name(name)] for name, _, _ in pairs]  # whatever order the file has
     return {
         sensor.name: channel
         for (_, pair, _), found in zip(pairs, members, strict=True)

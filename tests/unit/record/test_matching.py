@@ -230,6 +230,20 @@ def test_pairs_by_tags(names, planes):
     assert record.signals.shape == (10, 4)
 
 
+@pytest.mark.parametrize("form", ["{} 45°", "{}_45deg", "45 deg {}", "Ch1 {} (45°)"])
+@pytest.mark.parametrize("ends", [("NDE", "DE"), ("nde", "de"), ("TE", "CE")])
+def test_planes_and_angles_in_the_names_of_channels_seat_them(ends, form, machine):
+    """In any order of the file; planes of other names go in their order, and only when asked."""
+    at = ((0, "45"), (0, "135"), (1, "135"), (1, "45"))
+    said = numbered(*(form.format(ends[k]).replace("45", angle) for k, angle in at))
+    found = record_of(said, machine.sensors, profile=Profile(likely=ends[0] == "TE"))
+    np.testing.assert_allclose(found.signals[0], [1e-6, 0.0, 2e-6, 3e-6])
+    turned = Recording(channels=said.channels[::-1])
+    if ends[0] != "TE":
+        np.testing.assert_allclose(record_of(turned, machine.sensors).signals[0], found.signals[0])
+    assert arrangement_of(turned, Profile()).angles_known
+
+
 def test_names_of_sensors_in_a_profile_pair_the_channels_without_a_machine():
     rules = rules_of(None, ["DE_A=four", "NDE_A = one", "NDE_B = two", "DE_B = three"])
     arranged = arrangement_of(recording("one", "two", "three", "four"), rules)
