@@ -189,13 +189,14 @@ def _csv(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Pat
 
 
 def _mat(estimate: Estimate, time: Array, columns: tuple[Column, ...], path: Path) -> None:
-    """MATLAB 5: ``time`` and one struct per bearing; ``units`` says what is in which unit."""
+    """MATLAB 5: ``time`` and one struct per bearing; ``about`` and ``units`` say what is in which unit."""
     from scipy.io import savemat
 
     content: dict[str, Any] = {"time": time, "drop": estimate.name, "machine": estimate.machine.name}
     content |= _marks(estimate)
     for c in columns:
         content.setdefault(re.sub(r"\W", "_", f"b_{c.bearing}"), {})[c.quantity[:31]] = c.values
+    content["about"] = "b_NAME: histories at the touchdown bearing NAME; units says in which unit"
     content["units"] = {c.quantity[:31]: c.unit for c in columns} | {"time": "s"}
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         savemat(stream, content, do_compression=True, oned_as="column")

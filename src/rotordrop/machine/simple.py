@@ -153,8 +153,7 @@ def simple_text(given: Mapping[str, str]) -> str:
         If one is missing, is none of them, or they make no machine.
     """
     known = [name for name in EXAMPLES if name != "preload"]
-    if strange := [name for name in given if name not in EXAMPLES]:
-        raise UsageError(f"there is no number {strange[0]!r}; there are {', '.join(EXAMPLES)}")
+    refuse_strange(given)
     said: dict[str, Any] = {name: " ".join(value.split()) for name, value in given.items() if value.strip()}
     if missing := [name for name in known if name not in said]:
         raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
@@ -177,6 +176,12 @@ def simple_text(given: Mapping[str, str]) -> str:
         "touchdown_bearings.support.mass": "not given: a share of the rotor's mass",
     }
     return machine_text(made, remarks)
+
+
+def refuse_strange(given: Mapping[str, str]) -> None:
+    """Refuse a name that is none of the numbers."""
+    if strange := [name for name in given if name not in EXAMPLES]:
+        raise UsageError(f"there is no number {strange[0]!r}; there are {', '.join(EXAMPLES)}")
 
 
 def read_number(name: str, said: Mapping[str, str]) -> str | tuple[str, str]:

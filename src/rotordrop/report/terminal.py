@@ -111,7 +111,8 @@ def _fitting(
         last = k == len(others) and not (hidden or rows)
         left = room - (not last)
         shorter = (_short(one, lines, rest) for lines in (left if last else OTHERS, 1))
-        fits = next((short for short in shorter if _height(_statement(short)) <= left), None)
+        said_whole = one.level == "bad"
+        fits = next((short for short in shorter if said_whole or _height(_statement(short)) <= left), None)
         if fits is None:
             hidden.append(one)
         else:
@@ -127,6 +128,9 @@ def _fitting(
 
 
 def _short(one: Statement, lines: int, rest: str) -> Statement:
+    """A statement in so many lines; what forbids to go on says the way out, and is never cut."""
+    if one.level == "bad":
+        return one
     plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
     longest = lines * (WIDTH - len("warning: "))
     return Statement(shorten(plainly, longest, placeholder=f" … ({rest})"), one.level)

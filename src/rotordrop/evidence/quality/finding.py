@@ -37,7 +37,7 @@ class Finding:
     """When, in record time [s]."""
 
     def __str__(self) -> str:
-        where = f" {self.channel}" if self.channel else ""
+        where = f" {self.channel}" if self.channel and self.channel not in self.kind else ""
         when = f" at {self.time:.6g} s" if self.time is not None else ""
         return f"{self.kind}{where}{when}: {self.message}; {self.remedy}"
 
