@@ -16,7 +16,6 @@ TEXTS: Schema = {"type": "array", "items": TEXT}
 NUMBERS: Schema = {"type": "array", "items": NUMBER}
 PAIR: Schema = {**NUMBERS, "minItems": 2, "maxItems": 2}
 MAYBE_PAIR: Schema = {**PAIR, "type": ["array", "null"]}
-PAIRS: Schema = {"type": "array", "items": PAIR}
 
 
 def closed(optional: Schema | None = None, **needed: Any) -> Schema:

@@ -93,13 +93,12 @@ def init(
 
 def _simple_text(numbers: Sequence[str]) -> str:
     """The machine file of twelve numbers; what was not given as an option is asked for."""
-    from rotordrop.machine.simple import EXAMPLES, read_number, refuse_strange, simple_schema, simple_text
+    from rotordrop.machine.simple import EXAMPLES, read_number, simple_schema, simple_text
 
     given = pairs(numbers, 'a number, "mass=60 kg"')
-    refuse_strange(given)
     asked = simple_schema()
-    for name in EXAMPLES:
-        if given.get(name):
+    for name in given:
+        if given[name] or name not in EXAMPLES:
             read_number(name, given)
     missing = [name for name in asked["required"] if not given.get(name)]
     if missing and not (sys.stdin and sys.stdin.isatty()):

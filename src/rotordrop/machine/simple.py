@@ -153,7 +153,6 @@ def simple_text(given: Mapping[str, str]) -> str:
         If one is missing, is none of them, or they make no machine.
     """
     known = [name for name in EXAMPLES if name != "preload"]
-    refuse_strange(given)
     said: dict[str, Any] = {name: " ".join(value.split()) for name, value in given.items() if value.strip()}
     if missing := [name for name in known if name not in said]:
         raise UsageError(f"of the twelve numbers {', '.join(missing)} are missing")
@@ -178,12 +177,6 @@ def simple_text(given: Mapping[str, str]) -> str:
     return machine_text(made, remarks)
 
 
-def refuse_strange(given: Mapping[str, str]) -> None:
-    """Refuse a name that is none of the numbers."""
-    if strange := [name for name in given if name not in EXAMPLES]:
-        raise UsageError(f"there is no number {strange[0]!r}; there are {', '.join(EXAMPLES)}")
-
-
 def read_number(name: str, said: Mapping[str, str]) -> str | tuple[str, str]:
     """One of the numbers said as `SimpleMachine` takes it; a place has to lie on the rotor.
 
@@ -192,6 +185,8 @@ def read_number(name: str, said: Mapping[str, str]) -> str | tuple[str, str]:
     UsageError
         If it cannot be read.
     """
+    if name not in EXAMPLES:
+        raise UsageError(f"there is no number {name!r}; there are {', '.join(EXAMPLES)}")
     length = math.inf
     if name in ("centre", "bearings", "sensors") and "length" in said:
         length = in_si(read_number("length", said), "length", "length")

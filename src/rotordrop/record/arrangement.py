@@ -50,7 +50,6 @@ _COUNTER = re.compile(
 
 _ANGLE = re.compile(r"(?P<angle>(?:(?<![^\s(@])[+-])?\d{1,3}(?:\.\d+)?) ?(?:°|deg\b)", re.IGNORECASE)
 """An angle in a name, as in "DE 45°", "NDE_135deg", "DE (-45°)"."""
-_BESIDE = " _-,:;/@()"
 
 _SENSOR = re.compile(r"^(?:S|P|CH|SENSOR|PROBE)[ _-]", re.IGNORECASE)
 _LONGEST_UNIT = 30
@@ -95,11 +94,10 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         named = {name: fitting(recording.channels, label) for name, label in profile.channels.items()}
         called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
         pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
-        told = {id(channel): told_by(channel) for channel in recording.channels}
-        planes = [(name, [(one, told[id(one)][1]) for one in pair]) for name, pair, _ in pairs]
+        planes = [(name, [(one, told_by(one)[1]) for one in pair]) for name, pair, _ in pairs]
         known = all(angle is not None for _, entries in planes for _, angle in entries)
-        how = "and angles by" if known else f"guessed by the {guessed} of the channels, sensors 90° apart"
-        notes = (f"planes {how} the names of the channels" if known else f"planes {how}",)
+        how = "" if known else ", sensors 90° apart"
+        notes = (f"planes {'and angles' if known else 'guessed'} by the {guessed} of the channels{how}",)
         paired = {id(channel) for _, pair, _ in pairs for channel in pair}
         left = [c.label for c in recording.channels if _may_read(c) and id(c) not in paired]
         left = [label for label in left if label not in (profile.speed.channel, profile.speed.pulses)]
@@ -178,28 +176,23 @@ def seats(channels: Sequence[Channel], sensors: Sequence[Sensor]) -> list[Sensor
 def told_by(channel: Channel) -> tuple[str, float | None]:
     """Plane and angle [rad] that the name of a channel tells, as "DE 45°" does; None without an angle."""
     angle = _ANGLE.search(channel.name)
-    plane = _tag(_ANGLE.sub("", channel.name).strip(_BESIDE)).strip(_BESIDE)
+    plane = _tag(_ANGLE.sub("", channel.name).strip()).strip(" _-,:;/@()")
     return plane, angle and math.radians(float(angle["angle"]))
 
 
 def _at_angle(sensors: Sequence[Sensor], angle: float | None) -> list[Sensor]:
     """The sensors that stand at an angle [rad]."""
-    return [
-        one
+    away = [abs(math.remainder((angle or 0.0) - float(one.angle), 2 * math.pi)) for one in sensors]
+    return [one for one, off in zip(sensors, away, strict=True) if angle is not None and off <= _SAME_ANGLE]
+
+
+def sure_of(seated: Mapping[str, Channel], sensors: Sequence[Sensor]) -> bool:
+    """Whether the names of channels tell plane and angle of the sensors in which they are seated."""
+    return bool(seated) and all(
+        _at_angle([one], told_by(seated[one.name])[1])
+        and plain_name(told_by(seated[one.name])[0]) == plain_name(one.bearing)
         for one in sensors
-        if angle is not None and abs(math.remainder(angle - float(one.angle), 2 * math.pi)) < _SAME_ANGLE
-    ]
-
-
-def by_plane_and_angle(recording: Recording, sensors: Sequence[Sensor]) -> dict[str, Channel]:
-    """The channel of every sensor whose plane and angle are told by the name of one channel alone."""
-    found: dict[str, list[Channel]] = {}
-    for channel in recording.channels:
-        plane, angle = told_by(channel)
-        at = _at_angle([one for one in sensors if plain_name(one.bearing) == plain_name(plane)], angle)
-        if len(at) == 1:
-            found.setdefault(at[0].name, []).append(channel)
-    return {name: hits[0] for name, hits in found.items() if len(hits) == 1}
+    )
 
 
 def _axes_of(channels: Sequence[Channel], named: Sequence[Channel | Sensor]) -> tuple[Sequence[Channel], str]:
@@ -250,17 +243,13 @@ def sensors_of_planes(recording: Recording, sensors: Sequence[Sensor], profile: 
                 + f"; say which is which in place of [planes]: {ask}"
             )
         untold = seats([channel for channel, _ in entries], members)
-        for sensor, (channel, angle) in zip(untold, entries, strict=True):
-            if angle is not None:
-                apart = [abs(math.remainder(angle - float(s.angle), 2 * math.pi)) for s in members]
-                sensor = members[apart.index(min(apart))]
-                if min(apart) > _SAME_ANGLE or sensor.name in mapped:
-                    words = (
-                        f"at {math.degrees(angle):.4g} deg is none of the sensors of the machine ({stand})"
-                    )
-                    ask = "correct one of them, or leave out the angles where the order is the same"
-                    raise UsageError(f"the plane {name!r}: {channel.label} {words}; {ask}")
-            mapped[sensor.name] = channel.label
+        for seat, (channel, angle) in zip(untold, entries, strict=True):
+            at = [seat] if angle is None else _at_angle(members, angle)
+            if not at or at[0].name in mapped:
+                words = f"at {math.degrees(angle or 0.0):.4g} deg is none of the sensors ({stand})"
+                ask = "correct one of them, or leave out the angles where the order is the same"
+                raise UsageError(f"the plane {name!r}: {channel.label} {words}; {ask}")
+            mapped[at[0].name] = channel.label
     return mapped
 
 
@@ -348,14 +337,12 @@ def pairs_of(
 
 
 def _pairs_by_angle(channels: Sequence[Channel]) -> list[tuple[str, tuple[Channel, Channel], str]]:
-    """Channels whose names tell one plane and two angles, without letters of axes."""
-    told: dict[str, dict[float, Channel]] = {}
+    """Two channels whose names tell one plane and an angle each, without letters of axes."""
+    told: dict[str, list[Channel]] = {}
     for channel in channels:
-        plane, angle = told_by(channel)
-        if angle is not None:
-            told.setdefault(plane, {})[angle] = channel
-    pairs = ((plane, list(members.values())) for plane, members in told.items())
-    return [(plane, (two[0], two[1]), "") for plane, two in pairs if len(two) == 2]
+        if told_by(channel)[1] is not None:
+            told.setdefault(told_by(channel)[0], []).append(channel)
+    return [(plane, (two[0], two[1]), "") for plane, two in told.items() if len(two) == 2]
 
 
 def _common(first: str, second: str, axes: str) -> str | None:

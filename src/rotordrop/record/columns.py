@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from rotordrop.arrays import Array
 from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import RecordError, UnmatchedError, UsageError, mapped
-from rotordrop.record.arrangement import by_plane_and_angle, fitting, pairs_of, seats, sensors_of_planes
+from rotordrop.record.arrangement import fitting, pairs_of, seats, sensors_of_planes, sure_of
 from rotordrop.record.profile import LIKELY, Profile
 from rotordrop.record.recording import (
     FULL_SCALE,
@@ -46,10 +46,8 @@ def match_sensors(
     said = profile.channels | sensors_of_planes(recording, sensors, profile)
     wanted = {sensor.name: said.get(sensor.name, sensor.name) for sensor in sensors}
     hits = {name: fitting(recording.channels, channel) for name, channel in wanted.items()}
-    for name, channel in by_plane_and_angle(recording, sensors).items():
-        hits[name] = hits[name] or [channel]
-    if profile.likely and not all(hits.values()):
-        found = likeliest(recording, sensors)
+    found = {} if all(hits.values()) else likeliest(recording, sensors)
+    if profile.likely or sure_of(found, sensors):
         hits |= {name: [channel] for name, channel in found.items() if not hits[name]}
     missing = [name for name in wanted if not hits[name]]
     if missing:
@@ -62,10 +60,9 @@ def match_sensors(
         hint = f" (did you mean {close[0]!r}?)" if close else ""
         several = f" ({len(missing)} sensors have none)" if len(missing) > 1 else ""
         left = [f"; {one}" for one in (*recording.notes, *recording.warnings) if one.startswith("left out")]
-        likely = [*likeliest(recording, sensors).values()]
         sensitive = bool(recording.sensitivities) or all(one.sensitivity is not None for one in sensors)
         more = units_missing(
-            likely or [c for c in recording.channels if not c.unit], profile, sensitive=sensitive
+            [*found.values()] or [c for c in recording.channels if not c.unit], profile, sensitive=sensitive
         )
         gone = {one.bearing or "" for one in sensors} - {
             one.bearing or "" for one in sensors if hits[one.name]

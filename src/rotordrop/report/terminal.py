@@ -109,10 +109,9 @@ def _fitting(
     hidden: list[Statement] = []
     for k, one in enumerate(others, start=1):
         last = k == len(others) and not (hidden or rows)
-        left = room - (not last)
+        left = 99 if one.level == "bad" else room - (not last)  # a problem is told whole
         shorter = (_short(one, lines, rest) for lines in (left if last else OTHERS, 1))
-        said_whole = one.level == "bad"
-        fits = next((short for short in shorter if said_whole or _height(_statement(short)) <= left), None)
+        fits = next((short for short in shorter if _height(_statement(short)) <= left), None)
         if fits is None:
             hidden.append(one)
         else:
@@ -128,8 +127,7 @@ def _fitting(
 
 
 def _short(one: Statement, lines: int, rest: str) -> Statement:
-    """A statement in so many lines; what forbids to go on says the way out, and is never cut."""
-    if one.level == "bad":
+    if one.level == "bad":  # it says the way out
         return one
     plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
     longest = lines * (WIDTH - len("warning: "))

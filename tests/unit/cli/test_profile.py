@@ -91,7 +91,6 @@ def test_a_wrong_entry_is_named_as_it_was_given(capsys):
 def test_the_examples_of_the_documentation_are_profiles():
     page = (Path(__file__).parents[3] / "docs" / "recorders.md").read_text(encoding="utf-8")
     examples = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
-    assert len(examples) == 3
     for example in examples:
         profile_of(tomllib.loads(example), "example")
 

@@ -386,27 +386,6 @@ def test_the_same_log_in_postgresql(postgresql):
     assert len(logged_drops(postgresql, machine="LP-400")) == 100
 
 
-@pytest.mark.slow
-def test_a_role_that_may_only_read_reads_and_writes_nothing(postgresql):
-    import psycopg
-
-    number = add_drop(postgresql, replace(DROP, machine="other", sha256="e" * 64))
-    with psycopg.connect(postgresql) as connection:
-        connection.execute("CREATE ROLE reader LOGIN")
-        connection.execute("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
-    reader = postgresql.replace("rotordrop@", "reader@")
-    assert number in logged_drops(reader)
-    for write in (lambda: add_drop(reader, DROP), lambda: remove_drop(reader, number)):
-        with pytest.raises(OutputError, match=r"127\.0\.0\.1:\d+/postgres cannot be used: permission denied"):
-            write()
-    with psycopg.connect(postgresql) as connection:
-        connection.execute("UPDATE rotordrop_log SET kind = 'x' WHERE number = %s", (number,))
-    with pytest.raises(DamagedFileError, match=f"entry {number} is not what was logged"):
-        logged_drops(reader)
-    remove_drop(postgresql, number)
-    assert number not in logged_drops(reader)
-
-
 @pytest.mark.parametrize(
     "url",
     [
