@@ -68,7 +68,7 @@ from rotordrop.series import peak_indices
 from rotordrop.severity.numbers import LOADS
 from rotordrop.units import percent
 
-AROUND_PEAK = (2e-3, 4e-3)
+AROUND_PEAK = (2e-3, 6e-3)
 """Stretch before and after a peak [s] that gets a figure of its own; chosen, not measured."""
 ANOTHER_PEAK = 5e-3
 """Uncertainty of the time of a peak [s] from which another peak may be the largest; chosen, not measured."""
@@ -552,13 +552,10 @@ def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, 
         upright(figure, value, MUTED, "dot", row=1, col=column)
     times = f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂"
     top = "y domain" if column == 1 else f"y{column} domain"
-    left: dict[str, Any] = {"column": column, "size": 11.5, "xanchor": "left"}
-    words(figure, end, 1.0, times, yref=top, yanchor="top", xshift=3, **left)
-    drawn = bearing.motions[0].vertical
-    depth = float(np.interp(contact.deepest_time, drawn.time, drawn.values))
-    text = f"indentation {' to '.join(f'{one:.1f}' for one in depths)} µm"
-    arrow: dict[str, Any] = {"showarrow": True, "arrowhead": 2, "arrowcolor": LIMIT, "ax": 70, "ay": -4}
-    words(figure, MILLI * contact.deepest_time, MICRO * depth, text, **left, **arrow)
+    # above the rebounds, where no curve runs through it
+    text = f"{times}<br>indentation {' to '.join(f'{one:.1f}' for one in depths)} µm"
+    look: dict[str, Any] = {"size": 11.5, "xanchor": "left", "yanchor": "top", "align": "left", "xshift": 3}
+    words(figure, end, 1.0, text, column=column, yref=top, **look)
 
 
 STATED = (

@@ -495,7 +495,7 @@ def _mark(
         said.append(f"{'' if certain else 'peak, '}90 %: {low} to {high} {unit}")
     if not said:
         return
-    arrow = {"showarrow": True, "arrowhead": 2, "arrowcolor": MUTED, "ax": 20, "ay": 10}
+    arrow = {"showarrow": True, "arrowhead": 2, "arrowcolor": MUTED, "ax": 55, "ay": 10}
     beside: dict[str, Any] = {"xanchor": "left", "align": "left", "bgcolor": OVER, **arrow}
     at = (MILLI * peak.time, scale * peak.value)
     words(figure, *at, "<br>".join(said), row=row, column=column, **beside)
