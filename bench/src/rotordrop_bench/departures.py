@@ -15,7 +15,7 @@ from rotordrop.rotor.statics import bearing_load_shares
 
 Parts = dict[str, dict[str, Any]]
 
-SLIGHT, LARGE = 0, 1
+SIZES = ("slight", "large")
 """Sizes of a departure: as many machines have it, and as only some do."""
 
 PEAK_LOADS = 10.0

@@ -27,7 +27,7 @@ from rotordrop.rotor.unknowns import (
     sensor_prior,
     smallest_gap,
 )
-from rotordrop_bench.departures import DEPARTURES, LARGE, SLIGHT, departures
+from rotordrop_bench.departures import DEPARTURES, SIZES, departures
 from rotordrop_bench.event import drop_conditions, hidden_machine, stream
 from rotordrop_bench.faults import FAULTS, PLAIN, spoiled
 from rotordrop_bench.recording import SyntheticDrop, drop_path, synthesize_drop, truth_path, write_drop
@@ -38,12 +38,11 @@ from rotordrop_bench.violations import Violations
 PLAN, LIST = (resources.files(__package__).joinpath(f"{name}.toml") for name in ("cases", "dropbench"))
 DROPBENCH = tomllib.loads(LIST.read_text(encoding="utf-8"))
 VERSION, SPEEDS = DROPBENCH["version"], DROPBENCH["speeds"]
+"""Version of DropBench, and speeds of every rotor [Hz]."""
 KINDS = (*(kind for kind in DEPARTURES if kind != "unbalance jump"), "unbalance jump")
 """Departures, in turn over the cases of the corpus that have one."""
 TRIES, TRY = 20, 100_000
 """Draws from the prior until a rotor drops within its record, and what a further one adds to the seed."""
-
-SIZES = ((SLIGHT, "slight"), (LARGE, "large"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,13 +72,14 @@ class Case:
 
 
 Drop = tuple[str, int, tuple[tuple[str, int], ...], int, dict[str, Any]]
+"""Family, seed of the machine, departures, turn of the rotors, and what a drop has besides."""
 
 
 def _dropbench() -> Iterator[Case]:
     kinds, rotors, split = list(DEPARTURES), list(ROTORS), DROPBENCH["first"]
 
     def single(family: str, own: list[str], seed: int, turn: int) -> Iterator[Drop]:
-        for size, word in SIZES:
+        for size, word in enumerate(SIZES):
             for i, kind in enumerate(own):
                 yield f"{family}, {word}", seed + 100 * size + i, ((kind, size),), turn * size + i, {}
 
@@ -92,7 +92,7 @@ def _dropbench() -> Iterator[Case]:
     turn = 2 * (split + 1)
     for seed, (family, groups) in zip((1000, 1100), DROPBENCH["groups"].items(), strict=True):
         for i, named in enumerate(groups):
-            first.append((family, seed + i, tuple((kind, SLIGHT) for kind in named), turn, {}))
+            first.append((family, seed + i, tuple((kind, 0) for kind in named), turn, {}))
             turn += 1
     first += [
         ("other sampling rates", 1200 + i, (), turn + i, {"sampling_rate": rate})
@@ -100,8 +100,8 @@ def _dropbench() -> Iterator[Case]:
     ]
     later, last = kinds[split:-1], kinds[-1]
     play: list[Drop] = [
-        (f"{last}, {word}", 1500 + i, ((last, size),), i, {"speed": SPEEDS[rotor][1]})
-        for i, (rotor, (size, word)) in enumerate(zip(ROTORS, cycle(SIZES), strict=False))
+        (f"{last}, {SIZES[i % 2]}", 1500 + i, ((last, i % 2),), i, {"speed": SPEEDS[rotor][1]})
+        for i, rotor in enumerate(ROTORS)
     ]
     for start, drops in ((1, first), (101, single("later kinds", later, 1300, len(later))), (201, play)):
         speeds = {rotor: cycle(values) for rotor, values in SPEEDS.items()}
