@@ -601,3 +601,42 @@ def test_a_plane_between_the_bearings_has_the_name_of_neither(machine):
     record = replace(drop, sensors=three.sensors, signals=drop.signals[:, [0, 1, 2, 3, 2, 3]])
     read = dict(look_page(look(record, machine=three), drawn=False).facts)["channels"]
     assert read.endswith("; between: MS_NDE_A, MS_NDE_B")
+
+
+def test_channels_are_named_where_their_names_do_not_tell(tmp_path):
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path})
+    text = (
+        file.read_text()
+        .replace("NDE_X", "alpha")
+        .replace("NDE_Y", "bravo")
+        .replace("DE_X", "c")
+        .replace("DE_Y", "d")
+    )
+    file.write_text(text)
+    alone = look(file, gap=GAP)
+    assert [level.channel for level in alone.levels] == ["alpha", "bravo", "c", "d", "Speed"]
+    seen = look(file, gap=GAP, mapping=["left: alpha 0 deg, bravo 90 deg", "right: c 0 deg, d 90 deg"])
+    assert [plane.plane for plane in seen.planes] == ["left", "right"]
+    with pytest.raises(UsageError, match=r"there is no channel 'e'; write \"PLANE: .*there are alpha, bravo"):
+        look(file, mapping=["left: e 0 deg, alpha 90 deg"])
+    with pytest.raises(UsageError, match=r"'alpha' is neither \"SENSOR=CHANNEL\" nor \"PLANE: CHANNEL angle"):
+        look(file, mapping=["alpha"])
+
+
+@pytest.mark.parametrize("unit", ["um", "mil", "mm"])
+def test_a_unit_in_which_the_shaft_falls_faster_than_gravity_is_doubted(tmp_path, unit):
+    """Nothing else is known without a machine file; 25.4 times the gap passed without a word."""
+    time, path, _ = fall_and_bounce()
+    file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": 0.8 * path})
+    file.write_text(file.read_text().replace("[um]", f"[{unit}]"))
+    found = [one for one in look(file).findings if one.kind == "wrong unit factor"]
+    if unit == "um":
+        assert found == []
+        return
+    factor = {"mil": 25.4, "mm": 1e3}[unit]
+    told = re.search(
+        r"falls (\S+) times as fast as gravity .* a unit factor of (\d+\.?\d*)", found[0].message
+    )
+    assert float(told[1]) == pytest.approx(factor, rel=0.4) and float(told[2]) == factor
+    assert found[0].severity == "stop" and "which unit is it?" in found[0].remedy

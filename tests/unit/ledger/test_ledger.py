@@ -467,3 +467,41 @@ def test_a_drop_is_dated_by_its_recorder_unless_somebody_says_otherwise(tmp_path
     assert run(["log", "show", log, "--json", str(tmp_path / "log.json")]) == 0
     drops = json.loads((tmp_path / "log.json").read_text())["drops"].values()
     assert [drop["recorded"] for drop in drops] == ["2026-03-14T15:09:26Z", "2026-03-15T00:00:00"]
+
+
+@pytest.mark.slow
+def test_a_role_that_may_only_read_reads_and_writes_nothing(postgresql):
+    import psycopg
+
+    number = add_drop(postgresql, replace(DROP, machine="other", sha256="e" * 64))
+    with psycopg.connect(postgresql) as connection:
+        connection.execute("CREATE ROLE reader LOGIN")
+        connection.execute("GRANT SELECT ON ALL TABLES IN SCHEMA public TO reader")
+    reader = postgresql.replace("rotordrop@", "reader@")
+    assert number in logged_drops(reader)
+    for write in (lambda: add_drop(reader, DROP), lambda: remove_drop(reader, number)):
+        with pytest.raises(OutputError, match=r"127\.0\.0\.1:\d+/postgres cannot be used: permission denied"):
+            write()
+    with psycopg.connect(postgresql) as connection:
+        connection.execute("UPDATE rotordrop_log SET kind = 'x' WHERE number = %s", (number,))
+    with pytest.raises(DamagedFileError, match=f"entry {number} is not what was logged"):
+        logged_drops(reader)
+    remove_drop(postgresql, number)
+    assert number not in logged_drops(reader)
+
+
+@pytest.mark.slow
+def test_a_server_that_stops_in_between_keeps_what_was_acknowledged(postgresql):
+    import psycopg
+
+    before, one = {add_drop(postgresql, DROP)}, writer(postgresql, 7, 400)
+    for _ in range(20):
+        one.stdout.readline()
+    with psycopg.connect(postgresql, autocommit=True) as connection:
+        connection.execute(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+            "WHERE pid <> pg_backend_pid() AND datname = 'postgres'"
+        )
+    told = killed_after(one, 0) | {f"7{i:063d}" for i in range(20)}
+    there = {drop.sha256 for n, drop in logged_drops(postgresql).items() if n not in before}
+    assert told <= there and len(there) <= len(told) + 1

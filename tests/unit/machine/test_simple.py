@@ -15,7 +15,7 @@ from rotordrop.machine.saving import machine_text
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 from rotordrop.rotor.assembly import free_free_modes, rotor_fe
 from rotordrop.rotor.machine_summary import summarise_machine
-from rotordrop_bench.rotors import ROTORS
+from rotordrop_bench.rotors import ROTORS, bench_rotor
 
 
 def test_mass_and_centre_of_mass_are_those_given_and_planes_are_nodes():
@@ -50,7 +50,7 @@ def test_a_simple_rotor_bends_as_the_beam_and_reads_back():
 @pytest.mark.parametrize("rotor", ROTORS)
 def test_the_ranges_of_the_beam_hold_the_rotors_at_hand(rotor):
     """Bending and inertia of every rotor of the bench over those of the cylinder of its mass and length."""
-    described = ROTORS[rotor]().rotor
+    described = bench_rotor(rotor).rotor
     length = described.node_positions[-1]
     places = {"bearings": (0.1 * length, 0.9 * length), "sensors": (0.2 * length, 0.8 * length)}
     numbers = {"mass": described.mass, "length": length, "centre": described.centre_of_gravity} | places
