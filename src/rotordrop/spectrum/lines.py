@@ -178,8 +178,12 @@ def _joined(lines: Sequence[Line]) -> list[Line]:
 
 
 def _same(line: Line, other: Line) -> bool:
-    """Whether two entries are one line: in two planes, or in one at two times or within their errors."""
-    if line.label != other.label:
+    """Whether two entries are one line: in two planes, or in one at two times or within their errors.
+
+    Where both ends swing at one frequency, the rotor swings as a whole.
+    """
+    swings = line.named and other.named and _swing(line) == _swing(other) == PENDULUM
+    if line.label != other.label and not swings:
         return False
     apart = line.first_seen >= other.last_seen - 1.0 or other.first_seen >= line.last_seen - 1.0
     one = abs(line.frequency - other.frequency) <= line.frequency_error + other.frequency_error
@@ -198,8 +202,11 @@ def _same(line: Line, other: Line) -> bool:
 
 def _merged(line: Line, other: Line) -> Line:
     strong, weak = (line, other) if line.amplitude >= other.amplitude else (other, line)
+    alike = line.label == other.label
     return replace(
         strong,
+        label=line.label if alike else f"{PENDULUM} {' and '.join({**line.forward, **other.forward})}",
+        reason=strong.reason if alike else f"{line.reason}; {other.reason}",
         amplitude_xy={**weak.amplitude_xy, **strong.amplitude_xy},
         forward={**weak.forward, **strong.forward},
         backward={**weak.backward, **strong.backward},

@@ -27,7 +27,7 @@ from rotordrop.spectrum.detection import (
     clearest_peak,
     half_power_width,
 )
-from rotordrop.spectrum.lines import SWING_ERROR, name_lines, of_swings
+from rotordrop.spectrum.lines import SWING_ERROR, _joined, name_lines, of_swings
 from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
@@ -204,9 +204,11 @@ def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide():
     bands = (450.0, 20.0)
     names = [line.label for line in name_lines([("DE", swing), ("DE", twice)], known, 285e-6, bands)]
     assert names == ["pendulum", "pendulum, harmonic 2"]
-    ends = [pendulum_candidate(end, 28.3, 29.8, planes=[end]) for end in ("NDE", "DE")]
+    ends = [pendulum_candidate(f"pendulum {end}", 28.3, 29.8, planes=[end]) for end in ("NDE", "DE")]
     seen = [("NDE", swing), ("DE", replace(swing, frequency=28.71)), ("DE", twice)]
-    assert name_lines(seen, ends, 285e-6, bands)[2].label == "pendulum, harmonic 2"
+    joined = _joined(name_lines(seen, ends, 285e-6, bands))  # both ends at one frequency: the rotor swings
+    assert [line.label for line in joined] == ["pendulum NDE and DE", "pendulum, harmonic 2"]
+    assert set(joined[0].forward) == {"NDE", "DE"}
 
 
 def test_the_conical_swing_and_what_it_mixes_to_are_named_from_the_pendulum_found():
