@@ -43,6 +43,8 @@ def test_a_score_is_a_table_and_a_list_names_departures(folder, tmp_path, capsys
         assert run(["score", *map(str, given), "--json", str(folder / "scores.json")]) == 0
         out = capsys.readouterr().out
         assert "2.0 %" in out and "100 %" in out and "10 %" in out
+        departures = 1 if given[0] == estimate else 2  # of one violation in either drop, none named
+        assert f"of {departures} departures 0 were named, and 0 estimates name one" in " ".join(out.split())
         assert ("there is no synthetic_060Hz_2.json" in out) == (given[0] == tmp_path)
         assert "synthetic_060Hz_1" in json.loads((folder / "scores.json").read_text())["drops"]
     assert run(["list", "--only", "two departures"]) == 0
