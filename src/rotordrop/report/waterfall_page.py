@@ -46,7 +46,7 @@ from rotordrop.report.style import (
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
 from rotordrop.spectrum.indentation import DisplacementHistory
 from rotordrop.spectrum.lines import Line
-from rotordrop.spectrum.orders import LEAST_APART, STANDARD_SETTINGS, STEADY_APART, OrderTrack
+from rotordrop.spectrum.orders import LEAST_APART, REVOLUTIONS, STEADY_APART, OrderTrack
 from rotordrop.spectrum.waterfall import Waterfall
 
 if TYPE_CHECKING:
@@ -268,14 +268,14 @@ def _order_section(analysis: CoastDownAnalysis) -> Section:
 
 def _short(track: OrderTrack) -> tuple[Statement, ...]:
     """What the orders of a short signal cannot tell."""
-    if track.revolutions >= STANDARD_SETTINGS.revolutions:
+    if track.revolutions >= REVOLUTIONS:
         return ()
     close, steady = (turns / track.revolutions for turns in (LEAST_APART, STEADY_APART))
     have = ", ".join(f"{order:g}X" for order in track.orders)
     return (
         Statement(
             f"The signal is short: orders ({have}) are tracked over {track.revolutions:.3g} turns in place "
-            f"of {STANDARD_SETTINGS.revolutions:g}. Two orders less than {close:.2g}X apart, and an "
+            f"of {REVOLUTIONS:g}. Two orders less than {close:.2g}X apart, and an "
             f"order and a steady line less than {steady:.2g}X apart, are not told apart.",
             "notice",
         ),

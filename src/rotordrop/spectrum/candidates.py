@@ -61,8 +61,8 @@ class Candidate:
     """Whether value and tolerance are shares of the frequency of a swing that was found [1]."""
 
 
-def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:
-    """Whole orders up to the highest, and the half orders between them as the sign of rub.
+def order_candidates() -> tuple[Candidate, ...]:
+    """Whole orders up to the sixth, and the half orders between them as the sign of rub.
 
     Source: Neisi 2020, section 5.4: 1X, 2X, 3X in all tests; 1.5X, 2.5X, 3.5X, 4.5X as rub impact.
     """
@@ -77,11 +77,11 @@ def order_candidates(highest: int = 6) -> tuple[Candidate, ...]:
             tolerance=EQUAL_ORDER * k,
             reason=reasons.get(k, reasons.get(k % 1.0, usual)),
         )
-        for k in (0.5 * half for half in range(1, 2 * highest + 1))
+        for k in (0.5 * half for half in range(1, 13))
     )
 
 
-def mains_candidates(frequencies: Sequence[float] = (50.0, 60.0), highest: int = 6) -> tuple[Candidate, ...]:
+def mains_candidates() -> tuple[Candidate, ...]:
     """Hum of the electrical supply [Hz] and its multiples."""
     return tuple(
         Candidate(
@@ -94,8 +94,8 @@ def mains_candidates(frequencies: Sequence[float] = (50.0, 60.0), highest: int =
             weight=1.0 if k == 1 else 0.3,
             narrow=True,
         )
-        for f in frequencies
-        for k in range(1, highest + 1)
+        for f in (50.0, 60.0)
+        for k in range(1, 7)
     )
 
 

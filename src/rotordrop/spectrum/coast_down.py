@@ -246,7 +246,7 @@ def _plane(
         ]
         ends = np.array([start, start + (moved.shape[0] - 1) / rate])
         turns = abs(float(np.diff(signal.profile.angle_at(ends))[0])) / math.tau
-        orders, tracking = tracking_for(turns, ORDERS)
+        orders, revolutions = tracking_for(turns, ORDERS)
         track = track_orders(
             read,
             rate,
@@ -254,10 +254,9 @@ def _plane(
             orders=orders,
             start_time=start,
             steady_lines=others,
-            settings=tracking,
+            revolutions=revolutions,
         )
-        modes = [candidate for candidate in candidates if not candidate.family.startswith("mains")]
-        resonances = find_resonances(track, name, candidates=modes)
+        resonances = find_resonances(track, name, candidates)
     return PlaneAnalysis(
         waterfalls=_waterfalls(signal, moved, choice),
         history=displacement_history(

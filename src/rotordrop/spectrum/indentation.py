@@ -47,14 +47,12 @@ class DisplacementHistory:
     largest_indentation: float
     """``largest`` less the air gap [m]."""
     largest_later: float
-    """Largest magnitude after ``window`` [m]; nan when the signal ends before."""
+    """Largest magnitude after `PAPER_WINDOW` [m]; nan when the signal ends before."""
     largest_later_time: float
     """When [s]."""
     largest_indentation_interval_90: tuple[float, float] | None
     largest_later_interval_90: tuple[float, float] | None
     """Intervals that hold the two with 90 % probability [m], the former by gap and centre."""
-    window: float
-    """The time after power-off that a simulation would cover [s]."""
     noise: float
     """Noise of the displacement [m], which lifts every maximum by some four times itself."""
     statement: str
@@ -62,8 +60,8 @@ class DisplacementHistory:
 
     @property
     def held_maximum(self) -> bool:
-        """Whether the largest displacement fell into the first window (0.2 s in the paper)."""
-        return self.largest_time <= self.window
+        """Whether the largest displacement fell into `PAPER_WINDOW`."""
+        return self.largest_time <= PAPER_WINDOW
 
     @property
     def held_clearly(self) -> bool:
@@ -78,15 +76,13 @@ def displacement_history(
     air_gap: float,
     error: float | None = None,
     start_time: float = 0.0,
-    window: float = PAPER_WINDOW,
     intervals: int = 2000,
 ) -> DisplacementHistory:
     """Give the envelope of a displacement over the whole coast-down and say when the largest indentation
     came.
 
     The displacement (N, 2) [m] counts from the centre of the race, in one plane, and is read in blocks;
-    ``error`` is the standard error of that distance [m], where it is estimated; the window [s] is the time
-    that is asked about: did the maximum fall into it?
+    ``error`` is the standard error of that distance [m], where it is estimated.
 
     Source: Neisi 2020, section 5.4 and Fig. 17. Differs from the paper: it says whether 0.2 s held the
     maximum.
@@ -95,7 +91,7 @@ def displacement_history(
     if samples < 2:
         raise RecordError(f"displacement: {samples} samples, at least 2 are needed")
     per_interval = max(1, -(-samples // intervals))
-    boundary = int(np.ceil((window - start_time) * sampling_rate))
+    boundary = int(np.ceil((PAPER_WINDOW - start_time) * sampling_rate))
     early, late = (-np.inf, 0), (-np.inf, 0)
     noise: list[float] = []
     ends: list[list[Array]] = [[], []]
@@ -140,10 +136,9 @@ def displacement_history(
         largest_later_time=later_time if np.isfinite(later) else float("nan"),
         largest_indentation_interval_90=between(float(largest) - air_gap, math.sqrt(2.0)),
         largest_later_interval_90=between(later),
-        window=window,
         noise=spread,
         statement=_window_statement(
-            (early[0], start_time + early[1] / sampling_rate), (late[0], later_time), window, spread
+            (early[0], start_time + early[1] / sampling_rate), (late[0], later_time), spread
         ),
     )
 
@@ -177,19 +172,17 @@ def _peak(radius: Array, start: int) -> tuple[float, int]:
     return float(radius[at]), start + at
 
 
-def _window_statement(
-    early: tuple[float, float], late: tuple[float, float], window: float, noise: float
-) -> str:
+def _window_statement(early: tuple[float, float], late: tuple[float, float], noise: float) -> str:
     """When the largest displacement came, and what share of it stood in the other part."""
     held = early[0] >= late[0]
     (largest, time), (other, then) = (early, late) if held else (late, early)
     first = f"largest displacement at {format_moment(time)}"
     if not np.isfinite(other):
-        return f"{first}; the signal ends within {window:g} s"
+        return f"{first}; the signal ends within {PAPER_WINDOW:g} s"
     share = percent(other / (largest or 1.0))
     part = "later than" if held else "until"
-    second = f"{part} {window:g} s at most {share} of it (at {format_moment(then)})"
+    second = f"{part} {PAPER_WINDOW:g} s at most {share} of it (at {format_moment(then)})"
     if held and largest - other <= 2.0 * noise:
         return f"{first}; {second}: the noise of {noise * 1e6:.2f} µm leaves open which was larger"
     did = "held" if held else "did not hold"
-    return f"{first}; {second}: the first {window:g} s {did} the largest displacement"
+    return f"{first}; {second}: the first {PAPER_WINDOW:g} s {did} the largest displacement"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,36 +27,15 @@ STEADY_EXTRA = 2
 """How much higher the degree of a steady line's amplitude is: two swings may beat in it."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrackingSettings:
-    """How much signal each amplitude is taken from."""
-
-    revolutions: float = 24.0
-    """Turns of the rotor per window [1]: more average away more noise, fewer follow faster changes."""
-    longest_window: float = 3.0
-    """Limit of the window at low speed [s]."""
-    step: float = 0.1
-    """Time from one amplitude to the next [s], at least."""
-    share: float = 0.125
-    """The same over the length of the window [1], at least: what changes faster no window shows (chosen)."""
-    degree: int = 2
-    """Degree of the polynomial an amplitude may follow within a window [1]."""
-
-    def __post_init__(self) -> None:
-        if (
-            self.revolutions < FEWEST_TURNS
-            or self.longest_window <= 0.0
-            or self.step <= 0.0
-            or self.degree < 0
-        ):
-            raise UsageError(
-                f"order tracking: {self.revolutions:g} turns per window, longest window "
-                f"{self.longest_window:g} s, step {self.step:g} s, degree {self.degree}; expected at least "
-                f"{FEWEST_TURNS:g} turns, positive times and a degree of 0 or more"
-            )
-
-
-STANDARD_SETTINGS = TrackingSettings()
+REVOLUTIONS = 24.0
+"""Turns of the rotor per window [1]: more average away more noise, fewer follow faster changes."""
+LONGEST_WINDOW = 3.0
+"""Limit of the window at low speed [s]."""
+STEP, STEP_SHARE = 0.1, 0.125
+"""Time from one amplitude to the next at least [s], also over the length of the window [1]: what changes
+faster no window shows (chosen)."""
+DEGREE = 2
+"""Degree of the polynomial an amplitude may follow within a window [1]."""
 
 _FEWEST_WINDOWS = 2.0
 """Windows that lie in a signal side by side, at least, as long as they can be shortened [1] (chosen): of one
@@ -66,8 +45,8 @@ _FEWEST_CENTRES = 4
 """Amplitudes that are taken along a short signal, about [1] (chosen)."""
 
 
-def tracking_for(turns: float, orders: Sequence[float]) -> tuple[tuple[float, ...], TrackingSettings]:
-    """Orders and settings for a signal of so many turns of the rotor.
+def tracking_for(turns: float, orders: Sequence[float]) -> tuple[tuple[float, ...], float]:
+    """Orders for a signal of so many turns of the rotor, and the turns per window.
 
     Windows are halved until a short signal holds two, down to the turns that tell the orders apart. A signal
     that is too short for one window of all orders has the whole ones left, which 4 turns tell apart.
@@ -75,10 +54,10 @@ def tracking_for(turns: float, orders: Sequence[float]) -> tuple[tuple[float, ..
     wanted = tuple(orders)
     if turns < _least_turns(wanted):
         wanted = tuple(order for order in wanted if float(order).is_integer()) or wanted
-    revolutions, least = STANDARD_SETTINGS.revolutions, _least_turns(wanted)
+    revolutions, least = REVOLUTIONS, _least_turns(wanted)
     while revolutions > least and turns < _FEWEST_WINDOWS * revolutions:
         revolutions = max(0.5 * revolutions, least)
-    return wanted, replace(STANDARD_SETTINGS, revolutions=revolutions)
+    return wanted, revolutions
 
 
 def _least_turns(orders: Sequence[float] | Array) -> float:
@@ -142,7 +121,7 @@ def track_orders(
     orders: Sequence[float] = (1.0, 2.0, 3.0),
     start_time: float = 0.0,
     steady_lines: Sequence[FrequencyPath] = (),
-    settings: TrackingSettings = STANDARD_SETTINGS,
+    revolutions: float = REVOLUTIONS,
 ) -> OrderTrack:
     """Follow the orders of a displacement through a coast-down.
 
@@ -153,7 +132,7 @@ def track_orders(
 
     The displacement (N, 2) [m] of one plane is read window by window; the profile is on the clock of
     ``start_time`` [s]; steady lines do not follow the speed (pendulum, hum) and are explained besides the
-    orders.
+    orders; a window holds so many revolutions, at low speed fewer.
 
     Source: own method. Differs from the paper: section 5.4 uses fixed frames, in which 1X at 60 Hz reads 41
     % of its amplitude.
@@ -163,18 +142,18 @@ def track_orders(
         raise UsageError(
             f"order tracking: orders {list(orders)} given, expected positive multiples of the speed"
         )
-    centres = _centres(displacement.shape[0], sampling_rate, start_time, profile, wanted, settings)
+    centres = _centres(displacement.shape[0], sampling_rate, start_time, profile, wanted, revolutions)
     if not centres:
         duration = displacement.shape[0] / sampling_rate
         raise RecordError(
             f"order tracking: the signal of {duration:.2f} s holds no whole window"
-            f" of {settings.revolutions:g} turns; give a longer signal or fewer turns per window"
+            f" of {revolutions:g} turns; give a longer signal or fewer turns per window"
         )
     fastest = float(np.abs(profile.speed).max()) / math.tau
     highest = max([wanted.max() * fastest, *(float(line.frequency.max()) for line in steady_lines)])
     thin, thin_rate = reduce_rate(displacement, sampling_rate, highest)
     signal = _Signal(thin, thin_rate, start_time, profile, PASSED if thin_rate < sampling_rate else 1.0)
-    rows = [_window_fit(signal, wanted, steady_lines, settings.degree, t, w) for t, w in centres]
+    rows = [_window_fit(signal, wanted, steady_lines, t, w) for t, w in centres]
     time = np.array([t for t, _ in centres])
     window = np.array([w for _, w in centres])
     speed = profile.speed_at(time)
@@ -185,7 +164,7 @@ def track_orders(
         amplitude=np.array([row[0] for row in rows]),
         standard_error=np.array([row[1] for row in rows]),
         window=window,
-        revolutions=settings.revolutions,
+        revolutions=revolutions,
         separable=_separable(wanted, time, profile, window, steady_lines),
     )
 
@@ -196,24 +175,25 @@ def _centres(
     start: float,
     profile: SpeedProfile,
     orders: Array,
-    settings: TrackingSettings,
+    revolutions: float,
 ) -> list[tuple[float, float]]:
     """Middle [s] and length [s] of every window that fits into the signal and holds enough turns."""
     end = start + (samples - 1) / sampling_rate
     least = _least_turns(orders)
+    turns = max(revolutions, least)
     fastest = max(float(np.abs(profile.speed).max()) / math.tau, 1e-300)
-    room = end - start - min(max(settings.revolutions, least) / fastest, settings.longest_window)
+    room = end - start - min(turns / fastest, LONGEST_WINDOW)
     most = room / _FEWEST_CENTRES if room > 0.0 else math.inf
-    step = min(settings.step, most)
+    step = min(STEP, most)
     times = np.arange(start + step, end, step)
     speed = np.abs(profile.speed_at(times)) / math.tau
     fitting: list[tuple[float, float]] = []
     for t, n in zip(times.tolist(), speed.tolist(), strict=True):
         if n <= 0.0:
             continue
-        window = min(max(settings.revolutions, least) / n, settings.longest_window)
+        window = min(turns / n, LONGEST_WINDOW)
         inside = t - window / 2 >= start and t + window / 2 <= end
-        if fitting and t - fitting[-1][0] < min(settings.share * window, most) - 1e-9:
+        if fitting and t - fitting[-1][0] < min(STEP_SHARE * window, most) - 1e-9:
             continue
         if inside and window * n >= least:
             fitting.append((t, window))
@@ -237,22 +217,22 @@ class _Signal:
 
 
 def _window_fit(
-    signal: _Signal, orders: Array, steady: Sequence[FrequencyPath], degree: int, centre: float, window: float
+    signal: _Signal, orders: Array, steady: Sequence[FrequencyPath], centre: float, window: float
 ) -> tuple[ComplexArray, Array]:
     time, cut = signal.cut(centre, window)
     angle = signal.profile.angle_at(time)
     beside = _distinct(steady, orders, signal.profile, centre, window)
     u = 2.0 * (time - centre) / window
     weight = np.cos(0.5 * np.pi * u)[:, None]
-    phases = [(k * angle, degree) for k in orders]
-    phases += [(line.phase_over(time), degree + STEADY_EXTRA) for line in beside]
-    basis = _basis(phases, u, degree)
+    phases = [(k * angle, DEGREE) for k in orders]
+    phases += [(line.phase_over(time), DEGREE + STEADY_EXTRA) for line in beside]
+    basis = _basis(phases, u)
     basis *= weight
     measured = (cut - cut.mean(axis=0)) * weight
     inverse = np.linalg.pinv(basis.T @ basis, rcond=1e-13, hermitian=True)
     coefficients = inverse @ (basis.T @ measured)
-    first = (degree + 1) * 2 * np.arange(orders.size)
-    amplitude = coefficients[first] - 1j * coefficients[first + degree + 1]
+    first = (DEGREE + 1) * 2 * np.arange(orders.size)
+    amplitude = coefficients[first] - 1j * coefficients[first + DEGREE + 1]
     residual = measured - basis @ coefficients
     # what was thinned out has lost part of its noise, none of it at the orders
     freedom = max(signal.band * float(np.sum(weight**2)) * (1.0 - basis.shape[1] / len(basis)), 1.0)
@@ -278,17 +258,17 @@ def _distinct(
     return chosen
 
 
-def _basis(phases: list[tuple[Array, int]], u: Array, degree: int) -> Array:
+def _basis(phases: list[tuple[Array, int]], u: Array) -> Array:
     """Cosine and sine of every phase times powers of the place in the window up to its degree; the powers."""
-    powers = u[:, None] ** np.arange(max(degree, *(highest for _, highest in phases)) + 1)
+    powers = u[:, None] ** np.arange(DEGREE + STEADY_EXTRA + 1)
     # filled in place: a window has thousands of samples and up to a hundred columns
-    basis = np.empty((u.size, sum(2 * (highest + 1) for _, highest in phases) + degree + 1))
+    basis = np.empty((u.size, sum(2 * (highest + 1) for _, highest in phases) + DEGREE + 1))
     column = 0
     for phase, highest in phases:
         for part in (np.cos(phase), np.sin(phase)):
             np.multiply(part[:, None], powers[:, : highest + 1], out=basis[:, column : column + highest + 1])
             column += highest + 1
-    basis[:, column:] = powers[:, : degree + 1]
+    basis[:, column:] = powers[:, : DEGREE + 1]
     return basis
 
 

@@ -18,6 +18,11 @@ from rotordrop.spectrum.candidates import Candidate
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.orders import OrderTrack
 
+LEAST_RISE = 1.5
+"""Amplitude over the level on both sides [1] from which it is a rise (chosen)."""
+LOWEST_FREQUENCY, BAND = 5.0, 1000.0
+"""Frequency [Hz] from which excitation is looked at, and width of the band in which modes may lie [Hz]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PassedResonance:
@@ -60,31 +65,24 @@ class PassedResonance:
 def find_resonances(
     track: OrderTrack,
     plane: str,
-    *,
-    candidates: Sequence[Candidate] = (),
-    least_rise: float = 1.5,
-    lowest_frequency: float = 5.0,
-    band: float = 1000.0,
+    candidates: Sequence[Candidate],
 ) -> tuple[PassedResonance, ...]:
     """Find where the amplitude of each tracked order rises and falls again while the speed falls.
 
-    A rise counts when it stands ``least_rise`` times above the level on both sides and five standard errors
+    A rise counts when it stands `LEAST_RISE` times above the level on both sides and five standard errors
     clear of it. Where an order crosses a steady line (a pendulum swing, hum) its amplitude is unknown: there
     it is taken to be no higher than on the better known side, and a rise found so is reported as uncertain,
     with the least amplitude it must have had.
 
-    Candidates are modes; those of kind "steady" are compared, mains hum left out. Excitation below the lowest
-    frequency [Hz] is left out; modes may lie in a band so wide [Hz]. The result is in the order of time.
+    Of the candidates those of kind "steady" are compared, mains hum left out. The result is in the order of
+    time.
     """
     modes = [c for c in candidates if c.kind == "steady" and not c.family.startswith("mains")]
     found: list[PassedResonance] = []
     for column, order in enumerate(track.orders.tolist()):
-        curve = _curve(track, column, order, lowest_frequency)
+        curve = _curve(track, column, order)
         if curve is not None:
-            found += [
-                _resonance(track, curve, order, plane, peak, modes, band)
-                for peak in _peaks(curve, least_rise)
-            ]
+            found += [_resonance(track, curve, order, plane, peak, modes) for peak in _peaks(curve)]
     return tuple(sorted(found, key=lambda resonance: resonance.time))
 
 
@@ -109,15 +107,15 @@ class _Rise:
     right: float
 
 
-def _curve(track: OrderTrack, column: int, order: float, lowest: float) -> _Curve | None:
+def _curve(track: OrderTrack, column: int, order: float) -> _Curve | None:
     frequency = order * track.speed / math.tau
     known = track.separable[:, column]
     # Hidden ends say nothing about a rise: begin and end with amplitudes that are known.
-    usable = np.flatnonzero(known & (frequency >= lowest))
+    usable = np.flatnonzero(known & (frequency >= LOWEST_FREQUENCY))
     if usable.size < 5:
         return None
     rows = np.arange(usable[0], usable[-1] + 1)
-    rows = rows[frequency[rows] >= lowest]
+    rows = rows[frequency[rows] >= LOWEST_FREQUENCY]
     amplitude = track.major_axis[rows, column].copy()
     known = known[rows]
     gaps, count = label(~known)
@@ -128,11 +126,11 @@ def _curve(track: OrderTrack, column: int, order: float, lowest: float) -> _Curv
     return _Curve(rows, frequency[rows], amplitude, np.where(known, error, 0.0), known)
 
 
-def _peaks(curve: _Curve, least_rise: float) -> list[_Rise]:
+def _peaks(curve: _Curve) -> list[_Rise]:
     amplitude = curve.amplitude
     peaks, facts = find_peaks(amplitude, prominence=1e-12, plateau_size=1)
     base = amplitude[peaks] - facts["prominences"]
-    clear = amplitude[peaks] >= least_rise * base
+    clear = amplitude[peaks] >= LEAST_RISE * base
     noise = [curve.error[first : last + 1].max() for first, last in _edges(facts)]
     clear &= facts["prominences"] >= 5.0 * np.asarray(noise, dtype=np.float64)
     _, _, left, right = peak_widths(amplitude, peaks[clear], rel_height=0.5)
@@ -154,7 +152,6 @@ def _resonance(
     plane: str,
     rise: _Rise,
     modes: Sequence[Candidate],
-    band: float,
 ) -> PassedResonance:
     row = int(curve.rows[rise.at])
     start, end = np.interp([rise.left, rise.right], np.arange(curve.rows.size), curve.frequency)
@@ -175,8 +172,8 @@ def _resonance(
         roundness=0.0,
         radius=amplitude,
         plane=plane,
-        band=band,
-        order_band=band,
+        band=BAND,
+        order_band=BAND,
     )
     return PassedResonance(
         order=order,

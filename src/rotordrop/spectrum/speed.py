@@ -197,6 +197,8 @@ def _spread(values: Array) -> float:
 
 
 Model = Callable[[Array], Array]
+Law = Callable[[Array, Array], Array]
+"""Speed [rad/s] by the parameters of a law and the time since its start [s]."""
 
 MOST_VALUES = 2000
 CLOSE_ENOUGH = 1e-4
@@ -218,6 +220,12 @@ class FittedLaw:
     """What of it is noise of the recording [rad/s]; the rest says that the law is another."""
     statement: str
     """Whether the law holds, in a sentence."""
+    _law: Law
+    _parameters: Array
+
+    def speed_at(self, time: ArrayLike) -> Array:
+        """Fitted speed [rad/s] at times [s] from ``start`` on; standstill is kept."""
+        return self._law(self._parameters, np.asarray(time, dtype=np.float64) - self.start)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,14 +234,6 @@ class ExponentialFit(FittedLaw):
 
     time_constant: Known
     """τ [s]."""
-    time: Array
-    residual: Array
-    """Recorded minus fitted speed [rad/s] over time [s], shape (K,)."""
-
-    def speed_at(self, time: ArrayLike) -> Array:
-        """Fitted speed [rad/s] at times [s]."""
-        elapsed = np.asarray(time, dtype=np.float64) - self.start
-        return self.initial_speed.value * np.exp(-elapsed / self.time_constant.value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,14 +248,6 @@ class DragFit(FittedLaw):
     quadratic: Known
     """Turbulent drag per polar inertia of rotor and races [1/rad]; times that inertia it is the machine
     file's ``aero_quadratic``."""
-    correlation: Array
-    """Of initial speed, constant, linear, quadratic, in this order [1], shape (4, 4)."""
-
-    def speed_at(self, time: ArrayLike) -> Array:
-        """Fitted speed [rad/s] at times [s] from ``start`` on; standstill is kept."""
-        values = (self.initial_speed, self.constant, self.linear, self.quadratic)
-        parameters = np.array([value.value for value in values])
-        return _drag_solution(parameters, np.asarray(time, dtype=np.float64) - self.start)
 
 
 def fit_exponential(time: ArrayLike, speed: ArrayLike, *, start: float) -> ExponentialFit:
@@ -267,25 +259,13 @@ def fit_exponential(time: ArrayLike, speed: ArrayLike, *, start: float) -> Expon
     wrong law does not scatter like noise.
     """
     t, omega = _window(time, speed, start)
-    expected = _reading(t, omega)
     guess = max(_half_time(t, omega, start) / math.log(2.0), 1e-6)
     scale = np.array([max(float(omega[0]), 1e-9), guess])
-
-    def model(p: Array) -> Array:
-        return expected(p[0] * np.exp(-(t - start) / p[1]))
-
-    fit = _fit(model, omega, scale, lower=np.array([0.0, 1e-6]))
-    residual = omega - model(fit.parameters)
-    initial, constant = _values(fit, scale, ("rad/s", "s"), np.zeros(2))
-    return ExponentialFit(
-        initial_speed=initial,
-        time_constant=constant,
-        start=start,
-        end=float(t[-1]),
-        time=t,
-        residual=residual,
-        **_left_over("One time constant", residual, omega),
+    lower = np.array([0.0, 1e-6])
+    found = _fitted(
+        "One time constant", _exponential, t, omega, start, scale, lower, ("initial_speed", "time_constant")
     )
+    return ExponentialFit(**found)
 
 
 def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float) -> DragFit:
@@ -300,35 +280,88 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float) -> DragFit:
     speed, with a dry part that the recorded speed contains besides the aerodynamic ones.
     """
     t, omega = _window(time, speed, start)
-    expected = _reading(t, omega)
     # each of the three drags alone would stop about half of the rotor's speed in the half time
     half, first = max(_half_time(t, omega, float(t[0])), 1e-6), float(omega[0])
     scale = np.array([first, 0.05 * first / half, 0.5 / half, 0.1 / (half * first)])
+    names = ("initial_speed", "constant", "linear", "quadratic")
+    said = "Dry, linear and quadratic drag"
+    return DragFit(**_fitted(said, _drag_solution, t, omega, start, scale, np.zeros(4), names))
+
+
+_UNITS = {
+    "initial_speed": "rad/s",
+    "time_constant": "s",
+    "constant": "rad/s²",
+    "linear": "1/s",
+    "quadratic": "1/rad",
+}
+
+
+def _fitted(
+    said: str,
+    law: Law,
+    time: Array,
+    speed: Array,
+    start: float,
+    scale: Array,
+    lower: Array,
+    names: tuple[str, ...],
+) -> dict[str, Any]:
+    """A law fitted to recorded speeds [rad/s] from a first guess, by the fields of `FittedLaw`."""
+    expected = _reading(time, speed)
 
     def model(p: Array) -> Array:
-        return expected(_drag_solution(p, t - start))
+        return expected(law(p, time - start))
 
-    fit = _fit(model, omega, scale, lower=np.zeros(4))
-    initial, constant, linear, quadratic = _values(
-        fit, scale, ("rad/s", "rad/s²", "1/s", "1/rad"), np.zeros(4)
+    parameters, errors = _fit(model, speed, scale, lower=lower)
+    residual = speed - model(parameters)
+    rms, noise = float(np.sqrt(np.mean(residual**2))), neighbour_noise(speed)
+    follows = not rms > max(1.5 * noise, CLOSE_ENOUGH * float(speed.max()))
+    found = {
+        name: _positive(value, error, guess, _UNITS[name])
+        for name, value, error, guess in zip(
+            names, parameters.tolist(), errors.tolist(), scale.tolist(), strict=True
+        )
+    }
+    return found | {
+        "start": start,
+        "end": float(time[-1]),
+        "residual_rms": rms,
+        "noise": noise,
+        "statement": f"{said}: residual {rms / math.tau:.2g} Hz rms, noise of the speed "
+        f"{noise / math.tau:.2g} Hz; the speed {'follows' if follows else 'does not follow'} this law.",
+        "_law": law,
+        "_parameters": parameters,
+    }
+
+
+def _positive(value: float, error: float, guess: float, unit: str) -> Known:
+    status: Status = "determined"
+    if value <= 0.01 * error:
+        status = "at its bound"
+    elif error > 0.5 * abs(value):
+        status = "the record does not determine it"
+    return Known(
+        value=value,
+        status=status,
+        standard_error=error,
+        interval_90=(max(value - NINETY * error, 0.0), value + NINETY * error),
+        start=guess,
+        bounds=(0.0, math.inf),
+        unit=unit,
     )
-    return DragFit(
-        initial_speed=initial,
-        constant=constant,
-        linear=linear,
-        quadratic=quadratic,
-        correlation=fit.correlation,
-        start=start,
-        end=float(t[-1]),
-        **_left_over("Dry, linear and quadratic drag", omega - model(fit.parameters), omega),
-    )
 
 
-def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -> Known:
+def _exponential(parameters: Array, time: Array) -> Array:
+    """Speed [rad/s] by initial speed and time constant at times [s] from its beginning."""
+    return cast(Array, parameters[0] * np.exp(-time / parameters[1]))
+
+
+def find_standstill(time: ArrayLike, speed: ArrayLike) -> Known:
     """Find when the rotor stops [s], by carrying its last slow turning to zero speed.
 
     Dry and linear drag bring the rotor to rest at a definite time, which is fitted to the recorded speed from
-    ``share`` of its highest value on, with allowance for a tacho that cannot read below zero. What stops is
+    a twentieth of its highest value on, with allowance for a tacho that cannot read below zero. What stops is
     the mean turning: a rotor that still swings in the race rocks a little about its axis. A record that ends
     before, or a rotor that only creeps ever slower, is said to determine nothing; ``lower`` is then the time
     up to which it surely turned.
@@ -336,7 +369,7 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
     Times (K,) [s] rise, with the recorded speed (K,) [rad/s].
     """
     t, omega = _window(time, speed, -math.inf)
-    turning = np.flatnonzero(omega > share * float(omega.max()))
+    turning = np.flatnonzero(omega > 0.05 * float(omega.max()))
     t, omega = t[turning[-1] :], omega[turning[-1] :]
     noise = max(neighbour_noise(omega), 1e-9 * float(omega.max()))
     last_seen = float(t[np.flatnonzero(omega > 5.0 * noise)[-1]])
@@ -351,10 +384,10 @@ def find_standstill(time: ArrayLike, speed: ArrayLike, *, share: float = 0.05) -
         return expected(p[2] * np.expm1(p[1] * left) / np.expm1(p[1] * p[0]))
 
     upper = np.array([4.0 * span, 300.0 / span, np.inf])
-    fit = _fit(model, omega, scale, lower=np.array([1e-3 * span, 1e-3 / span, 0.0]), upper=upper)
-    error = float(fit.error[0])
-    value = float(t[0]) + float(fit.parameters[0])
-    determined = value + NINETY * error < t[-1] and error < 0.2 * fit.parameters[0]
+    found, errors = _fit(model, omega, scale, lower=np.array([1e-3 * span, 1e-3 / span, 0.0]), upper=upper)
+    error = float(errors[0])
+    value = float(t[0]) + float(found[0])
+    determined = value + NINETY * error < t[-1] and error < 0.2 * found[0]
     status: Status = "determined" if determined else "the record does not determine it"
     return Known(
         value=value if determined else float(t[-1]),
@@ -375,22 +408,15 @@ def neighbour_noise(speed: ArrayLike) -> float:
     return noise_by_differences(turning, 2)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Fit:
-    parameters: Array
-    error: Array
-    correlation: Array
-    lower: Array
-
-
-def _fit(model: Model, measured: Array, scale: Array, *, lower: Array, upper: Array | None = None) -> _Fit:
+def _fit(
+    model: Model, measured: Array, scale: Array, *, lower: Array, upper: Array | float = math.inf
+) -> tuple[Array, Array]:
     """Least squares in scaled parameters, with errors from the residual and its run of equal signs."""
-    highest = np.full(scale.size, np.inf) if upper is None else upper / scale
-    start = np.clip(np.ones(scale.size), lower / scale, highest)
+    bounds = lower / scale, upper / scale
     solution = least_squares(
         lambda q: model(q * scale) - measured,
-        start,
-        bounds=(lower / scale, highest),
+        np.clip(np.ones(scale.size), *bounds),
+        bounds=bounds,
         x_scale="jac",
         xtol=1e-12,
         ftol=1e-12,
@@ -399,13 +425,7 @@ def _fit(model: Model, measured: Array, scale: Array, *, lower: Array, upper: Ar
     freedom = max(residual.size - scale.size, 1)
     variance = float(residual @ residual) / freedom * inflation(residual)
     covariance = variance * np.linalg.pinv(solution.jac.T @ solution.jac)
-    deviation = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    return _Fit(
-        parameters=solution.x * scale,
-        error=deviation * scale,
-        correlation=covariance / np.outer(deviation, deviation),
-        lower=lower,
-    )
+    return solution.x * scale, np.sqrt(np.maximum(np.diag(covariance), 1e-300)) * scale
 
 
 def inflation(residual: Array) -> float:
@@ -415,29 +435,6 @@ def inflation(residual: Array) -> float:
         return 1.0
     likeness = min(max(float(residual[1:] @ residual[:-1]) / power, 0.0), 0.98)
     return (1.0 + likeness) / (1.0 - likeness)
-
-
-def _values(fit: _Fit, start: Array, units: tuple[str, ...], bound: Array) -> list[Known]:
-    found = []
-    for k, unit in enumerate(units):
-        value, error = float(fit.parameters[k]), float(fit.error[k])
-        status: Status = "determined"
-        if value <= bound[k] + 0.01 * error:
-            status = "at its bound"
-        elif error > 0.5 * abs(value):
-            status = "the record does not determine it"
-        found.append(
-            Known(
-                value=value,
-                status=status,
-                standard_error=error,
-                interval_90=(max(value - NINETY * error, float(bound[k])), value + NINETY * error),
-                start=float(start[k]),
-                bounds=(float(bound[k]), math.inf),
-                unit=unit,
-            )
-        )
-    return found
 
 
 def _window(time: ArrayLike, speed: ArrayLike, start: float) -> tuple[Array, Array]:
@@ -498,15 +495,3 @@ def _drag_solution(parameters: Array, time: Array) -> Array:
         root = np.tan(np.minimum(half, math.atan2(rate * first, stop))) / rate
     speed = (first - stop * root) / (1.0 + (2.0 * quadratic * first + linear) * root)
     return np.maximum(speed, 0.0)
-
-
-def _left_over(law: str, residual: Array, omega: Array) -> dict[str, Any]:
-    """What a law leaves of recorded speeds [rad/s], by the fields of `FittedLaw`."""
-    rms, noise = float(np.sqrt(np.mean(residual**2))), neighbour_noise(omega)
-    follows = not rms > max(1.5 * noise, CLOSE_ENOUGH * float(omega.max()))
-    return {
-        "residual_rms": rms,
-        "noise": noise,
-        "statement": f"{law}: residual {rms / math.tau:.2g} Hz rms, noise of the speed "
-        f"{noise / math.tau:.2g} Hz; the speed {'follows' if follows else 'does not follow'} this law.",
-    }

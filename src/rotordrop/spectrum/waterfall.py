@@ -41,9 +41,6 @@ class WaterfallSettings:
     """Samples per frame [1]."""
     overlap: float = 0.5
     """Share of a frame that the next one uses again [1]."""
-    remove_mean: bool = True
-    """Subtract each frame's mean, which with a Hann window changes only the lines at 0 and ± one resolution.
-    """
 
     def __post_init__(self) -> None:
         if self.points < FEWEST_POINTS:
@@ -155,8 +152,7 @@ def waterfalls(
     for row in range(frames):
         start = row * settings.hop
         frame = np.asarray(displacement[start : start + settings.points], dtype=np.float64)
-        if settings.remove_mean:
-            frame = frame - frame.mean(axis=0)
+        frame = frame - frame.mean(axis=0)  # changes only the lines at 0 and ± one resolution
         for one, (_, keep), amplitude in zip(components, lines, amplitudes, strict=True):
             amplitude[row] = _amplitude(frame, window, one)[keep] * AMPLITUDE_SCALE[amplitude_kind]
     centre = (np.arange(frames, dtype=np.float64) * settings.hop + settings.points / 2) / sampling_rate

@@ -36,15 +36,14 @@ def tone(frequency, samples=8192, amplitude=1.0):
 def test_same_amplitudes_as_scipys_short_time_transform():
     rng = np.random.default_rng(1)
     xy = rng.standard_normal((10000, 2))
-    (ours,) = waterfalls(
-        xy, FS, components=("x",), settings=WaterfallSettings(points=2048, remove_mean=False)
-    )
+    (ours,) = waterfalls(xy, FS, components=("x",), settings=SMALL)
     transform = ShortTimeFFT(
         hann(2048, sym=False), hop=1024, fs=FS, scale_to="magnitude", fft_mode="onesided"
     )
     theirs = 2.0 * np.abs(transform.stft(xy[:, 0], p0=1, p1=1 + len(ours.time), k_offset=0)).T
     theirs[:, [0, -1]] /= 2.0
-    assert ours.amplitude == pytest.approx(theirs, rel=1e-9, abs=1e-12)
+    # the mean of each frame, which is subtracted, stands in the first two lines
+    assert ours.amplitude[:, 2:] == pytest.approx(theirs[:, 2:], rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("component", ["x", "y", "full"])
@@ -62,9 +61,6 @@ def test_peak_to_peak_offset_and_direction_stand_where_they_belong():
     assert double.amplitude == pytest.approx(2.0 * single.amplitude)
     assert (single.amplitude_kind, double.amplitude_kind) == ("zero-to-peak", "peak-to-peak")
     xy = np.tile([2e-6, -285e-6], (4096, 1))
-    (kept,) = waterfalls(xy, FS, settings=WaterfallSettings(points=2048, remove_mean=False))
-    near = np.abs(kept.frequency) < 1.5 * kept.resolution
-    assert kept.amplitude[:, ~near].max() < 1e-15
     assert waterfalls(xy, FS, settings=SMALL)[0].amplitude.max() < 1e-15
     (found,) = waterfalls(tone(50 * FS / 2048) * [1.0, -1.0], FS, components=("full",), settings=SMALL)
     (backward,) = waterfalls(tone(-50 * FS / 2048), FS, components=("full",), settings=SMALL)
