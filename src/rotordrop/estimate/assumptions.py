@@ -23,11 +23,9 @@ from rotordrop.units import format_quantity, percent
 def evidence_assumptions(evidence: Evidence) -> Iterator[str]:
     """What every method takes where the record does not say."""
     yield not_seen(evidence)
-    machine = evidence.model.machine
-    if evidence.speed.note:
-        yield f"speed: {evidence.speed.note}"
+    machine = evidence.base.machine
     if evidence.record.measured_speed is None:
-        most = format_quantity(strongest_slowing(evidence.model), "speed")
+        most = format_quantity(strongest_slowing(evidence.base), "speed")
         yield (
             "the speed was not measured after power-off: the rotor angle, and with it the 2X runout, is that "
             f"of a rotor that loses anything from nothing to {most} a second"

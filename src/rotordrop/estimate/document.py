@@ -17,10 +17,11 @@ from rotordrop.simulate.fingerprint import fingerprint
 def published_drop(estimate: Estimate) -> Drop:
     """What is published of an estimate; Python and the command line get the same."""
     method, steps, names = estimate.method, estimate.replay, [bearing.name for bearing in estimate.bearings]
-    replayed: dict[str, Any] = {} if steps is None else {**steps.document}
+    replayed: dict[str, Any] = {}
     if steps is not None:
         contacts = map(FirstContact.of_result, steps.contacts)
-        replayed["first_contact"] = dict(zip(names, contacts, strict=True))
+        first = dict(zip(names, contacts, strict=True))
+        replayed = {"initial_state": steps.initial_state, "first_contact": first}
     return Drop.of_result(
         estimate,
         format=FORMAT,

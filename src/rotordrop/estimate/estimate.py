@@ -23,12 +23,19 @@ from rotordrop.errors import needing
 from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.methods import Method
-from rotordrop.estimate.published import Agreement, Joint, LaterMotion, Structure, later_warning, peak_text
+from rotordrop.estimate.published import (
+    Agreement,
+    InitialState,
+    Joint,
+    LaterMotion,
+    Structure,
+    later_warning,
+    peak_text,
+)
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff
 from rotordrop.evidence.quality.finding import Finding
-from rotordrop.evidence.speed import SpeedFit
 from rotordrop.files import write_json
 from rotordrop.known import Known
 from rotordrop.machine import Machine
@@ -168,15 +175,10 @@ class SensorMotion:
 class ReplaySteps:
     """The steps of the paper's route beside the common result."""
 
-    speed: SpeedFit
-    """Speed at power-off and how it falls."""
     contacts: tuple[TimedContact, ...]
     """First contact of every bearing in the record, with the stiffness of eq. (17)."""
-    speed_time: Array
-    speed_simulated: Array
-    """Simulated speed [rad/s] against time [s], shape (T,)."""
-    document: Mapping[str, Any]
-    """Initial state and speed law, ready for the published document."""
+    initial_state: InitialState
+    """Where it starts."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

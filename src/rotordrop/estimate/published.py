@@ -297,17 +297,6 @@ class Unbalance(Document):
     sentence: str
 
 
-class Speed(Document):
-    """Speed in a replay."""
-
-    aero_time_constant_s: Annotated[
-        Value | None, Of(lambda fit: tau if math.isfinite((tau := fit.aero_time_constant).value) else None)
-    ]
-    profile_time_constant_s: float | None
-    friction_loss_Hz: Annotated[float, Of(lambda fit: fit.friction_loss / (2.0 * math.pi))]
-    simulated_end_Hz: float
-
-
 class Expansion(Document):
     """Start by modal expansion (the paper's), by bearing."""
 
@@ -407,7 +396,6 @@ class Drop(Document):
     """How the errors of what belongs to the machine hang together."""
     sensors: Annotated[dict[str, Sensor], Of(lambda made: {one.sensor: one for one in made.sensors})]
     unbalance: list[Unbalance]
-    speed: Speed = ABSENT
     initial_state: InitialState = ABSENT
     first_contact: dict[str, FirstContact] = ABSENT
     agreement: Annotated[Agreement, Of("agreement")] = ABSENT

@@ -81,7 +81,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
     # before the rotor model: the paths of a minute and the compiler need not be in memory at once
     walls, falls = _seen(record, machine)
     evidence = read_evidence(build_drop_model(machine), record)
-    off, names = evidence.power_off.value, evidence.model.bearing_names
+    off, names = evidence.power_off.value, evidence.base.bearing_names
     sensing = known(evidence.sensing)
     first = int(np.searchsorted(record.time, off))
     try:

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.errors import IdentificationError, RecordError
-
-if TYPE_CHECKING:
-    pass
 
 CLEAR = 6e-3
 """How far the rotor must come out of the air gap circle to count as out, over the gap [1], against noise

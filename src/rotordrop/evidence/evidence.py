@@ -27,7 +27,7 @@ from rotordrop.evidence.events import (
     of_whole,
 )
 from rotordrop.evidence.levitated import LevitatedModel
-from rotordrop.evidence.measured_speed import RotorAngle, rotor_angle
+from rotordrop.evidence.measured_speed import RotorAngle, SpeedAtDrop, rotor_angle, speed_at_drop
 from rotordrop.evidence.rest import rest_of, resting_record
 from rotordrop.record.axes import sensor_polarity
 from rotordrop.record.record import Record
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from rotordrop.evidence.quality.flight import Weighed
     from rotordrop.evidence.rest import Rest
     from rotordrop.evidence.sensing import Sensing
-    from rotordrop.evidence.speed import SpeedFit
     from rotordrop.machine import Machine
     from rotordrop.rotor.parameters import DropModel
 
@@ -211,17 +210,13 @@ class Evidence:
         return build_drop_model(self.machine)
 
     @cached_property
-    def model(self) -> DropModel:
-        """The drop model with the speed law of the record."""
-        slowed = min(self.speed.aero_time_constant.value, 1e6)
-        return self.base.with_values({"speed.aero_time_constant": slowed})
-
-    @cached_property
-    def speed(self) -> SpeedFit:
-        """Speed at power-off and how it falls."""
-        from rotordrop.evidence.speed import identify_speed
-
-        return identify_speed(self.record, self.power_off.value, turning=self._turning)
+    def speed(self) -> SpeedAtDrop:
+        """Speed at power-off, by the levitated orbit where the readings of the speed do not contradict it."""
+        read = speed_at_drop(self.record, self.power_off.value)
+        error, turning = max(read.standard_error, 1e-4 * read.value), self._turning
+        if turning is not None and abs(turning - read.value) < 5.0 * error + 2e-3 * read.value:
+            return SpeedAtDrop(value=turning, standard_error=1e-4 * turning)
+        return SpeedAtDrop(value=read.value, standard_error=error)
 
     @property
     def _turning(self) -> float | None:
@@ -230,7 +225,7 @@ class Evidence:
     @cached_property
     def angle(self) -> RotorAngle:
         """Rotor angle over the whole record."""
-        turning = self.speed.initial if self._turning is None else self._turning
+        turning = self.speed.value if self._turning is None else self._turning
         slowing = strongest_slowing(self.base)
         return rotor_angle(self.record, self.power_off.value, turning, strongest_slowing=slowing)
 
@@ -350,7 +345,6 @@ class Evidence:
 
 _OF_ALL = (
     "base",
-    "model",
     "power_off",
     "speed",
     "angle",

@@ -29,15 +29,8 @@ class SpeedAtDrop:
     """Speed when the rotor was let go."""
 
     value: float
-    """Speed at the drop [rad/s]."""
     standard_error: float
-    """Standard error of `value` [rad/s]."""
-    slope: float
-    """Mean rate of change over the first 0.2 s after the drop [rad/s²]."""
-    scatter: float
-    """Standard deviation of one reading [rad/s]."""
-    readings: int
-    """Readings used."""
+    """Speed at the drop and its standard error [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +113,7 @@ def speed_at_drop(record: Record, drop: float) -> SpeedAtDrop:
     time, readings = require_speed(record)
     if record.speed_by_hand:
         value = float(np.median(readings))
-        error = BY_HAND_ERROR * abs(value)
-        return SpeedAtDrop(value=value, standard_error=error, slope=0.0, scatter=0.0, readings=0)
+        return SpeedAtDrop(value=value, standard_error=BY_HAND_ERROR * abs(value))
     good = np.isfinite(readings)
     before = good & (time <= drop) & (time >= drop - _BEFORE)
     after = good & (time > drop) & (time <= drop + _AFTER)
@@ -137,14 +129,8 @@ def speed_at_drop(record: Record, drop: float) -> SpeedAtDrop:
         line = _robust(np.column_stack([np.ones_like(when), when]), values)
         if abs(line[0][1]) > 4.0 * line[1] * float(np.sqrt(line[2][1, 1])):
             solution, scatter, covariance = line
-    value = float(solution[0])
-    return SpeedAtDrop(
-        value=value,
-        standard_error=float(scatter * np.sqrt(covariance[0, 0])),
-        slope=float(np.median((readings[after] - value) / (time[after] - drop))) if after.any() else 0.0,
-        scatter=scatter,
-        readings=int(used.sum()),
-    )
+    error = float(scatter * np.sqrt(covariance[0, 0]))
+    return SpeedAtDrop(value=float(solution[0]), standard_error=error)
 
 
 def require_speed(record: Record) -> tuple[Array, Array]:
@@ -157,12 +143,12 @@ def require_speed(record: Record) -> tuple[Array, Array]:
     return record.speed_time, record.speed_readings
 
 
-def _robust(design: Array, values: Array, rounds: int = 12) -> tuple[Array, float, Array]:
+def _robust(design: Array, values: Array) -> tuple[Array, float, Array]:
     """Least squares with Huber weights; gives solution, scatter and the unscaled covariance."""
     weights = np.ones(len(values))
     scatter = 0.0
     solution: Array = np.zeros(design.shape[1])
-    for _ in range(rounds):
+    for _ in range(12):
         found = np.linalg.lstsq(design * weights[:, None], values * weights, rcond=None)[0]
         solution = np.asarray(found, dtype=np.float64)
         rest = values - design @ solution

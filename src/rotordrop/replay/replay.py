@@ -7,7 +7,6 @@ recorded one, so it has no interval; the tracked twin, from whose smoothed estim
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from rotordrop.estimate.bearing_drop import Role as MotionRole
 from rotordrop.estimate.bearing_values import bearing_values
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
 from rotordrop.estimate.methods import Replay
-from rotordrop.estimate.published import Expansion, InitialState, Speed, later_warning
+from rotordrop.estimate.published import Expansion, InitialState, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.contacts import identify_first_contacts
 from rotordrop.evidence.evidence import Missing, sought
@@ -116,13 +115,7 @@ def replayed_drop(drop: TrackedDrop, method: Replay, facts: RecordFacts) -> Esti
         agreement=compare_orbits(
             time[inside], measured[inside], shown[0], gap, result.bearing_names, at=result.time
         ),
-        replay=ReplaySteps(
-            speed=evidence.speed,
-            contacts=contacts,
-            speed_time=result.time,
-            speed_simulated=result.speed,
-            document=_document(drop, result),
-        ),
+        replay=ReplaySteps(contacts=contacts, initial_state=_initial_state(drop)),
         later=later,
         findings=facts.findings,
         warnings=facts.warnings_with(*evidence.power_off.notes, later_warning(later, DURATION)),
@@ -159,33 +152,29 @@ def _open_loop(drop: TrackedDrop, gap_change: Array) -> DropResult:
     return replace(result, time=result.time + first, contacts=log)
 
 
-def _document(drop: TrackedDrop, result: DropResult) -> dict[str, Any]:
-    """Initial state and speed law of a replay, ready for the published document."""
-    problem, evidence, layout = drop.problem, drop.evidence, drop.problem.model.layout
-    at_off, p = drop.smoothed.means[0], problem.model.parameters
+def _initial_state(drop: TrackedDrop) -> InitialState:
+    """Where the replay starts, and where the paper's would: by two rigid modes from the samples around it."""
+    problem, evidence, at_off = drop.problem, drop.evidence, drop.smoothed.means[0]
+    layout, p = problem.model.layout, problem.model.parameters
     identified = parameters_at(problem, at_off[problem.parameter_slice])
 
     def by_bearing(values: Array) -> dict[str, list[float]]:
-        return dict(zip(result.bearing_names, values.tolist(), strict=True))
+        return dict(zip(problem.model.bearing_names, values.tolist(), strict=True))
 
     def of_rotor(x: slice, y: slice) -> dict[str, list[float]]:
         return by_bearing(p.bearing_shape @ np.column_stack([at_off[x], at_off[y]]))
 
     gains, offsets = problem.sensor_errors(drop.smoothed.means[-1])
     along = (evidence.readings(np.inf) - offsets) / (1.0 + gains)
-    # the paper's start, beside ours: two rigid modes from the samples around power-off
     expanded = sought(lambda: expand_initial_state(evidence.time, along, problem.sensor_rows, problem.model))
     expansion: dict[str, Expansion] = {}
     if not isinstance(expanded, Missing):
         place, velocity = map(by_bearing, expanded.at_bearings)
         expansion["modal_expansion"] = Expansion(displacement_m=place, velocity_m_per_s=velocity)
-    return {
-        "speed": Speed.of_result(evidence.speed, simulated_end_Hz=float(result.speed[-1]) / (2.0 * np.pi)),
-        "initial_state": InitialState(
-            displacement_m=of_rotor(layout.modal_x, layout.modal_y),
-            velocity_m_per_s=of_rotor(layout.velocity_of(layout.modal_x), layout.velocity_of(layout.modal_y)),
-            remanent_force_N=identified.magnet[:, L.REMANENT_X : L.REMANENT_Y + 1].tolist(),
-            remanence_time_constant_s=float(identified.spin[L.REMANENCE_TIME_CONSTANT]),
-            **expansion,
-        ),
-    }
+    return InitialState(
+        displacement_m=of_rotor(layout.modal_x, layout.modal_y),
+        velocity_m_per_s=of_rotor(layout.velocity_of(layout.modal_x), layout.velocity_of(layout.modal_y)),
+        remanent_force_N=identified.magnet[:, L.REMANENT_X : L.REMANENT_Y + 1].tolist(),
+        remanence_time_constant_s=float(identified.spin[L.REMANENCE_TIME_CONSTANT]),
+        **expansion,
+    )

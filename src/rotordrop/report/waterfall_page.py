@@ -44,7 +44,7 @@ from rotordrop.report.style import (
     words,
 )
 from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
-from rotordrop.spectrum.indentation import DisplacementHistory
+from rotordrop.spectrum.indentation import PAPER_WINDOW, DisplacementHistory
 from rotordrop.spectrum.lines import Line
 from rotordrop.spectrum.orders import LEAST_APART, REVOLUTIONS, STEADY_APART, OrderTrack
 from rotordrop.spectrum.waterfall import Waterfall
@@ -149,8 +149,7 @@ def _verdict(analysis: CoastDownAnalysis) -> tuple[Statement, ...]:
     clear = [name for name, history in histories.items() if history.held_clearly]
     said: list[Statement] = []
     if clear:
-        window = histories[clear[0]].window
-        text = f"The first {window:g} s held the largest displacement at {' and '.join(clear)}."
+        text = f"The first {PAPER_WINDOW:g} s held the largest displacement at {' and '.join(clear)}."
         said.append(Statement(text, "good"))
     for name, history in histories.items():
         if name not in clear:

@@ -79,11 +79,6 @@ def test_the_drop_is_simulated_at_both_limits_of_the_air_gap(replayed):
 def test_every_number_of_the_document_is_that_of_its_source(document, replayed, bank):
     steps, agreement = replayed.replay, replayed.agreement
     assert steps is not None and agreement is not None
-    speed = document["speed"]
-    assert speed["friction_loss_Hz"] == pytest.approx(steps.speed.friction_loss / (2.0 * math.pi))
-    assert speed["profile_time_constant_s"] == steps.speed.profile_time_constant
-    assert speed["simulated_end_Hz"] == pytest.approx(steps.speed_simulated[-1] / (2.0 * math.pi))
-    assert 0.0 <= speed["friction_loss_Hz"] < document["speed_Hz"] - speed["simulated_end_Hz"]
     assert document["speed_Hz"] == pytest.approx(replayed.speed / (2.0 * math.pi))
     started = bank("workshop").forces.displacement[0]
     for b, name in enumerate(BEARINGS):

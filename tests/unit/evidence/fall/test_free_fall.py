@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from rotordrop.evidence.contacts import (
     equivalent_stiffness,
     identify_first_contacts,
 )
+from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import held_by
 from rotordrop.evidence.sensing import build_sensing
-from rotordrop.evidence.speed import identify_speed
 from rotordrop.replay.modal_expansion import expand_initial_state, expansion_matrix
 from rotordrop.rotor.statics import rest_on
 from rotordrop.track.problem import sensor_rows
@@ -200,31 +201,18 @@ def test_expansion_matrix_returns_rigid_amplitudes(sensing):
 INITIAL = 2.0 * np.pi * 60.0
 
 
-def with_speed(record, end, loss=3.0, constant=9.0):
-    """A record whose speed falls by air and, within the first 0.3 s, by friction."""
-    time = np.arange(-0.25, end, 0.01)
-    after = np.maximum(time, 0.0)
-    speed = INITIAL * np.exp(-after / constant) - loss * (1.0 - np.exp(-after / 0.08))
-    speed += np.random.default_rng(2).normal(0.0, 0.1, len(time))
-    return replace(record, speed_time=time, speed_readings=speed)
+def test_the_speed_at_the_drop_is_that_before_it_and_of_its_orbit(drop, model):
+    time = np.arange(-0.25, 2.0, 0.01)
+    read = INITIAL * np.exp(-np.maximum(time, 0.0) / 9.0) + np.random.default_rng(2).normal(
+        0.0, 0.1, len(time)
+    )
+    record = replace(drop.record, speed_time=time, speed_readings=read)
 
+    def speed(turning):
+        levitated = None if turning is None else SimpleNamespace(frequency=turning / (2.0 * np.pi))
+        told = {"power_off": SimpleNamespace(value=0.0), "levitated": levitated}
+        return Evidence(record=record, machine=model.machine).with_facts(**told).speed.value
 
-def test_air_and_friction_are_told_apart_where_the_record_is_long(drop):
-    fit = identify_speed(with_speed(drop.record, 2.0), 0.0)
-    assert fit.aero_time_constant.value == pytest.approx(9.0, rel=0.02)
-    assert fit.friction_loss == pytest.approx(3.0, rel=0.1)
-    assert fit.profile_time_constant < 8.8
-    low, high = fit.aero_time_constant.interval_90 or (0.0, 0.0)
-    assert low < 9.0 < high
-    fit = identify_speed(with_speed(drop.record, 0.4), 0.0)
-    assert fit.aero_time_constant.status == "the record does not determine it"
-    assert fit.aero_time_constant.value < 9.0
-
-
-def test_the_speed_at_the_drop_is_that_before_it_and_of_its_orbit(drop):
-    assert identify_speed(with_speed(drop.record, 2.0), 0.0).initial == pytest.approx(INITIAL, abs=0.3)
-    record = with_speed(drop.record, 2.0)
-    assert identify_speed(record, 0.0, turning=INITIAL + 0.01).initial == INITIAL + 0.01
-    assert identify_speed(record, 0.0, turning=2.0 * INITIAL).initial == pytest.approx(INITIAL, abs=0.3)
-    fit = identify_speed(with_speed(drop.record, 0.05), 0.0)
-    assert np.isinf(fit.aero_time_constant.value)
+    assert speed(None) == pytest.approx(INITIAL, abs=0.3)
+    assert speed(INITIAL + 0.01) == pytest.approx(INITIAL + 0.01, rel=1e-12)
+    assert speed(2.0 * INITIAL) == speed(None)
