@@ -14,7 +14,9 @@ from rotordrop.arrays import Array, Mask
 from rotordrop.series import closed
 from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum._views import (
+    BANDWIDTH,
     BESIDE,
+    LOWEST_FREQUENCY,
     Clock,
     Envelope,
     Near,
@@ -26,6 +28,7 @@ from rotordrop.spectrum._views import (
     smooth,
 )
 from rotordrop.spectrum.detection import (
+    FALSE_ALARM,
     Peak,
     clearest_peak,
     frame_power,
@@ -91,10 +94,9 @@ class _Refused:
 class LineSearch:
     """What is left of the signal while lines are found one after the other."""
 
-    def __init__(self, signal: Array, clock: Clock) -> None:
-        self.settings = clock.settings
-        self._clock = clock
-        self._rest = signal - smooth(signal, round(clock.signal_rate / self.settings.lowest_frequency))
+    def __init__(self, signal: Array, clock: Clock, most_lines: int) -> None:
+        self._clock, self._most = clock, most_lines
+        self._rest = signal - smooth(signal, round(clock.signal_rate / LOWEST_FREQUENCY))
         self._refused: list[_Refused] = []
         self._views: dict[tuple[bool, float], View] = {}
         self._after: tuple[Array, View] | None = None
@@ -132,7 +134,7 @@ class LineSearch:
 
     def _single_lines(self, *, speed_change: float, shares: tuple[float, ...]) -> None:
         """Take lines out as long as any is seen while the speed falls by such a share of itself."""
-        while len(self.found) < self.settings.most_lines and len(self._refused) < MOST_REFUSED:
+        while len(self.found) < self._most and len(self._refused) < MOST_REFUSED:
             views = [self._view(share, of_orders) for share in shares for of_orders in (False, True)]
             peaks = [(self._clearest(view, speed_change), view) for view in views if view is not None]
             seen = [(peak, view) for peak, view in peaks if peak is not None]
@@ -174,7 +176,7 @@ class LineSearch:
             for first, last in stretches_of(len(speed), LASTING)
             if speed[first] - speed[last - 1] >= speed_change * speed[first:last].mean()
         ]
-        return clearest_peak(view, self._free(view), self.settings.detection, stretches, usual)
+        return clearest_peak(view, self._free(view), stretches, usual)
 
     def _free(self, view: View) -> Mask:
         """Where a new line may be: not at low frequency, not on the path of a line already taken out."""
@@ -186,8 +188,8 @@ class LineSearch:
             ]
             unit = np.maximum(np.column_stack(moments), 0.1)
         middle = unit[:, 2]
-        free = place * middle[:, None] >= self.settings.lowest_frequency
-        width = np.maximum(self.settings.bandwidth, 1.0 / view.length) / middle
+        free = place * middle[:, None] >= LOWEST_FREQUENCY
+        width = np.maximum(BANDWIDTH, 1.0 / view.length) / middle
         for k, line in enumerate(self.found):
             of_orders = line.kind == "order" or (line.kind == "undecided" and line.order is not None)
             if of_orders != view.of_orders and line.ratio < HARMLESS:
@@ -277,7 +279,7 @@ class LineSearch:
             return False
         speed = float(np.mean(self._clock.speed[spoken]))
         order = coordinate if view.of_orders else coordinate / speed
-        if order * float(np.ptp(self._clock.speed[spoken])) > CLOSE * self.settings.bandwidth:
+        if order * float(np.ptp(self._clock.speed[spoken])) > CLOSE * BANDWIDTH:
             return False
         other = coordinate * speed if view.of_orders else order
         path = other * self._advance(not view.of_orders, of_signal=True)
@@ -300,9 +302,7 @@ class LineSearch:
         seen = present & spoken if (present & spoken).any() else present
         alone = seen & (size < 5.0 * float(np.median(size[seen])))
         for line in self.found:
-            alone &= ~(
-                np.abs(frequency - line.frequency_at(self._clock.time)) < 2.0 * self.settings.bandwidth
-            )
+            alone &= ~(np.abs(frequency - line.frequency_at(self._clock.time)) < 2.0 * BANDWIDTH)
             if line.brief and line.ratio > BURST:
                 # The start and end of a burst spread over all frequencies.
                 alone &= (self._clock.time < line.first_seen) | (self._clock.time > line.last_seen)
@@ -319,7 +319,7 @@ class LineSearch:
 
     def _part(self, envelope: Envelope, present: Mask) -> NDArray[np.complex128]:
         """The amplitude of the line where it is present [m], fading in and out."""
-        reach = round(self._clock.rate / self.settings.bandwidth)
+        reach = round(self._clock.rate / BANDWIDTH)
         near = smooth(present.astype(np.float64), reach) > 0.02
         fade = smooth((near & self._clock.reachable(envelope.phase)).astype(np.float64), max(reach // 4, 1))
         return fade[:, None] * envelope.value
@@ -373,7 +373,7 @@ class LineSearch:
             ratio=peak.ratio,
             first_seen=float(when[0]),
             last_seen=float(when[-1]),
-            existence=1.0 - self.settings.detection.false_alarm,
+            existence=1.0 - FALSE_ALARM,
             time=self._clock.time,
             path=np.abs(self._clock.rate_of(envelope.phase)),
             power=0.5 * np.sum(np.abs(part) ** 2, axis=1),
@@ -403,7 +403,7 @@ class LineSearch:
         steady = sorted(kept, key=lambda entry: -entry[0].strength)
         pairs = [(line, phase, k) for line, phase in steady[:STEADY_PARTNERS] for k in COMBINED_ORDERS]
         seen: list[list[Peak | None]] = []
-        while pairs and len(self.found) < self.settings.most_lines:
+        while pairs and len(self.found) < self._most:
             # what is seen along the paths stays as it is until a line is taken out
             seen = seen or [self._along(self._combined(phase, k)) for _, phase, k in pairs]
             scored = [(peak, index) for index, peaks in enumerate(seen) for peak in peaks]
@@ -439,14 +439,14 @@ class LineSearch:
         for line in self.found:
             moments = [view.time + share * length for share in FIVE_MOMENTS]
             apart = np.abs([self._clock.at(when, path) - line.frequency_at(when) for when in moments])
-            usable &= apart.min(axis=0) > 2.0 * self.settings.bandwidth * max(line.skirt, 1.0)
+            usable &= apart.min(axis=0) > 2.0 * BANDWIDTH * max(line.skirt, 1.0)
         allowed = usable[:, None] & (np.abs(view.coordinate) < 2.5 * view.spacing)
         stretches = [
             (first, last)
             for first, last in stretches_of(len(view.time), LASTING)
             if usable[first:last].mean() >= 0.75
         ]
-        peak = clearest_peak(view, allowed, self.settings.detection, stretches)
+        peak = clearest_peak(view, allowed, stretches)
         if peak is None or peak.score < SURE_COMBINATION or abs(peak.coordinate) > 1.5 * view.spacing:
             return None
         return peak

@@ -13,8 +13,17 @@ from scipy.ndimage import uniform_filter1d
 from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array, ComplexArray, Mask
-from rotordrop.spectrum.detection import FramePower, LineSettings, frame_power, order_power
+from rotordrop.spectrum.detection import FramePower, frame_power, order_power
 from rotordrop.spectrum.speed import SpeedProfile
+
+LOWEST_FREQUENCY, HIGHEST_ORDER = 5.0, 20.0
+"""Where lines are looked for [Hz], [1]."""
+FRAME = 1.6384
+"""Length of a frame for steady lines [s]: that of the paper."""
+TURNS = 32
+"""Turns of the rotor in a frame for orders [1]."""
+BANDWIDTH = 1.0
+"""Amplitude changes that are followed [Hz]."""
 
 SHARPENING = 3
 """Passes over what the smoothing missed: each widens the band in which an amplitude is kept exactly."""
@@ -220,22 +229,20 @@ class Clock:
         profile: SpeedProfile | None,
         *,
         start_time: float,
-        settings: LineSettings,
         highest_frequency: float,
     ) -> None:
-        self.settings = settings
         self.highest_frequency = highest_frequency
         self.signal_rate = sampling_rate
         self.start = start_time
         self.signal_time: Array = start_time + np.arange(samples, dtype=np.float64) / sampling_rate
         self.signal_angle = None if profile is None else profile.angle_at(self.signal_time)
         self._signal_speed = np.zeros(samples) if profile is None else profile.speed_at(self.signal_time)
-        self.factor = max(int(sampling_rate // max(5.2 * BESIDE, 50.0 * settings.bandwidth)), 1)
+        self.factor = max(int(sampling_rate // max(5.2 * BESIDE, 50.0 * BANDWIDTH)), 1)
         self.rate = sampling_rate / self.factor
         self.time: Array = self.signal_time[:: self.factor].copy()
         self.angle = None if self.signal_angle is None else self.signal_angle[:: self.factor].copy()
         self.speed: Array = self._signal_speed[:: self.factor] / math.tau
-        self.frame = min(settings.frame, samples / sampling_rate / 3.0)
+        self.frame = min(FRAME, samples / sampling_rate / 3.0)
 
     def at(self, time: Array, values: Array) -> Array:
         """Values [any] at the times of lines, at other times."""
@@ -248,7 +255,7 @@ class Clock:
     def reachable(self, phase: Array) -> Mask:
         """Where a phase [rad] runs at a frequency that is looked at."""
         frequency = np.abs(self.rate_of(phase))
-        return (frequency >= self.settings.lowest_frequency) & (frequency <= self.highest_frequency)
+        return (frequency >= LOWEST_FREQUENCY) & (frequency <= self.highest_frequency)
 
     def near(self, signal: Array, path: Array) -> Near:
         """What a signal [m] holds near a path, whose phase [rad] is known at every sample of the signal."""
@@ -256,7 +263,7 @@ class Clock:
 
     def extract(self, near: Near, turn: Array | float = 0.0) -> Envelope:
         """The part that follows a path and a further phase [rad]."""
-        return extract(near, self.rate, turn, bandwidth=self.settings.bandwidth)
+        return extract(near, self.rate, turn, bandwidth=BANDWIDTH)
 
     def line(self, envelope: Envelope, size: NDArray[np.complex128]) -> Array:
         """A line with a complex amplitude [m] at every sample of the signal, shape (N, C)."""
@@ -286,15 +293,15 @@ class Clock:
         """Power over order, in frames of equal rotor angle; None without speed or whole frame."""
         if self.signal_angle is None:
             return None
-        turns = 2 * round(0.5 * self.settings.turns * (share if share == 1.0 else 2.0 * share))
-        slowest = max(self.settings.lowest_frequency / self.settings.highest_order, 0.5)
+        turns = 2 * round(0.5 * TURNS * (share if share == 1.0 else 2.0 * share))
+        slowest = max(LOWEST_FREQUENCY / HIGHEST_ORDER, 0.5)
         frames = order_power(
             signal,
             self.signal_time,
             self.signal_angle,
             self._signal_speed,
             turns=turns,
-            highest_order=self.settings.highest_order,
+            highest_order=HIGHEST_ORDER,
             highest_frequency=self.highest_frequency,
             lowest_speed=math.tau * slowest,
         )

@@ -20,13 +20,12 @@ from rotordrop.one_thread import one_thread
 from rotordrop.progress import Progress
 from rotordrop.require import each, require
 from rotordrop.spectrum.candidates import Candidate
-from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.indentation import (
     DisplacementHistory,
     displacement_history,
     find_settling,
 )
-from rotordrop.spectrum.lines import Line, find_lines
+from rotordrop.spectrum.lines import MOST_LINES, Line, find_lines
 from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
 from rotordrop.spectrum.resonances import PassedResonance, find_resonances
 from rotordrop.spectrum.speed import (
@@ -217,7 +216,7 @@ def analyse_coast_down(
         skip=last + BOUNCE_MARGIN - signal.start_time if last < LONGEST_BOUNCE * duration else 0.0,
         candidates=candidates,
         air_gap=float(np.mean(list(signal.air_gap.values()))),
-        settings=STANDARD_SETTINGS if signal.recorded else LineSettings(most_lines=LINES_OF_A_SIMULATION),
+        most_lines=MOST_LINES if signal.recorded else LINES_OF_A_SIMULATION,
     )
     tell("orders and waterfalls", 0.5)
     planes = {  # one after the other: side by side they fill the memory of two

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -119,16 +119,12 @@ HANN_OVERLAP_SHARE = 1.0 / 18.0
 """How much half-overlapping Hann frames repeat each other: averages counted as n / (1 + share)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class DetectionSettings:
-    """When a peak counts as a line."""
-
-    least_ratio: float = 2.0
-    """Amplitude over the local floor [1]."""
-    false_alarm: float = 1e-3
-    """Accepted probability that noise alone shows any line in the whole search [1]."""
-    floor_lines: int = 81
-    """Neighbouring lines whose median is the local floor [1]."""
+LEAST_RATIO = 2.0
+"""Amplitude over the local floor from which a peak counts as a line [1]."""
+FALSE_ALARM = 1e-3
+"""Accepted probability that noise alone shows any line in the whole search [1]."""
+FLOOR_LINES = 81
+"""Neighbouring lines whose median is the local floor [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +155,6 @@ class Peak:
 def clearest_peak(
     frames: FramePower,
     allowed: Mask,
-    settings: DetectionSettings,
     stretches: Sequence[tuple[int, int]],
     usual: Array | None = None,
 ) -> Peak | None:
@@ -170,14 +165,14 @@ def clearest_peak(
     to count as a line: the floor is nowhere lower. None where noise explains everything.
     """
     trials = max(int(np.sum(allowed.any(axis=0))), 1) * frames.power.shape[2] * max(len(stretches), 1)
-    threshold = math.log(trials / settings.false_alarm)
-    floor = _floor(frames.power, settings.floor_lines)
+    threshold = math.log(trials / FALSE_ALARM)
+    floor = _floor(frames.power)
     if usual is not None:
         floor = np.maximum(floor, usual)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(allowed[:, :, None] & (floor > 0.0), frames.power / floor, np.nan)
     # Counts over the frames say at once which lines a stretch can hold: sorting all of them takes long.
-    nearly = (1.0 - 1e-9) * settings.least_ratio**2 / MEDIAN_OF_NOISE
+    nearly = (1.0 - 1e-9) * LEAST_RATIO**2 / MEDIAN_OF_NOISE
     seen, above = (
         np.concatenate([np.zeros((1, *part.shape[1:]), dtype=np.intp), np.cumsum(part, axis=0)])
         for part in (np.isfinite(ratio), ratio >= nearly)
@@ -192,7 +187,7 @@ def clearest_peak(
             around[1:] |= possible[:-1]
             around[:-1] |= possible[1:]
             looked = around & enough
-            best = max(best, _best_in(ratio[first:last], looked, known, settings.least_ratio, first, last))
+            best = max(best, _best_in(ratio[first:last], looked, known, first, last))
     if best[1] < 0:
         return None
     return _peak(frames, floor, ratio, *best)
@@ -208,7 +203,7 @@ def stretches_of(count: int, shortest: int) -> Iterator[tuple[int, int]]:
 
 
 def _best_in(
-    ratio: Array, looked: Mask, known: NDArray[np.intp], least: float, first: int, last: int
+    ratio: Array, looked: Mask, known: NDArray[np.intp], first: int, last: int
 ) -> tuple[float, int, int, int, int]:
     """Score, line, channel and stretch of the clearest peak in one stretch, of the lines looked at.
 
@@ -217,7 +212,7 @@ def _best_in(
     typical = np.full(ratio.shape[1:], np.nan)
     typical[looked] = median_of_known(ratio[:, looked])
     independent = np.maximum(known / (1.0 + HANN_OVERLAP_SHARE), 1.0)
-    clear = (typical * MEDIAN_OF_NOISE >= least**2) & _local_maximum(typical)
+    clear = (typical * MEDIAN_OF_NOISE >= LEAST_RATIO**2) & _local_maximum(typical)
     score = np.where(clear, _improbability(np.nan_to_num(typical), independent), 0.0)
     line, channel = np.unravel_index(int(np.argmax(score)), score.shape)
     return float(score[line, channel]), int(line), int(channel), first, last
@@ -253,12 +248,12 @@ def _peak(
     )
 
 
-def _floor(power: Array, lines: int) -> Array:
+def _floor(power: Array) -> Array:
     """Median power of the lines around each line, frame by frame: half-overlapping blocks, joined by
     straight lines.
     """
     count = power.shape[1]
-    half = max(min(lines, count) // 2, 1)
+    half = max(min(FLOOR_LINES, count) // 2, 1)
     centres = np.arange(half, max(count - half, half + 1), half)
     blocks = np.empty((power.shape[0], centres.size, power.shape[2]))
     for k, centre in enumerate(centres):
@@ -328,26 +323,3 @@ def half_power_width(power: Array, line: int) -> float:
         0.0 if right == len(power) - 1 else float((power[right] - half) / (power[right] - power[right + 1]))
     )
     return right - left + below + above
-
-
-@dataclass(frozen=True, kw_only=True)
-class LineSettings:
-    """Where lines are looked for and in frames of what length."""
-
-    lowest_frequency: float = 5.0
-    highest_frequency: float = 1000.0
-    """[Hz]."""
-    highest_order: float = 20.0
-    """[1]."""
-    frame: float = 1.6384
-    """Length of a frame for steady lines [s]; 1.6384 s is the paper's."""
-    turns: int = 32
-    """Turns of the rotor in a frame for orders [1]."""
-    bandwidth: float = 1.0
-    """Amplitude changes that are followed [Hz]."""
-    most_lines: int = 60
-    """The search stops after so many lines [1]."""
-    detection: DetectionSettings = field(default_factory=DetectionSettings)
-
-
-STANDARD_SETTINGS = LineSettings()

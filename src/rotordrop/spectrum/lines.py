@@ -11,7 +11,7 @@ from rotordrop.document import stated
 from rotordrop.errors import RecordError
 from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
-from rotordrop.spectrum._views import Clock
+from rotordrop.spectrum._views import HIGHEST_ORDER, Clock
 from rotordrop.spectrum.candidates import (
     CONICAL,
     PENDULUM,
@@ -19,7 +19,6 @@ from rotordrop.spectrum.candidates import (
     harmonic_candidates,
     mixed_candidates,
 )
-from rotordrop.spectrum.detection import STANDARD_SETTINGS, LineSettings
 from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
 from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal, reduce_rate
@@ -61,6 +60,9 @@ class Line(SeenLine):
         )
 
 
+MOST_LINES = 60
+"""The search stops after so many lines [1]."""
+
 EVEN = 1.0 / math.sqrt(12.0)
 """Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
 
@@ -77,7 +79,8 @@ def find_lines(
     skip: float = 0.0,
     candidates: Sequence[Candidate] = (),
     air_gap: float | None = None,
-    settings: LineSettings = STANDARD_SETTINGS,
+    highest_frequency: float = 1000.0,
+    most_lines: int = MOST_LINES,
 ) -> tuple[Line, ...]:
     """Find the lines of a coast-down one after the other, the clearest first, and name those that can be
     named.
@@ -89,13 +92,14 @@ def find_lines(
 
     The displacement in each plane (N, 2) [m] begins with power-off. Without a profile of the speed every line
     stays undecided; ``skip`` leaves out so much of the beginning [s], since a rotor that bounces shows
-    everything at once; the air gap [m] is needed to recognise whirl. The strongest line comes first.
+    everything at once; the air gap [m] is needed to recognise whirl; lines lie up to the highest frequency
+    [Hz], so many at most. The strongest line comes first.
 
     Source: own method; names after Neisi 2020, section 5.4.
     """
     if not planes:
         raise RecordError("lines: no plane given, at least one displacement (N, 2) is needed")
-    highest = min(settings.highest_frequency, 0.4 * sampling_rate)
+    highest = min(highest_frequency, 0.4 * sampling_rate)
 
     def lines_of(displacement: PlanarSignal) -> list[FoundLine]:
         thin, rate = reduce_rate(displacement, sampling_rate, highest, samples_per_turn=2.7)
@@ -107,14 +111,13 @@ def find_lines(
             rate,
             profile,
             start_time=start_time + first / rate,
-            settings=settings,
             highest_frequency=highest,
         )
-        return LineSearch(thin[first:], clock).run()
+        return LineSearch(thin[first:], clock, most_lines).run()
 
     # One plane after the other: side by side they would hold twice the memory for a third less time.
     found = [(plane, line) for plane, moved in planes.items() for line in lines_of(moved)]
-    bands = (highest, settings.highest_order)
+    bands = (highest, HIGHEST_ORDER)
     lines = _joined(name_lines(found, candidates, air_gap, bands))
     return tuple(sorted(lines, key=lambda line: -line.amplitude))
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from rotordrop.spectrum._found_line import FoundLine
 from rotordrop.spectrum.coast_down import CoastDownSignal
-from rotordrop.spectrum.detection import LineSettings
 from rotordrop.spectrum.lines import find_lines
 from rotordrop.spectrum.orders import track_orders
 from rotordrop.spectrum.speed import exact_speed_profile, fit_speed_profile
@@ -80,7 +79,7 @@ class CoastDown:
 
     def lines(self, profile=None, **options):
         """Its lines up to 450 Hz."""
-        options = {"settings": LineSettings(highest_frequency=450.0)} | options
+        options = {"highest_frequency": 450.0} | options
         return find_lines({"DE": self.xy}, self.sampling_rate, profile or self.exact(), **options)
 
     def exact(self):

@@ -17,10 +17,9 @@ from rotordrop.spectrum.candidates import (
     order_candidates,
     pendulum_candidate,
 )
-from rotordrop.spectrum.detection import LineSettings, median_of_known
+from rotordrop.spectrum.detection import median_of_known
 from rotordrop.spectrum.lines import find_lines
 
-SETTINGS = LineSettings(highest_frequency=450.0)
 AIR_GAP = 285e-6
 KNOWN = (*order_candidates(), *mains_candidates(), pendulum_candidate("pendulum", 28.3, 29.8))
 
@@ -128,7 +127,7 @@ def typical():
         down.recorded(),
         candidates=candidates,
         air_gap=AIR_GAP,
-        settings=SETTINGS,
+        highest_frequency=450.0,
     )
     return down, lines
 

@@ -13,7 +13,7 @@ from rotordrop.known import Known
 from rotordrop.machine import example_machine
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.spectrum._search import BRIEF, LineSearch
-from rotordrop.spectrum._views import Clock, View
+from rotordrop.spectrum._views import BANDWIDTH, LOWEST_FREQUENCY, Clock, View
 from rotordrop.spectrum.candidates import (
     bearing_defect_candidates,
     mode_candidate,
@@ -21,23 +21,20 @@ from rotordrop.spectrum.candidates import (
     settled_modes,
 )
 from rotordrop.spectrum.detection import (
-    DetectionSettings,
+    FALSE_ALARM,
     FramePower,
-    LineSettings,
     clearest_peak,
     half_power_width,
 )
-from rotordrop.spectrum.lines import SWING_ERROR, _joined, name_lines, of_swings
+from rotordrop.spectrum.lines import MOST_LINES, SWING_ERROR, _joined, name_lines, of_swings
 from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
 
-SETTINGS = LineSettings(highest_frequency=450.0)
 
-
-def search(signal, rate, profile=None, settings=SETTINGS):
-    clock = Clock(len(signal), rate, profile, start_time=0.0, settings=settings, highest_frequency=450.0)
-    return LineSearch(signal, clock)
+def search(signal, rate, profile=None):
+    clock = Clock(len(signal), rate, profile, start_time=0.0, highest_frequency=450.0)
+    return LineSearch(signal, clock, MOST_LINES)
 
 
 @pytest.mark.parametrize("length", [0.25, 4.0])
@@ -53,10 +50,10 @@ def test_no_line_is_looked_for_where_one_was_taken_out(length, kind, widths):
     seeker.found = [line]
     free = seeker._free(view)
     blocked = place[~free[0] & (place > 50.0)]
-    reach = max(SETTINGS.bandwidth, 1.0 / length) * (line.skirt if widths is None else widths)
+    reach = max(BANDWIDTH, 1.0 / length) * (line.skirt if widths is None else widths)
     assert line.skirt == pytest.approx(3.5)
     assert (blocked[0], blocked[-1]) == pytest.approx((100.0 - reach, 100.0 + reach), abs=0.06)
-    assert np.array_equal(free[0], free[1]) and not free[0][place < SETTINGS.lowest_frequency].any()
+    assert np.array_equal(free[0], free[1]) and not free[0][place < LOWEST_FREQUENCY].any()
 
 
 def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is():
@@ -69,7 +66,7 @@ def test_a_line_that_lasts_is_not_brief_and_a_late_burst_is():
     assert not lasting.brief and lasting.last_seen - lasting.first_seen > BRIEF * 20.0
     assert burst.brief and 13.5 < burst.first_seen < 15.1
     for line in found:
-        assert line.existence == 1.0 - SETTINGS.detection.false_alarm
+        assert line.existence == 1.0 - FALSE_ALARM
 
 
 @pytest.mark.parametrize(("steady", "multiple"), [(200.0, 1.0), (200.0, -2.0), (20.0, -1.0)])
@@ -109,11 +106,11 @@ def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch():
     frames = FramePower(time=np.arange(40.0), coordinate=np.arange(400.0), power=power)
     stretches = [(first, first + 10) for first in (0, 10, 20, 30)]
     allowed = np.ones((40, 400), dtype=np.bool_)
-    peak = clearest_peak(frames, allowed, DetectionSettings(), stretches)
+    peak = clearest_peak(frames, allowed, stretches)
     assert peak is not None
     assert (peak.first, peak.last, peak.channel) == (30, 40, 1)
     assert peak.coordinate == pytest.approx(200.0, abs=0.6)
-    quiet = clearest_peak(frames, allowed, DetectionSettings(), stretches[:3])
+    quiet = clearest_peak(frames, allowed, stretches[:3])
     assert quiet is None
 
 
