@@ -59,7 +59,27 @@ def drop(stress=2e9, width=0.02, gap=275e-6, stiffness=1e8, unbalance=None, **mo
         amount = value(unbalance, 0.9 * unbalance, unbalance / 0.9)
         planes = [Unbalance(node=8, amount_kg_m=amount, phase_rad=None, sentence="")]
     bearings = {"NDE": bearing(numbers), "DE": bearing(numbers)}
-    return published(bearings=bearings, parameters=found, unbalance=planes, **more)
+    known = {"parameters": found, "joint": joint_of(found)}
+    return published(bearings=bearings, unbalance=planes, **known | more)
+
+
+def joint_of(parameters):
+    """Parameters that a record knows apart from each other: a gap by itself, a stiffness by its logarithm."""
+
+    def measured(one, known):
+        low, high = known.interval_90
+        if one.path.endswith("air_gap"):
+            return known.value, (high - low) / (2.0 * NINETY)
+        return math.log(known.value), math.log(high / low) / (2.0 * NINETY)
+
+    found = [measured(one, one.estimate) for one in parameters]
+    return Joint(
+        paths=[one.path for one in parameters],
+        mean=[middle for middle, _ in found],
+        covariance=np.diag([sigma**2 for _, sigma in found])[np.tril_indices(len(found))].tolist(),
+        prior_mean=[275e-6 if one.path.endswith("air_gap") else math.log(1e8) for one in parameters],
+        prior_standard_deviation=[measured(one, one.prior)[1] for one in parameters],
+    )
 
 
 def ratio(card, kind, where="NDE"):
@@ -276,7 +296,7 @@ def test_the_next_drops_are_counted_by_speed_and_no_more_is_said_than_they_tell(
 
 
 def test_a_drop_that_went_on_is_said_and_the_next_are_simulated_past_it():
-    gone = drop(later_motion=[went_on("DE", at=0.2)])
+    gone = drop(later_motion=[went_on("DE", at=0.2)], joint=None)
     assert any("DE went 60.0 µm further out at 200 ms" in text for text in said(restart_card(gone), gone))
     after = next_drops(example_machine("small"), 100.0, {}, drop=gone, drops=2)
     assert after.duration == pytest.approx(0.25)
@@ -300,7 +320,7 @@ def written(file, **told):
 
 def test_the_command_reads_hertz_and_simulates_radians(tmp_path):
     machine = example_machine("small")
-    estimate = written(tmp_path / "drop.json", machine=machine.name, speed_Hz=80.0)
+    estimate = written(tmp_path / "drop.json", machine=machine.name, speed_Hz=80.0, joint=None)
     file, out, page = (tmp_path / name for name in ("m.toml", "card.json", "card.html"))
     save_machine(machine, file)
     call = ["restart", str(file), estimate, "--drops", "20", "--json", str(out), "--check", "lift=good"]
