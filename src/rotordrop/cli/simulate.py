@@ -161,7 +161,6 @@ def coast_down(
         if output is not None:
             console(sys.stderr).print(f"the part of {output} done so far is kept: go on with --resume")
         raise
-    assert result is not None
     certificate = None
     if certify and result.finished:
         with progress_bar("at a tighter tolerance") as progress:

@@ -362,13 +362,11 @@ def read_evidence(
     tail: Record | None = None,
     *,
     name: str = "",
-    power_off: PowerOff | None = None,
 ) -> Evidence:
     """Ask a record what it says before the first contact and at rest; the name is that of the record if
     empty.
 
-    The tail is that of the record itself where it reaches standstill; `power_off` is given where it is known
-    already.
+    The tail is that of the record itself where it reaches standstill.
 
     Raises
     ------
@@ -376,8 +374,7 @@ def read_evidence(
         When the rotor does not fall in the record, or it has no speed.
     """
     found = Evidence(record=record, machine=model.machine, tail=tail, name=name or record.name)
-    given: dict[str, Any] = {"base": model} if power_off is None else {"base": model, "power_off": power_off}
-    return insisted(found.with_facts(**given))
+    return insisted(found.with_facts(base=model))
 
 
 def insisted(evidence: Evidence) -> Evidence:

@@ -91,21 +91,21 @@ class MarkAngle:
     error: float
 
 
-def angle_since_mark(marks: Array, when: float, *, span: float = MARK_SPAN) -> MarkAngle | None:
+def angle_since_mark(marks: Array, when: float) -> MarkAngle | None:
     """How far the shaft has turned at an instant [s] since the mark passed last, from the passages (M,)
     before.
 
-    Passages up to `span` [s] before the instant count. Friction changes the speed within a fraction of a turn
-    after the first contact, so those after it are not asked; before it a levitated rotor turns evenly, or
-    slows evenly where that shows. None where fewer than three passages lie before, or the last one far before
+    Passages up to `MARK_SPAN` before it count. Friction changes the speed within a fraction of a turn after
+    the first contact, so those after it are not asked; before it a levitated rotor turns evenly, or slows
+    evenly where that shows. None where fewer than three passages lie before, or the last one far before
     the instant.
     """
-    used = marks[(marks <= when) & (marks >= when - span)]
+    used = marks[(marks <= when) & (marks >= when - MARK_SPAN)]
     if len(used) < FEWEST_MARKS or when - used[-1] > MISSED_MARKS * float(np.median(np.diff(used))):
         return None
     turns = np.cumsum(np.append(0.0, np.round(np.diff(used) / float(np.median(np.diff(used))))))
     degree = 2 if len(used) > FEWEST_FOR_SLOWING else 1
-    since = (used - when) / span
+    since = (used - when) / MARK_SPAN
     design = np.vander(since, degree + 1, increasing=True)
     fitted, *_ = np.linalg.lstsq(design, 2.0 * np.pi * turns, rcond=None)
     rest = 2.0 * np.pi * turns - design @ fitted

@@ -134,14 +134,14 @@ class Table:
         return Table(tuple(heads), rows, self.caption, self.note)
 
 
-def verdict_column(status: Callable[[Any], str], label: str = "verdict") -> Column:
+def verdict_column(status: Callable[[Any], str]) -> Column:
     """What the identification says of a number that is not determined; of one that is, nothing."""
 
     def said(row: Any) -> str:
         verdict = status(row)
         return "" if verdict == "determined" else verdict
 
-    return Column(label, said, optional=True)
+    return Column("verdict", said, optional=True)
 
 
 def table(rows: Iterable[Any], columns: Sequence[Column], caption: str = "", note: str = "") -> Table:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rotordrop.estimate.changed import unlike
 from rotordrop.estimate.published import Drop
 from rotordrop.require import each, require
-from rotordrop.restart.damages import AIR_GAP, CHECKS, DAMAGES, Check, Damage, require_check
+from rotordrop.restart.damages import AIR_GAP, CHECKS, Check, require_check
 from rotordrop.restart.evidence import Indicator, in_order, indicators
 from rotordrop.restart.foreseen import Foreseen
 
@@ -48,7 +48,6 @@ def restart_card(
     earlier: Sequence[Drop] = (),
     checks: Mapping[str, str] | None = None,
     foreseen: Foreseen | None = None,
-    damages: Mapping[str, Damage] = DAMAGES,
 ) -> RestartCard:
     """Collect what is known when a machine is to run again after a drop.
 
@@ -62,8 +61,6 @@ def restart_card(
         Checks that were made after this drop, with their outcome.
     foreseen : Foreseen, optional
         What the next drop would be, the speed limit, and the lift.
-    damages : mapping of str to Damage
-        Kinds of damage with what each moves, by default those of the package.
 
     Raises
     ------
@@ -79,7 +76,7 @@ def restart_card(
     ordered = in_order(drop, earlier)
     apart = {one.record: words for one in ordered if (words := unlike(one, drop))}
     ordered = [one for one in ordered if one.record not in apart]
-    found = indicators(drop, ordered, damages)
+    found = indicators(drop, ordered)
     gaps = {
         one.path.removesuffix(f".{AIR_GAP}"): ends
         for one in drop.parameters

@@ -14,7 +14,7 @@ from rotordrop.errors import UsageError
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
-from rotordrop.restart.damages import AIR_GAP, DAMAGES, UNBALANCE, Damage, Effect
+from rotordrop.restart.damages import AIR_GAP, DAMAGES, UNBALANCE, Effect
 from rotordrop.units import format_amount
 
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
@@ -62,9 +62,7 @@ class _Moved:
     """Change and its standard error: of the logarithm, or [m] of a number that is no factor."""
 
 
-def indicators(
-    drop: Drop, earlier: Sequence[Drop], damages: Mapping[str, Damage] = DAMAGES
-) -> tuple[Indicator, ...]:
+def indicators(drop: Drop, earlier: Sequence[Drop]) -> tuple[Indicator, ...]:
     """What changed since the earlier estimates, in their order, by likelihood ratio for each kind of damage.
 
     A change that the records do not determine says nothing, and neither does an estimate that is not
@@ -80,7 +78,7 @@ def indicators(
     found = []
     places = [
         (kind, bearing, path, effect)
-        for kind, damage in damages.items()
+        for kind, damage in DAMAGES.items()
         for bearing in (("",) if damage.of_machine else drop.bearings)
         for path, effect in damage.moves.items()
     ]

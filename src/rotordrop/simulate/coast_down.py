@@ -65,8 +65,7 @@ def simulate_coast_down(
     output: str | Path | None = None,
     resume: bool = False,
     progress: Shown = None,
-    windows_at_most: int | None = None,
-) -> CoastDownResult | None:
+) -> CoastDownResult:
     """Simulate a rotor from power-off to standstill on its touchdown bearings.
 
     Parameters
@@ -83,12 +82,10 @@ def simulate_coast_down(
         that had ended is read from its output.
     progress : callable or False, optional
         Called with a few words and the fraction done; by default a bar in a terminal or a notebook.
-    windows_at_most : int, optional
-        Stop after so many windows, as if killed; the run can then be resumed. None is returned.
 
     Returns
     -------
-    CoastDownResult or None
+    CoastDownResult
         Statistics, peaks with their time, and how it ended.
 
     Raises
@@ -108,7 +105,6 @@ def simulate_coast_down(
     require(case, "case", CoastDownCase)
     require(output, "output", str, PathLike, none=True)
     require(resume, "resume", bool)
-    require(windows_at_most, "windows_at_most", int, least=1, none=True)
     output = None if output is None else Path(output)
     model = machine if isinstance(machine, DropModel) else build_drop_model(machine, case.reduction)
     setup, run = _begun(model, case)
@@ -122,8 +118,6 @@ def simulate_coast_down(
     run = run if stored is None else Run.of(stored)
     with shown(progress, "coast-down") as tell:
         while run.going:
-            if windows_at_most is not None and run.status[WINDOW] >= windows_at_most:
-                return None
             samples, log = _advance(model, case, setup, run, nodes)
             if folder is not None:
                 write_part(part_path(folder, int(run.status[WINDOW]) - 1), samples, log)

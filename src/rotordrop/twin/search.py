@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -199,23 +198,6 @@ class Checkpoint:
     """How the fit follows the record."""
 
 
-class Fits(Protocol):
-    """Fits of candidate models to the same drops."""
-
-    @property
-    def windows(self) -> int:
-        """Number of windows from guesses to the first impacts whole."""
-
-    def extend(self, machine: Machine, start: int, number: int, before: Checkpoint | None) -> Checkpoint:
-        """A fit of a machine over one window more; from its guesses where nothing is before."""
-
-    def converge(self, checkpoint: Checkpoint) -> TrackedDrops:
-        """The fit over the last window, repeated while that pays."""
-
-    def relinearise(self, known: TrackedDrops, machine: Machine, passes: int) -> TrackedDrops:
-        """Passes over the last window with a machine, linearised at a fit."""
-
-
 def is_calibrated(machine: Machine) -> bool:
     """Whether the supports of all bearings are estimates, not guesses."""
     return all(
@@ -293,7 +275,7 @@ def gain_of(candidate: Candidate, before: Candidate) -> float:
     return before.score[2] - candidate.score[2]
 
 
-def best_structure(base: Candidate, search: Fits) -> Candidate:
+def best_structure(base: Candidate, search: Search) -> Candidate:
     """The best of the base model and its extensions, one on top of the other while that pays.
 
     The windows of a search leave it a few passes short, and an extension may have only led to a better start.
@@ -314,7 +296,7 @@ def best_structure(base: Candidate, search: Fits) -> Candidate:
     return best_start(best, search)
 
 
-def _best_extension(base: Candidate, search: Fits) -> Candidate | None:
+def _best_extension(base: Candidate, search: Search) -> Candidate | None:
     """The best candidate with one extension more, by either way from guesses; None where all were lost."""
     attempts = [
         _Attempt(
@@ -329,7 +311,7 @@ def _best_extension(base: Candidate, search: Fits) -> Candidate | None:
     return _successive_halving(attempts, search)
 
 
-def _base_again(base: Candidate, better: Candidate, search: Fits) -> Candidate:
+def _base_again(base: Candidate, better: Candidate, search: Search) -> Candidate:
     """The base, or what it makes of the checkpoint that an extension has found."""
     try:
         back = replace(base, fit=search.relinearise(better.fit, base.machine, RELINEARISED_PASSES))
@@ -338,7 +320,7 @@ def _base_again(base: Candidate, better: Candidate, search: Fits) -> Candidate:
     return min(base, back, key=lambda one: one.score)
 
 
-def best_start(best: Candidate, search: Fits) -> Candidate:
+def best_start(best: Candidate, search: Search) -> Candidate:
     """The same machine from other places in its prior, where it ended inconsistent with the record.
 
     The objective has several minima.
@@ -365,7 +347,7 @@ class _Attempt:
         return (True, math.inf, math.inf) if self.checkpoint is None else self.checkpoint.score
 
 
-def _successive_halving(attempts: Sequence[_Attempt], search: Fits) -> Candidate | None:
+def _successive_halving(attempts: Sequence[_Attempt], search: Search) -> Candidate | None:
     """Who follows the record best of those that many short windows and few long ones leave.
 
     Successive halving: Jamieson & Talwalkar, AISTATS 2016.

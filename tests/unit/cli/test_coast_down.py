@@ -9,6 +9,7 @@ from importlib.resources import files
 import h5py
 import numpy as np
 import pytest
+from tests.unit.simulate.short_drop import Killed, killed_after
 
 from rotordrop import build_drop_model, read_record, save_machine, simulate_coast_down
 from rotordrop.cli.app import run
@@ -257,10 +258,9 @@ def test_a_run_is_resumed_with_its_own_machine_only(machine, tmp_path, capsys):
     described = load_machine(machine)
     save_machine(described.with_values({"DE.support.stiffness": 3e8}), other)
     case = CoastDownCase(speed=2.0 * math.pi * 60.0, duration=0.4, start=CentredStart())
-    stopped = simulate_coast_down(
-        build_drop_model(described, "quick"), case, output=output, windows_at_most=1
-    )
-    assert stopped is None
+    model = build_drop_model(described, "quick")
+    with pytest.raises(Killed):
+        simulate_coast_down(model, case, output=output, progress=killed_after(1))
     again = ["--speed", "60 Hz", "--until", "0.4 s", "--output", str(output)]
     ending = ["coast-down", machine, *again, "--resume", "--json", str(told)]
 

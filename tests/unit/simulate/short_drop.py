@@ -11,6 +11,21 @@ START = PlacedStart(
 CASE = DropCase(speed=2.0 * np.pi * 60.0, duration=0.002, output_step=1e-4, start=START)
 
 
+class Killed(Exception):
+    """What `killed_after` raises."""
+
+
+def killed_after(windows):
+    """The progress of a coast-down that is killed when so many more windows are kept."""
+    left = iter(range(windows - 1, -1, -1))
+
+    def progress(*_):
+        if next(left) == 0:
+            raise Killed
+
+    return progress
+
+
 def model():
     """The reference machine with 6 + 2 modes per plane."""
     return build_drop_model(example_machine("paper"), "quick")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+from tests.unit.simulate.short_drop import Killed, killed_after
 
 from rotordrop import (
     CoastDownCase,
@@ -125,15 +126,18 @@ def test_the_settled_scheme_agrees_with_the_runge_kutta_pair_and_is_given_up_whe
 def test_kill_and_resume_is_bit_identical_and_another_run_is_refused(model, slow, tmp_path):
     whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
     simulate_coast_down(model, slow, output=whole)
-    assert simulate_coast_down(model, slow, output=cut, windows_at_most=1) is None
+    with pytest.raises(Killed):
+        simulate_coast_down(model, slow, output=cut, progress=killed_after(1))
     assert not cut.exists() and work_folder(cut).is_dir()
     part_path(work_folder(cut), 1).write_bytes(b"half a part that a kill left behind")
-    assert simulate_coast_down(model, slow, output=cut, resume=True, windows_at_most=3) is None
-    assert simulate_coast_down(model, slow, output=cut, resume=True) is not None
+    with pytest.raises(Killed):
+        simulate_coast_down(model, slow, output=cut, resume=True, progress=killed_after(2))
+    simulate_coast_down(model, slow, output=cut, resume=True)
     assert not work_folder(cut).exists()
     assert whole.read_bytes() == cut.read_bytes()
     output = tmp_path / "c.h5"
-    simulate_coast_down(model, slow, output=output, windows_at_most=1)
+    with pytest.raises(Killed):
+        simulate_coast_down(model, slow, output=output, progress=killed_after(1))
     with pytest.raises(OutputError, match=r"c\.h5\.partial holds an unfinished run; add --resume"):
         simulate_coast_down(model, slow, output=output)
     with pytest.raises(SimulationError, match="belongs to another run"):

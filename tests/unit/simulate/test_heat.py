@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.simulate.short_drop import Killed, killed_after
 
 from rotordrop import build_drop_model, load_result, simulate_coast_down, simulate_drop
 from rotordrop.errors import MachineFileError, UsageError
@@ -222,7 +223,8 @@ CASE = CoastDownCase(speed=NOMINAL, duration=1.4)
 
 def test_a_coast_down_with_heat_is_resumed_to_the_last_bit_and_said(coasting, tmp_path):
     whole = simulate_coast_down(coasting, CASE, output=tmp_path / "whole.h5")
-    assert simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", windows_at_most=2) is None
+    with pytest.raises(Killed):
+        simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", progress=killed_after(2))
     resumed = simulate_coast_down(coasting, CASE, output=tmp_path / "cut.h5", resume=True)
     assert np.array_equal(resumed.heat.temperature, whole.heat.temperature)
     assert np.array_equal(resumed.windows.peak, whole.windows.peak)

@@ -288,7 +288,7 @@ def test_without_tail_and_levitated_part_less_is_known(calibrated, workshop, qui
         method="given",
         notes=(),
     )
-    item = read_evidence(build_drop_model(calibrated), cut, name="cut", power_off=instant)
+    item = Evidence(record=cut, machine=calibrated, name="cut").with_facts(power_off=instant)
     assert item.levitated is None
     inside, drop = followed(calibrated, item)
     assert_right(drop, synthetic, factor=2.0)
