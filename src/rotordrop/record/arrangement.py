@@ -48,8 +48,12 @@ _COUNTER = re.compile(
 )
 """A number of the channel in front of its tag, as in "Ch1 VE-101X", "3:NDE X", "[2] X"."""
 
-_ANGLE = re.compile(r"(?P<angle>(?:(?<![^\s(@])[+-])?\d{1,3}(?:\.\d+)?) ?(?:°|deg\b)", re.IGNORECASE)
-"""An angle in a name, as in "DE 45°", "NDE_135deg", "DE (-45°)"."""
+_ANGLE = re.compile(
+    r"(?P<angle>(?:(?<![^\s(@])[+-])?\d{1,3}(?:\.\d+)?(?= ?(?:°|deg\b))"
+    r"|(?:(?<=[ _])|(?<=\w-))(?:0|45|90|135|180|225|270|315)$)(?: ?(?:°|deg\b))?",
+    re.IGNORECASE,
+)
+"""An angle in a name, as in "DE 45°", "NDE_135deg", "DE (-45°)"; of eighths at its end, "NDE_135"."""
 
 _SENSOR = re.compile(r"^(?:S|P|CH|SENSOR|PROBE)[ _-]", re.IGNORECASE)
 _LONGEST_UNIT = 30
@@ -94,7 +98,7 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         named = {name: fitting(recording.channels, label) for name, label in profile.channels.items()}
         called = {id(hits[0]): name for name, hits in named.items() if len(hits) == 1}
         pairs, guessed = pairs_of(recording.channels, lambda channel: called.get(id(channel), channel.name))
-        planes = [(name, [(one, told_by(one)[1]) for one in pair]) for name, pair, _ in pairs]
+        planes = [(name, [*zip(pair, _angles(pair), strict=True)]) for name, pair, _ in pairs]
         known = all(angle is not None for _, entries in planes for _, angle in entries)
         how = "" if known else ", sensors 90° apart"
         notes = (f"planes {'and angles' if known else 'guessed'} by the {guessed} of the channels{how}",)
@@ -178,6 +182,12 @@ def told_by(channel: Channel) -> tuple[str, float | None]:
     angle = _ANGLE.search(channel.name)
     plane = _tag(_ANGLE.sub("", channel.name).strip()).strip(" _-,:;/@()")
     return plane, angle and math.radians(float(angle["angle"]))
+
+
+def _angles(pair: Sequence[Channel]) -> Sequence[float | None]:
+    """Angles that the names of a pair tell [rad]; none where one is missing, or both are the plane's."""
+    angles = [told_by(channel)[1] for channel in pair]
+    return [None] * len(pair) if None in angles or len({*angles}) == 1 else angles
 
 
 def _at_angle(sensors: Sequence[Sensor], angle: float | None) -> list[Sensor]:
@@ -340,8 +350,9 @@ def _pairs_by_angle(channels: Sequence[Channel]) -> list[tuple[str, tuple[Channe
     """Two channels whose names tell one plane and an angle each, without letters of axes."""
     told: dict[str, list[Channel]] = {}
     for channel in channels:
-        if told_by(channel)[1] is not None:
-            told.setdefault(told_by(channel)[0], []).append(channel)
+        plane, angle = told_by(channel)
+        if angle is not None and plane.upper() not in ("X", "Y", "H", "V"):  # of "X_45" the number is a plane
+            told.setdefault(plane, []).append(channel)
     return [(plane, (two[0], two[1]), "") for plane, two in told.items() if len(two) == 2]
 
 

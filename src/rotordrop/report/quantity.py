@@ -127,11 +127,8 @@ class Quantity:
         if sure and (chance := format_chance(self.value))[0] in "<>":
             return self._with_unit(chance.removesuffix(" %"))
         if self.kind == "speed" and self.system == "SI" and math.isfinite(self.value):
-            turns = self.value / (2 * math.pi)
-            places = self._places()
-            shown = turns if places is None else round(turns, places)
-            rpm = written(60 * shown, max(0, 3 - _magnitude(60 * shown)))
-            return f"{self.number} Hz ({rpm} rpm)"
+            rpm = 60 * self.value / (2 * math.pi)
+            return f"{self.number} Hz ({written(rpm, max(0, 3 - _magnitude(rpm)))} rpm)"
         return self._with_unit(self.number)
 
     @property

@@ -223,7 +223,7 @@ def test_pairs_by_tags(names, planes):
     assert record.signals.shape == (10, 4)
 
 
-@pytest.mark.parametrize("form", ["{} 45°", "{}_45deg", "45 deg {}", "Ch1 {} (45°)"])
+@pytest.mark.parametrize("form", ["{} 45°", "{}_45deg", "45 deg {}", "Ch1 {} (45°)", "{}_45", "{}-45"])
 @pytest.mark.parametrize("ends", [("NDE", "DE"), ("de", "nde"), ("TE", "CE")])
 def test_planes_and_angles_in_the_names_of_channels_seat_them(ends, form, machine):
     """In any order of the file; planes of other names go in their order, and only when asked."""
@@ -232,6 +232,12 @@ def test_planes_and_angles_in_the_names_of_channels_seat_them(ends, form, machin
     read = [3e-6, 2e-6, 1e-6, 0.0] if ends[0] == "de" else [1e-6, 0.0, 3e-6, 2e-6]
     np.testing.assert_allclose(found.signals[0], read)
     assert arrangement_of(said, Profile()).angles_known
+
+
+def test_an_angle_that_both_names_of_a_pair_end_with_is_no_angle_of_a_sensor():
+    arranged = arrangement_of(recording("X_45", "Y_45", "X_90", "Y_90"), Profile())
+    assert [sensor.bearing for sensor in arranged.sensors] == ["45", "45", "90", "90"]
+    assert not arranged.angles_known
 
 
 def test_names_of_sensors_in_a_profile_pair_the_channels_without_a_machine():

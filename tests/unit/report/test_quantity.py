@@ -21,6 +21,7 @@ THIN = "\u202f"
         (1.7408e9, "pressure", f"1{THIN}741 MPa"),
         (1.02e8, "stiffness", "102.0 N/µm"),
         (2 * math.pi * 60, "speed", f"60.00 Hz (3{THIN}600 rpm)"),
+        (math.pi / 30 * 8600, "speed", f"143.3 Hz (8{THIN}600 rpm)"),
         (-math.pi / 2, "angle", "−90.00°"),
         (8.18e-3, "time", "8.180 ms"),
         (3.78e9, "contact_stiffness", "3.780 GN/mⁿ"),
