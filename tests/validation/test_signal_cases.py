@@ -9,15 +9,15 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.physics.aerodynamics import exponential_deceleration
 from rotordrop.record.axes import planar_of, sensor_planes
 from rotordrop.severity.statistics import stress_statistics
-from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
+from rotordrop.spectrum.waterfall import frame_starts, waterfalls
 
 
 def waterfall_grid(inputs):
-    settings = WaterfallSettings(points=inputs["nfft"], overlap=inputs["overlap"])
-    frames = {f"frames for N={n}": float(settings.frame_count(n)) for n in inputs["points"]}
+    cut = {"points": inputs["nfft"], "overlap": inputs["overlap"]}
+    frames = {f"frames for N={n}": float(len(frame_starts(n, **cut))) for n in inputs["points"]}
     # The count is that of frames really computed, not only of the formula.
     shortest = min(inputs["points"])
-    (computed,) = waterfalls(np.zeros((shortest, 2)), inputs["fs"], settings=settings, highest_frequency=10.0)
+    (computed,) = waterfalls(np.zeros((shortest, 2)), inputs["fs"], highest_frequency=10.0, **cut)
     assert len(computed.time) == frames[f"frames for N={shortest}"]
     return frames | {"frequency resolution": computed.resolution}
 
@@ -28,9 +28,7 @@ def hann_amplitudes(inputs):
     def highest(off):
         phase = 2.0 * math.pi * (1000.0 + off) * np.arange(points) / points
         tone = inputs["A"] * np.column_stack([np.cos(phase), np.zeros(points)])
-        (found,) = waterfalls(
-            tone, float(points), components=("x",), settings=WaterfallSettings(points=points)
-        )
+        (found,) = waterfalls(tone, float(points), components=("x",), points=points)
         return float(found.amplitude.max())
 
     half = highest(0.5)

@@ -220,7 +220,7 @@ def _waterfall_section(analysis: CoastDownAnalysis, against: str) -> Section:
         for fall in plane.waterfalls:
             caption = (
                 f"{name}, {COMPONENTS[fall.component]}: amplitude {fall.amplitude_kind} of frames of "
-                f"{fall.settings.points} points, Hann window, {100 * fall.settings.overlap:.0f} % overlap, "
+                f"{fall.points} points, Hann window, {100 * fall.overlap:.0f} % overlap, "
                 f"lines {fall.resolution:.3f} Hz apart (Neisi 2020, Fig. 18). A falling speed smears the "
                 "orders here; their true amplitude is below."
             )

@@ -37,12 +37,13 @@ from rotordrop.spectrum.speed import (
     fit_exponential,
 )
 from rotordrop.spectrum.waterfall import (
+    FEWEST_POINTS,
+    PAPER_OVERLAP,
     AmplitudeKind,
     Component,
     PlanarSignal,
     Waterfall,
-    WaterfallSettings,
-    settings_for,
+    points_for,
     waterfalls,
 )
 
@@ -108,7 +109,7 @@ class WaterfallChoice:
     """[Hz]."""
     points: int | None = None
     """Samples per frame; the paper's when left out, less for a short signal."""
-    overlap: float = 0.5
+    overlap: float = PAPER_OVERLAP
     """Share of a frame that is used again [1]."""
 
     def __post_init__(self) -> None:
@@ -116,7 +117,8 @@ class WaterfallChoice:
             require(one, "a component", str, among=get_args(Component))
         require(self.amplitude_kind, "amplitude_kind", str, among=get_args(AmplitudeKind))
         require(self.highest_frequency, "highest_frequency", float, above=0.0)
-        require(self.points, "points", int, least=1, none=True)
+        require(self.points, "points", int, least=FEWEST_POINTS, none=True)
+        require(self.overlap, "overlap", float, least=0.0, most=0.99)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,22 +275,22 @@ def _plane(
 def _waterfalls(
     signal: CoastDownSignal, moved: PlanarSignal, choice: WaterfallChoice
 ) -> tuple[Waterfall, ...]:
-    points = choice.points or settings_for(moved.shape[0]).points
-    settings = WaterfallSettings(points=points, overlap=choice.overlap)
-    if settings.frame_count(moved.shape[0]) == 0:
+    points = choice.points or points_for(moved.shape[0])
+    if moved.shape[0] < points:
         return ()
     speed = None
     if signal.profile is not None:
         speed = np.empty(moved.shape[0])
-        for begin in range(0, len(speed), settings.points):  # a minute at once takes four times its own size
-            index = np.arange(begin, min(begin + settings.points, len(speed)))
+        for begin in range(0, len(speed), points):  # a minute at once takes four times its own size
+            index = np.arange(begin, min(begin + points, len(speed)))
             speed[index] = signal.profile.speed_at(signal.start_time + index / signal.sampling_rate)
     return waterfalls(
         moved,
         signal.sampling_rate,
         components=choice.components,
         speed=speed,
-        settings=settings,
+        points=points,
+        overlap=choice.overlap,
         amplitude_kind=choice.amplitude_kind,
         start_time=signal.start_time,
         highest_frequency=choice.highest_frequency,
@@ -326,7 +328,7 @@ def _plane_json(plane: PlaneAnalysis) -> dict[str, Any]:
         waterfalls=[
             stated(  # the whole field is in the figure and the record
                 fall,
-                "component amplitude_kind points=settings.points overlap=settings.overlap resolution_hz "
+                "component amplitude_kind points overlap resolution_hz "
                 "frames frequency_hz rms_over_frames_m=average",
                 frames=len(fall.time),
             )
@@ -376,7 +378,7 @@ def _write_plane(group: Any, plane: PlaneAnalysis) -> None:
         _put(group, f"displacement/{called}", getattr(history, name), "s" if name == "time" else "m")
     for fall in plane.waterfalls:
         place = group.create_group(f"waterfall_{fall.component}")
-        place.attrs["points"], place.attrs["overlap"] = fall.settings.points, fall.settings.overlap
+        place.attrs["points"], place.attrs["overlap"] = fall.points, fall.overlap
         _put(place, "time", fall.time, "s")
         _put(place, "frequency", fall.frequency, "Hz")
         _put(place, "amplitude", fall.amplitude, "m")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array
-from rotordrop.errors import RecordError, UsageError
+from rotordrop.errors import RecordError
 
 Component = Literal["x", "y", "full"]
 AmplitudeKind = Literal["zero-to-peak", "peak-to-peak"]
@@ -33,49 +33,24 @@ FEWEST_POINTS = 16
 """Samples of the shortest frame [1], without which no line is looked for (chosen)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class WaterfallSettings:
-    """How the signal is cut into frames; the defaults are those of the paper."""
-
-    points: int = 32768
-    """Samples per frame [1]."""
-    overlap: float = 0.5
-    """Share of a frame that the next one uses again [1]."""
-
-    def __post_init__(self) -> None:
-        if self.points < FEWEST_POINTS:
-            raise UsageError(
-                f"waterfall: {self.points} points per frame given, at least {FEWEST_POINTS} are needed"
-            )
-        if not 0.0 <= self.overlap < 1.0:
-            raise UsageError(f"waterfall: overlap {self.overlap} given, expected at least 0 and below 1")
-
-    @property
-    def hop(self) -> int:
-        """Samples from the start of one frame to the start of the next [1]."""
-        return max(1, round(self.points * (1.0 - self.overlap)))
-
-    def resolution(self, sampling_rate: float) -> float:
-        """Distance between two lines [Hz] at a sampling rate [Hz]."""
-        return sampling_rate / self.points
-
-    def frame_count(self, samples: int) -> int:
-        """Whole frames [1] that fit into so many samples; nothing is padded."""
-        return 0 if samples < self.points else (samples - self.points) // self.hop + 1
-
-
-PAPER_SETTINGS = WaterfallSettings()
+PAPER_POINTS, PAPER_OVERLAP = 32768, 0.5
+"""Samples per frame [1], and share of a frame that the next one uses again [1], of the paper."""
 
 _FEWEST_FRAMES, _SHORTEST_FRAME = 12, 1024
 """A map with fewer frames shows bars and no change, one of shorter frames no lines [1] (chosen)."""
 
 
-def settings_for(samples: int) -> WaterfallSettings:
-    """Settings of the paper, with frames halved until a short signal has a dozen of them."""
-    points = PAPER_SETTINGS.points
-    while points > _SHORTEST_FRAME and WaterfallSettings(points=points).frame_count(samples) < _FEWEST_FRAMES:
+def frame_starts(samples: int, points: int, overlap: float = PAPER_OVERLAP) -> range:
+    """First samples of the whole frames that fit into so many samples; nothing is padded."""
+    return range(0, samples - points + 1, max(1, round(points * (1.0 - overlap))))
+
+
+def points_for(samples: int) -> int:
+    """Samples per frame of the paper, halved until a short signal has a dozen frames."""
+    points = PAPER_POINTS
+    while points > _SHORTEST_FRAME and len(frame_starts(samples, points)) < _FEWEST_FRAMES:
         points //= 2
-    return WaterfallSettings(points=points)
+    return points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,12 +73,14 @@ class Waterfall:
     """"zero-to-peak" or "peak-to-peak"."""
     sampling_rate: float
     """Of the signal [Hz]."""
-    settings: WaterfallSettings
+    points: int
+    overlap: float
+    """Samples per frame, and share of a frame that the next one uses again [1]."""
 
     @property
     def resolution(self) -> float:
         """Distance between two lines [Hz]."""
-        return self.settings.resolution(self.sampling_rate)
+        return self.sampling_rate / self.points
 
     def average(self) -> Array:
         """Root-mean-square over the frames of the amplitude of each line [m], shape (K,)."""
@@ -121,7 +98,8 @@ def waterfalls(
     *,
     components: Sequence[Component] = ("full",),
     speed: ArrayLike | None = None,
-    settings: WaterfallSettings = PAPER_SETTINGS,
+    points: int = PAPER_POINTS,
+    overlap: float = PAPER_OVERLAP,
     amplitude_kind: AmplitudeKind = "zero-to-peak",
     start_time: float = 0.0,
     highest_frequency: float | None = None,
@@ -134,29 +112,29 @@ def waterfalls(
 
     The displacement (N, 2) [m] is that of one plane, with the rotor speed (N,) [rad/s] where it is known;
     each component, one direction or forward and backward parts of x + jy, has a waterfall of its own; lines
-    above the highest frequency [Hz] are left out.
+    above the highest frequency [Hz] are left out. A frame has so many points, and shares the overlap [1] of
+    them with the next one.
 
     Source: Neisi 2020, section 5.4 (Hann window, 32768 points, 50 % overlap, amplitude times 2).
     Differs from the paper: the full spectrum, and the choice of zero-to-peak or peak-to-peak.
     """
     samples = displacement.shape[0]
-    frames = settings.frame_count(samples)
-    if frames == 0:
+    starts = frame_starts(samples, points, overlap)
+    if not starts:
         raise RecordError(
-            f"waterfall: the signal has {samples} samples, one frame needs {settings.points}; "
+            f"waterfall: the signal has {samples} samples, one frame needs {points}; "
             f"choose shorter frames or a longer record"
         )
-    lines = [_lines(settings.points, sampling_rate, one, highest_frequency) for one in components]
-    window = hann_window(settings.points)
-    amplitudes = [np.empty((frames, frequency.size)) for frequency, _ in lines]
-    for row in range(frames):
-        start = row * settings.hop
-        frame = np.asarray(displacement[start : start + settings.points], dtype=np.float64)
+    lines = [_lines(points, sampling_rate, one, highest_frequency) for one in components]
+    window = hann_window(points)
+    amplitudes = [np.empty((len(starts), frequency.size)) for frequency, _ in lines]
+    for row, start in enumerate(starts):
+        frame = np.asarray(displacement[start : start + points], dtype=np.float64)
         frame = frame - frame.mean(axis=0)  # changes only the lines at 0 and ± one resolution
         for one, (_, keep), amplitude in zip(components, lines, amplitudes, strict=True):
             amplitude[row] = _amplitude(frame, window, one)[keep] * AMPLITUDE_SCALE[amplitude_kind]
-    centre = (np.arange(frames, dtype=np.float64) * settings.hop + settings.points / 2) / sampling_rate
-    mean_speed, change = _frame_speed(speed, samples, frames, settings)
+    centre = (np.array(starts, dtype=np.float64) + points / 2) / sampling_rate
+    mean_speed, change = _frame_speed(speed, samples, starts, points)
     return tuple(
         Waterfall(
             time=start_time + centre,
@@ -167,7 +145,8 @@ def waterfalls(
             component=component,
             amplitude_kind=amplitude_kind,
             sampling_rate=sampling_rate,
-            settings=settings,
+            points=points,
+            overlap=overlap,
         )
         for component, (frequency, _), amplitude in zip(components, lines, amplitudes, strict=True)
     )
@@ -202,7 +181,7 @@ def _amplitude(frame: Array, window: Array, component: Component) -> Array:
 
 
 def _frame_speed(
-    speed: ArrayLike | None, samples: int, frames: int, settings: WaterfallSettings
+    speed: ArrayLike | None, samples: int, starts: range, points: int
 ) -> tuple[Array | None, Array | None]:
     if speed is None:
         return None, None
@@ -211,7 +190,7 @@ def _frame_speed(
         raise RecordError(
             f"waterfall: speed has shape {values.shape}, expected one value per sample, ({samples},)"
         )
-    cuts = [values[row * settings.hop :][: settings.points] for row in range(frames)]
+    cuts = [values[start : start + points] for start in starts]
     mean = np.array([np.mean(cut) for cut in cuts])
     change = np.array([np.ptp(cut) for cut in cuts])
     return mean, change

@@ -51,7 +51,7 @@ def test_recorded_speed_gives_the_amplitude_within_a_hundredth(seed):
 def test_tracking_has_phase_and_direction_and_no_smear():
     down, amplitude = chirp(noise=0.0)
     (frames,) = waterfalls(down.xy, down.sampling_rate, components=("x",))
-    assert frames.settings.points == 32768  # 13 s at this sampling rate: the smear is drastic
+    assert frames.points == 32768  # 13 s at this sampling rate: the smear is drastic
     assert frames.amplitude[0, frames.frequency > 30.0].max() < 0.25 * amplitude(3.0)
     track = down.tracked()
     row = np.argmin(np.abs(track.time - 3.0))

@@ -29,7 +29,7 @@ from rotordrop.spectrum.detection import (
 from rotordrop.spectrum.lines import MOST_LINES, SWING_ERROR, _joined, name_lines, of_swings
 from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
-from rotordrop.spectrum.waterfall import WaterfallSettings, waterfalls
+from rotordrop.spectrum.waterfall import waterfalls
 
 
 def search(signal, rate, profile=None):
@@ -183,7 +183,7 @@ def test_the_average_over_frames_is_that_of_the_power():
     size = np.where(time < 4 * points / rate, 3e-6, 4e-6)
     phase = TURN * 50.0 * rate / points * time
     xy = size[:, None] * np.column_stack([np.cos(phase), np.sin(phase)])
-    (found,) = waterfalls(xy, rate, components=("x",), settings=WaterfallSettings(points=points, overlap=0.0))
+    (found,) = waterfalls(xy, rate, components=("x",), points=points, overlap=0.0)
     assert found.amplitude.shape[0] == 8
     assert found.average()[50] == pytest.approx(math.sqrt(0.5 * (9.0 + 16.0)) * 1e-6, rel=1e-9)
 

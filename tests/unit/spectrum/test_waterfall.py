@@ -7,6 +7,7 @@ from scipy.signal.windows import hann
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum import waterfall
+from rotordrop.spectrum.coast_down import WaterfallChoice
 from rotordrop.spectrum.speed import (
     exact_speed_profile,
     find_standstill,
@@ -15,17 +16,16 @@ from rotordrop.spectrum.speed import (
     fit_speed_profile,
 )
 from rotordrop.spectrum.waterfall import (
-    PAPER_SETTINGS,
+    PAPER_POINTS,
     STOP_BAND,
     TAPS_PER_FACTOR,
-    WaterfallSettings,
+    points_for,
     reduce_rate,
-    settings_for,
     waterfalls,
 )
 
 FS = 20000.0
-SMALL = WaterfallSettings(points=2048)
+SMALL = 2048
 
 
 def tone(frequency, samples=8192, amplitude=1.0):
@@ -36,7 +36,7 @@ def tone(frequency, samples=8192, amplitude=1.0):
 def test_same_amplitudes_as_scipys_short_time_transform():
     rng = np.random.default_rng(1)
     xy = rng.standard_normal((10000, 2))
-    (ours,) = waterfalls(xy, FS, components=("x",), settings=SMALL)
+    (ours,) = waterfalls(xy, FS, components=("x",), points=SMALL)
     transform = ShortTimeFFT(
         hann(2048, sym=False), hop=1024, fs=FS, scale_to="magnitude", fft_mode="onesided"
     )
@@ -48,7 +48,7 @@ def test_same_amplitudes_as_scipys_short_time_transform():
 
 @pytest.mark.parametrize("component", ["x", "y", "full"])
 def test_a_tone_on_a_line_reads_its_amplitude(component):
-    (found,) = waterfalls(tone(50 * FS / 2048, amplitude=3e-6), FS, components=(component,), settings=SMALL)
+    (found,) = waterfalls(tone(50 * FS / 2048, amplitude=3e-6), FS, components=(component,), points=SMALL)
     line = np.argmin(np.abs(found.frequency - 50 * FS / 2048))
     assert found.amplitude[:, line] == pytest.approx(np.full(len(found.time), 3e-6), rel=1e-12)
     assert found.amplitude.sum(axis=1) == pytest.approx(np.full(len(found.time), 6e-6), rel=1e-9)
@@ -56,14 +56,14 @@ def test_a_tone_on_a_line_reads_its_amplitude(component):
 
 def test_peak_to_peak_offset_and_direction_stand_where_they_belong():
     xy = tone(50 * FS / 2048)
-    (single,) = waterfalls(xy, FS, settings=SMALL)
-    (double,) = waterfalls(xy, FS, settings=SMALL, amplitude_kind="peak-to-peak")
+    (single,) = waterfalls(xy, FS, points=SMALL)
+    (double,) = waterfalls(xy, FS, points=SMALL, amplitude_kind="peak-to-peak")
     assert double.amplitude == pytest.approx(2.0 * single.amplitude)
     assert (single.amplitude_kind, double.amplitude_kind) == ("zero-to-peak", "peak-to-peak")
     xy = np.tile([2e-6, -285e-6], (4096, 1))
-    assert waterfalls(xy, FS, settings=SMALL)[0].amplitude.max() < 1e-15
-    (found,) = waterfalls(tone(50 * FS / 2048) * [1.0, -1.0], FS, components=("full",), settings=SMALL)
-    (backward,) = waterfalls(tone(-50 * FS / 2048), FS, components=("full",), settings=SMALL)
+    assert waterfalls(xy, FS, points=SMALL)[0].amplitude.max() < 1e-15
+    (found,) = waterfalls(tone(50 * FS / 2048) * [1.0, -1.0], FS, components=("full",), points=SMALL)
+    (backward,) = waterfalls(tone(-50 * FS / 2048), FS, components=("full",), points=SMALL)
     at = backward.frequency[np.argmax(backward.amplitude[0])]
     assert at == pytest.approx(-50 * FS / 2048)
     assert found.frequency[np.argmax(found.amplitude[0])] == pytest.approx(-50 * FS / 2048)
@@ -79,28 +79,28 @@ def test_frames_are_read_one_at_a_time():
             return np.zeros((key.stop - key.start, 2))
 
     signal = Counting()
-    assert waterfalls(signal, FS, settings=SMALL)[0].amplitude.shape[0] == 96
+    assert waterfalls(signal, FS, points=SMALL)[0].amplitude.shape[0] == 96
     assert signal.largest == 2048
 
 
 def test_frames_have_a_speed_smear_with_its_change_and_limits():
     speed = np.linspace(377.0, 300.0, 8192)
-    (found,) = waterfalls(tone(100.0), FS, speed=speed, settings=SMALL)
+    (found,) = waterfalls(tone(100.0), FS, speed=speed, points=SMALL)
     assert found.speed == pytest.approx(np.interp(found.time * FS - 0.5, np.arange(8192), speed), rel=1e-9)
     assert found.speed_change == pytest.approx(np.full(7, 77.0 * 2047 / 8191), rel=1e-9)
     # 60 Hz falling with a time constant of 5.9 s reads 41 % of its amplitude in the paper's first frame.
-    t = np.arange(PAPER_SETTINGS.points) / FS
+    t = np.arange(PAPER_POINTS) / FS
     angle = 2.0 * np.pi * 60.0 * 5.9 * (1.0 - np.exp(-t / 5.9))
     (found,) = waterfalls(np.column_stack([np.cos(angle), np.sin(angle)]), FS)
     assert found.amplitude.max() == pytest.approx(0.41, abs=0.01)
     with pytest.raises(RecordError, match="100 samples, one frame needs 32768"):
         waterfalls(np.zeros((100, 2)), FS)
-    with pytest.raises(UsageError, match=r"overlap 1\.0 given"):
-        WaterfallSettings(overlap=1.0)
+    with pytest.raises(UsageError, match=r"overlap is 1\.0; expected a finite number of at least 0 up to 0"):
+        WaterfallChoice(overlap=1.0)
     with pytest.raises(
         RecordError, match=r"speed has shape \(5,\), expected one value per sample, \(4096,\)"
     ):
-        waterfalls(np.zeros((4096, 2)), FS, settings=SMALL, speed=np.zeros(5))
+        waterfalls(np.zeros((4096, 2)), FS, points=SMALL, speed=np.zeros(5))
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_frames_have_a_speed_smear_with_its_change_and_limits():
     [(1_140_000, 32768), (212_992, 32768), (212_991, 16384), (45_000, 4096), (3000, 1024)],
 )
 def test_a_short_signal_has_a_dozen_frames_as_long_as_that_allows(samples, points):
-    assert settings_for(samples).points == points
+    assert points_for(samples) == points
 
 
 @pytest.mark.parametrize("samples", [40, 700, 20_001])
