@@ -205,7 +205,7 @@ def where_of(line: Line) -> str:
     if line.kind == "combination":
         first, *_, last = line.path.frequency
         return f"{first:.0f} to {last:.0f} Hz".replace(" ", NO_BREAK)
-    matches = line.name.matches
+    matches = line.matches
     # Where the speed changed too little to tell, the name says which of the two it is.
     an_order = line.kind == "order" or bool(matches and matches[0].candidate.kind == "order")
     if line.order is None or not an_order:

@@ -25,15 +25,9 @@ from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal, reduce_rat
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line(SeenLine):
-    """One line of a coast-down, with its name and the reason for it."""
+class Line(SeenLine, Name):
+    """One line of a coast-down with its name, whose confidence is also that of the line."""
 
-    label: str
-    """Its name, or "unnamed"."""
-    named: bool
-    confidence: float
-    """Probability that line and name are right [1]."""
-    reason: str
     amplitude: float
     """Zero-to-peak [m], in the plane and direction where it is largest, root mean square over its time."""
     amplitude_xy: dict[str, tuple[float, float]]
@@ -43,8 +37,6 @@ class Line(SeenLine):
     """Radii of the forward and backward turning parts [m] in each plane, root mean square over its time."""
     path: FrequencyPath
     """Its frequency over time [Hz]."""
-    name: Name
-    """With all candidates worth considering."""
 
     def as_json(self) -> dict[str, Any]:
         """Everything known about the line, ready for JSON; amplitudes are zero-to-peak in m."""
@@ -54,9 +46,7 @@ class Line(SeenLine):
             "width_hz amplitude_zero_to_peak_m=amplitude amplitude_xy_zero_to_peak_m=amplitude_xy forward_m "
             "backward_m floor_zero_to_peak_m=floor ratio_to_floor=ratio first_seen_s last_seen_s candidates",
             confidence=round(self.confidence, 4),
-            candidates=[
-                stated(match, "name=candidate.name probability deviation") for match in self.name.matches
-            ],
+            candidates=[stated(match, "name=candidate.name probability deviation") for match in self.matches],
         )
 
 
@@ -221,8 +211,8 @@ def _merged(line: Line, other: Line) -> Line:
 
 def _swing(line: Line) -> str:
     """What a swing or whirl is called at either end, of which multiples are seen; nothing of other lines."""
-    family = line.name.matches[0].candidate.family if line.name.matches else line.label
-    return family if family in (PENDULUM, CONICAL) or not line.name.matches else ""
+    family = line.matches[0].candidate.family if line.matches else line.label
+    return family if family in (PENDULUM, CONICAL) or not line.matches else ""
 
 
 def _parents(
@@ -295,15 +285,10 @@ def _line(found: FoundLine, plane: str, name: Name) -> Line:
     seen = {one.name: getattr(found, one.name) for one in fields(SeenLine)}
     errors = {"frequency_error": max(found.frequency_error, least), "order_error": order_error}
     return Line(
-        **{**seen, **errors},
-        label=name.label,
-        named=name.named,
-        confidence=name.confidence * found.existence,
-        reason=name.reason,
+        **{**seen, **errors, **vars(name), "confidence": name.confidence * found.existence},
         amplitude=float(found.amplitude.max()),
         amplitude_xy={plane: (float(found.amplitude[0]), float(found.amplitude[1]))},
         forward={plane: float(found.forward[0])},
         backward={plane: float(found.backward[0])},
         path=found.path_of_frequency(),
-        name=name,
     )
