@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Role: TypeAlias = Literal["measured", "simulated", "simulated, lower gap", "estimated", "cross-check"]
 
+WIDE = 0.05
+"""Half a 90 % interval of a peak over the peak from which it is said why [1] (chosen)."""
 LATE = (0.15, 0.2)
 """Stretch of the late mean force [s from power-off]."""
 
@@ -136,6 +138,11 @@ class Peak:
     def interval_90(self) -> tuple[float, float] | None:
         """Interval that holds the true peak with 90 % probability, where one is known."""
         return self.known.interval_90
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it is known so badly that it is said why."""
+        return self.known.high - self.known.low > 2.0 * WIDE * abs(self.value)
 
     def as_json(self) -> dict[str, Any]:
         """What is known of the number and of its time, ready for JSON."""

@@ -20,10 +20,10 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import needing
-from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.methods import Method
 from rotordrop.estimate.published import (
+    Advice,
     Agreement,
     InitialState,
     Joint,

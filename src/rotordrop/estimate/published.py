@@ -217,6 +217,10 @@ class Advice(Document):
     """The same once the measurement is known."""
     sentence: str
 
+    def left(self, bearing: str) -> float:
+        """What would be left of the interval at a bearing [1]."""
+        return self.narrowed_N[bearing] / self.half_widths_N[bearing]
+
 
 class CrossCheck(Document):
     """One number found in two ways."""

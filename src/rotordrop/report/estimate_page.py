@@ -16,7 +16,6 @@ from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.parameter import Role
 from rotordrop.elements.table import published, row_of
-from rotordrop.estimate.advice import is_wide
 from rotordrop.estimate.bearing_drop import BearingDrop, History
 from rotordrop.estimate.estimate import (
     CrossCheck,
@@ -222,9 +221,9 @@ def width_advice(estimate: Estimate) -> Iterator[str]:
     found: dict[tuple[str, str, str], list[tuple[str, float, float]]] = {}
     for bearing in estimate.bearings:
         force, stress = bearing.peak_force.known, bearing.peak_stress.known
-        if estimate.consistent and is_wide(force):
+        if estimate.consistent and bearing.peak_force.is_wide:
             half = 0.5 * (force.high - force.low) / force.value
-            lefts = [one.narrowed[bearing.name] / one.half_widths[bearing.name] for one in estimate.advice]
+            lefts = [one.left(bearing.name) for one in estimate.advice]
             left = min(lefts, default=1.0)
             cause = remedy = ""
             if left < WORTH:

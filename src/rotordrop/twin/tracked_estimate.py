@@ -10,7 +10,6 @@ from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError
-from rotordrop.estimate.advice import Advice, is_wide
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.estimate.bearing_values import bearing_values
@@ -25,7 +24,7 @@ from rotordrop.estimate.estimate import (
 )
 from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Tracked
-from rotordrop.estimate.published import LaterMotion, later_warning
+from rotordrop.estimate.published import Advice, LaterMotion, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.estimate.unbalance import unbalance_notes
 from rotordrop.known import Known
@@ -146,7 +145,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
             *twin_assumptions(evidence, problem),
             *assumed,
             *(check.noted() for check in drop.checks if check.note),
-            *(f"a further number: {one.sentence()}" for one in advice),
+            *(f"a further number: {one.sentence}" for one in advice),
             *(note for note in unbalance_notes(unbalance) if note not in assumed),
             *(quick if method.quick else ()),
         ),
@@ -159,7 +158,7 @@ def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     """What to measure of a machine whose rotor is not known by its drawing, or whose forces are wide."""
     unsure = any(unknown.path == "rotor.stiffness_factor" for unknown in drop.problem.unknowns)
     loads = (_loads(drop, judged, b).peak_force for b in range(len(drop.problem.model.bearing_names)))
-    wide = any(is_wide(one.known) for one in loads)
+    wide = any(one.is_wide for one in loads)
     # of a model that does not fit the covariances say nothing
     if not judged.fits or not (unsure or wide) or drop.drops != 1:
         return ()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.estimate.advice import WORTH_SAYING, Advice
+from rotordrop.estimate.published import Advice
 from rotordrop.known import NINETY
 from rotordrop.track.forces import ForceHistory, force_gradient
 from rotordrop.track.problem import DropProblem
@@ -16,6 +16,9 @@ from rotordrop.track.smoother import Smoothed, smooth
 from rotordrop.twin.allowances import MODEL_FORCE_SIGMA
 
 DRAWING = "the rotor by its sections, from a drawing"
+WORTH_SAYING = 0.95
+"""Half width left over the one there is from which a further number is not worth its measurement
+[1] (chosen)."""
 MOST_NAMED = 3
 """Measurements that are named beside the best of every bearing (chosen)."""
 
@@ -54,20 +57,35 @@ def value_of_information(
     paths = {problem.n_dynamic + k: unknown.path for k, unknown in enumerate(problem.unknowns)}
     paths |= {first + c: f"sensors.{one.name}.gain" for c, one in enumerate(problem.model.machine.sensors)}
     listed = [
-        Advice(
-            measurement=measurement,
-            paths=tuple(paths[entry] for entry in entries),
-            half_widths=before,
-            narrowed=after[measurement],
-        )
+        advice_of(measurement, [paths[entry] for entry in entries], before, after[measurement])
         for measurement, entries in _measurements(problem)
     ]
     if form:
-        listed.append(Advice(measurement=DRAWING, paths=("rotor",), half_widths=before, narrowed=drawing))
-    listed.sort(key=lambda one: one.left)
-    best = [min(listed, key=lambda one: one.narrowed[name]) for name in names]
+        listed.append(advice_of(DRAWING, ["rotor"], before, drawing))
+    least = {one.measurement: min(map(one.left, names)) for one in listed}
+    listed.sort(key=lambda one: least[one.measurement])
+    best = [min(listed, key=lambda one: one.narrowed_N[name]) for name in names]
     named = (one for k, one in enumerate(listed) if k < MOST_NAMED or one in best)
-    return tuple(one for one in named if one.left < WORTH_SAYING)
+    return tuple(one for one in named if least[one.measurement] < WORTH_SAYING)
+
+
+def advice_of(
+    measurement: str, paths: Sequence[str], before: Mapping[str, float], after: Mapping[str, float]
+) -> Advice:
+    """What a measurement of some parameters would bring: half widths of the peak forces by bearing [N]."""
+    parts = [
+        f"{name} from ± {half:.3g} N to ± {after[name]:.3g} N"
+        for name, half in before.items()
+        if after[name] < WORTH_SAYING * half
+    ]
+    sentence = f"{measurement} would narrow the peak force: {', '.join(parts)}"
+    return Advice(
+        measurement=measurement,
+        paths=list(paths),
+        half_widths_N=dict(before),
+        narrowed_N=dict(after),
+        sentence=sentence,
+    )
 
 
 def explained(covariance: Array, shared: Array) -> float:

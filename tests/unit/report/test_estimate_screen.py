@@ -8,13 +8,13 @@ import numpy as np
 from rich.console import Console
 from tests.unit.report.conftest import section
 
-from rotordrop.estimate.advice import Advice
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.known import Known
 from rotordrop.report.estimate_page import estimate_page, estimate_screen, width_advice
 from rotordrop.report.terminal import print_summary
 from rotordrop.track.consistency import Check
+from rotordrop.twin.value_of_information import advice_of
 
 
 def lines_of(estimate):
@@ -93,10 +93,10 @@ def test_a_wide_force_says_why_and_what_would_narrow_it_once_for_both_ends(estim
 
     halves = {one.name: 0.16 * one.peak_force.known.value for one in estimate.bearings}
     narrowed = {name: half / 8.0 for name, half in halves.items()}
-    found = Advice(measurement="a tap test", paths=("support.mass",), half_widths=halves, narrowed=narrowed)
+    found = advice_of("a tap test", ["support.mass"], halves, narrowed)
     wide = replace(estimate, bearings=tuple(map(as_wide, estimate.bearings)), advice=(found,))
     (said,) = width_advice(wide)
     assert "Force (NDE, DE) ± 16 %" in said and "± 2 % with a tap test" in said
     assert said in text_of(wide)
-    (said,) = width_advice(replace(wide, advice=(replace(found, narrowed=halves),)))
+    (said,) = width_advice(replace(wide, advice=(advice_of("a tap test", [], halves, halves),)))
     assert "Force (NDE, DE) ± 16 %; no one measurement" in said

@@ -14,7 +14,6 @@ import rotordrop
 from rotordrop import build_drop_model, check_record, example_machine, read_record
 from rotordrop.elements.rotor import FORM
 from rotordrop.elements.table import EXTENSIONS
-from rotordrop.estimate.advice import Advice
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine.simple import SimpleMachine, simple_machine
@@ -32,7 +31,7 @@ from rotordrop.twin.tracked_loads import (
     is_beyond_accuracy,
     with_form_error,
 )
-from rotordrop.twin.value_of_information import explained
+from rotordrop.twin.value_of_information import advice_of, explained
 
 STAGE = Stage(until=0.016, force=0.07, share=0.01, passes=2)
 
@@ -187,15 +186,11 @@ def test_advice_names_measurement_and_gain():
     apart = np.diag([4.0, 9.0])
     assert explained(apart, np.array([2.0, 3.0])) == pytest.approx(2.0)
     assert explained(np.array([[4.0, 4.0], [4.0, 4.0]]), np.array([2.0, 2.0])) == pytest.approx(1.0)
-    one = Advice(
-        measurement="a lift check at DE (rotordrop clearance)",
-        paths=("DE.air_gap",),
-        half_widths={"NDE": 200.0, "DE": 300.0},
-        narrowed={"NDE": 199.0, "DE": 150.0},
-    )
-    assert one.left == pytest.approx(0.5)
+    before, after = {"NDE": 200.0, "DE": 300.0}, {"NDE": 199.0, "DE": 150.0}
+    one = advice_of("a lift check at DE (rotordrop clearance)", ["DE.air_gap"], before, after)
+    assert one.left("DE") == pytest.approx(0.5)
     said = "a lift check at DE (rotordrop clearance) would narrow the peak force: DE from ± 300 N to ± 150 N"
-    assert one.sentence() == said
+    assert one.sentence == said
 
 
 def test_the_error_of_a_beam_is_in_forces_and_cross_check():
