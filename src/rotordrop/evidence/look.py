@@ -37,7 +37,7 @@ from rotordrop.evidence.paths import (
 from rotordrop.evidence.quality import Finding, gate, not_seen, stops
 from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone, check_senses
 from rotordrop.evidence.quality.channels import check_channels
-from rotordrop.evidence.quality.finding import found, ranked
+from rotordrop.evidence.quality.finding import found, ranked, standing
 from rotordrop.evidence.quality.motion import (
     LOUD,
     check_fall,
@@ -46,7 +46,7 @@ from rotordrop.evidence.quality.motion import (
     check_rotation_line,
     check_slow_fall,
 )
-from rotordrop.evidence.quality.recorder import check_blocks, check_clock
+from rotordrop.evidence.quality.recorder import check_blocks, check_clock, check_coupling
 from rotordrop.evidence.rest import STANDSTILL, standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
@@ -308,7 +308,8 @@ def look(
         if evidence is None:
             before = drops[0].release - BEFORE_RELEASE
             line = [] if turning is None else check_rotation_line(fell, before, turning)
-            findings = ranked([*findings, *check_fall(motion), *line])
+            coupled = check_coupling(fell, None, drops[0].release)
+            findings = ranked(standing([*findings, *check_fall(motion), *line, *coupled]))
         if _unit_doubted(findings):
             raise NothingFallsError("no length is known", "give the right unit")
     except NothingFallsError as error:
@@ -488,8 +489,9 @@ def _checked(record: Record) -> tuple[Finding, ...]:
 def _living(
     record: Record, gaps: tuple[Gap | None, ...], findings: Iterable[Finding]
 ) -> tuple[Record, tuple[Gap | None, ...]]:
-    """The record without its dead channels and the planes that they leave half blind, and the gaps of it."""
-    dead = {one.channel for one in findings if one.kind == "dead channel"}
+    """The record without dead or long stuck channels and planes that they leave half blind, and its gaps."""
+    lost = ("dead channel", "stuck channel", "zeroed block")
+    dead = {one.channel for one in findings if one.kind in lost and one.severity == "stop"}
     living = [one for one in record.sensors if one.name not in dead]
     seeing = [sees_both_directions([s for s in living if s.node == p.node]) for p in record.planes]
     if not dead or not any(seeing):

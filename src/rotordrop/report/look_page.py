@@ -45,6 +45,7 @@ FEW = 2
 """Lines of a channel that a terminal has room for."""
 ORBIT_BEFORE, ORBIT_UNTIL = 0.05, 0.5
 """Part of the record that the orbits are drawn of, from the release [s]: those of a minute are one blot."""
+COUPLED = "AC coupling"
 RELEASE = "the release"
 """What a look counts time from."""
 SENSOR_PLANES = f"Displacement in the planes of the sensors; time counts from {RELEASE}."
@@ -82,13 +83,13 @@ def _of_drop(seen: Look, *, drawn: bool) -> ReportContent:
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}"
         + ("" if drawn else f", times as in the record (from {format_moment(seen.record.time[0])})"),
         verdict=(*quality_statements(doubted), *_verdict(seen), *quality_statements(others)),
-        cards=tuple(_card(seen, plane) for plane in seen.planes),
+        cards=tuple(card for card in (_card(seen, plane) for plane in seen.planes) if card.figures),
         counted_from=RELEASE,
         lead=1 if drawn else 0,
         summary=(_timeline(seen),) if drawn else (),
         sections=(
             *figures[:2],
-            *(() if _loud(seen) else (Section("Impacts", tables=(_impacts(seen),)),)),
+            *(() if _hidden_by(seen) else (Section("Impacts", tables=(_impacts(seen),)),)),
             *figures[2:],
         ),
     )
@@ -247,8 +248,10 @@ def _verdict(seen: Look) -> list[Statement]:
     release = f"{format_moment(drop.release)} (± {half:.2g} ms)"
     count = len(seen.impacts)
     hits = f"{count} impact{'' if count == 1 else 's'} ({low} to {high})"
-    if _loud(seen):
-        hits, ends = "noise hides its impacts", "."
+    if hidden := _hidden_by(seen):
+        hits, ends = f"{hidden} hides its impacts", "."
+    if hidden == COUPLED:
+        return [Statement(f"Released at {release}; {hits} and its air gap.")]
     touched = " First end: not determined." if len(seen.planes) > 1 else ""
     if seen.first_end is not None:
         at = next(plane.touch for plane in seen.planes if plane.plane == seen.first_end)
@@ -275,9 +278,11 @@ def _verdict(seen: Look) -> list[Statement]:
     return [*map(Statement, said), *(Statement(text, "warning") for text in grave)]
 
 
-def _loud(seen: Look) -> bool:
-    """Whether noise makes impacts of its own."""
-    return any(plane.noise > LOUD for plane in seen.planes)
+def _hidden_by(seen: Look) -> str:
+    """What makes impacts of its own or moves them: a high-pass, noise; empty where nothing does."""
+    if any(one.kind == COUPLED for one in seen.findings):
+        return COUPLED
+    return "noise" if any(plane.noise > LOUD for plane in seen.planes) else ""
 
 
 def _card(seen: Look, plane: PlaneLook) -> Card:
@@ -293,7 +298,9 @@ def _card(seen: Look, plane: PlaneLook) -> Card:
         (gap_up_to, KeyFigure("position index (mean distance over gap)", index)),
     )
     figures = [figure for most, figure in with_noise if plane.noise <= most]
-    if plane.velocity_index is not None:
+    if _hidden_by(seen) == COUPLED:  # no place of the rotor is known, nor the gap
+        figures = []
+    elif plane.velocity_index is not None:
         label = "velocity index (r.m.s. over speed × gap)"
         velocity = _found(plane.velocity_index, plane.velocity_index_interval_90, "dimensionless")
         figures.append(KeyFigure(label, velocity))

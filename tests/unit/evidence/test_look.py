@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from rotordrop import Known, example_record_path, read_record
 from rotordrop.cli._options import machine_first
@@ -592,6 +593,21 @@ def test_noise_is_named_and_what_it_hides_is_not_stated(noise, rows, tmp_path):
         assert plane.gap_determined == (rows > 1)
         low, high = plane.largest_interval_90
         assert low < GAP < high and high - low > 4.0 * noise
+
+
+def test_what_a_high_pass_or_a_stuck_channel_hides_is_not_stated(machine):
+    drop = read_record(example_record_path("lp400_drop_060"), machine)
+    high = butter(1, 1.0, "high", fs=drop.sampling_rate, output="sos")
+    coupled = sosfilt(high, drop.signals - drop.signals[0], axis=0)
+    stuck = np.where(drop.time[:, None] > (np.inf, np.inf, 0.03, np.inf), drop.signals[0], drop.signals)
+    for signals, kind, ends in ((coupled, "AC coupling", set()), (stuck, "stuck channel", {"NDE"})):
+        for of in (None, machine):
+            seen = look(replace(drop, signals=signals), machine=of)
+            assert {one.kind for one in seen.findings if one.severity == "stop"} == {kind}
+            page = look_page(seen, drawn=False)
+            stated = {card.title for card in page.cards if "air gap" in {f.label for f in card.figures}}
+            assert stated == ends
+            assert ("impacts (" in page.verdict[0].text) == bool(ends)
 
 
 def test_a_plane_between_the_bearings_has_the_name_of_neither(machine):
