@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.errors import RotordropError
-from rotordrop.machine.ross_files import ImportedRotor, read_ross, write_ross
+from rotordrop.machine.ross_files import ImportedRotor, Spring, read_ross, write_ross
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.suspension import Support, spring
 from rotordrop.rotor.whirl import unbalance_response, whirl_modes
@@ -31,8 +31,17 @@ AMOUNT = 1e-4
 
 def supports_of(imported: ImportedRotor, speed: float) -> list[Support]:
     """Bearings of the source as supports here, with their coefficients at a speed [rad/s]."""
-    at = [one.at_speed(speed) for one in imported.springs]
-    return [spring(one.node, np.array(one.stiffness_matrix), np.array(one.damping_matrix)) for one in at]
+    return [spring(one.node, *at_speed(one, speed)) for one in imported.springs]
+
+
+def at_speed(bearing: Spring, speed: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stiffness and damping matrix of a bearing at a speed [rad/s], straight between those of its table."""
+    stiffness, damping = np.array(bearing.stiffness_matrix), np.array(bearing.damping_matrix)
+    for letter, matrix in (("k", stiffness), ("c", damping)):
+        for place, axes in np.ndenumerate([["xx", "xy"], ["yx", "yy"]]):
+            if len(values := bearing.told.get(f"{letter}{axes}", ())) > 1:
+                matrix[place] = np.interp(speed, bearing.told["frequency"], values)
+    return stiffness, damping
 
 
 def tabled(imported: ImportedRotor, speed: float) -> bool:

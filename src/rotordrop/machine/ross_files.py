@@ -14,8 +14,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rotordrop.document import parse_toml
 from rotordrop.elements.magnet import ActiveMagneticBearing
 from rotordrop.elements.rotor import Rotor
@@ -76,29 +74,6 @@ class Spring:
     def damping_matrix(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Force in (x, y) against velocity in (x, y) [N s/m]."""
         return _matrix(self.damping, self.cross_damping)
-
-    def at_speed(self, speed: float) -> Spring:
-        """The bearing with its coefficients at a speed [rad/s], straight between those of its table."""
-        speeds = self.told.get("frequency", ())
-        if len(speeds) < 2:
-            return self
-
-        def pair(kind: str, keys: tuple[str, str], now: tuple[float, float]) -> tuple[float, float]:
-            tables = [self.told.get(f"{kind}{key}", ()) for key in keys]
-            first, second = (
-                float(np.interp(speed, speeds, values)) if len(values) > 1 else value
-                for values, value in zip(tables, now, strict=True)
-            )
-            return first, second
-
-        own, cross = ("xx", "yy"), ("xy", "yx")
-        return replace(
-            self,
-            stiffness=pair("k", own, self.stiffness),
-            damping=pair("c", own, self.damping),
-            cross_stiffness=pair("k", cross, self.cross_stiffness),
-            cross_damping=pair("c", cross, self.cross_damping),
-        )
 
 
 def _matrix(
