@@ -13,7 +13,7 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.errors import OutputError, UsageError, needing
-from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.bearing_drop import BearingDrop, Motion
 from rotordrop.files import atomic_path, new_hdf5
 from rotordrop.labelled import Stored, put
 
@@ -62,11 +62,13 @@ def history_columns(estimate: Estimate) -> tuple[Array, tuple[Column, ...]]:
     own = finest_time(estimate)
     step = (own[-1] - own[0]) / (len(own) - 1)
     return step * (round(own[0] / step) + np.arange(len(own))), tuple(
-        column for bearing in estimate.bearings for column in _columns(bearing, estimate.machine, own)
+        column for bearing in estimate.bearings for column in columns_of(bearing, estimate.machine, own)
     )
 
 
-def _columns(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Column]:
+def columns_of(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Column]:
+    """Every history of a bearing at some times [s], shape (T,)."""
+
     def column(quantity: str, unit: str, text: str, at: Array, values: Array) -> Column:
         on_time = values if at is time else np.interp(time, at, values, left=np.nan, right=np.nan)
         return Column(quantity=quantity, bearing=bearing.name, unit=unit, text=text, values=on_time)
@@ -86,10 +88,14 @@ def _columns(bearing: BearingDrop, machine: Machine, time: Array) -> Iterator[Co
     for motion in bearing.motions:
         for k, axis in enumerate("xy"):
             text = f"displacement of the rotor along {axis}, {motion.label}"
-            name = f"{motion.role.replace(', ', ' ').replace(' ', '_')}_{axis}"
-            yield column(name, "m", text, motion.time, motion.displacement[:, k])
+            yield column(f"{quantity_of(motion)}_{axis}", "m", text, motion.time, motion.displacement[:, k])
     load = numbers_of(machine.bearing(bearing.name)).load_of_stress(bearing.stress.values)
     yield column("largest_ball_load", "N", "load of the most loaded ball", bearing.stress.time, load)
+
+
+def quantity_of(motion: Motion) -> str:
+    """What the columns of a motion are called, before their axis."""
+    return motion.role.replace(", ", " ").replace(" ", "_")
 
 
 def loads_of_balls(estimate: Estimate, name: str) -> Array:

@@ -1,28 +1,26 @@
 """What a computation leaves: its report, its document, histories to draw, and their page as JSON.
 
-Sentences and numbers are those of the report; the page derives none of its own.
+Sentences and numbers are those of the report, in both systems of units; the page derives none of its own.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rotordrop.arrays import Array
-from rotordrop.estimate.histories import finest_time
+from rotordrop.estimate.histories import Column, columns_of, finest_time, quantity_of
 from rotordrop.evidence.impacts import AFTER_LAST
 from rotordrop.files import write_json
 from rotordrop.jobs.traces import write_traces
-from rotordrop.jobs.written import columns_json, quantity_json, shown_units
 from rotordrop.known import NINETY
-from rotordrop.report.content import SIMULATED_RECORD, Statement
+from rotordrop.report.content import SIMULATED_RECORD, Statement, Table
 from rotordrop.report.origin import Origin, UsedFile, command_line, now
 from rotordrop.report.page import write_page
-from rotordrop.report.quantity import Quantity
+from rotordrop.report.quantity import Quantity, System, display_unit
 
 if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate
@@ -35,6 +33,8 @@ if TYPE_CHECKING:
 
 Met = tuple[str, float, float, Quantity, Quantity]
 """An impact: place, time [s], azimuth [rad], and two numbers of it."""
+SYSTEMS: tuple[System, ...] = ("SI", "US")
+SHOWN_KINDS = ("length", "force", "pressure", "speed")
 
 
 def write_look(seen: Look, made: Path, machine: str) -> None:
@@ -131,7 +131,7 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     listed = _impacts(met, "peak force", "impulse")
     for row, (*_, after) in zip(listed["impacts"], contacts, strict=True):
         row["impact"] = after
-    write_traces(made, "drop", grid, columns)
+    write_traces(made, "drop", grid, {name: column.values for name, column in columns.items()})
     write_page(content, made / "report.html")
     write_json(made / "document.json", estimate_document(estimate), sealed=True)
     row = {
@@ -155,7 +155,7 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
                 }
                 for bearing, card in zip(estimate.bearings, content.cards, strict=True)
             ],
-            "labels": {column: _label(estimate, column) for column in columns},
+            "labels": {name: column.label for name, column in columns.items()},
             "timeline": _events(estimate),
             "zero": estimate.drop_instant.value,
             "speed": estimate.speed,
@@ -238,13 +238,6 @@ def _largest(estimate: Estimate, peak: str, kind: str) -> dict[str, Any] | None:
     return {"bearing": name, "interval_90": ends, **quantity_json(Quantity.of(one.known, kind))}
 
 
-def _label(estimate: Estimate, column: str) -> str:
-    """A column as people name it, ``"force lower 0"`` by the bearing it is of and with its unit."""
-    words, _, number = column.rpartition(" ")
-    unit = {"force": "N", "stress": "Pa"}.get(words.partition(" ")[0], "m")
-    return f"{estimate.bearings[int(number)].name} {words} [{unit}]"
-
-
 def _events(estimate: Estimate) -> list[dict[str, Any]]:
     """What happened when, times [s] from power-off: the estimate knows better than the first look.
 
@@ -301,42 +294,21 @@ def _origin(job: Job, options: Mapping[str, Any], verb: str) -> Origin:
     )
 
 
-def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Array]]:
-    """Every history of an estimate on the clock of its force, and which column of a bearing is what.
-
-    Where a history has a clock of its own it is read off between its samples by straight lines.
-    """
-    grid = finest_time(estimate)
-    columns: dict[str, Array] = {}
-    names: list[dict[str, Any]] = []
+def histories_of(estimate: Estimate) -> tuple[list[dict[str, Any]], Array, dict[str, Column]]:
+    """Every history of an estimate on the clock of its force, and which column of a bearing is what."""
+    grid, names, columns = finest_time(estimate), list[dict[str, Any]](), dict[str, Column]()
     for b, bearing in enumerate(estimate.bearings):
-        told: dict[str, Any] = {"labels": {}}
-        for motion in bearing.motions:
-            role = "measured" if motion.role == "measured" else "estimated"
-            if role in told:
-                continue
-            told[role] = [f"{axis} {role} {b}" for axis in "xy"]
-            told["labels"][role] = motion.label
-            for column, history in zip(told[role], (motion.horizontal, motion.vertical), strict=True):
-                columns[column] = _on(grid, history.time, history.values)
-        for kind, history, band in (
-            ("force", bearing.force, bearing.force_band),
-            ("stress", bearing.stress, bearing.stress_band),
-        ):
-            told[kind] = [f"{kind} {b}"]
-            columns[f"{kind} {b}"] = _on(grid, history.time, history.values)
-            if band is not None:
-                told[kind] += [f"{kind} lower {b}", f"{kind} upper {b}"]
-                columns[f"{kind} lower {b}"] = _on(grid, band.time, band.lower)
-                columns[f"{kind} upper {b}"] = _on(grid, band.time, band.upper)
-        names.append(told)
+        own = {one.quantity: one for one in columns_of(bearing, estimate.machine, grid)}
+        motions = {
+            "measured" if one.role == "measured" else "estimated": one for one in bearing.motions[::-1]
+        }
+        parts = {role: [f"{quantity_of(one)}_{axis}" for axis in "xy"] for role, one in motions.items()}
+        for kind in ("force", "stress"):
+            parts[kind] = [one for one in (kind, f"{kind}_lower", f"{kind}_upper") if one in own]
+        labels = {role: one.label for role, one in motions.items()}
+        names.append({"labels": labels, **{part: [f"{q} {b}" for q in of] for part, of in parts.items()}})
+        columns |= {f"{q} {b}": own[q] for of in parts.values() for q in of}
     return names, grid, columns
-
-
-def _on(grid: Array, time: Array, values: Array) -> Array:
-    if len(time) == len(grid) and np.array_equal(time, grid):
-        return values
-    return np.asarray(np.interp(grid, time, values, left=math.nan, right=math.nan))
 
 
 def _panel(panel: Panel) -> dict[str, Any]:
@@ -355,3 +327,35 @@ def _impacts(found: Sequence[Met], *columns: str) -> dict[str, Any]:
         for (place, time, azimuth, *_), numbers in zip(found, rows, strict=True)
     ]
     return {"impacts": impacts, "impact_columns": heads}
+
+
+def quantity_json(quantity: Quantity) -> dict[str, Any]:
+    """A number as it is [SI] and as it is written, with its interval."""
+    finite = math.isfinite(quantity.value) and not quantity.range_only
+    told: dict[str, Any] = {"value": quantity.value if finite else None, "kind": quantity.kind}
+    for system in SYSTEMS:
+        shown = replace(quantity, system=system)
+        told[system] = [shown.levelled, shown.interval_text]
+    return told
+
+
+def columns_json(
+    heads: Sequence[str], rows: Sequence[Sequence[Quantity]]
+) -> tuple[list[dict[str, str]], list[list[dict[str, Any]]]]:
+    """Columns of numbers: headings with the unit that a column shares, and rows of numbers without it."""
+    told = [[quantity_json(cell) for cell in row] for row in rows]
+    above: dict[str, Sequence[str]] = {}
+    for system in SYSTEMS:
+        cells = (tuple(replace(cell, system=system) for cell in row) for row in rows)
+        shown = Table(tuple(heads), tuple(cells)).with_units_above()
+        above[system] = shown.columns
+        for one, row in zip(told, shown.rows, strict=True):
+            for cell, number in zip(one, row, strict=True):
+                assert isinstance(number, Quantity)
+                cell[system] = [number.levelled, number.interval_text]
+    return [{system: above[system][k] for system in SYSTEMS} for k in range(len(heads))], told
+
+
+def shown_units() -> dict[str, Any]:
+    """What the page divides by [SI] and writes behind a number, by kind and system of units."""
+    return {kind: {system: display_unit(kind, system) for system in SYSTEMS} for kind in SHOWN_KINDS}

@@ -14,10 +14,9 @@ from rotordrop.arrays import Array
 from rotordrop.document import parse_toml
 from rotordrop.errors import MachineFileError, RotordropError, UnmatchedError, UsageError
 from rotordrop.files import write_json
-from rotordrop.jobs.results import write_check, write_estimate, write_look, write_waterfall
+from rotordrop.jobs.results import SYSTEMS, write_check, write_estimate, write_look, write_waterfall
 from rotordrop.jobs.runner import Verb
 from rotordrop.jobs.workspace import Job, is_path
-from rotordrop.jobs.written import SYSTEMS
 from rotordrop.machine import load_machine
 from rotordrop.machine.machine import Machine
 from rotordrop.progress import Progress
@@ -183,7 +182,7 @@ def _estimate(job: Job, made: Path, options: dict[str, Any], progress: Progress)
 
 
 def _waterfall(job: Job, made: Path, options: dict[str, Any], progress: Progress) -> None:
-    from rotordrop.estimate.waterfall import waterfall
+    from rotordrop.estimate.coast_down import waterfall
 
     progress("reading machine and record", 0.0)
     machine = machine_of(job)

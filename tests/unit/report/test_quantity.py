@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from rotordrop.jobs.written import quantity_json
+from rotordrop.jobs.results import quantity_json
 from rotordrop.known import Known
 from rotordrop.report.quantity import Quantity, with_error, written
 from rotordrop.severity.numbers import SEVERITY

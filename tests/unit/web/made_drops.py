@@ -7,10 +7,10 @@ import json
 import numpy as np
 from tests.unit.web.serving import Served
 
+from rotordrop.jobs.results import quantity_json, shown_units
 from rotordrop.jobs.runner import publish, write_state
 from rotordrop.jobs.traces import write_traces
 from rotordrop.jobs.workspace import Job
-from rotordrop.jobs.written import quantity_json, shown_units
 from rotordrop.report.quantity import Quantity
 
 GAP, SPEED = 250e-6, 2.0 * np.pi * 60.0

@@ -101,7 +101,7 @@ def test_the_curves_are_those_of_the_estimate(estimate, page, written):
     traces = open_traces(written, "drop", tuple(page["traces"]["columns"]))
     np.testing.assert_array_equal(traces.time, estimate.bearings[0].force.time)
     for b, bearing in enumerate(estimate.bearings):
-        rows = traces.chosen((f"force {b}", f"stress {b}", f"y estimated {b}"))
+        rows = traces.chosen((f"force {b}", f"stress {b}", f"estimated_y {b}"))
         wanted = [bearing.force.values, bearing.stress.values, bearing.motion.vertical.values]
         for row, values in zip(rows, wanted, strict=True):
             if len(values) == len(traces.time):
@@ -130,5 +130,5 @@ def test_a_replayed_drop_is_drawn_beside_its_record(drop, tmp_path):
 def test_a_place_without_a_band_has_none(drop):
     bare = replace(drop, bearings=tuple(replace(one, force_band=None) for one in drop.bearings))
     names, _, columns = histories_of(bare)
-    assert names[0]["force"] == ["force 0"] and "force lower 0" not in columns
-    assert pytest.approx(bare.bearings[0].force.values) == columns["force 0"]
+    assert names[0]["force"] == ["force 0"] and "force_lower 0" not in columns
+    assert pytest.approx(bare.bearings[0].force.values) == columns["force 0"].values
