@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from rotordrop.elements.catalog.lookup import find_bearing as find_bearing
     from rotordrop.errors import RotordropError as RotordropError
     from rotordrop.estimate.changed import changes as changes
+    from rotordrop.estimate.coast_down import waterfall as waterfall
     from rotordrop.estimate.published import read_drop as read_drop
-    from rotordrop.estimate.waterfall import waterfall as waterfall
     from rotordrop.estimation import Replay as Replay
     from rotordrop.estimation import Tracked as Tracked
     from rotordrop.estimation import estimate_drop as estimate_drop
@@ -65,7 +65,7 @@ _PUBLIC = {
         "errors": "RotordropError",
         "estimate.changed": "changes",
         "estimate.published": "read_drop",
-        "estimate.waterfall": "waterfall",
+        "estimate.coast_down": "waterfall",
         "estimation": "Replay Tracked estimate_drop estimate_drops",
         "evidence.look": "look",
         "evidence.quality": "check_record",

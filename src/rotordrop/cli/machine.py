@@ -86,7 +86,7 @@ def init(
         for file in copy_example(example, target or Path(example), overwrite=force):
             typer.echo(f"written: {file}")
         return
-    from rotordrop.machine.template import template_text
+    from rotordrop.machine.examples import template_text
 
     deliver_text(template_text(), target or TEMPLATE_FILE, overwrite=force)
 

@@ -236,7 +236,7 @@ def waterfall(
 
     Example: rotordrop waterfall machine.toml coastdown.h5 --report waterfall.html
     """
-    from rotordrop.estimate.waterfall import waterfall as analyse
+    from rotordrop.estimate.coast_down import waterfall as analyse
     from rotordrop.machine import load_machine
     from rotordrop.record.record import Record, read_record
     from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD

@@ -123,8 +123,7 @@ def coast_down(
 
     Example: rotordrop coast-down machine.toml --speed "60 Hz" --report coast.html
     """
-    from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
-    from rotordrop.estimate.waterfall import waterfall
+    from rotordrop.estimate.coast_down import recorded_coast_down, waterfall, with_recorded_drag
     from rotordrop.machine import load_machine
     from rotordrop.record.record import read_record
     from rotordrop.report.simulate_page import coast_down_page

@@ -176,8 +176,6 @@ class FirstContact:
     """Beginning t1 and end t2 of the first contact [s] from power-off."""
     indentation: float
     """Largest displacement beyond the air gap during it [m]."""
-    deepest_time: float
-    """Time of the largest displacement [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,16 +288,11 @@ def when_largest(history: History, band: Band, doubt: float) -> tuple[float, flo
 
 
 def deepest(motion: Motion, start: float, end: float, gap: float) -> FirstContact:
-    """First contact between two times [s]: how far beyond the gap [m] the rotor went, and when."""
+    """First contact between two times [s]: how far beyond the gap [m] the rotor went."""
     radius = motion.radial
-    inside = (radius.time >= start) & (radius.time <= end)
-    at = int(np.argmax(np.where(inside, radius.values, -np.inf)))
-    return FirstContact(
-        start=start,
-        end=end,
-        indentation=float(radius.values[at]) - gap,
-        deepest_time=float(radius.time[at]),
-    )
+    begun = float(np.interp(start, radius.time, radius.values))  # a contact may lie between two samples
+    reached = float(np.max(radius.between(start, end).values, initial=begun))
+    return FirstContact(start=start, end=end, indentation=reached - gap)
 
 
 def simulated_bearings(result: DropResult) -> tuple[BearingDrop, ...]:

@@ -15,7 +15,7 @@ from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError
 from rotordrop.estimate.agreement import compare_orbits
 from rotordrop.estimate.assumptions import twin_assumptions
-from rotordrop.estimate.bearing_drop import AirGap, Motion, Origin, deepest, simulated_bearings
+from rotordrop.estimate.bearing_drop import AirGap, FirstContact, Motion, Origin, simulated_bearings
 from rotordrop.estimate.bearing_drop import Role as MotionRole
 from rotordrop.estimate.bearing_values import bearing_values
 from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
@@ -93,9 +93,8 @@ def replayed_drop(drop: TrackedDrop, method: Replay, facts: RecordFacts) -> Esti
                 at_gap_limits=(seen, lower, upper),
                 air_gap=AirGap(lower=float(ends[0][b]), upper=float(ends[1][b])),
                 values={**own, **simulated.values},
-                first_contact=replace(
-                    deepest(seen, contacts[b].start, contacts[b].end, 0.0),
-                    indentation=contacts[b].indentation,
+                first_contact=FirstContact(
+                    start=contacts[b].start, end=contacts[b].end, indentation=contacts[b].indentation
                 ),
             )
         )

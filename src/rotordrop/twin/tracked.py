@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import Evidence
@@ -103,10 +103,6 @@ def tracked_drop(
     smoothed: Smoothed,
     judged: Smoothed,
     noise_factor: float,
-    drops: int = 1,
-    accepted: tuple[Accepted, ...] = (),
-    cross_check: Future[InputEstimate] | None = None,
-    others: tuple[OtherModel, ...] = (),
 ) -> TrackedDrop:
     """Forces and checks of one smoothed drop."""
     return TrackedDrop(
@@ -117,10 +113,6 @@ def tracked_drop(
         forces=_forces(problem, smoothed),
         checks=consistency_checks(problem, judged, noise_factor),
         noise_factor=noise_factor,
-        drops=drops,
-        accepted=accepted,
-        cross_check=cross_check,
-        others=others,
     )
 
 
@@ -176,5 +168,6 @@ def followed_drops(
     del search, found, cross_check
     for number in range(count):
         item, problem, smoothed, judged, check = waiting.pop(0)
+        drop = tracked_drop(item, problem, smoothed, judged, factor)
         others = _of_drop(alternatives, number)
-        yield tracked_drop(item, problem, smoothed, judged, factor, count, accepted, check, others)
+        yield replace(drop, drops=count, accepted=accepted, cross_check=check, others=others)

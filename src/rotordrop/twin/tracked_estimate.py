@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,6 @@ from rotordrop.estimate.estimate import (
     SensorMotion,
     Verdict,
 )
-from rotordrop.estimate.later_motion import later_motion
 from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.published import Advice, LaterMotion, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
@@ -61,6 +61,8 @@ QUICK = (
     "Quick estimate: one pass over the record, {}without the search for the size of the process noise. "
     "A number that decides needs a whole estimate."
 )
+RESOLVED = 4.0
+"""Difference of two largest distances that counts, in standard deviations of the noise [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -343,6 +345,37 @@ def motion_later(drop: TrackedDrop, *, believed: bool) -> tuple[LaterMotion, ...
         until=float(drop.problem.time[-1]),
         noise=float(np.sqrt(np.mean(drop.problem.variances))),
     )
+
+
+def later_motion(
+    names: Sequence[str], time: Array, motion: Array, until: float, noise: float
+) -> tuple[LaterMotion, ...]:
+    """Compare the rest of a record with its estimated part, bearing by bearing; empty where nothing follows.
+
+    The motion (N, B, 2) is the measured displacement from the centres of the bearings [m], the noise its
+    standard deviation [m]; times (N,) and the end of the estimated part count from power-off [s].
+    """
+    radius = np.hypot(motion[..., 0], motion[..., 1])
+    parts = ((time >= 0.0) & (time <= until), time > until)
+    found = []
+    for b, name in enumerate(names):
+        inside = [np.flatnonzero(part & np.isfinite(radius[:, b])) for part in parts]
+        if not all(len(samples) for samples in inside):
+            continue
+        first, later = (samples[np.argmax(radius[samples, b])] for samples in inside)
+        before, after, resolved = float(radius[first, b]), float(radius[later, b]), RESOLVED * noise
+        found.append(
+            LaterMotion(
+                bearing=name,
+                first=before,
+                first_time=float(time[first]),
+                later=after,
+                later_time=float(time[later]),
+                resolved=resolved,
+                larger=after > before + resolved,
+            )
+        )
+    return tuple(found)
 
 
 def _at_sensors(drop: TrackedDrop) -> SensorMotion:

@@ -16,9 +16,9 @@ import pytest
 from rotordrop import example_record_path, look, read_record
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import UsageError
+from rotordrop.estimate.coast_down import recorded_coast_down
 from rotordrop.estimate.published import estimate_schema
 from rotordrop.estimate.record_facts import COUNTED_TWICE, INCONSISTENT_CALIBRATION, facts_of
-from rotordrop.estimate.recorded_coast_down import recorded_coast_down
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import example_machine, example_path, load_machine

@@ -14,8 +14,7 @@ from tests.unit.simulate.short_drop import Killed, killed_after
 from rotordrop import build_drop_model, read_record, save_machine, simulate_coast_down
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError, SimulationError
-from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_recorded_drag
-from rotordrop.estimate.simulated_coast_down import simulated_coast_down
+from rotordrop.estimate.coast_down import recorded_coast_down, simulated_coast_down, with_recorded_drag
 from rotordrop.files import new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.simulate import coast_down

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop import example_machine, example_record_path, look, read_record
-from rotordrop.estimate.recorded_coast_down import recorded_coast_down, with_found_air_gaps
+from rotordrop.estimate.coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.spectrum.candidates import machine_candidates, swing_ranges
 from rotordrop.spectrum.indentation import displacement_history, find_settling
 

@@ -27,10 +27,9 @@ from rotordrop.errors import MachineFileError
 from rotordrop.known import Known
 from rotordrop.machine import Machine, example_machine, example_names, load_machine, loads_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
-from rotordrop.machine.examples import example_path
+from rotordrop.machine.examples import example_path, template_text
 from rotordrop.machine.saving import machine_text, save_machine
 from rotordrop.machine.schema import machine_schema
-from rotordrop.machine.template import template_text
 
 PATHS = {
     "NDE.air_gap": (1e-6, 1e-2),

@@ -194,7 +194,7 @@ def test_the_orbit_lies_in_circles_of_both_gap_limits_at_equal_scales():
 
 
 def test_the_first_contact_is_marked_with_its_times_and_depth():
-    contact = FirstContact(start=0.00775, end=0.0087, indentation=20.04e-6, deepest_time=0.008)
+    contact = FirstContact(start=0.00775, end=0.0087, indentation=20.04e-6)
     drawn = first_contact_figure((drop("NDE"), drop("DE", first_contact=contact)))
     texts = [line for note in drawn.layout.annotations for line in note.text.split("<br>")]
     assert {"t₁ 7.75, t₂ 8.70, T 0.95 ms", "indentation 20.0 µm"} <= {*texts}

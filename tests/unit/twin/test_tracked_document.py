@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rotordrop.estimate.document import estimate_document
-from rotordrop.estimate.later_motion import RESOLVED
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.evidence.impacts import shortest_flight
 from rotordrop.known import NINETY, Known
@@ -19,6 +18,7 @@ from rotordrop.track.input_state import InputEstimate
 from rotordrop.track.problem import build_problem
 from rotordrop.track.smoother import PassSettings, forward, smooth
 from rotordrop.twin.problems import COARSE_BASIS, recorded_drop
+from rotordrop.twin.tracked_estimate import RESOLVED
 from rotordrop.twin.tracked_loads import (
     loads_of_cross_check,
     race_moved,

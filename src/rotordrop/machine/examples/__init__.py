@@ -16,6 +16,11 @@ _EXAMPLES = {
 }
 
 
+def template_text() -> str:
+    """Give a complete, commented machine file that can be read as it stands."""
+    return (files("rotordrop.machine") / "template.toml").read_text(encoding="utf-8")
+
+
 def example_names() -> tuple[str, ...]:
     """Names of the machines that ship with rotordrop."""
     return tuple(_EXAMPLES)

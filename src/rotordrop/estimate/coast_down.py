@@ -1,9 +1,14 @@
-"""A recorded coast-down made ready for the frequency analysis: power-off, centre, planes, speed."""
+"""A recorded or simulated coast-down made ready for the frequency analysis, and its frequencies named.
+
+Of a recorded one: power-off, centre, planes, speed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +18,7 @@ from rotordrop.elements.sensor import Sensor
 from rotordrop.elements.touchdown_bearing import AIR_GAP
 from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
+from rotordrop.evidence.given import require_drop
 from rotordrop.evidence.impacts import Settling
 from rotordrop.evidence.paths import Drop, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
@@ -20,16 +26,32 @@ from rotordrop.evidence.sensing import Sensing
 from rotordrop.evidence.wall import Wall
 from rotordrop.known import NINETY, Known
 from rotordrop.machine import Machine
+from rotordrop.progress import Shown, shown
 from rotordrop.record.axes import along_sensors, end_columns
 from rotordrop.record.record import Record
+from rotordrop.require import require
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SHORTEST_LAW, CoastDownSignal
-from rotordrop.spectrum.speed import fit_drag, fit_speed_profile
+from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
+from rotordrop.spectrum.candidates import machine_candidates
+from rotordrop.spectrum.coast_down import (
+    RACES_SPUN_UP,
+    SHORTEST_LAW,
+    CoastDownAnalysis,
+    CoastDownSignal,
+    WaterfallChoice,
+    analyse_coast_down,
+)
+from rotordrop.spectrum.speed import exact_speed_profile, fit_drag, fit_speed_profile
+from rotordrop.spectrum.waterfall import PlanarSignal
 
 MOST_UNEVEN = 0.01
 """Share of uneven steps of the clock above which a spectrum means nothing [1] (chosen)."""
+SPEED_STEP = 0.02
+"""Distance of the values [s] from which the profile of the exact speed is drawn (chosen)."""
+LEAST_KNOTS = 20
+"""Values of it at least, also of a coast-down of a few tenths of a second (chosen)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,3 +209,73 @@ def with_recorded_drag(machine: Machine, signal: CoastDownSignal) -> Machine:
     for bearing in machine.touchdown_bearings:
         values[f"{bearing.name}.race.drag_coefficient"] = drag.constant.value * turning / lever
     return machine.with_values(values)
+
+
+def simulated_coast_down(path: Path, machine: Machine | None = None) -> CoastDownSignal:
+    """Open the samples that ``rotordrop coast-down --output`` wrote where a recording would have its sensors.
+
+    With a machine the planes are those of its sensors, named by the end they belong to; without it, or when
+    it has none, those of the bearings.
+    """
+    result, samples = load_coast_down(path), open_samples(path)
+    planes: dict[str, PlanarSignal] = {name: samples.planes[name] for name in samples.air_gap}
+    sensors = () if machine is None else machine.sensors
+    ends = {sensor.bearing: samples.planes.get(f"node {sensor.node}") for sensor in sensors}
+    if set(ends) == set(planes) and all(plane is not None for plane in ends.values()):
+        planes = {name: plane for name, plane in ends.items() if plane is not None}
+    count = len(samples.speed)
+    every = max(1, min(round(SPEED_STEP * samples.sampling_rate), count // LEAST_KNOTS))
+    time = np.arange(count)[::every] / samples.sampling_rate
+    speed = np.abs(samples.speed[::every])
+    return CoastDownSignal(
+        planes=planes,
+        air_gap={name: samples.air_gap[name] for name in planes},
+        sampling_rate=samples.sampling_rate,
+        start_time=0.0,
+        profile=exact_speed_profile(time, speed),
+        speed_time=time,
+        speed=speed,
+        recorded=False,
+        standstill=result.standstill_time,
+        force_and_stress=tuple(maximum.as_json() for maximum in result.maxima()),
+    )
+
+
+def waterfall(
+    machine: Machine,
+    coast_down: Record | str | Path,
+    choice: WaterfallChoice | None = None,
+    *,
+    progress: Shown = None,
+) -> CoastDownAnalysis:
+    """Find and name the frequencies of a coast-down.
+
+    Parameters
+    ----------
+    machine : Machine
+        What lines are named by.
+    coast_down : Record or path
+        A recorded one, or the file that `simulate_coast_down` wrote.
+    choice : WaterfallChoice, optional
+        Which waterfalls; those of the paper by default.
+    progress : callable or False, optional
+        Called with a text and the fraction done; by default a bar in a terminal or a notebook.
+
+    Raises
+    ------
+    RecordError
+        If the record cannot be used.
+    """
+    require(machine, "machine", Machine)
+    require(coast_down, "the coast-down", Record, str, PathLike)
+    require(choice, "choice", WaterfallChoice, none=True)
+    if isinstance(coast_down, Record):
+        require_drop(coast_down, machine)
+        signal = recorded_coast_down(machine, coast_down)
+    else:
+        signal = simulated_coast_down(Path(coast_down), machine)
+    candidates = machine_candidates(
+        with_found_air_gaps(machine, signal), {name: name for name in signal.planes}
+    )
+    with shown(progress, "frequencies") as tell:
+        return analyse_coast_down(signal, candidates, choice, progress=tell)
