@@ -427,11 +427,12 @@ def bearing_drop(
     )
     samples = forces.time[:: forces.substeps]
     shown = Motion(label="measured", time=samples, displacement=measured[: len(samples)], role="measured")
+    of_balls = (loads.peak_stress.known.allowance_90 or 0.0) / max(loads.peak_stress.value, 1e-300)
     peak_force, peak_stress = (
-        replace(peak, time_interval_90=when_largest(history, band, doubt))
-        for peak, history, band in (
-            (loads.peak_force, loads.force, loads.force_band),
-            (loads.peak_stress, loads.stress, loads.stress_band),
+        replace(peak, time_interval_90=when_largest(history, band, doubt, common))
+        for peak, history, band, common in (
+            (loads.peak_force, loads.force, loads.force_band, 0.0),
+            (loads.peak_stress, loads.stress, loads.stress_band, of_balls),
         )
     )
     impacts: tuple[Impact, ...] = ()
