@@ -32,6 +32,7 @@ from rotordrop.twin.tracked_loads import (
     with_form_error,
 )
 from rotordrop.twin.value_of_information import advice_of, explained
+from rotordrop_bench import hidden_machine, synthesize_drop
 
 STAGE = Stage(until=0.016, force=0.07, share=0.01, passes=2)
 
@@ -165,6 +166,17 @@ def test_bending_and_inertia_are_found_from_the_record_without_a_contact_law(des
     assert rotor_fe(found).diametral_inertia == pytest.approx(true.diametral_inertia, rel=0.12)
     assert found.stiffness_factor.status == "estimated"
     assert "without a contact law" in found.stiffness_factor.source
+
+
+@pytest.mark.slow
+def test_a_hollow_rotor_is_found_stiffer_than_the_middle_of_its_prior(twelve):
+    """From the middle the way down led to another minimum: 0.48 for 1.4."""
+    hollow = twelve.with_values({"rotor.stiffness_factor": 1.4} | {f"rotor.{row.path}": 0.0 for row in FORM})
+    hidden = hidden_machine(hollow, 3)
+    drop = synthesize_drop(hidden, 200.0 * math.pi, 3, duration=0.06, tolerance=1e-7, name="hollow")
+    evidence = read_evidence(build_drop_model(twelve), drop.record, drop.tail)
+    found = with_found_rotor(twelve, [recorded_drop(evidence, 0.03)]).rotor
+    assert float(found.stiffness_factor) == pytest.approx(1.4, rel=0.15)
 
 
 def test_a_rotor_that_is_sought_does_not_judge_what_a_filter_took(described, twelve):
