@@ -95,7 +95,7 @@ def with_found_rotor(
             return math.inf
         return total + 0.5 * float(np.sum(deviations**2))
 
-    # of a hollow rotor, stiffer than the middle of the prior, the way down from there ended in another minimum
+    # from the middle of the prior the way down ended in another minimum where a hollow rotor is stiffer
     starts = [np.eye(len(unknowns))[0] * deviation for deviation in SCANNED]
     options = {"eps": STEP, "maxiter": ROUNDS, "gtol": 2.0}
     found = _within(minimize(cost, min(starts, key=cost), method="BFGS", options=options).x)
