@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
@@ -12,6 +13,15 @@ from rotordrop.require import numbers, require
 
 NINETY = 1.6448536269514722
 """Half width of a 90 % interval in standard deviations of a normal distribution [1]."""
+
+
+def deviation_of(value: float, ends: tuple[float, float] | None, *, logarithmic: bool = False) -> float:
+    """Standard deviation that belongs to a 90 % interval, of the logarithm where that is normal."""
+    low, high = ends or (value, value)
+    if not logarithmic:
+        return (high - low) / (2.0 * NINETY)
+    return math.log(high / value) / NINETY if low <= 0.0 else math.log(high / low) / (2.0 * NINETY)
+
 
 Provenance = Literal["given", "guess", "estimated", "default", "inferred"]
 """How a value of a machine is known; what a machine file may say."""

@@ -46,8 +46,7 @@ def restart(
     from rotordrop.estimate.published import read_drop
     from rotordrop.machine import load_machine
     from rotordrop.report.restart_page import restart_numbers, restart_page
-    from rotordrop.restart.card import restart_card
-    from rotordrop.restart.foreseen import Foreseen
+    from rotordrop.restart.card import Foreseen, restart_card
     from rotordrop.restart.next_drop import DROPS, lift_now, next_drops
     from rotordrop.severity.numbers import read_limits
     from rotordrop.study.repeat import COMPARED

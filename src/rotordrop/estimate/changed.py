@@ -14,8 +14,8 @@ from rotordrop.elements.parameter import Parameter
 from rotordrop.elements.table import fitted_row, row_of
 from rotordrop.errors import UsageError
 from rotordrop.estimate import published
-from rotordrop.estimate.published import Drop, Joint, Value
-from rotordrop.known import NINETY
+from rotordrop.estimate.published import Drop, Joint
+from rotordrop.known import NINETY, deviation_of
 from rotordrop.physics.linear_algebra import solve, symmetric_eigen
 from rotordrop.require import each
 from rotordrop.units import format_chance
@@ -217,17 +217,11 @@ def _leaves_prior(entry: published.Parameter, row: Parameter) -> bool:
     """
     if row.spin_up_only or entry.prior is None:
         return not row.spin_up_only
-    return _deviation(entry.estimate, row) < BY_PRIOR * _deviation(entry.prior, row)
-
-
-def _deviation(known: Value, row: Parameter) -> float:
-    """Standard error, of the logarithm where the parameter is logarithmic."""
-    low, high = known.interval or (known.value, known.value)
-    if not row.logarithmic:
-        return max((high - low) / (2.0 * NINETY), 1e-300)
-    if low <= 0.0:
-        return max(math.log(high / known.value) / NINETY, 1e-12)
-    return max(math.log(high / low) / (2.0 * NINETY), 1e-12)
+    after, before = (
+        deviation_of(known.value, known.interval, logarithmic=row.logarithmic)
+        for known in (entry.estimate, entry.prior)
+    )
+    return after < BY_PRIOR * before
 
 
 def _level(count: int) -> float:
@@ -253,12 +247,8 @@ def _change(
     assert least is not None
     before, after = (one[path].estimate.value for one in both)
     smallest = 1.0 + smallest if factor else smallest
-    if math.isinf(sigma):
-        nothing = (0.0, math.inf) if factor else (-math.inf, math.inf)
-        return Change(
-            path=path, before=before, after=after, change=1.0 if factor else 0.0, interval_90=nothing,
-            factor=factor, probability=0.0, named=False, smallest=smallest, determined=False,
-        )  # fmt: skip
+    determined = math.isfinite(sigma)
+    moved = moved if determined else 0.0
     ends = (moved - NINETY * sigma, moved, moved + NINETY * sigma)
     low, middle, high = (math.exp(end) for end in ends) if factor else ends
     beyond = float(ndtr((moved - least) / sigma) + ndtr((-moved - least) / sigma))
@@ -269,9 +259,10 @@ def _change(
         change=middle,
         interval_90=(low, high),
         factor=factor,
-        probability=beyond,
+        probability=beyond if determined else 0.0,
         named=named,
         smallest=smallest,
+        determined=determined,
     )
 
 

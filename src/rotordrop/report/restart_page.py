@@ -23,10 +23,9 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.style import SERIES, curve, finished, panels
-from rotordrop.restart.card import POSITIVE, RestartCard
+from rotordrop.restart.card import POSITIVE, Foreseen, LiftNow, NextDrop, RestartCard
 from rotordrop.restart.damages import CHECKS, DAMAGES, Check
 from rotordrop.restart.evidence import Indicator
-from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop
 from rotordrop.severity.numbers import NUMBERS
 from rotordrop.units import format_amount, format_chance, format_quantity
 

@@ -13,7 +13,7 @@ from rotordrop.known import Known
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.progress import Progress
-from rotordrop.restart.foreseen import Foreseen, LiftNow, NextDrop
+from rotordrop.restart.card import Foreseen, LiftNow, NextDrop
 from rotordrop.rotor.magnet_loop import carrying_currents
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.unknowns import all_unknowns, smallest_gap
@@ -24,8 +24,7 @@ from rotordrop.study.repeat import COMPARED, OFF_CENTRE, repeat_study
 from rotordrop.study.run import run_study
 from rotordrop.study.summary import StudyResults, exceedance
 from rotordrop.track.prior import fall_time
-from rotordrop.twin.calibrated import as_filed, machine_values
-from rotordrop.twin.joint_covariance import joint_covariance
+from rotordrop.twin.calibrated import as_filed, joint_covariance, machine_values
 from rotordrop.twin.problems import WINDOW
 from rotordrop.twin.tracked_parameters import NOT_DETERMINED
 

@@ -20,19 +20,26 @@ from rotordrop.estimate.published import Structure
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.evidence.given import given_drops
 from rotordrop.evidence.one_end import with_zeros
-from rotordrop.known import NINETY, Known, Status
+from rotordrop.known import NINETY, Known, Status, deviation_of
 from rotordrop.machine import Machine
-from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, RecordedLift
+from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread, RecordedLift
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Shown, shown
 from rotordrop.record.record import Record
-from rotordrop.rotor.parameters import build_drop_model
+from rotordrop.rotor.parameters import DropModel, build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.rotor.unknowns import weight_per_magnet
+from rotordrop.rotor.unknowns import (
+    Unknown,
+    file_of_fitted,
+    file_path,
+    is_logarithmic,
+    is_of_a_bearing,
+    slope_signs,
+    weight_per_magnet,
+)
 from rotordrop.track.consistency import Check, consistency_checks
 from rotordrop.track.problem import DropProblem
 from rotordrop.track.smoother import Smoothed
-from rotordrop.twin.joint_covariance import joint_covariance
 from rotordrop.twin.problems import Drops, tail_first
 from rotordrop.twin.search import Search, track_drops
 from rotordrop.twin.steps import Steps
@@ -318,6 +325,41 @@ def machine_values(bearings: Sequence[str], values: dict[str, Known], source: st
             range=None if vertical.range is None else scaled,
         )
     return entries
+
+
+def joint_covariance(
+    model: DropModel,
+    fitted: Mapping[str, Unknown],
+    mean: Sequence[float],
+    covariance: Array,
+    known: Mapping[str, Known],
+) -> JointSpread:
+    """Joint distribution of the calibrated values of the touchdown bearings.
+
+    The correlations are those of the fit, with mean (n,) and covariance (n, n) of the unknowns by path; the
+    spreads are as wide as the intervals that the machine file states: a study of drops must not believe a
+    value more than the file says.
+    """
+    chosen = [
+        (place, unknown)
+        for place, (path, unknown) in enumerate(fitted.items())
+        # a value that came out as zero has no logarithm to correlate
+        if is_of_a_bearing(unknown) and not (is_logarithmic(unknown) and known[path].value <= 0.0)
+    ]
+    places, unknowns = [place for place, _ in chosen], [unknown for _, unknown in chosen]
+    logs = [is_logarithmic(unknown) for unknown in unknowns]
+    block = covariance[np.ix_(places, places)]
+    errors = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    named = [(known[one.path], log) for one, log in zip(unknowns, logs, strict=True)]
+    stated = [deviation_of(one.value, one.interval_90, logarithmic=log) for one, log in named]
+    scale = slope_signs(unknowns, np.array(mean)[places], errors) * np.array(stated) / errors
+    through = file_of_fitted(model, unknowns, [known[one.path].value for one in unknowns])
+    matrix = through @ (scale[:, None] * block * scale) @ through.T
+    return JointSpread(
+        paths=tuple(file_path(one.path) for one in unknowns),
+        logarithmic=tuple(logs),
+        covariance=tuple(matrix[np.tril_indices(len(unknowns))].tolist()),
+    )
 
 
 def _identifiability(

@@ -22,11 +22,10 @@ from rotordrop.files import write_json
 from rotordrop.known import NINETY, Known
 from rotordrop.report.restart_page import restart_numbers, restart_page
 from rotordrop.restart import restart_card
-from rotordrop.restart.card import POSITIVE
+from rotordrop.restart.card import POSITIVE, Foreseen, NextDrop
 from rotordrop.restart.damages import CHECKS as KNOWN_CHECKS
 from rotordrop.restart.damages import DAMAGES
 from rotordrop.restart.evidence import in_order
-from rotordrop.restart.foreseen import Foreseen, NextDrop
 from rotordrop.restart.next_drop import found_machine, lift_now, next_drops, speed_limit
 from rotordrop.rotor.magnet_loop import carrying_currents
 from rotordrop.rotor.unknowns import all_unknowns, is_of_a_bearing

@@ -10,8 +10,7 @@ from rotordrop import build_drop_model, example_machine
 from rotordrop.known import NINETY, Known
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.rotor.unknowns import bearing_unknowns, correlate
-from rotordrop.twin.calibrated import as_filed
-from rotordrop.twin.joint_covariance import joint_covariance
+from rotordrop.twin.calibrated import as_filed, joint_covariance
 from rotordrop.twin.tracked_parameters import identified
 
 
