@@ -35,7 +35,7 @@ test-all: test slow ## run all tests
 
 NUMERIC := tests/unit/physics tests/unit/rotor tests/unit/simulate tests/validation
 FITTED := tests/unit/track/test_filter_and_smoother.py tests/unit/track/test_propagation.py \
-	tests/unit/replay/test_first_impacts.py
+	tests/unit/replay/test_replay.py
 
 # An old processor has another linear algebra and no fused multiply-add at once; tests/unit/simulate/test_result.py
 # tries each of the two alone.

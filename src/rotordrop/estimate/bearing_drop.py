@@ -271,15 +271,14 @@ class BearingDrop:
         return lasting_from(self.touched, float(self.force.time[-1]))
 
 
-def when_largest(history: History, band: Band, doubt: float, common: float = 0.0) -> tuple[float, float]:
+def when_largest(history: History, band: Band, doubt: float) -> tuple[float, float]:
     """Interval of the time of a peak [s], 90 %: from the first to the last value that may be the largest.
 
     Each value has the error that its band shows, independent of that of the peak; ``doubt`` is half the
-    interval of the instant from which the times count [s], ``common`` the share of its value by which every
-    one may be off alike [1], which the band holds too: a scale makes none the largest.
+    interval of the instant from which the times count [s].
     """
     at = int(np.argmax(history.values))
-    half = np.sqrt(np.maximum((band.upper - history.values) ** 2 - (common * history.values) ** 2, 0.0))
+    half = band.upper - history.values
     times = history.time[history.values + np.hypot(half, half[at]) >= history.values[at]]
     moment = history.time[at]
     return (

@@ -1,6 +1,6 @@
 """What the sensors show while the rotor still levitates: level, orbit, runout, mains hum and noise.
 
-The one fit of the levitated part of a record: power-off, fall, filter and replay all start from it.
+The one fit of the levitated part of a record: power-off, fall and filter all start from it.
 """
 
 from __future__ import annotations

@@ -417,7 +417,7 @@ def _rows(estimate: Estimate, scope: str) -> list[ParameterRow]:
             verdict = (
                 f"larger than {shown(one.estimate.lower, kind)}, the most that the {one.row.way_of} moved"
             )
-        # a prior is a range: its middle is nobody's word; where a replay begins is a number of its own
+        # a prior is a range: its middle is nobody's word
         spread = one.prior is not None and one.prior.standard_error is not None
         prior = Quantity.of(one.prior, kind, range_only=spread)
         found = Quantity.of(one.estimate, kind, range_only=uncertain)
@@ -595,8 +595,9 @@ def _other(check: CrossCheck) -> Quantity:
 
 _WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
 MEAN = "mean_force_0p15_0p2_N"
-ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement")
-"""What is not shown where the model does not fit: there would be ranges from end to end."""
+OVER_GAP = "displacement / air gap"
+ONLY_CERTAIN = ("at (from power-off)", "impacts", CONTACT_FROM, "largest displacement", OVER_GAP)
+"""What is not shown where the model does not fit: there would be ranges from end to end, of a wrong gap."""
 
 
 def estimate_screen(estimate: Estimate) -> ReportContent:
@@ -669,7 +670,7 @@ def _loads(estimate: Estimate) -> Table:
             NO_INTERVAL if b.contact_from_interval_90 is None else f"≈ {shown(b.contact_from, 'time', 2)}"
         ),
         "largest displacement": lambda b: number(b.largest, "length"),
-        "displacement / air gap": lambda b: _over_gap(b, certain=certain),
+        OVER_GAP: _over_gap,
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
     }
     names = [name for name in lines if certain or name not in ONLY_CERTAIN]
@@ -680,18 +681,11 @@ def _loads(estimate: Estimate) -> Table:
     return table([name for name in names if any(own[name] != NO_INTERVAL for own in cells)], columns)
 
 
-def _over_gap(b: BearingDrop, *, certain: bool) -> str:
-    """The largest distance from the centre over the air gap; as a range, if not certain.
-
-    A gain error is in displacement and gap alike, and not in their ratio: of an estimate that is not certain
-    the gap alone has an error that counts, of one that is they count as independent.
-    """
+def _over_gap(b: BearingDrop) -> str:
+    """The largest distance from the centre over the air gap, with errors that count as independent."""
     gap = b.values.get("air_gap_m")
-    if gap is None or (certain and b.largest is None):
+    if gap is None or b.largest is None:
         return NO_INTERVAL
-    if not certain or b.largest is None:
-        farthest = float(np.nanmax(b.motions[-1].radial.values))
-        return f"{farthest / gap.high:.2f} to {farthest / max(gap.low, 1e-9):.2f}"
     ratio = b.largest.value / gap.value
     doubt = ratio * math.hypot(
         0.5 * (b.largest.high - b.largest.low) / b.largest.value, 0.5 * (gap.high - gap.low) / gap.value

@@ -49,7 +49,7 @@ one machine took 1.6 falls at most."""
 def found_machine(machine: Machine, drop: Drop) -> Machine | None:
     """The machine as the estimate of a drop found it: gaps, supports and friction with their joint intervals.
 
-    None where the estimate has no joint distribution: it is a replay, or does not fit its record. What the
+    None where the estimate has no joint distribution, or does not fit its record. What the
     record does not determine keeps the width it had before.
     """
     joint = drop.joint

@@ -79,6 +79,8 @@ def _lowest(function: Callable[[int], float]) -> float:
     while known[best + 1] < known[best] or (math.isinf(known[best]) and best < most):
         best += 1
         known[best + 1] = function(best + 1) if best < most else math.inf
+    if math.isinf(known[best]):
+        return 0.0  # every size loses the drops
     low, middle, high = (known.get(best + k, math.inf) for k in (-1, 0, 1))
     bend = low - 2.0 * middle + high
     return best + 0.5 * (low - high) / bend if math.isfinite(bend) and bend > 0.0 else float(best)

@@ -427,14 +427,9 @@ def bearing_drop(
     )
     samples = forces.time[:: forces.substeps]
     shown = Motion(label="measured", time=samples, displacement=measured[: len(samples)], role="measured")
-    of_balls = (loads.peak_stress.known.allowance_90 or 0.0) / max(loads.peak_stress.value, 1e-300)
-    peak_force, peak_stress = (
-        replace(peak, time_interval_90=when_largest(history, band, doubt, common))
-        for peak, history, band, common in (
-            (loads.peak_force, loads.force, loads.force_band, 0.0),
-            (loads.peak_stress, loads.stress, loads.stress_band, of_balls),
-        )
-    )
+    # the stress rises with the force; sizes of balls and preload are in all of its instants alike
+    begin, end = when_largest(loads.force, loads.force_band, doubt)
+    at = loads.peak_stress.time
     impacts: tuple[Impact, ...] = ()
     seen: dict[str, Any] = {}
     if loads.peak_force.origin is Origin.TWIN:
@@ -454,8 +449,8 @@ def bearing_drop(
         stress=loads.stress,
         stress_band=loads.stress_band,
         preload_stress=float(loads.stress.values[0]),
-        peak_force=peak_force,
-        peak_stress=peak_stress,
+        peak_force=replace(loads.peak_force, time_interval_90=(begin, end)),
+        peak_stress=replace(loads.peak_stress, time_interval_90=(min(begin, at), max(end, at))),
         values={**values, **loads.means},
         missing=loads.missing,
         impacts=impacts,

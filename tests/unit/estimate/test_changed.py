@@ -415,9 +415,8 @@ def test_a_peak_may_be_wherever_the_force_may_be_largest():
     values = sum(size * np.exp(-(((time - at) / 1e-3) ** 2)) for size, at in ((100.0, 0.01), (96.0, 0.03)))
     force = History(label="estimated", time=time, values=values)
 
-    def within(error, doubt=0.0, common=0.0):
-        half = np.hypot(error, common * values)
-        return when_largest(force, Band(time=time, lower=values - half, upper=values + half), doubt, common)
+    def within(error, doubt=0.0):
+        return when_largest(force, Band(time=time, lower=values - error, upper=values + error), doubt)
 
     low, high = within(5.0)
     assert 0.009 < low < 0.01 and 0.03 <= high < 0.031
@@ -425,7 +424,6 @@ def test_a_peak_may_be_wherever_the_force_may_be_largest():
     # a share of √2 % below the top lies √(√2 %) widths beside it
     assert (low, high) == pytest.approx((0.01 - 0.119e-3, 0.01 + 0.119e-3), abs=0.5e-4)
     assert within(1.0, 1e-3) == pytest.approx((0.009, 0.011), abs=0.02e-3)
-    assert within(1.0, common=0.2) == pytest.approx((low, high)), "a scale of all makes none the largest"
 
 
 def test_times_and_counts_are_published_with_their_intervals():

@@ -4,7 +4,6 @@ import io
 import re
 from dataclasses import replace
 
-import numpy as np
 from rich.console import Console
 from tests.unit.report.conftest import section
 
@@ -77,9 +76,7 @@ def test_an_estimate_that_lost_its_record_shows_ranges_and_blames_no_sensor(esti
         bearings=tuple(replace(b, values={**b.values, "air_gap_m": gap}) for b in estimate.bearings),
     )
     text, page = text_of(told), estimate_page(told)
-    farthest = float(np.nanmax(told.bearings[0].motions[-1].radial.values))
-    assert f"{farthest / 350e-6:.2f} to {farthest / 250e-6:.2f}" in line(told, "displacement / air gap")
-    assert f"{1e6 * farthest:.1f} µm" not in text
+    assert "displacement" not in text, "the gap of a model that does not fit is off"
     assert [row[1] for row in section(page, "Checks").tables[0].rows] == ["no", "not judged", "no"]
     sensors = next(one for one in section(page, "Parameters").tables if one.caption == "Sensors")
     assert "verdict" not in sensors.columns, "every gain is determined"

@@ -132,6 +132,7 @@ def parabola(likeliest, scale=30.0):
         (parabola(1e4, 1.0), 1.0, LARGEST),
         (parabola(2.0, 1.0), 8.0, 8.0),  # else a drop that the usual impulses lose would be called followed
         (lambda factor: [pass_of(factor, 10 if factor >= 1.0 else 9)], 1.0, 1.0),  # none that loses a drop
+        (lambda factor: [pass_of(factor, 9)], 1.0, 1.0),  # where every size loses it
     ],
 )
 def test_the_size_is_the_likeliest_within_its_limits_that_follows_the_drops(

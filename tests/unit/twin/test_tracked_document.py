@@ -239,9 +239,8 @@ def mirrored(machine):
     return machine.model_copy(update={"sensors": tuple(sensors)})
 
 
-def first_impacts(machine, drop, spin):
+def first_impacts(machine, seen, spin):
     """Forces over the first impacts."""
-    seen = recorded_drop(read_evidence(build_drop_model(machine), drop.record, drop.tail), UNTIL)
     turned = replace(seen, initial_speed=spin * seen.initial_speed, speed=spin * seen.speed)
     problem = build_problem(build_drop_model(machine, COARSE_BASIS), turned, until=UNTIL)
     smoothed = smooth(forward(problem, PassSettings(impulse=3e-3, share=0.03)), watched=problem.watched)
@@ -250,13 +249,15 @@ def first_impacts(machine, drop, spin):
 
 def test_a_mirrored_record_gives_the_mirrored_force(calibrated, synthetic):
     """x to -x with the spin reversed: no law knows left from right."""
-    one = first_impacts(calibrated, synthetic, 1.0)
-    other = first_impacts(mirrored(calibrated), synthetic, -1.0)
+    evidence = read_evidence(build_drop_model(calibrated), synthetic.record, synthetic.tail)
+    seen = recorded_drop(evidence, UNTIL)
+    one = first_impacts(calibrated, seen, 1.0)
+    other = first_impacts(mirrored(calibrated), seen, -1.0)
     peak = one.magnitude.max()
     assert peak > 1000.0
     assert np.abs(one.force[..., 0]).max() > 100.0
     assert other.force[..., 0] == pytest.approx(-one.force[..., 0], abs=1e-5 * peak)
     assert other.force[..., 1] == pytest.approx(one.force[..., 1], abs=1e-5 * peak)
     assert other.magnitude_sigma == pytest.approx(one.magnitude_sigma, abs=1e-5 * peak)
-    same_spin = first_impacts(mirrored(calibrated), synthetic, 1.0)
+    same_spin = first_impacts(mirrored(calibrated), seen, 1.0)
     assert np.abs(same_spin.force[..., 0] + one.force[..., 0]).max() > 1e-3 * peak
