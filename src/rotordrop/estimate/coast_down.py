@@ -20,6 +20,7 @@ from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.evidence import Evidence, Missing, known, read_evidence
 from rotordrop.evidence.given import require_drop
 from rotordrop.evidence.impacts import Settling
+from rotordrop.evidence.one_end import with_zeros
 from rotordrop.evidence.paths import Drop, drops_of, with_impacts
 from rotordrop.evidence.rest import identify_air_gap
 from rotordrop.evidence.sensing import Sensing
@@ -97,6 +98,7 @@ def recorded_coast_down(machine: Machine, record: Record) -> CoastDownSignal:
         raise RecordError(
             f"{uneven:.0%} of the steps of the clock are uneven; export the record without gaps"
         )
+    machine = with_zeros(record, machine)
     ends = end_columns(record.sensors, machine.rotor.node_positions)
     if len(ends) < len(record.sensors):
         record = record.of_channels(ends)

@@ -278,9 +278,8 @@ class Evidence:
         """Radii of the circles in which the record shows the shaft [m], shape (B,); NaN where it is open."""
 
         def found() -> Array:
-            walls = known(self.motion).walls
-            told = [walls.get(name) for name in self.base.bearing_names]
-            return np.array([one.gap if one is not None and one.determined else np.nan for one in told])
+            gaps = {one.name: one.gap for one in known(self.motion).at_bearings if one.gap_determined}
+            return np.array([gaps.get(name, np.nan) for name in self.base.bearing_names])
 
         return sought(found)
 

@@ -84,6 +84,12 @@ def test_neither_level_nor_swing_matter_and_time_counts_from_power_off(machine, 
         assert 0.015 < settled.contact_from < 0.06
 
 
+def test_probes_on_a_gap_voltage_show_the_same_gap(machine, record, signal):
+    moved = recorded_coast_down(machine, replace(record, signals=record.signals - 1.2e-3))
+    for name, gap in moved.air_gap.items():
+        assert gap == pytest.approx(signal.air_gap[name], abs=1.65 * moved.air_gap_error[name])
+
+
 def test_impacts_are_those_of_a_look_at_the_record(machine, record, signal):
     """One circle, one rule: counts, times and their intervals are the same, from power-off on."""
     looked = look(record, machine=machine)
