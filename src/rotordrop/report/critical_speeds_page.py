@@ -256,8 +256,7 @@ def crossing_table(machine: Machine, diagrams: Mapping[str, CampbellDiagram], ma
         return table(rows, columns, "Critical speeds with damping", CROSSINGS_NOTE)
     judged = (
         Column("margin", lambda row: f"{100.0 * row[2].margin:.1f} %" if row[2] else "–"),
-        Column("required", lambda row: row[2].asked if row[2] else "–"),
-        Column("API 617", lambda row: row[2].verdict if row[2] else "–"),
+        Column("API 617", lambda row: f"{row[2].asked}, {row[2].verdict}" if row[2] else "–"),
     )
     caption = "Critical speeds with damping and separation margins"
     return table(rows, (*columns, *judged), caption, f"{CROSSINGS_NOTE} {MARGINS_NOTE}")

@@ -495,7 +495,8 @@ def _mark(
         said.append(f"{'' if certain else 'peak, '}90 %: {low} to {high} {unit}")
     if not said:
         return
-    arrow = {"showarrow": True, "arrowhead": 2, "arrowcolor": MUTED, "ax": 55, "ay": 10}
-    beside: dict[str, Any] = {"xanchor": "left", "align": "left", "bgcolor": OVER, **arrow}
-    at = (MILLI * peak.time, scale * peak.value)
-    words(figure, *at, "<br>".join(said), row=row, column=column, **beside)
+    # above the largest value, where no other peak is
+    look = {"showarrow": True, "arrowhead": 2, "arrowcolor": MUTED, "ax": -25, "ay": -24, "bgcolor": OVER}
+    above: dict[str, Any] = {"xanchor": "left", "yanchor": "bottom", "align": "left", **look}
+    top = peak.value if certain or peak.interval_90 is None else peak.interval_90[1]
+    words(figure, MILLI * peak.time, scale * top, "<br>".join(said), row=row, column=column, **above)

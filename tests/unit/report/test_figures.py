@@ -225,7 +225,8 @@ def test_the_force_has_its_band_its_peak_and_the_weight():
     assert [shape.y0 for shape in shapes(drawn, 3)] == [409.1]
     near = trace(drawn, "estimated", 2)
     assert (near.x[0], near.x[-1]) == pytest.approx((6.2, 14.1), abs=0.1)
-    assert sum("peak 3333 N" in text for text in texts) == 1
+    (mark,) = (note for note in drawn.layout.annotations if "peak 3" in note.text)
+    assert (mark.yanchor, mark.y) == ("bottom", 3333.1), "above all curves"
     drawn = time_panels([[force_panel(drop("DE"), {}, certain=False)]], 1.0, "N")
     assert {one.name for one in drawn.data} == {"estimated, not believed", "90 % interval, not believed"}
 
