@@ -166,7 +166,7 @@ def calibrate(
                 if check.failed:
                     out.print(f"{name}: {check.said()}")
         for pair in result.confounded:
-            apart = f"(correlation {pair.correlation:.2f}); {pair.way_out}"
+            apart = f"(correlation {pair.correlation:.2f}); {pair.separated_by}"
             out.print(f"confounded: {pair.first} and {pair.second} {apart}")
         if result.consistent:
             out.print(f"Calibrated machine, every value with its interval: {output}")

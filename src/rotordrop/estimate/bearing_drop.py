@@ -183,29 +183,25 @@ class BearingMotions:
     """Motions of the rotor at one bearing, or in one plane of sensors, where no more is known."""
 
     name: str
-    motions: tuple[Motion, ...]
-    air_gap: AirGap | None = None
-    at_gap_limits: tuple[Motion, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class BearingDrop:
-    """Everything one touchdown bearing went through in a drop."""
-
-    name: str
     """Name of the bearing."""
     motions: tuple[Motion, ...]
     """Motions of the rotor, the measured one first where there is a record."""
+    air_gap: AirGap | None = None
+    """Limits of the air gap."""
+    at_gap_limits: tuple[Motion, ...] = ()
+    """Motions simulated with the lower and the upper air gap (Neisi 2020, Fig. 14); may be empty."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingDrop(BearingMotions):
+    """Everything one touchdown bearing went through in a drop."""
+
     force: History
     stress: History
     """Magnitude of the ball force on the race [N] and largest Hertz stress at the inner race [Pa]."""
     peak_force: Peak
     peak_stress: Peak
     """Highest points of the two histories."""
-    air_gap: AirGap | None = None
-    """Limits of the air gap."""
-    at_gap_limits: tuple[Motion, ...] = ()
-    """Motions simulated with the lower and the upper air gap (Neisi 2020, Fig. 14); may be empty."""
     force_band: Band | None = None
     stress_band: Band | None = None
     """Their 90 % bands."""

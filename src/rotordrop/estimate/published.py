@@ -308,11 +308,9 @@ class Expansion(Document):
     velocity_m_per_s: dict[str, list[float]]
 
 
-class InitialState(Document):
+class InitialState(Expansion):
     """Start of a replay, by bearing."""
 
-    displacement_m: dict[str, list[float]]
-    velocity_m_per_s: dict[str, list[float]]
     remanent_force_N: list[list[float]]
     remanence_time_constant_s: float
     modal_expansion: Expansion = ABSENT

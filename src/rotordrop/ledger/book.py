@@ -19,13 +19,10 @@ from rotordrop.ledger._store import Rows, append, read_rows
 from rotordrop.ledger._store import is_url as is_url
 from rotordrop.ledger._store import name_of as name_of
 from rotordrop.require import require
+from rotordrop.severity.numbers import LOADS
+from rotordrop.units import si_unit
 
-QUANTITIES: Mapping[str, str] = {
-    "peak_force_N": "N",
-    "peak_stress_Pa": "Pa",
-    "mean_force_0p15_0p2_N": "N",
-    "mean_stress_Pa": "Pa",
-}
+QUANTITIES = {one.field: si_unit(one.kind) for one in LOADS}
 """Numbers of an estimate that are logged, by their name in its document, with their units."""
 FEWEST_FOR_TREND, BY_CHANCE = 5, 0.01
 """Drops from which a trend is looked for, and how rare it must be without one [1]; chosen, not measured."""

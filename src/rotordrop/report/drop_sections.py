@@ -238,7 +238,7 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
 
 
 def motion_section(
-    bearings: Sequence[BearingMotions | BearingDrop],
+    bearings: Sequence[BearingMotions],
     origin: str,
     *text: str,
     at_sensors: tuple[Figure, ...] = (),
@@ -290,7 +290,7 @@ def radial_section(bearings: Sequence[BearingDrop]) -> Section:
     return Section("Radial displacement", figures=(radial,))
 
 
-def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> object:
+def displacement_figure(bearings: Sequence[BearingMotions]) -> object:
     """Draw horizontal (x) and vertical (y, up) displacement at every bearing (Neisi 2020, Figs 7, 8, 13).
 
     Differs from the paper: vertical is y and horizontal is x here, z runs along the rotor.
@@ -313,7 +313,7 @@ def displacement_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> obj
 
 
 def orbit_section(
-    bearings: Sequence[BearingMotions | BearingDrop], early: Sequence[BearingMotions] = (), until: str = ""
+    bearings: Sequence[BearingMotions], early: Sequence[BearingMotions] = (), until: str = ""
 ) -> Section:
     """Orbits in the clearance circle, of an early part alone where one is given."""
     # planes of sensors alone stand in the order of the record, not in that of the rotor
@@ -447,7 +447,7 @@ ORBIT_POINTS = 4000
 """Samples at even steps that an orbit is drawn with: 40 a turn at 200 Hz in half a second."""
 
 
-def orbit_figure(bearings: Sequence[BearingMotions | BearingDrop]) -> go.Figure:
+def orbit_figure(bearings: Sequence[BearingMotions]) -> go.Figure:
     """Draw the path of the rotor centre in each bearing inside its clearance circle (Neisi 2020, Fig. 12).
 
     One panel per bearing in µm at one scale, x to the right and y up; the circle is the upper air gap, with

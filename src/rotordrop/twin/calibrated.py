@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotordrop.arrays import Array
-from rotordrop.document import stated
+from rotordrop.document import Document, stated
 from rotordrop.elements.contact import pair_of_the_file
 from rotordrop.elements.landing_sleeve import with_amounts
 from rotordrop.elements.magnet import FORCES
@@ -50,27 +50,25 @@ CONFOUNDED = 0.9
 """Correlation from which two parameters are reported as confounded [1] (chosen)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Identifiability:
+class Identifiability(Document):
     """What the records say about one parameter: its prior and posterior standard deviation, and the verdict.
 
     Standard deviations are of the logarithm for positive parameters; the verdict is that of its value.
     """
 
     path: str
-    prior_sigma: float
-    posterior_sigma: float
+    prior_standard_deviation: float
+    posterior_standard_deviation: float
     verdict: Status
 
 
-@dataclass(frozen=True, kw_only=True)
-class Confounded:
+class Confounded(Document):
     """Two parameters the records cannot tell apart, their correlation [1], and what would separate them."""
 
     first: str
     second: str
     correlation: float
-    way_out: str
+    separated_by: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +171,7 @@ def calibrate_machine(
     origin = CalibrationOrigin(drops=tuple(calibrated_on), consistent=consistent, joint=joint)
     if not consistent:  # nothing is determined by a model that is not believed
         values = {path: replace(one, status=INCONSISTENT) for path, one in values.items()}
-        identifiability = tuple(replace(one, verdict=INCONSISTENT) for one in identifiability)
+        identifiability = tuple(one.model_copy(update={"verdict": INCONSISTENT}) for one in identifiability)
     return Calibration(
         machine=_possible(with_found(machine, said), fitted, stems).calibrated_on(origin),
         values=values,
@@ -289,7 +287,11 @@ def _as_known(values: dict[str, Known], identifiability: tuple[Identifiability, 
     for entry in identifiability:
         path = entry.path
         if entry.verdict in NOT_DETERMINED and row_of(path).logarithmic:
-            row, value, reach = row_of(path), found[path].value, math.exp(NINETY * entry.prior_sigma)
+            row, value, reach = (
+                row_of(path),
+                found[path].value,
+                math.exp(NINETY * entry.prior_standard_deviation),
+            )
             interval = (row.within(value / reach), row.within(value * reach))
             found[path] = replace(found[path], interval_90=interval)
     return found
@@ -369,8 +371,8 @@ def _identifiability(
     return tuple(
         Identifiability(
             path=unknown.path,
-            prior_sigma=unknown.sigma,
-            posterior_sigma=float(sigma[problem.n_dynamic + k]),
+            prior_standard_deviation=unknown.sigma,
+            posterior_standard_deviation=float(sigma[problem.n_dynamic + k]),
             verdict=values[unknown.path].status,
         )
         for k, unknown in enumerate(problem.unknowns)
@@ -393,7 +395,7 @@ def confounded_of(problem: DropProblem, covariance: Array) -> tuple[Confounded, 
             first=known[j][0].path_of(known[j][1]),
             second=known[i][0].path_of(known[i][1]),
             correlation=float(correlation[i, j]),
-            way_out=separating_measurement(known[j][0], known[i][0]),
+            separated_by=separating_measurement(known[j][0], known[i][0]),
         )
         for i, j in sorted(pairs, key=lambda pair: -abs(correlation[pair]))
     )
@@ -404,17 +406,6 @@ def calibration_json(calibration: Calibration) -> dict[str, object]:
     return stated(
         calibration,
         "values identifiability confounded checks consistent structure nis sentence",
-        identifiability=[
-            stated(
-                one,
-                "path prior_standard_deviation=prior_sigma posterior_standard_deviation=posterior_sigma "
-                "verdict",
-            )
-            for one in calibration.identifiability
-        ],
-        confounded=[
-            stated(one, "first second correlation separated_by=way_out") for one in calibration.confounded
-        ],
         checks={
             name: [stated(one, "name passed message=said") for one in checks]
             for name, checks in calibration.checks.items()

@@ -55,7 +55,7 @@ def test_the_calibrated_machine_loads_and_says_what_was_determined(calibration, 
             assert verdicts[f"{name}.{path}"] == "the record does not determine it"
     for entry in calibration.identifiability:  # what drifts may end less certain than it began
         if row_of(entry.path).drift == 0.0:
-            assert entry.posterior_sigma <= 1.0001 * entry.prior_sigma
+            assert entry.posterior_standard_deviation <= 1.0001 * entry.prior_standard_deviation
 
 
 def test_drops_keep_their_lift_and_sensors_their_gain(calibration, synthetic, hidden):
@@ -77,7 +77,7 @@ def test_confounded_values_are_said_in_the_document_too(calibration):
     pairs = {frozenset((pair.first, pair.second)): pair for pair in calibration.confounded}
     pair = pairs[frozenset(("NDE.support.stiffness", "NDE.support.mass"))]
     assert pair.correlation > 0.9
-    assert "hammer test" in pair.way_out
+    assert "hammer test" in pair.separated_by
     written = calibration_json(calibration)
     assert set(written["values"]) == set(calibration.values)
     assert written["sentence"] == calibration.sentence()

@@ -183,7 +183,7 @@ def test_what_is_called_confounded_is_what_correlates(problem):
         (unknowns[1].path, f"sensors.{sensors[0].name}.offset"),
     ]
     assert [pair.correlation for pair in found] == pytest.approx([-0.95, 0.92])
-    assert all(abs(pair.correlation) > CONFOUNDED and pair.way_out for pair in found)
+    assert all(abs(pair.correlation) > CONFOUNDED and pair.separated_by for pair in found)
 
 
 def test_a_simulated_coast_down_is_seen_where_the_sensors_are(monkeypatch):
