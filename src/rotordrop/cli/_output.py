@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, suppress
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -65,10 +66,12 @@ def deliver(
     needs one page. What was written before is named.
     """
     if report is not None:
+        from rotordrop.report.origin import Origin, command_line, now
         from rotordrop.report.page import write_page
 
         assert not callable(summary) and not isinstance(summary, Sequence)
-        write_page(summary, report)
+        made = dict(Origin(command=command_line(sys.argv[1:]), made=now()).facts())
+        write_page(replace(summary, facts=tuple((made | dict(summary.facts)).items())), report)
     if json_file == STANDARD_OUTPUT:
         sealed = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"

@@ -185,6 +185,7 @@ def test_critical_speeds_of_the_paper(tmp_path, capsys):
     told, page = tmp_path / "c.json", tmp_path / "c.html"
     arguments = ["critical-speeds", PAPER, "--top-speed", "100 Hz", "--held", "touchdown bearings"]
     assert run([*arguments, "--json", str(told), "--report", str(page)]) == 0
+    assert "<dt>report made</dt>" in page.read_text(encoding="utf-8")
     found = json.loads(told.read_text())
     settled = found["maps"]["standstill"]["at_the_machine_Hz"]
     assert settled["tangent"][:2] == pytest.approx([134.0, 235.0], rel=5e-3)
