@@ -30,7 +30,7 @@ def sketch(
         points = points[np.isfinite(points).all(axis=1)]
         drawn[name] = points[peak_indices(points[:, 1])] if len(points) else points
     every = np.concatenate([*drawn.values(), np.empty((0, 2))])
-    text = f"<pre>{escape(words)}</pre>"
+    text = f'<pre style="white-space:pre-wrap">{escape(words)}</pre>'
     if not len(every):
         return text
     low, high = every.min(axis=0), every.max(axis=0)

@@ -412,8 +412,11 @@ class Drop(Document):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        peaks = {
-            name: ([hit.peak_time_s for hit in one.impacts], [hit.peak_force_N.value for hit in one.impacts])
+        peaks = {  # a line from zero for each
+            name: (
+                [hit.peak_time_s for hit in one.impacts for _ in range(3)],
+                [force for hit in one.impacts for force in (0.0, hit.peak_force_N.value, 0.0)],
+            )
             for name, one in self.bearings.items()
         }
         return sketch(repr(self), "time from power-off [s]", "peak force of contacts [kN]", peaks, 1e-3)

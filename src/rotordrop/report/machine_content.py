@@ -345,9 +345,8 @@ def _statements(written: str, first: CatalogueBearing) -> list[Statement]:
     else:
         said = [Statement(f"no list in the catalogue has {written}: size by ISO 15, balls {balls.basis}")]
     if first.read is not None and first.read.unread:
-        said.append(
-            Statement(f"not read: {', '.join(first.read.unread)} (cage, seals, accuracy have no effect here)")
-        )
+        unread = ", ".join(first.read.unread)
+        said.append(Statement(f"not read: {unread}; what names cage, seals or accuracy has no effect here"))
     if first.contact_angle_range is not None:
         low, high = (math.degrees(angle) for angle in first.contact_angle_range)
         text = f"{written} does not say its contact angle: {low:.0f}° to {high:.0f}° are usual; give it"

@@ -269,6 +269,13 @@ FAULTS = {
     "crossed": ("fast_drop", order(2, 1, 0, 3), "swapped channels", CROSSED, "exchanged"),
     "crossed, slow": ("drop+", order(2, 1, 0, 3), "swapped channels", CROSSED, "by 15.7 standard"),
     "no drop": ("drop", window(-0.25, -0.01), "no drop in the record", None, "spans 26.5 µm, 20.5 µm"),
+    "no drop, no speed": (
+        "drop",
+        lambda r: speed(lambda r, t: 0.0 * r)(window(-0.25, -0.01)(r)),
+        "no drop in the record",
+        None,
+        "strays by 17.9 µm in all",
+    ),
     "begins late": ("drop", window(0.002, 0.3), LATE, None, ""),
     "begins thrown about": ("whole_drop", window(0.035, 0.6), LATE, None, ""),
     "short": ("drop+", window(-0.25, 0.1), "short record", None, "ends 100."),

@@ -51,8 +51,13 @@ def test_a_curve_ends_where_its_largest_number_is():
     (drawn,) = lines(html)
     assert drawn[-1] - drawn[0] == pytest.approx((WIDTH, -HEIGHT))
     texts = re.findall(r">([^<>]+)</text>", html)
-    assert {"0", "2", "t [s]", "y [mm]", "&lt;i&gt;"} == set(texts) and "<pre>&lt;b&gt;</pre>" in html
-    assert sketch("nothing", "", "", {"y": ([0.0], [np.nan])}) == "<pre>nothing</pre>"
+    assert {"0", "2", "t [s]", "y [mm]", "&lt;i&gt;"} == set(texts) and 'pre-wrap">&lt;b&gt;</pre>' in html
+    assert sketch("nothing", "", "", {"y": ([0.0], [np.nan])}).endswith(">nothing</pre>")
+
+
+def test_contacts_are_lines_from_zero():
+    (drawn,) = lines(SHOWN["estimate that was read"][0]()._repr_html_())
+    assert drawn[[0, 2, 3, 5], 1] == pytest.approx(np.max(drawn[:, 1])), "none runs from peak to peak"
 
 
 def test_what_one_uses_is_listed():

@@ -51,7 +51,7 @@ def test_without_scripts_the_first_figures_are_small_pictures():
     curve = drawn_together(np.array([0.0, 0.5]), {"NDE": {"force": np.array([1.0, 7.0])}}, "force", "N")
     shown = Section("Force", figures=(Figure(curve, "The force."),))
     page = render_page(ReportContent(title="T", sections=(shown, replace(shown, folded=True))))
-    assert page.count("<polyline") == 1 and "<noscript><pre>NDE</pre><svg" in page
+    assert page.count("<polyline") == 1 and ">NDE</pre><svg" in page.partition("<noscript><pre")[2]
     assert all(f">{mark}</text>" in page for mark in ("7", "1", "500", "force [N]"))
 
 
@@ -61,7 +61,7 @@ def test_a_small_picture_has_title_and_axes_of_its_own_panel():
     chart.add_scatter(x=[0, 1], y=[5, 6], mode="lines", line_width=1.5, name="DE", row=2, col=1)
     chart.update_yaxes(title_text="force [N]", row=1).update_yaxes(title_text="stress [MPa]", row=2)
     drawn = still(chart)
-    assert "<pre>stress</pre>" in drawn and ">stress [MPa]</text>" in drawn and "force [N]" not in drawn
+    assert ">stress</pre>" in drawn and ">stress [MPa]</text>" in drawn and "force [N]" not in drawn
     chart.update_yaxes(type="log", row=2)
     assert still(chart) == ""
 

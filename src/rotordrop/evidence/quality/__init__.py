@@ -142,11 +142,12 @@ def _motion(evidence: Evidence) -> Motion | None:
 
 
 def _speed(evidence: Evidence) -> list[Finding]:
-    motion = evidence.motion if evidence.record.speed_readings is None else None
+    seen = check_speed(evidence.record)
+    motion = evidence.motion if stops(seen) else None
     if isinstance(motion, Missing) and isinstance(motion.error, NothingFallsError):
         # a tail, say, needs no speed but a drop
         return [found("no-drop", seen=motion.error.seen, way_out=motion.error.remedy)]
-    return check_speed(evidence.record)
+    return seen
 
 
 def _line(evidence: Evidence) -> list[Finding]:
