@@ -468,30 +468,19 @@ def drops_of(content: Mapping[str, Any], place: str) -> dict[str, Drop]:
     return {Path(place).stem: Drop.of(content, place, MADE_BY)}
 
 
-def drop_of(content: Mapping[str, Any], place: str) -> Drop:
-    """The estimate of the one drop that an object holds.
-
-    Raises
-    ------
-    UsageError
-        If it is no document of an estimate, one of another version, or one of several drops.
-    """
-    drops = drops_of(content, place)
-    if len(drops) > 1:
-        raise UsageError(
-            f"{place} holds the drops {', '.join(drops)}; expected one. Write that drop to a file of its own."
-        )
-    return next(iter(drops.values()))
-
-
 def read_drops(path: Path) -> dict[str, Drop]:
     """The estimates that a file holds, by name."""
     return drops_of(read_json(path, MADE_BY), str(path))
 
 
 def read_drop(path: Path) -> Drop:
-    """The estimate of the one drop that a file holds."""
-    return drop_of(read_json(path, MADE_BY), str(path))
+    """The estimate of the one drop that a file holds; a file of several is refused."""
+    drops = read_drops(path)
+    if len(drops) > 1:
+        raise UsageError(
+            f"{path} holds the drops {', '.join(drops)}; expected one. Write that drop to a file of its own."
+        )
+    return next(iter(drops.values()))
 
 
 def estimate_schema() -> dict[str, Any]:

@@ -95,18 +95,16 @@ def next_drops(
     speed: float,
     limits: Mapping[str, float],
     *,
-    chance: float = MOST_BEYOND,
     drop: Drop | None = None,
     shares: Sequence[float] | None = None,
     drops: int = DROPS,
     duration: float | None = None,
-    seed: int = 1,
     progress: Progress | None = None,
 ) -> Foreseen:
     """Simulate the drops that could happen next, at a speed [rad/s] and at shares of it.
 
     ``limits`` are known by the field of an estimate document (``"peak_stress_Pa"``) [SI]; with them the speed
-    is sought up to which a share ``chance`` of the drops at most passes them [1]. The machine is that of
+    is sought up to which a share `MOST_BEYOND` of the drops at most passes them. The machine is that of
     ``drop``, by its estimate, where there is one; what stays open varies as in `repeat_study`. Damage is not
     simulated.
     By default 0.2 s are simulated, or until past where the rotor went further out than that in ``drop`` [s].
@@ -120,7 +118,7 @@ def next_drops(
     made = []
     for k, share in enumerate(shares):
         count = drops if k == 0 else max(drops // 2, 2)
-        study = repeat_study(at, share * speed, duration=duration, drops=count, seed=seed)
+        study = repeat_study(at, share * speed, duration=duration, drops=count)
         with TemporaryDirectory() as folder:
             results = run_study(study, Path(folder) / "drops", progress=False)
         beyond = [
@@ -142,16 +140,14 @@ def next_drops(
     return Foreseen(
         drops=tuple(made),
         duration=duration,
-        speed_limit=speed_limit(made, chance),
-        chance=chance,
+        speed_limit=speed_limit(made, MOST_BEYOND),
+        chance=MOST_BEYOND,
         limits=dict(limits),
         of_estimate=found is not None,
     )
 
 
-def lift_now(
-    machine: Machine, *, drop: Drop | None = None, lifts: int = LIFTS, seed: int = 1
-) -> LiftNow | None:
+def lift_now(machine: Machine, *, drop: Drop | None = None, lifts: int = LIFTS) -> LiftNow | None:
     """Simulate lifts from where the rotor rests, at standstill; None without a magnet in its loop.
 
     The machine is that of ``drop``, by its estimate, where there is one, and varies as that leaves it open;
@@ -167,7 +163,6 @@ def lift_now(
         name=f"lift of {at.name}",
         machine=at,
         drops=lifts,
-        seed=seed,
         duration=LIFT_ENDS * fall,
         relevitate=LIFT_BEGINS * fall,
         speed=0.0,

@@ -14,7 +14,7 @@ from rotordrop.estimate.bearing_drop import Origin
 from rotordrop.estimate.changed import changes
 from rotordrop.estimate.document import estimate_document, published_drop
 from rotordrop.estimate.estimate import Verdict
-from rotordrop.estimate.published import LaterMotion, drop_of, later_warning
+from rotordrop.estimate.published import Drop, LaterMotion, later_warning
 from rotordrop.evidence.quality.finding import Finding
 from rotordrop.report.drop_sections import drop_sections, impact_table
 from rotordrop.report.estimate_page import cross_check_statements, estimate_page, estimate_screen
@@ -175,5 +175,7 @@ def test_a_wider_gap_before_is_named_in_words(estimate):
     known["interval_90"] = [end - 60e-6 for end in known["interval_90"]]
     joint = document["joint"]
     joint["mean"][joint["paths"].index("NDE.air_gap")] -= 60e-6
-    first = changes_page(changes(drop_of(document, "before.json"), published_drop(estimate))).verdict[0]
+    first = changes_page(
+        changes(Drop.of(document, "before.json", "estimate"), published_drop(estimate))
+    ).verdict[0]
     assert first.level == "warning" and "NDE: air gap (" in first.text
