@@ -205,7 +205,9 @@ def _judgement(estimate: Estimate) -> Statement:
         said.append("The independent cross-check disagrees.")
     if level != "bad" and estimate.later_warning:
         said.append(f"{estimate.later_warning}.")
-    return Statement(" ".join(said), "warning" if len(said) > 1 else level)
+    if level == "bad" and estimate.machine.rotor.is_beam:
+        said.append(GUESSED_ROTOR)
+    return Statement(" ".join(said), "warning" if len(said) > 1 and level != "bad" else level)
 
 
 def _part(estimate: Estimate) -> Statement:
@@ -593,6 +595,7 @@ def _other(check: CrossCheck) -> Quantity:
     return Quantity.of(check.check, KINDS[check.estimate.unit], 3)
 
 
+GUESSED_ROTOR = "A beam stands for the rotor, in the cross-check too: the ranges are no 90 % intervals."
 _WIRING = ("swapped ends", "swapped channels", "swapped axes", "inverted polarity", "machine file")
 MEAN = "mean_force_0p15_0p2_N"
 OVER_GAP = "displacement / air gap"
@@ -674,7 +677,8 @@ def _loads(estimate: Estimate) -> Table:
         "mean force, 150 to 200 ms": lambda b: load(b, MEAN, b.values.get(MEAN)),
     }
     names = [name for name in lines if certain or name not in ONLY_CERTAIN]
-    what = "open loop" if estimate.replay else "90 % intervals" if certain else "90 % ranges"
+    ranges = "ranges" if estimate.machine.rotor.is_beam else "90 % ranges"
+    what = "open loop" if estimate.replay else "90 % intervals" if certain else ranges
     columns = [Column(f"first {1e3 * estimate.until:.0f} ms, {what}", str)]
     cells = [{name: lines[name](bearing) for name in names} for bearing in estimate.bearings]
     columns += [Column(b.name, own.__getitem__) for b, own in zip(estimate.bearings, cells, strict=True)]

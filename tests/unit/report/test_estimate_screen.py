@@ -5,12 +5,14 @@ import re
 from dataclasses import replace
 
 from rich.console import Console
+from tests.scaled_machines import TWELVE_NUMBERS
 from tests.unit.report.conftest import section
 
 from rotordrop.estimate.estimate import Verdict
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.known import Known
-from rotordrop.report.estimate_page import estimate_page, estimate_screen, width_advice
+from rotordrop.machine.simple import SimpleMachine, simple_machine
+from rotordrop.report.estimate_page import GUESSED_ROTOR, estimate_page, estimate_screen, width_advice
 from rotordrop.report.terminal import print_summary
 from rotordrop.track.consistency import Check
 from rotordrop.twin.value_of_information import advice_of
@@ -80,6 +82,11 @@ def test_an_estimate_that_lost_its_record_shows_ranges_and_blames_no_sensor(esti
     assert [row[1] for row in section(page, "Checks").tables[0].rows] == ["no", "not judged", "no"]
     sensors = next(one for one in section(page, "Parameters").tables if one.caption == "Sensors")
     assert "verdict" not in sensors.columns, "every gain is determined"
+    assert "90 % ranges" in text
+    guessed = replace(told, machine=simple_machine(SimpleMachine(**TWELVE_NUMBERS)))
+    text = text_of(guessed)
+    assert GUESSED_ROTOR in text and "90 % ranges" not in text
+    assert estimate_screen(guessed).verdict[0].level == "bad"
 
 
 def test_a_wide_force_says_why_and_what_would_narrow_it_once_for_both_ends(estimate):
