@@ -166,13 +166,13 @@ def _gaps(evidence: Evidence, problem: DropProblem) -> Iterator[str]:
     level = evidence.settled_level
     if not isinstance(level, Missing):
         return
-    seen, names = evidence.seen_gaps, problem.model.bearing_names
+    reach, names = evidence.reach, problem.model.bearing_names
     for b, (name, entry) in enumerate(zip(names, problem.gap_entries, strict=True)):
         begin = format_quantity(float(problem.start[entry]), "length")
         within = format_quantity(NINETY * math.sqrt(float(problem.covariance[entry, entry])), "length")
-        moved = not isinstance(seen, Missing) and problem.start[entry] == seen[b]
-        origin = "the circle in which the record shows the shaft" if moved else "the machine file"
-        why = f" ({seen.reason})" if isinstance(seen, Missing) else ""
+        moved = not isinstance(reach, Missing) and problem.start[entry] == reach[b]
+        origin = "the reach of the first force" if moved else "the machine file"
+        why = f" ({reach.reason})" if isinstance(reach, Missing) else ""
         tail = "without a tail" if evidence.tail is None else f"as the tail is not used ({level.reason}),"
         yield f"{name}: {tail} the air gap begins at {begin} ± {within} (90 %), by {origin}{why}"
 

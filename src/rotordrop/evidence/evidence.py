@@ -29,7 +29,7 @@ from rotordrop.evidence.events import (
 from rotordrop.evidence.levitated import LevitatedModel
 from rotordrop.evidence.measured_speed import RotorAngle, SpeedAtDrop, rotor_angle, speed_at_drop
 from rotordrop.evidence.rest import rest_of, resting_record
-from rotordrop.record.axes import sensor_polarity
+from rotordrop.record.axes import along_sensors, sensor_polarity
 from rotordrop.record.record import Record
 
 if TYPE_CHECKING:
@@ -44,6 +44,9 @@ if TYPE_CHECKING:
     from rotordrop.rotor.parameters import DropModel
 
 Fact = TypeVar("Fact")
+
+BEHIND_FALL = 5e-4
+"""Time behind the fitted fall up to which that of a rotor with one end held is followed on [s] (chosen)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,12 +277,32 @@ class Evidence:
         return level * sensor_polarity(sensors)
 
     @cached_property
-    def seen_gaps(self) -> Array | Missing:
-        """Radii of the circles in which the record shows the shaft [m], shape (B,); NaN where it is open."""
+    def reach(self) -> Array | Missing:
+        """Distance from the bearing centre at which the first force acts [m], shape (B,); NaN without one.
+
+        The fitted fall says where the rotor is when a force first makes it leave that fall; no contact law
+        enters. The zeros of the sensors shift the result one to one, so it is a place to start from where no
+        tail tells the gap, and not a measurement of it.
+        """
+        from rotordrop.evidence.contacts import first_forces
 
         def found() -> Array:
-            gaps = {one.name: one.gap for one in known(self.motion).at_bearings if one.gap_determined}
-            return np.array([gaps.get(name, np.nan) for name in self.base.bearing_names])
+            instant, sensing, names = self.power_off, known(self.sensing), self.base.bearing_names
+            if not isinstance(instant, DropInstant):
+                raise IdentificationError(
+                    f"{self.record.name} begins with the fall: where the first forces act shows only with "
+                    "the levitated rotor before it"
+                )
+            reached = np.full(len(names), np.nan)
+            for contact in first_forces(self.record, self.machine, instant):
+                if contact.bearing in self.held:
+                    continue  # that is the force of its magnets
+                if self.held and contact.start > instant.fall.end + BEHIND_FALL:
+                    continue  # what a magnet adds to its force is not known so far behind the fall
+                b = names.index(contact.bearing)
+                along = along_sensors(instant.fall.predicted(np.array([contact.start])), self.record.sensors)
+                reached[b] = np.hypot(*sensing.at_bearings(along)[0, b])
+            return reached
 
         return sought(found)
 
@@ -350,7 +373,7 @@ _OF_ALL = (
     "sensing",
     "rest",
     "still",
-    "seen_gaps",
+    "reach",
 )
 """Facts found with all sensors, which evidence of some of them keeps."""
 

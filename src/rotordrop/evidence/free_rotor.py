@@ -146,6 +146,15 @@ def free_rotor(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
     return replace(released, lift=gone[0], aside=gone[1], held=stay)
 
 
+def rotor_pushed_at_bearings(machine: Machine, planes: tuple[Plane, ...]) -> FreeRotor:
+    """Model the free rotor with forces at the touchdown bearings, local flexibility there included."""
+    fe = build_rotor_fe(machine)
+    nodes = [bearing.node for bearing in machine.touchdown_bearings]
+    basis = reduce_rotor(fe, Reduction(modes=modes_that_sag(fe) + 2, attachment=True), nodes)
+    words = f"free rotor, {basis.description}, pushed at {len(nodes)} touchdown bearings"
+    return _pushed(fe, basis, planes, nodes, (np.zeros(len(nodes)), np.zeros(len(nodes))), words)
+
+
 def _pushed(
     fe: RotorFE,
     basis: RotorBasis,

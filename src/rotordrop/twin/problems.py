@@ -36,7 +36,7 @@ FALL_SHARE = 1.7e-7
 def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) -> DropProblem:
     """Estimation problem of a record up to a time [s].
 
-    Without a tail the gaps, where they are unknown, start where the record shows them.
+    Without a tail the gaps, where they are unknown, start where the first forces act.
     """
     problem = build_problem(model, recorded_drop(evidence, until), until=until)
     if isinstance(evidence.settled_level, Missing):
@@ -64,17 +64,16 @@ def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:
 
 
 def _start_gaps(problem: DropProblem, evidence: Evidence) -> None:
-    """Let unsure air gaps begin where the record shows them; their prior uncertainty stays.
+    """Let unsure air gaps begin at the reach of the first contact; their prior uncertainty stays.
 
     From a gap that is tens of micrometres off, the first impacts come at the wrong time and the filter may
-    settle at a wrong machine. Where no circle shows, the value of the machine file has to do.
+    settle at a wrong machine. Where no first force shows, the value of the machine file has to do.
     """
-    seen = evidence.seen_gaps
-    if isinstance(seen, Missing):
+    if isinstance(evidence.reach, Missing):
         return
     gaps = problem.gap_entries
     unsure = problem.covariance[gaps, gaps] > (UNSURE_GAP * problem.mean[gaps]) ** 2
-    for entry, found, moved in zip(gaps, seen, unsure & np.isfinite(seen), strict=True):
+    for entry, found, moved in zip(gaps, evidence.reach, unsure & np.isfinite(evidence.reach), strict=True):
         if moved:
             problem.mean[entry] = problem.start[entry] = found
 

@@ -10,6 +10,7 @@ from tests.scaled_machines import scaled_machine
 
 from rotordrop import Known, example_machine, load_machine
 from rotordrop.errors import RecordError
+from rotordrop.evidence.contacts import first_forces
 from rotordrop.evidence.events import DropInstant, coarse_drop, sinking
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import GRID, free_rotor, response_at
@@ -132,8 +133,28 @@ def test_instant_and_remanent_lift_go_with_the_clock(found, found_fast, drop, ma
     assert moved.value - found.value == pytest.approx(1.234, abs=2e-6)
 
 
-def test_the_instant_needs_no_amb_planes(drop, machine):
-    """The rotor then counts as held at its sensor planes, beside which its magnets are."""
+def test_first_contacts_without_any_contact_model(drop, fast_drop, machine, found, found_fast):
+    """Truth, from power-off: begin, end [ms] and peak force [N] of the first contacts."""
+    truth = {
+        60: {"NDE": (7.75, 8.70, 3313.0), "DE": (7.11, 9.75, 3603.0)},
+        150: {"NDE": (9.35, 10.04, 4131.0), "DE": (7.24, 9.74, 3410.0)},
+    }
+    for hertz, record, instant, t0 in ((60, drop, found, -0.25e-3), (150, fast_drop, found_fast, -0.6e-3)):
+        contacts = first_forces(record, machine, instant)
+        assert [contact.bearing for contact in contacts] == ["NDE", "DE"]
+        for contact in contacts:
+            begin, end, peak = truth[hertz][contact.bearing]
+            assert (contact.start - t0) * 1e3 == pytest.approx(begin, abs=0.1)
+            assert contact.end is not None
+            assert (contact.end - t0) * 1e3 == pytest.approx(end, abs=0.4)
+            assert contact.peak_force == pytest.approx(peak, rel=0.10)
+            assert 60 < np.degrees(contact.azimuth) < 120
+
+
+def test_first_contacts_need_the_amb_planes_and_the_instant_does_not(drop, machine, found):
+    with pytest.raises(RecordError, match=r"the machine has 0 AMB planes; give the AMB nodes"):
+        first_forces(drop, machine.changed(ambs=()), found)
+    # The rotor then counts as held at its sensor planes, beside which its magnets are.
     plain = power_off(drop, machine.changed(ambs=()))
     assert plain.value == pytest.approx(-0.25e-3, abs=5e-5)
     assert plain.interval_90[0] < -0.25e-3 < plain.interval_90[1]

@@ -79,9 +79,9 @@ def test_the_fall_knows_that_one_magnet_holds_on(evidence, drop):
     assert fall.misfit < 1.5
     assert fall.instant == pytest.approx(truth["t_off_in_record_s"], abs=6e-5)
     assert fall.remanent_force[0] == pytest.approx([0.0, 0.0])
-    assert np.isnan(evidence.seen_gaps).tolist() == [True, False]
+    assert np.isnan(evidence.reach).tolist() == [True, False]
     gap = {b.name: float(b.air_gap) for b in evidence.machine.touchdown_bearings}[FELL]
-    assert evidence.seen_gaps[1] == pytest.approx(gap, rel=0.3)
+    assert evidence.reach[1] == pytest.approx(gap, rel=0.3)
 
 
 def test_the_twin_seeks_the_loop_of_that_magnet_and_not_its_lift(evidence):
