@@ -361,7 +361,7 @@ def _successive_halving(attempts: Sequence[_Attempt], search: Search) -> Candida
         return replace(one, checkpoint=checkpoint)
 
     with ThreadPoolExecutor(max_workers=THREADS) as pool:
-        for window in range(search.windows):
+        for window in range(len(_WINDOWS)):
             there = [one for one in pool.map(further, attempts) if one is not None]
             attempts = sorted(there, key=lambda one: one.score)
             if window >= FIRST_CHOICE:
@@ -412,11 +412,6 @@ class Search:
                 raise
             return found
         return again if found is None else min(found, again, key=score_of)
-
-    @property
-    def windows(self) -> int:
-        """Number of windows from guesses."""
-        return len(_WINDOWS)
 
     def extend(self, machine: Machine, start: int, number: int, before: Checkpoint | None) -> Checkpoint:
         """A fit of a machine by the coarse basis over one window more, after what was found before."""
