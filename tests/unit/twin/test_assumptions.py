@@ -2,7 +2,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from rotordrop import build_drop_model, example_machine, example_record_path, lo
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
-from rotordrop.evidence.evidence import Evidence, Missing, read_evidence
+from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, with_end_planes, with_sensors_of
@@ -62,14 +61,6 @@ def test_assumptions_are_said_with_their_numbers(machine, evidence):
     for sensor in machine.sensors:
         assert f"{sensor.name}: no levitated readings tell its noise; 0." in text
     assert "no levitated readings" not in said(machine, evidence)
-
-
-def test_under_noise_the_gap_begins_where_a_look_states_one(evidence):
-    motion = evidence.motion
-    loud = replace(motion, paths=tuple(replace(path, noise=10e-6) for path in motion.paths))
-    unasked = Evidence(record=evidence.record, machine=evidence.machine)
-    assert np.isfinite(unasked.with_facts(motion=motion).seen_gaps).all()
-    assert np.isnan(unasked.with_facts(motion=loud).seen_gaps).all()
 
 
 def test_gains_and_bandwidths_that_nobody_stated_are_said(machine, evidence):
