@@ -21,7 +21,7 @@ from rotordrop.units import format_minute, format_quantity
 
 if TYPE_CHECKING:
     from rotordrop.ledger.book import LoggedDrop
-    from rotordrop.report.content import ReportContent
+    from rotordrop.report.content import ReportContent, Statement
 
 LARGEST = (("force, 90 %", "peak_force_N", 1.0, "N"), ("stress, 90 %", "peak_stress_Pa", 1e-6, "MPa"))
 WHEN = "add: when it happened, ISO 8601; what the recorder wrote by default."
@@ -59,6 +59,7 @@ def log(
     Example: rotordrop log add drops.db drop.json
     """
     from rotordrop.ledger import book
+    from rotordrop.report.content import Statement
 
     if action is Action.add:
         drop = _drop(what, bearings, recorded, duration, cause)
@@ -81,8 +82,9 @@ def log(
         "trends": [asdict(one) | {"sentence": one.sentence()} for one in rising],
         "statement": book.STATEMENT,
     }
-    said = [*(share.sentence() for share in shares), *(one.sentence() for one in rising)]
-    deliver(content, json, _page(where, found, [*said, book.STATEMENT]), whole=everything)
+    said = [Statement(share.sentence(), "bad" if share.passed else "notice") for share in shares]
+    said += [Statement(text) for text in (*(one.sentence() for one in rising), book.STATEMENT)]
+    deliver(content, json, _page(where, found, said), whole=everything)
 
 
 def _allow(
@@ -119,9 +121,9 @@ def _drop(what: str | None, bearings: str, recorded: str, duration: float | None
     return drop_of_estimate(drop, bearings, recorded=date, duration=duration, cause=cause)
 
 
-def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str]) -> ReportContent:
+def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[Statement]) -> ReportContent:
     """What is used, and the drops, the latest first."""
-    from rotordrop.report.content import ReportContent, Statement, Table
+    from rotordrop.report.content import ReportContent, Table
 
     rows = []
     owners = {"machine": "machine", "bearings": "bearing_set"}
@@ -147,7 +149,7 @@ def _page(where: str, found: Mapping[int, LoggedDrop], said: Sequence[str]) -> R
     table = Table(tuple(rows[0]) if rows else ("drop",), tuple(tuple(row.values()) for row in rows))
     return ReportContent(
         title=f"Log of drops: {where}",
-        verdict=tuple(map(Statement, said)),
+        verdict=tuple(said),
         rest="--all",
         summary=(table,),
     )

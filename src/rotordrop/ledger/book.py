@@ -264,6 +264,11 @@ class UsedShare:
     seconds_passed_at: int | None = None
     """Drops of the log with which a limit was passed."""
 
+    @property
+    def passed(self) -> bool:
+        """Whether a limit is passed."""
+        return self.drops_passed_at is not None or self.seconds_passed_at is not None
+
     def sentence(self) -> str:
         """The share in words."""
         who = f"{self.machine}, bearings {self.bearing_set}"

@@ -123,14 +123,16 @@ def moment_of(peak: Peak) -> str:
 
 
 def static_limit_statement(bearings: Sequence[BearingDrop], *, certain: bool = True) -> Statement:
-    """Set the peak stresses beside the stress of the static load rating, as information."""
+    """Set the peak stresses beside the stress of the static load rating: passed, open or kept."""
     level: Level = "notice"
     shares: dict[str, list[str]] = {}
     for bearing in bearings:
         peak = Quantity.of(bearing.peak_stress.known, "pressure", range_only=not certain)
         ends = " to ".join(dict.fromkeys(f"{100.0 * end / STATIC_STRESS:.0f}" for end in peak.ends))
         shares.setdefault(ends, []).append(bearing.name)
-        if (peak.value if certain else peak.ends[1]) >= STATIC_STRESS:
+        if (peak.value if certain else peak.ends[0]) >= STATIC_STRESS:
+            level = "bad"
+        elif peak.ends[1] >= STATIC_STRESS and level != "bad":
             level = "warning"
     limit = f"static limit, {shown(STATIC_STRESS, 'pressure')} (ISO 76)"
     told = " and ".join(f"{share} % ({', '.join(names)})" for share, names in shares.items())

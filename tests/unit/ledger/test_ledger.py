@@ -455,6 +455,8 @@ def test_a_log_from_the_command_line(tmp_path, estimate, capsys):
         ("DE", 3200.0, 3400.0),
         ("NDE", 3200.0, 3400.0),
     ]
+    assert run(["log", "allow", log, *allowed[:4], "--seconds", "50 s", "--source", "contract 17"]) == 0
+    assert "problem: LP-400" in capsys.readouterr().out
     assert run(["log", "remove", log, "1"]) == 0
 
 

@@ -11,6 +11,7 @@ from rotordrop.estimate.bearing_drop import simulated_bearings
 from rotordrop.estimate.published import LaterMotion
 from rotordrop.known import Known
 from rotordrop.report.content import Figure, ReportContent, Section
+from rotordrop.report.drop_sections import static_limit_statement
 from rotordrop.report.estimate_page import inspection_section
 from rotordrop.report.origin import Origin, UsedFile, command_line
 from rotordrop.report.page import css_text, render_page
@@ -84,6 +85,10 @@ def test_a_stress_whose_interval_reaches_the_static_limit_asks_for_a_look_at_the
     assert not any(one.level == "warning" for one in inspection_section(below).statements)
     said = inspection_section(above).statements[0]
     assert said.level == "warning" and "4\u202f210 MPa" in said.text
+    cases = ((3.9e9, 4.19e9, "notice"), (3.9e9, 4.21e9, "warning"), (4.3e9, 4.5e9, "bad"))
+    for value, high, level in cases:  # kept, open, passed: as a limit of 'compare'
+        assert static_limit_statement((stressed(nde, value, high), de)).level == level
+    assert static_limit_statement((stressed(nde, 4.3e9, 4.5e9), de), certain=False).level == "warning"
 
 
 def test_a_model_that_does_not_fit_is_to_be_settled_before_anything_else(drop_result):
