@@ -76,13 +76,15 @@ def _of_drop(seen: Look, *, drawn: bool) -> ReportContent:
     # what a gap that was given makes false, or the speed of the headline, stands before the numbers
     false = {"wrong speed", "wrong speed unit", *(("wrong air gap",) if given else ())}
     doubted = [one for one in seen.findings if one.kind in false]
-    others = [one for one in seen.findings if one not in doubted]
+    released, *told = _verdict(seen)
+    rest = [*quality_statements([one for one in seen.findings if one not in doubted]), *told]
+    rest.sort(key=lambda one: one.level not in ("bad", "warning"))  # what makes numbers doubtful first
     return ReportContent(
         title=f"A look at {seen.record.name}",
         # figures of a page count from the release
         subtitle=f"{len(seen.drops)} drop{'s' if len(seen.drops) > 1 else ''}{speed}"
         + ("" if drawn else f", times as in the record (from {format_moment(seen.record.time[0])})"),
-        verdict=(*quality_statements(doubted), *_verdict(seen), *quality_statements(others)),
+        verdict=(*quality_statements(doubted), released, *rest),
         cards=tuple(card for card in (_card(seen, plane) for plane in seen.planes) if card.figures),
         counted_from=RELEASE,
         lead=1 if drawn else 0,

@@ -20,6 +20,7 @@ from rotordrop.errors import UnpairedError, UsageError
 from rotordrop.estimate.published import drops_of
 from rotordrop.evidence.held import held_contacts, masses_at
 from rotordrop.evidence.look import look, look_schema
+from rotordrop.evidence.quality.finding import found
 from rotordrop.evidence.quality.motion import check_slow_fall
 from rotordrop.evidence.touch import first_touch
 from rotordrop.machine import example_path, load_machine
@@ -201,6 +202,10 @@ def test_a_whirl_has_its_sense_frequency_and_turns(frequency, sense, tmp_path):
     assert whirl.turns_interval_90[0] < whirl.turns < whirl.turns_interval_90[1]
     assert whirl.turns == pytest.approx(frequency * 0.2, abs=0.35)
     assert (whirl.start, whirl.end) == pytest.approx((0.4, 0.6), abs=0.02)
+    noted = replace(seen, findings=(found("zero", away=1e-4, ratio=0.4, half=1e-6),))
+    words = [one.text for one in look_page(noted, drawn=False).verdict]
+    where = {name: next(k for k, text in enumerate(words) if name in text) for name in ("DC gap", sense)}
+    assert (where[sense] < where["DC gap"]) == (sense == "backward"), "warnings, doubts, news"
 
 
 def test_a_gap_may_be_a_text_with_its_unit_and_a_bare_speed_is_refused():
