@@ -106,7 +106,7 @@ def estimate_drops(
     from rotordrop.estimate.record_facts import facts_of
     from rotordrop.evidence.evidence import Evidence, insisted
     from rotordrop.evidence.given import given_drops
-    from rotordrop.evidence.one_end import as_dropped
+    from rotordrop.evidence.one_end import as_dropped, on_common_zeros
 
     require(method, "the method", Tracked, Replay, hint="Write Tracked() or Replay()")
     records, tails, stems = given_drops(machine, records, tails, names)
@@ -118,15 +118,14 @@ def estimate_drops(
             f"({'; '.join(', '.join(one) or 'none stays on' for one in held)}); expected the same of all. "
             "Estimate them apart"
         )
-    machine = ways[0]
     if isinstance(method, Replay) and any(held):
         raise RecordError(
             f"{held[0][0]} stayed held by its magnets in {stems[0]}, and the replay knows no drop of one "
             "end; estimate it with the tracked twin"
         )
     evidence = [
-        Evidence(record=record, machine=machine, tail=tail, name=stem)
-        for record, tail, stem in zip(records, tails, stems, strict=True)
+        Evidence(record=record, machine=way, tail=tail, name=stem)
+        for record, way, tail, stem in zip(records, ways, tails, stems, strict=True)
     ]
     facts = [facts_of(one) for one in evidence]
     from rotordrop.replay.replay import replayed_drop
@@ -134,6 +133,8 @@ def estimate_drops(
     from rotordrop.twin.tracked import followed_drops
     from rotordrop.twin.tracked_estimate import estimate_of
 
+    evidence = on_common_zeros(evidence)
+    machine = evidence[0].machine
     model = build_drop_model(machine)
     evidence = [insisted(one.with_facts(base=model)) for one in evidence]
     with shown(progress, "estimating") as tell:

@@ -6,6 +6,7 @@ the tilt and the swing of its magnet; a plane that fell lies, bounces or whirls 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from rotordrop.arrays import Array
 from rotordrop.evidence.events import FALLEN_SHARE, beginning_of, nominal_gaps
-from rotordrop.evidence.evidence import Missing, sought
+from rotordrop.evidence.evidence import Evidence, Missing, sought
 from rotordrop.evidence.wall import CENTRED
 from rotordrop.known import NINETY, Known
 from rotordrop.record.axes import planar_of
@@ -140,6 +141,25 @@ def with_zeros(record: Record, machine: Machine) -> Machine:
             for sensor, at in zeros
         }
     )
+
+
+def on_common_zeros(drops: Sequence[Evidence]) -> list[Evidence]:
+    """Drops of one machine, each with the zeros of its own record, as read with those of one of them.
+
+    Probes on a gap voltage that was set anew between drops have other zeros; the machine is the same.
+    """
+    ways = [one.machine for one in drops]
+    machine = next((way for way in ways if way.sensors[0].offset.source == LEVITATED), ways[0])
+    zeros = {sensor.name: float(sensor.offset) for sensor in machine.sensors}
+    alike = []
+    for one in drops:
+        moved = np.array([zeros[sensor.name] - float(sensor.offset) for sensor in one.record.sensors])
+        if moved.any():
+            record = replace(one.record, signals=one.record.signals + moved)
+            tail = one.tail and replace(one.tail, signals=one.tail.signals + moved)
+            one = replace(one, record=record, tail=tail, machine=machine)
+        alike.append(one)
+    return alike
 
 
 def off_zero(

@@ -17,9 +17,9 @@ from rotordrop.elements.parameter import below
 from rotordrop.elements.table import row_of, rows, separating_measurement
 from rotordrop.errors import IdentificationError, UsageError
 from rotordrop.estimate.published import Structure
-from rotordrop.evidence.evidence import read_evidence
+from rotordrop.evidence.evidence import Evidence, insisted
 from rotordrop.evidence.given import given_drops
-from rotordrop.evidence.one_end import with_zeros
+from rotordrop.evidence.one_end import on_common_zeros, with_zeros
 from rotordrop.known import NINETY, Known, Status, deviation_of
 from rotordrop.machine import Machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, JointSpread, RecordedLift
@@ -134,9 +134,14 @@ def calibrate_machine(
         The machine with estimates, what the records determine and what not.
     """
     records, tails, stems = given_drops(machine, records, tails, names)
-    machine = with_zeros(records[0], machine)
+    own = [
+        Evidence(record=record, machine=with_zeros(record, machine), tail=tail, name=stem)
+        for record, tail, stem in zip(records, tails, stems, strict=True)
+    ]
+    alike = on_common_zeros(own)
+    machine = alike[0].machine
     model = build_drop_model(machine)
-    evidence = [read_evidence(model, r, t, name=n) for r, t, n in zip(records, tails, stems, strict=True)]
+    evidence = [insisted(one.with_facts(base=model)) for one in alike]
     drops = Drops(evidence=tuple(tail_first(evidence)), calibrate_only=True)
     with shown(progress, "calibrating") as tell:
         search = Search(drops=drops, progress=Steps(tell))

@@ -357,8 +357,11 @@ def test_the_levitated_place_counts_as_zero_of_probes_on_a_gap_voltage(bias, dro
     stated = machine.with_values({f"sensors.{name}.offset": bias for name in drop.channel_names})
     assert as_dropped(moved, stated) is stated
     assert [one.kind for one in check_record(moved, stated, lying)] == []
-    (wrong,) = [one for one in check_record(drop, stated, tail) if one.severity == "stop"]
-    assert wrong.kind == "zero of the sensors"
+    half = machine.with_values({f"sensors.{drop.channel_names[0]}.offset": bias})
+    for told, read, words in ((stated, drop, "by the offset that"), (half, moved, "leaves out (S_NDE_B, ")):
+        (wrong,) = [one for one in check_record(read, told, tail) if one.severity == "stop"]
+        assert wrong.kind == "zero of the sensors"
+        assert words in wrong.message
 
 
 def test_a_record_that_ends_before_standstill_wants_a_tail(whole_drop, machine):

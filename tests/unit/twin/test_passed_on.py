@@ -20,21 +20,31 @@ from rotordrop.twin.tracked_estimate import RESOLVED, later_motion
 from rotordrop.twin.tracked_parameters import (
     determination,
     parameter_widening,
+    prior_of,
     sensor_errors,
     within_bounds,
 )
 
 NINETY = 1.6448536269514722
 SENSORS = 4
+SIGNS = (1, -1, 1, 1)
 
 
 @pytest.fixture(scope="module")
 def problem():
-    """The unknowns of a machine, behind five entries of the motion and before gains and offsets."""
-    model = build_drop_model(example_machine("lp400"), "quick")
+    """The unknowns of a machine, behind five entries of the motion and before gains and offsets.
+
+    Its second sensor is inverted, and every zero is stated.
+    """
+    machine = example_machine("lp400")
+    one, inverted, *others = machine.sensors
+    machine = machine.changed(sensors=(one, inverted.changed(polarity=-1), *others))
+    zeros = {f"sensors.{sensor.name}.offset": 10e-6 for sensor in machine.sensors}
+    model = build_drop_model(machine.with_values(zeros), "quick")
     unknowns = all_unknowns(model)
     first = 5 + len(unknowns)
     return SimpleNamespace(
+        parameter_slice=slice(5, first),
         model=model,
         unknowns=unknowns,
         n_dynamic=5,
@@ -99,8 +109,11 @@ def test_sensor_errors_are_those_at_the_end_of_the_drop(problem):
         assert [one.sensor for one in found] == [s.name for s in problem.model.machine.sensors]
         for c, one in enumerate(found):
             assert one.noise == pytest.approx((c + 1) * 1e-7)
-            for at, value in ((first + c, one.gain_error), (first + SENSORS + c, one.offset)):
-                middle, half = means[2, at], NINETY * widening * sigma[at]
+            for at, value, sign in (
+                (first + c, one.gain_error, 1),
+                (first + SENSORS + c, one.offset, SIGNS[c]),
+            ):
+                middle, half = sign * means[2, at], NINETY * widening * sigma[at]
                 assert value.value == middle
                 assert value.standard_error == pytest.approx(widening * sigma[at])
                 assert value.interval_90 == pytest.approx((middle - half, middle + half), rel=1e-12)
@@ -121,19 +134,25 @@ def test_a_sensor_that_the_model_does_not_fit_is_as_its_prior_allows(problem, do
     found = sensor_errors(known, smoothed, fits=False, widening=2.0)
     first = size - 2 * SENSORS
     for c, one in enumerate(found):
-        for at, value in ((first + c, one.gain_error), (first + SENSORS + c, one.offset)):
+        for at, value, sign in ((first + c, one.gain_error, 1), (first + SENSORS + c, one.offset, SIGNS[c])):
             form = problem.model.machine.rotor.gain_sigma if value is one.gain_error else 0.0
             half = NINETY * math.hypot(prior_sigma[at], form)
-            low, high = prior[at] - half, prior[at] + half
+            low, high = sign * prior[at] - half, sign * prior[at] + half
             if done == 3:
                 assert value.status == "the model does not fit the record"
-                assert value.value == means[-1, at]
-                low = min(low, means[-1, at] - 2.0 * NINETY * sigma[at])
-                high = max(high, means[-1, at] + 2.0 * NINETY * sigma[at])
+                assert value.value == sign * means[-1, at]
+                low = min(low, sign * means[-1, at] - 2.0 * NINETY * sigma[at])
+                high = max(high, sign * means[-1, at] + 2.0 * NINETY * sigma[at])
             else:
                 assert value.status == "the record does not determine it"
-                assert value.value == prior[at]
+                assert value.value == sign * prior[at]
             assert value.interval_90 == pytest.approx((low, high))
+
+
+def test_a_stated_zero_of_an_inverted_sensor_counts_in_its_positive_direction(problem):
+    size = problem.n_dynamic + len(problem.unknowns) + 2 * SENSORS
+    before = prior_of(SimpleNamespace(**vars(problem), mean=np.zeros(size), covariance=np.eye(size)))
+    assert before[0][-SENSORS:].tolist() == [10e-6 * sign for sign in SIGNS]
 
 
 def test_a_calibrated_gain_undoes_the_error_of_the_sensor():

@@ -216,7 +216,8 @@ def _zero(evidence: Evidence) -> list[Finding]:
     mean, read = evidence.beginning.levitated.mean, evidence.record
     away, share = off_zero(read, evidence.machine, mean)
     if share >= OFF_ZERO:
-        return [found("zero-given", away=away, ratio=share)]
+        names = ", ".join(one.name for one in evidence.machine.sensors if one.offset.status == "default")
+        return [found("zero-open" if names else "zero-given", away=away, ratio=share, names=names)]
     known = read.sensors[0].offset
     if known.source != LEVITATED:
         return []
