@@ -35,7 +35,7 @@ from rotordrop.evidence.paths import (
     with_impacts,
 )
 from rotordrop.evidence.quality import Finding, gate, not_seen, stops
-from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone, check_senses
+from rotordrop.evidence.quality.arrangement import BEFORE_RELEASE, check_alone, check_senses, falls_aside
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.finding import found, ranked, standing
 from rotordrop.evidence.quality.motion import (
@@ -292,9 +292,8 @@ def look(
         guessed = (ends.words(fell), *guessed)
         fell = fell.of_channels(ends.columns(fell, held=False))
         gaps = tuple(one for one, stays in zip(gaps, ends.held, strict=True) if not stays)
-    stated = arrangement is None or arrangement.angles_known
     try:
-        motion = motion_of(fell, gaps=gaps, angles_known=stated, machine=machine)
+        motion, stated = _motion_of(fell, gaps, arrangement, machine)
         if evidence is None:
             turning = _speed_at(read, float(motion.time[int(np.argmin(motion.floats))]))
             wiring = check_alone(fell, motion, turning) if stated else check_senses(fell, motion)
@@ -333,6 +332,22 @@ def look(
         synchronous=_synchronous(fell, motion, drops[0].release),
         notes=(*guessed, *motion.notes),
     )
+
+
+def _motion_of(
+    record: Record, gaps: tuple[Gap | None, ...], arrangement: Arrangement | None, machine: Machine | None
+) -> tuple[Motion, bool]:
+    """The motion, and whether by stated angles: those in names of channels only where the fall agrees."""
+    stated = arrangement is None or arrangement.angles_known
+    motion = motion_of(record, gaps=gaps, angles_known=stated, machine=machine)
+    if arrangement is None or not arrangement.angles_named or not falls_aside(record, motion):
+        return motion, stated
+    words = (
+        "by the angles in the names of the channels the rotor does not fall down: they count from another "
+        "axis, or the sensors are wired otherwise, and are left out"
+    )
+    motion = motion_of(record, gaps=gaps, angles_known=False, machine=machine)
+    return replace(motion, notes=(words, *motion.notes)), False
 
 
 def _given(

@@ -85,6 +85,8 @@ class Arrangement:
     """Whether the angles were given; else two sensors of a plane are taken as perpendicular."""
     notes: tuple[str, ...]
     """Guesses in words."""
+    angles_named: bool = False
+    """Whether the angles are those that the names of the channels tell."""
 
 
 def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
@@ -144,6 +146,7 @@ def arrangement_of(recording: Recording, profile: Profile) -> Arrangement:
         channels={sensor.name: label for sensor, label in zip(sensors, labels, strict=True)},
         angles_known=known,
         notes=notes,
+        angles_named=known and not profile.planes,
     )
 
 

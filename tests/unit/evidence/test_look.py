@@ -70,11 +70,18 @@ def written(path, time, planes, angles=(0.0, 90.0), origin=(0.0, 0.0), speed=60.
     return path
 
 
+FROM_VERTICAL = "by the angles in the names of the channels the rotor does not fall down"
+
+
 @pytest.mark.parametrize("angles", [(0.0, 90.0), (45.0, 135.0), (200.0, 290.0), (90.0, 0.0)])
-def test_release_impacts_and_contact_of_a_bouncing_point(angles, tmp_path):
+@pytest.mark.parametrize("named", [("_X", "_Y"), (" +45°", " -45°"), (" 45 deg", " 315 deg")])
+def test_release_impacts_and_contact_of_a_bouncing_point(angles, named, tmp_path):
+    """Whatever the angles, also where those in the names count from the vertical."""
     time, path, hits = fall_and_bounce()
     file = written(tmp_path / "drop.csv", time, {"NDE": path, "DE": path}, angles, origin=(30e-6, -80e-6))
+    file.write_text(file.read_text().replace("_X", named[0]).replace("_Y", named[1]))
     seen = look(file, gap=GAP)
+    assert any(note.startswith(FROM_VERTICAL) for note in seen.notes) == (named[0] != "_X")
     assert seen.drops[0].release == pytest.approx(RELEASE, abs=2e-3)
     found = [impact for impact in seen.impacts if impact.plane == "NDE"]
     clear = [hit for hit in hits if hit[2] ** 2 / (2 * G) > 0.05 * GAP]

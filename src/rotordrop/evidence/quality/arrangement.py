@@ -145,22 +145,39 @@ def check_alone(record: Record, motion: Motion, speed: float | None) -> list[Fin
 
     The speed [rad/s] counts as counter-clockwise.
     """
-    gone = np.flatnonzero(motion.floats[:-1] & ~motion.floats[1:])
-    if not len(gone):
+    shown = _fall_shown(record, motion)
+    if shown is None:
         return []
-    sunk_at, took = int(gone[0]) + 1, fall_time(max(path.gap for path in motion.paths))
-    begins = sunk_at - round((took + BEFORE_RELEASE) * record.sampling_rate)
-    if begins < 2:
-        return []
-    level = np.mean(record.signals[:begins], axis=0)
+    begins, level, sunk = shown
     tone = np.zeros(len(level), dtype=np.complex128)
     turns = math.floor((record.time[begins] - record.time[0]) * (speed or 0.0) / (2.0 * math.pi))
     if speed and turns >= FEWEST_TURNS:
         first = int(np.searchsorted(record.time, record.time[begins] - turns * 2.0 * math.pi / speed))
         waves = np.exp(-1j * speed * record.time[first:begins])
         tone = 2.0 * np.mean((record.signals[first:begins] - level) * waves[:, None], axis=0) * record.gains
-    seen = check_planes(record.planes, fall_of(record, level, sunk_at), tone)
+    seen = check_planes(record.planes, sunk, tone)
     return [one for one in seen if tone.any() or one.kind != "sense of the orbit"]
+
+
+def falls_aside(record: Record, motion: Motion) -> bool:
+    """Whether the rotor falls down in no plane by the angles of its sensors, as from another axis."""
+    shown = _fall_shown(record, motion)
+    return shown is not None and all(
+        _tilt(plane, shown[2], AS_DESCRIBED) > MOST_TILT for plane in record.planes
+    )
+
+
+def _fall_shown(record: Record, motion: Motion) -> tuple[int, Array, Array] | None:
+    """Sample before which the rotor floats, the level there, and its change by the fall [m], shape (S,)."""
+    gone = np.flatnonzero(motion.floats[:-1] & ~motion.floats[1:])
+    if not len(gone):
+        return None
+    sunk_at, took = int(gone[0]) + 1, fall_time(max(path.gap for path in motion.paths))
+    begins = sunk_at - round((took + BEFORE_RELEASE) * record.sampling_rate)
+    if begins < 2:
+        return None
+    level = np.mean(record.signals[:begins], axis=0)
+    return begins, level, fall_of(record, level, sunk_at)
 
 
 def check_senses(record: Record, motion: Motion) -> list[Finding]:
