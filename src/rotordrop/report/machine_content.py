@@ -28,6 +28,7 @@ from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, panels, plain
 from rotordrop.rotor.assembly import rotor_fe
 from rotordrop.rotor.imported import SHOWN, free_frequencies, supported_frequencies
+from rotordrop.rotor.machine_summary import CRITICAL
 
 if TYPE_CHECKING:
     from rotordrop.elements.touchdown_bearing import TouchdownBearing
@@ -52,9 +53,10 @@ def machine_content(
         facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
         verdict=(
             _verdict(warnings),
+            *(Statement(f"{one.message}.", "warning") for one in warnings if one.kind == CRITICAL),
             _rotor(summary),
             *(one for rest in summary.bearings for one in _has(machine.bearing(rest.name), rest)),
-            *map(Statement, _remarks(one for one in warnings if not one.doubtful)),
+            *map(Statement, _remarks(one for one in warnings if not (one.doubtful or one.kind == CRITICAL))),
         ),
         cards=(
             *(_card(machine, rest) for rest in summary.bearings),

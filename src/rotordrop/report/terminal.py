@@ -130,7 +130,7 @@ def _short(one: Statement, lines: int, rest: str) -> Statement:
     if one.level == "bad":  # it says the way out
         return one
     plainly = one.text.replace(THIN_SPACE, "")  # which would be taken for a blank
-    longest = lines * (WIDTH - len("warning: "))
+    longest = lines * (WIDTH - len("warning: ")) - len(".")
     return Statement(shorten(plainly, longest, placeholder=f" … ({rest})"), one.level)
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rotordrop.arrays import Array
 from rotordrop.document import stated
 from rotordrop.elements.bearing_numbers import BearingFigure, numbers_of
@@ -17,6 +19,7 @@ from rotordrop.machine import Machine
 from rotordrop.machine.plausibility import Doubt, doubts
 from rotordrop.physics.thermal import friction_heat, growth_of_race
 from rotordrop.rotor.assembly import N_RIGID, RotorFE, build_rotor_fe, free_free_modes, modes_on_springs
+from rotordrop.rotor.campbell import LEAST_FACTOR, campbell_diagram, separations
 from rotordrop.rotor.magnet_loop import LoopStability, MagnetSummary, loop_of, magnet_summaries
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rotor_on_race
 from rotordrop.rotor.suspension import stiffness_of
@@ -129,6 +132,9 @@ FREQUENCY_DISTANCE = 0.15
 HEAT_WINDOW = 0.2
 """Time [s] over which frictional heat is added up: the part of a drop the force is estimated for."""
 
+CRITICAL, NEAR_CRITICAL = "critical speed", 0.1
+"""Kind of a warning of a critical speed, and how near to the speed one is told [1] (chosen)."""
+
 GROWTH_SHARE = 0.1
 """Thermal growth of the race over the room it has from which heat counts (chosen)."""
 
@@ -142,7 +148,7 @@ class MachineWarning(Doubt):
 
     Its kind is "limiting speed", "ball centrifugal force", "support resonance", "frictional heat", "load
     direction", "shoulder of the race", "thermal runaway", "face", "control loop", "lift", "guess off the
-    middle of its range", or one of the doubts.
+    middle of its range", "critical speed", or one of the doubts.
     """
 
     doubtful: bool = False
@@ -164,7 +170,22 @@ def machine_warnings(
         found += _landing(machine, bearing)
         found += [*_resonance(rest, summary), *_heat(bearing, rest, omega), *_lifted(rest)]
         found += _guesses_aside(bearing)
-    return (*found, *_loop(summary))
+    return (*_near_critical(machine, omega), *found, *_loop(summary))
+
+
+def _near_critical(machine: Machine, omega: float) -> Iterator[MachineWarning]:
+    """Critical speeds near a speed [rad/s] in AMBs whose stiffness was given: none by a default of ours."""
+    if not machine.ambs or not all(amb.loop_is_given for amb in machine.ambs):
+        return
+    around = np.linspace((1.0 - NEAR_CRITICAL) * omega, (1.0 + NEAR_CRITICAL) * omega, 5)
+    for one, apart in separations(campbell_diagram(machine, around, "AMBs"), omega, omega).items():
+        if apart.factor >= LEAST_FACTOR:
+            speed, at = (f"{one_of / (2.0 * math.pi):.4g} Hz" for one_of in (one.speed, omega))
+            text = (
+                f"{one.direction} critical speed {speed}, {100.0 * apart.margin:.1f} % from {at}, amplified "
+                f"{apart.factor:.1f} ×"
+            )
+            yield _warning(CRITICAL, "AMBs", one.speed, omega, text)
 
 
 def _loop(summary: MachineSummary) -> Iterator[MachineWarning]:

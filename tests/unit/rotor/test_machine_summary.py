@@ -15,8 +15,9 @@ from rotordrop.elements.table import parameter
 from rotordrop.errors import SimulationError, UsageError
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.timoshenko import round_section
+from rotordrop.report.machine_content import machine_content
 from rotordrop.rotor.assembly import assemble
-from rotordrop.rotor.machine_summary import machine_warnings, summarise_machine
+from rotordrop.rotor.machine_summary import CRITICAL, machine_warnings, summarise_machine
 from rotordrop.rotor.statics import bearing_load_shares, levitated_sag, rest_on, settled_sag, weight_vector
 from rotordrop.rotor.suspension import equivalent_stiffness
 
@@ -51,6 +52,23 @@ def test_the_reference_machine_has_its_numbers_with_and_without_ambs(summary, ma
 def warnings_of(machine, kind, speed_Hz):
     found = machine_warnings(machine, summarise_machine(machine), 2 * math.pi * speed_Hz)
     return [warning for warning in found if warning.kind == kind]
+
+
+def test_a_critical_speed_near_the_speed_is_told_where_the_magnets_are_given(machine):
+    """548.4 Hz beside a nominal 550 Hz, by a stiffness of the user and not by a default of ours."""
+    given = tuple(
+        one.model_copy(
+            update={name: replace(getattr(one, name), status="given") for name in ("stiffness", "damping")}
+        )
+        for one in machine.ambs
+    )
+    stated = machine.model_copy(update={"ambs": given})
+    (found,) = warnings_of(stated, CRITICAL, 550.0)
+    assert (found.value / (2 * math.pi), found.doubtful) == (pytest.approx(548.4, abs=0.2), False)
+    assert "0.3 % from 550 Hz" in found.message
+    said = machine_content(stated, summarise_machine(stated), (found,)).verdict
+    assert [one.level for one in said[:2]] == ["good", "warning"]
+    assert not warnings_of(stated, CRITICAL, 400.0) and not warnings_of(machine, CRITICAL, 550.0)
 
 
 @pytest.mark.parametrize(("speed_Hz", "force"), [(60.0, 1.8), (210.0, 22.0), (550.0, 149.0)])
