@@ -503,6 +503,7 @@ def test_the_bundled_drop_with_and_without_its_machine(machine):
     for name in ("NDE", "DE"):
         first = [next(hit.time for hit in seen.impacts if hit.plane == name) for seen in (alone, known)]
         assert first[0] == pytest.approx(first[1], abs=1e-3)
+    assert "between ends that fall alike" in known.not_seen
     jsonschema.validate(alone.as_json(), look_schema())
 
 

@@ -310,7 +310,10 @@ STAGES: tuple[Mapping[str, Callable[[Evidence], list[Finding]]], ...] = (
 
 NO_CHECK_SEES = "No check sees: "
 UNSEEN_ANYWHERE = "exchanged blocks, jitter, limits with noise on them, up to 6 lost samples"
-UNSEEN = "gaps or gains off by 20 %, the rotor's mass, ends or axes exchanged in the tail"
+UNSEEN = (
+    "gaps or gains off by 20 %, the rotor's mass, ends or axes exchanged in the tail, channels exchanged "
+    "between ends that fall alike"
+)
 """What passes these checks by the faults of the bench, in any record and in one of a machine."""
 
 SEEN_BY: Mapping[str, str] = {
