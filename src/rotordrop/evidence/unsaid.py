@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +21,9 @@ from rotordrop.record.keys import speed_told
 from rotordrop.record.profile import Profile
 from rotordrop.record.record import record_of
 from rotordrop.record.recording import Channel, Recording, called, listed
+
+_PULSES = re.compile(r"(?<![^\W_])(KPH|key ?phas|ta[ck]ho|trigger|phase ?mark)", re.IGNORECASE)
+"""Names of channels that hold pulses of the shaft."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +67,11 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
     profile = given.model_copy(update={"channels": mapped, "planes": {} if sensors else planes})
     profile, speed = _with_speed(recording, profile, used if sensors else [])
     if speed is None and sensors:  # a look needs none
-        missing.append('the shaft speed: --speed-channel "...", --pulses "..." or --speed "60 Hz"')
+        pulses = next(
+            (c.label for c in recording.channels if c.label not in looked_at and _PULSES.search(c.name)),
+            "...",
+        )
+        missing.append(f'the shaft speed: --speed-channel "...", --pulses "{pulses}" or --speed "60 Hz"')
     sensitive = recording.sensitivities or (sensors and all(one.sensitivity is not None for one in sensors))
     missing += units_missing([c for c in used if c.label != speed], profile, sensitive=bool(sensitive))
     found = []

@@ -256,6 +256,12 @@ def test_a_tail_may_lack_the_speed_that_the_profile_names(tail, machine, tmp_pat
         assert read_record(tmp_path / "tail.h5", machine, profile=rules, tail=True).speed is None
 
 
+def test_a_channel_of_pulses_is_offered_by_its_name(machine):
+    marked = recording(*API, extra=(channel("Ch5 KPH", "V", np.tile([-1.0, -9.0], 5)),))
+    (asked,) = guess_profile(marked, Profile(likely=True), machine.sensors).missing
+    assert '--pulses "Ch5 KPH"' in asked
+
+
 def test_what_a_profile_writes_serves_look_with_and_without_the_machine(machine, tmp_path):
     names = recording(*API, extra=(channel("n", "rpm", np.full(10, 3600.0)),))
     alone = guess_profile(names, Profile())
