@@ -23,12 +23,13 @@ def left_over(served, job):
 
 
 def test_half_an_upload_leaves_nothing(served):
-    job = served.new_job({})
+    job, until = served.new_job({}), time.monotonic() + 600.0
     with socket.create_connection(("127.0.0.1", served.port)) as connection:
         head = f"PUT /api/jobs/{job}/files/record?name=a.csv HTTP/1.1\r\nHost: 127.0.0.1:{served.port}\r\n"
         head += f"X-Rotordrop-Token: {served.token}\r\nContent-Length: 100000\r\n\r\n"
         connection.sendall(head.encode() + b"x" * 5000)
-    until = time.monotonic() + 600.0
+        while not left_over(served, job) and time.monotonic() < until:
+            time.sleep(0.05)  # until it has begun
     while left_over(served, job) and time.monotonic() < until:
         time.sleep(0.05)
     assert left_over(served, job) == []
