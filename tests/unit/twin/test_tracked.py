@@ -240,9 +240,8 @@ def test_a_gap_in_the_record_and_a_lost_channel_are_lived_with(calibrated, works
     signals[start : start + 40] = np.nan
     signals[:, 1] = np.nan
     worse = replace(record, signals=signals)
-    item = read_evidence(
-        build_drop_model(calibrated), worse, synthetic.tail, name="worse", power_off=quick.drop_instant
-    )
+    item = Evidence(record=worse, machine=calibrated, tail=synthetic.tail, name="worse")
+    item = item.with_facts(power_off=quick.drop_instant)
     inside, drop = followed(calibrated, item)
     assert drop.verdict is Verdict.ONE_DIRECTION and not drop.cross_check
     assert "no independent cross-check is possible" in drop.sentence
