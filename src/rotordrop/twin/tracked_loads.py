@@ -433,7 +433,9 @@ def bearing_drop(
     impacts: tuple[Impact, ...] = ()
     seen: dict[str, Any] = {}
     if loads.peak_force.origin is Origin.TWIN:
-        impacts = twin_impacts(forces, b, widening, cross_check)
+        impacts = tuple(
+            _as_unsure(one, loads.peak_force) for one in twin_impacts(forces, b, widening, cross_check)
+        )
         seen = race_moved(forces, b, gap, widening, doubt)
         if cross_check is not None:  # as is handed over of a model that is not believed
             seen["largest"] = replace(seen["largest"], status=INCONSISTENT)
@@ -499,6 +501,22 @@ def twin_impacts(
         impact = _impact(forces, b, int(first), int(first + samples), widening)
         found.append(impact if cross_check is None else _impact_holding(impact, cross_check, b))
     return tuple(found)
+
+
+def _as_unsure(impact: Impact, peak: Peak) -> Impact:
+    """An impact as unsure, over its force, as the stated peak, whose interval holds other models too.
+
+    That of the peak has its interval.
+    """
+    force, stated = impact.peak_force, peak.known
+    if force.interval_90 is None or stated.interval_90 is None or min(force.value, stated.value) <= 0.0:
+        return impact
+    low, high = (force.value * end / stated.value for end in stated.interval_90)
+    if impact.start <= peak.time <= impact.end:
+        return replace(impact, peak_force=replace(force, interval_90=(low, high)))
+    return replace(
+        impact, peak_force=replace(force, interval_90=(min(low, force.low), max(high, force.high)))
+    )
 
 
 def _impact(forces: ForceHistory, b: int, first: int, last: int, widening: float) -> Impact:

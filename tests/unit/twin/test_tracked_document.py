@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rotordrop.estimate.bearing_drop import Impact, Origin, Peak
 from rotordrop.estimate.document import estimate_document
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.evidence.impacts import shortest_flight
@@ -20,6 +21,7 @@ from rotordrop.track.smoother import PassSettings, forward, smooth
 from rotordrop.twin.problems import COARSE_BASIS, recorded_drop
 from rotordrop.twin.tracked_estimate import RESOLVED
 from rotordrop.twin.tracked_loads import (
+    _as_unsure,
     loads_of_cross_check,
     race_moved,
     widened_to,
@@ -261,3 +263,31 @@ def test_a_mirrored_record_gives_the_mirrored_force(calibrated, synthetic):
     assert other.magnitude_sigma == pytest.approx(one.magnitude_sigma, abs=1e-5 * peak)
     same_spin = first_impacts(mirrored(calibrated), seen, 1.0)
     assert np.abs(same_spin.force[..., 0] + one.force[..., 0]).max() > 1e-3 * peak
+
+
+def test_a_contact_is_as_unsure_as_the_stated_peak_and_its_own_row_is_that_peak():
+    """Other models stood in the peak alone: one force had two intervals."""
+
+    def force(value, low, high):
+        return Known(value=value, status="determined", interval_90=(low, high), unit="N")
+
+    nothing = force(1.0, 1.0, 1.0)
+    largest, other, loose = (
+        Impact(
+            start=start,
+            end=start + 1e-3,
+            azimuth=0.0,
+            peak_time=start,
+            peak_force=known,
+            impulse=nothing,
+            dissipated_energy=nothing,
+        )
+        for start, known in (
+            (0.01, force(3000.0, 2900.0, 3200.0)),
+            (0.02, force(1000.0, 990.0, 1010.0)),
+            (0.03, force(100.0, 50.0, 150.0)),
+        )
+    )
+    peak = Peak(known=force(3000.0, 2700.0, 3100.0), time=0.0105, origin=Origin.TWIN)
+    found = [_as_unsure(one, peak).peak_force.interval_90 for one in (largest, other, loose)]
+    assert found == [pytest.approx(ends) for ends in ((2700.0, 3100.0), (900.0, 3100.0 / 3.0), (50.0, 150.0))]
