@@ -119,7 +119,7 @@ def profile(
 ) -> None:
     """Make a profile of a recorder: what its files do not say themselves, said once.
 
-    Example: rotordrop profile record.csv
+    Example: rotordrop profile record.csv -o record.profile.toml
     """
     from rotordrop.evidence.unsaid import guess_profile
     from rotordrop.record.profile import OPTIONS, profile_of, rules_of, save_profile
