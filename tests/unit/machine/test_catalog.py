@@ -1,7 +1,9 @@
 """Bearings by designation, as people write them, and as the catalogue has them."""
 
 import math
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from tests.reference.ball_bearing_catalogue import geometry_of
@@ -104,91 +106,20 @@ def test_what_is_given_goes_before_the_catalogue(changed):
     assert (bearing.ball_youngs_modulus.value, bearing.ball_density.value) == (208e9, 7800.0)
 
 
-# series and bore; contact angle [°] (D: deep groove, ?: not said); h: hybrid, s: small balls, class of
-# clearance or preload, arrangement; as written
-WRITTEN = """
-71914 | ? | | 71914, 7914
-71914 | 15 | | B71914-C-T-P4S, B71914C.T.P4S
-71914 | 25 | light | B71914-E-T-P4S-UL, NSK 7914A5TRDULP4
-71914 | 25 | medium | B71914E-T-P4S-DUM
-7016 | 15 | | B7016-C-T-P4S, 7016 CD/P4A
-7016 | 15 | light | B7016-C-T-P4S-UL
-7016 | 25 | heavy | FAG B7016-E-2RSD-T-P4S-UH
-71914 | 25 | h light | HCB71914-E-2RSD-T-P4S-UL
-7016 | 15 | h | HCB7016-C-T-P4S, 7016 CD/HCP4A
-71914 | 25 | h | XCB71914-E, XCB 71914 E.T.P4S, xcb71914e
-71914 | 15 | s | HS71914-C-T-P4S, HSS71914-C-T-P4S, 71914 CB/P4A
-71914 | 25 | h s | HC71914-E-T-P4S
-71914 | 25 | h s light | HCS71914-E-T-P4S-UL
-7014 | 15 | h s | XC7014-C-T-P4S
-71816 | 15 | | B71816-C-TPA-P4
-7016 | 25 | h | 7016 ACD/HCP4A
-7016 | 25 | | 7016 ACD/P4A
-7016 | 25 | h light | S7016 ACD/HCP4ADGA
-7014 | 15 | medium | 7014 CD/P4ADGB
-7014 | 15 | O medium | 7014 CD/P4ADBB
-7014 | 25 | X light | 7014 ACD/P4ADFA
-7014 | 25 | tandem heavy | 7014 ACD/P4ADTC
-71914 | 15 | h s | 71914 CE/HCP4A
-71914 | 25 | s | 71914 ACE/P4A
-71920 | 25 | | SKF 71920 ACD/P4A
-7016 | 18 | s | 80BNR10S, NSK 80BNR10STYNDUELP4
-71914 | 25 | s | 70BER19S
-71824 | 25 | | 71824 ACD/P4
-7216 | 40 | | 7216 BECBM, 7216 BEP, 7216 BEGAP, 7216-B-TVP, 7216 B
-7206 | 40 | | 7206 BEGBP
-7014 | 15 | O light | NSK 7014CTYNDBLP4
-7014 | 25 | light | 7014A5TYNSULP4, 7014ADG/GLP42
-71914 | 15 | X medium | 7914CTYNDFMP3
-7014 | 30 | | 7014A
-7014 | 15 | h | NTN 5S-7014UCG/GNP42
-71914 | 15 | h light | 5S-7914CT1G/GLP42
-6016 | 15 | | S 6016 C TA
-6016 | 25 | | S 6016 E TA
-6016 | 25 | light | S6016 E TA P4 DUL
-61914 | 15 | | GMN S 61914 C TA
-6010 | 15 | | SM 6010 C TA
-61914 | 25 | s | KH 61914 E TA
-61914 | 25 | h s | HY KH 61914 E TA
-6016 | 25 | h | HY S 6016 E TA
-6011 | 15 | h | HYSM 6011 C TA
-6206 | 25 | | S 6206 E TA
-6016 | D | | 6016, 6016-2RS1, 6016-2Z, 6016 2HRS, 6016ZZCM, 6016LLU/2AS, 6016 P6, W 6016-2Z, SS6016
-6016 | D | C3 | 6016-2RS1/C3, 6016-2Z/C3, 6016-2Z/C3WT, 6016 2ZR C3, 6016-C3, 6016 M/C3, FAG 6016.2RSR.C3
-6016 | D | C3 | FAG 6016-2RSR-C3, 6016-C-2HRS-C3, 6016 ZZ C3, 6016ZZC3, 6016LLBC3/5K, 6016DDUC3
-6016 | D | C3 | NSK 6016VVC3E
-6016 | D | C4 | 6016 C4, 6016-M-C4
-6016 | D | C2 | 6016/C2
-6016 | D | h C3 | 6016/HC5C3, 6016-2RSLTN9/HC5C3WT
-6206 | D | C3 | 6206 P63
-6005 | D | C3 | 6005 2RS C3 P6
-6016 | D | h | HC6016
-6216 | D | C3 | 6216-2Z/C3
-61914 | D | | SKF 61914, 61914-2RZ, 6914ZZ
-61914 | D | C3 | 6914 ZZ C3
-61816 | D | | 61816-2RS1, 6816ZZ
-608 | D | | 608-2RSH, 608ZZ
-625 | D | | 625
-619/8 | D | | 619/8-2Z
-618/5 | D | | 618/5
-60/28 | D | | 60/28
-61800 | D | | 61800
-6200 | D | | 6200-2Z
-6003 | D | CN | 6003 CN
-"""
-ROWS = [[part.strip() for part in line.split("|")] for line in WRITTEN.strip().splitlines()]
-CASES = [(one.strip(), *said) for *said, written in ROWS for one in written.split(",")]
+WRITTEN = tomllib.loads((Path(__file__).parent / "designations.toml").read_text(encoding="utf-8"))
+CASES = [(one, *said.split(" ", 2)) for said, written in WRITTEN.items() for one in written.split(", ")]
 
 
-@pytest.mark.parametrize(("written", "basic", "angle", "more"), CASES, ids=[case[0] for case in CASES])
-def test_a_designation_as_people_write_it(written, basic, angle, more):
+@pytest.mark.parametrize("case", CASES, ids=[case[0] for case in CASES])
+def test_a_designation_as_people_write_it(case):
+    written, basic, angle, *more = case
     read = read_designation(written)
     assert read is not None
     assert read.basic == basic
     assert read.kind == ("deep groove" if angle == "D" else "angular contact")
     said = None if read.contact_angle is None else f"{math.degrees(read.contact_angle):.0f}"
     assert said == (None if angle in "D?" else angle)
-    words = set(more.split())
+    words = set(" ".join(more).split())
     assert read.hybrid == ("h" in words)
     assert read.balls == ("small" if "s" in words else "standard")
     found = {read.clearance_class, read.preload_class, read.arrangement} - {None}
