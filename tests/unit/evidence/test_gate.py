@@ -783,14 +783,20 @@ def test_lost_samples_in_the_fall(count, drop):
     assert missing == pytest.approx(count, abs=0.5)
 
 
-def test_a_tail_whose_zero_moved_rests_beside_the_path_of_the_rotor(whole_drop, tail, machine):
+@pytest.mark.parametrize(
+    ("by", "severity"), [(40.0, "stop"), (17.0, "stop"), (-17.0, "warning"), (12.0, "warning")]
+)
+def test_a_tail_whose_zero_moved_rests_beside_the_path(whole_drop, tail, machine, by, severity):
     floating = levitated(whole_drop).mean
     assert check_rest_in_record(tail, whole_drop, machine, floating, sag=1e-6) == []
-    moved = replace(tail, signals=tail.signals + 40e-6 * np.eye(4)[2])
+    moved = replace(tail, signals=tail.signals + 1e-6 * by * np.eye(4)[2])
     (found,) = check_rest_in_record(moved, whole_drop, machine, floating, sag=1e-6)
-    assert (found.kind, found.severity) == ("tail offset", "warning")
-    off = float(re.search(r"rests ([\d.]+) µm higher at node 25", found.message)[1])
-    assert off == pytest.approx(40.0 / np.sqrt(2.0), abs=3.0)
+    assert (found.kind, found.severity) == ("tail offset", severity)
+    where = "higher" if by > 0.0 else "lower"
+    off = float(re.search(rf"rests ([\d.]+) µm {where} at node 25", found.message)[1])
+    assert off == pytest.approx(abs(by) / np.sqrt(2.0), abs=3.0)
+    within = float(re.search(r"expected within ([\d.]+) µm", found.message)[1])
+    assert 5.0 <= within < off and "give the tail of this drop" in found.remedy
     assert found.channel == ", ".join(whole_drop.channel_names[2:])
 
 

@@ -275,7 +275,8 @@ def _tail_at_rest(evidence: Evidence) -> list[Finding]:
     if evidence.tail is not None and not seen and not isinstance(whole, Missing):
         stiffness = sum(float(bearing.support.stiffness) for bearing in evidence.machine.touchdown_bearings)
         sag = GRAVITY * evidence.rotor.mass / stiffness  # of the rigid rotor
-        return check_rest_in_record(whole, record, evidence.machine, evidence.floating.mean, sag)
+        drop = known(evidence.beginning).coarse.instant
+        return check_rest_in_record(whole, record, evidence.machine, evidence.floating.mean, sag, drop)
     # a record that shows another gap than the file speaks for the tail that does so too
     if any(one.kind == "wrong unit factor" for one in seen) and _gaps(evidence):
         return [
