@@ -10,7 +10,6 @@ from rotordrop._version import __version__
 from rotordrop.estimate.estimate import Estimate
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import FORMAT, Bearing, Drop, FirstContact
-from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.simulate.fingerprint import fingerprint
 
 
@@ -31,7 +30,7 @@ def published_drop(estimate: Estimate) -> Drop:
         quick=not isinstance(method, Replay) and method.quick,
         bearings={
             bearing.name: Bearing.of_result(
-                replace(bearing, values={**bearing.values, **severity_values(estimate, bearing)})
+                replace(bearing, values={**bearing.values, **estimate.severity[bearing.name]})
             )
             for bearing in estimate.bearings
         },

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
@@ -32,6 +33,7 @@ from rotordrop.estimate.published import (
     later_warning,
     peak_text,
 )
+from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff
@@ -246,6 +248,11 @@ class Estimate:
     def consistent(self) -> bool:
         """Whether single numbers may be relied on within their intervals."""
         return self.verdict.holds
+
+    @cached_property
+    def severity(self) -> dict[str, dict[str, Known]]:
+        """How severe the drop was, by the name of a bearing and the fields of `severity.numbers.SEVERITY`."""
+        return {bearing.name: severity_values(self, bearing) for bearing in self.bearings}
 
     @property
     def later_warning(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +11,12 @@ from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.estimate.bearing_drop import BearingDrop
-from rotordrop.estimate.estimate import Estimate
 from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.known import Known, Status
 from rotordrop.severity.fatigue import fatigue_share
+
+if TYPE_CHECKING:
+    from rotordrop.estimate.estimate import Estimate
 
 Factor = Callable[[float], float]
 

@@ -25,7 +25,6 @@ from rotordrop.estimate.estimate import (
 )
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Agreement
-from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.known import NINETY, Known
 from rotordrop.report.content import (
@@ -368,7 +367,7 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
 
 def _severity(estimate: Estimate) -> Section:
     """Means, safety, impulse, energy, indices, fatigue of a drop by bearing, and what they rest on."""
-    found = {b.name: {**b.missing, **b.values, **severity_values(estimate, b)} for b in estimate.bearings}
+    found = {b.name: {**b.missing, **b.values, **estimate.severity[b.name]} for b in estimate.bearings}
     uncertain = not estimate.consistent
 
     def at(name: str) -> Column:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rotordrop.arrays import Array, Integers
 from rotordrop.elements.sensor import LAG
@@ -194,6 +193,8 @@ def _slope(model: DropModel, node: int, offset: float) -> Array:
 
     Over some centimetres a shaft is not its tangent, which is taken where the distance is zero.
     """
+    from scipy.interpolate import CubicSpline  # slow to load, and few machines have such a sensor
+
     z = model.fe.node_positions
     shapes = CubicSpline(z, [model.basis.node_row(k) for k in range(1, len(z) + 1)])
     at = z[node - 1]

@@ -13,7 +13,6 @@ from tests.unit.report.conftest import section
 
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.table import published, rows
-from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.report.content import Section, Table
 from rotordrop.report.estimate_page import spoken
 from rotordrop.report.page import render_page
@@ -222,7 +221,7 @@ def test_no_number_of_the_report_is_missing_in_the_document_or_in_python(estimat
     known = {*in_python(estimate, set()), *derived(document)}
     for bearing in estimate.bearings:
         more = (bearing.peak_force.known, bearing.peak_stress.known, bearing.statistics.as_json())
-        known |= {*in_python([*severity_values(estimate, bearing).values(), *more], set())}
+        known |= {*in_python([*estimate.severity[bearing.name].values(), *more], set())}
         known |= {one.value for one in bearing.values.values()}
     compared = 0
     for number in numbers(page):
