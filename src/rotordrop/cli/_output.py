@@ -13,13 +13,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rotordrop.errors import OutputError, UsageError
-from rotordrop.files import require_place, with_digest, write_json, write_text
+from rotordrop.files import digest_of_file, require_place, with_digest, write_json, write_text
 from rotordrop.progress import Progress, is_shown, shown, told_in_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rotordrop.report.content import ReportContent
+    from rotordrop.report.origin import Origin
 
 STANDARD_OUTPUT = Path("-")
 _PLAIN_WIDTH = 110
@@ -30,7 +31,8 @@ OUTPUTS = ("json", "report", "output")
 FILLED = ("target", "folder")
 """Parameters that name a folder to fill, or a file that is never replaced unasked."""
 
-_inputs: list[Path] = []
+_inputs: list[tuple[str, Path]] = []
+_origin: list[Origin] = []
 
 
 def console(stream: TextIO | None = None) -> Console:
@@ -56,6 +58,7 @@ def deliver(
     summary: ReportContent | Sequence[ReportContent] | Callable[[Console], None],
     *,
     report: Path | None = None,
+    drawn: ReportContent | None = None,
     written: Sequence[Path | None] = (),
     whole: bool = False,
 ) -> None:
@@ -63,15 +66,12 @@ def deliver(
 
     ``content`` is ready for JSON; a table gets a digest of its values. With ``-`` as its file it is printed
     in place of the summary: a page, several, or a function that prints on the console it is given. A report
-    needs one page. What was written before is named.
+    needs one page, drawn or as it is summarised. What was written before is named.
     """
     if report is not None:
-        from rotordrop.report.origin import Origin, command_line, now
-        from rotordrop.report.page import write_page
-
-        assert not callable(summary) and not isinstance(summary, Sequence)
-        made = dict(Origin(command=command_line(sys.argv[1:]), made=now()).facts())
-        write_page(replace(summary, facts=tuple((made | dict(summary.facts)).items())), report)
+        page = drawn or summary
+        assert not callable(page) and not isinstance(page, Sequence)
+        write_report(page, report)
     if json_file == STANDARD_OUTPUT:
         sealed = with_digest(content) if isinstance(content, dict) else content
         whole = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
@@ -91,6 +91,13 @@ def deliver(
         out.print(f"Written: {', '.join(files)}")
 
 
+def write_report(content: ReportContent, file: Path, fingerprint: str = "") -> None:
+    """Write a page with what it comes from: this command, its start, and the files as they were then."""
+    from rotordrop.report.page import write_page
+
+    write_page(content, file, replace(_origin[0], fingerprint=fingerprint))
+
+
 def deliver_text(text: str, file: Path | None, *, overwrite: bool) -> None:
     """Print a text, or write it to a file that must not exist yet unless `overwrite` says so."""
     if file is None or file == STANDARD_OUTPUT:
@@ -108,7 +115,7 @@ def with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
     @wraps(verb)
     def called(**values: Any) -> None:
         _inputs[:] = [
-            file
+            ("shaft table" if file is not path and path.suffix.lower() == ".toml" else name, file)
             for name, value in values.items()
             if name not in (*OUTPUTS, *FILLED)
             for path in (value if isinstance(value, list) else [value])
@@ -116,9 +123,27 @@ def with_files_apart(verb: Callable[..., None]) -> Callable[..., None]:
             for file in (path, *_read_beside(path))
         ]
         require_places(*(values[name] for name in OUTPUTS if name in values))
+        _origin[:] = [] if values.get("report") is None else [_origin_of(values.get("operator", ""))]
         verb(**values)
 
     return called
+
+
+def _origin_of(operator: str) -> Origin:
+    """Where a report of this command comes from; a file is for what its parameter says."""
+    from rotordrop.report.origin import Origin, UsedFile, command_line
+
+    def role(name: str, file: Path) -> str:
+        if name in ("machine", "record", "records", "files"):  # in either order
+            return "machine file" if file.suffix.lower() == ".toml" else "record"
+        return name.removesuffix("s").replace("_", " ")
+
+    files = (
+        UsedFile(role=role(name, file), name=file.name, sha256=digest_of_file(file))
+        for name, file in _inputs
+        if file.is_file()
+    )
+    return Origin(command=command_line(sys.argv[1:]), files=tuple(files), operator=operator)
 
 
 def _read_beside(file: Path) -> list[Path]:
@@ -140,7 +165,7 @@ def _read_beside(file: Path) -> list[Path]:
 
 def require_places(*files: Path | None) -> None:
     """Refuse outputs that cannot be written, or would replace an input or another output, before any work."""
-    read = {_identity(file) for file in _inputs}
+    read = {_identity(file) for _, file in _inputs}
     places: dict[object, Path] = {}
     for file in files:
         if file is None or file == STANDARD_OUTPUT:

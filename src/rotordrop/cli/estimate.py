@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -12,7 +11,7 @@ from typer import Option
 
 from rotordrop.cli import _options as options
 from rotordrop.cli._options import file_option, text_option
-from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places
+from rotordrop.cli._output import deliver, places_beside, progress_bar, require_places, write_report
 from rotordrop.errors import ConsistencyError, UsageError
 from rotordrop.interrupts import interruptible
 
@@ -62,8 +61,7 @@ def estimate(
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_screen, estimate_summary
-    from rotordrop.report.origin import origin_here
-    from rotordrop.report.page import write_page
+    from rotordrop.simulate.fingerprint import fingerprint
     from rotordrop.twin.search import is_calibrated
 
     machine, *records = options.machine_first(machine, *records)
@@ -85,17 +83,11 @@ def estimate(
         estimates = interruptible(
             lambda: estimate_drops(description, read, tails, method=chosen, progress=progress)
         )
-    used = [
-        ("machine file", machine),
-        *(("record", path) for path in records),
-        *(("tail", path) for path in tail or []),
-    ]
-    origin = origin_here(sys.argv[1:], used, operator)
-    screens = [estimate_summary(made, origin) if everything else estimate_screen(made) for made in estimates]
+    screens = [estimate_summary(made) if everything else estimate_screen(made) for made in estimates]
     for made, place in zip(estimates, outputs, strict=False):
         made.save(place)
     for made, place in zip(estimates, reports, strict=False):
-        write_page(estimate_page(made, origin), place)
+        write_report(estimate_page(made), place, fingerprint())
     documents = [estimate_document(made) for made in estimates]
     numbers = combined(documents, [made.name for made in estimates])
     deliver(numbers, json, screens, written=[*reports, *outputs], whole=everything)

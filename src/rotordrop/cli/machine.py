@@ -149,17 +149,14 @@ def check(
     from rotordrop.machine import load_machine
     from rotordrop.report.critical_speeds_page import machine_page
     from rotordrop.report.machine_content import machine_content
-    from rotordrop.report.page import write_page
     from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine
 
     described = load_machine(machine)
     summary = summarise_machine(described)
     warnings = machine_warnings(described, summary, speed)
-
-    if report is not None:
-        write_page(machine_page(described, summary, warnings), report)
-    page = machine_content(described, summary, warnings)
-    deliver(machine_json(described, summary, warnings), json, page, written=[report], whole=everything)
+    drawn = None if report is None else machine_page(described, summary, warnings)
+    numbers, page = machine_json(described, summary, warnings), machine_content(described, summary, warnings)
+    deliver(numbers, json, page, report=report, drawn=drawn, whole=everything)
 
 
 def bearings(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -68,12 +67,10 @@ def look(
         return
     from rotordrop.evidence.look import look as look_at
     from rotordrop.report.look_page import look_page
-    from rotordrop.report.page import write_page
 
     seen = look_at(record, machine=described, gap=gap, speed=speed, mapping=mapping or (), profile=profile)
-    if report is not None:
-        write_page(look_page(seen), report)
-    deliver(seen.as_json(), json, look_page(seen, drawn=False), written=[report])
+    drawn = None if report is None else look_page(seen, described)
+    deliver(seen.as_json(), json, look_page(seen, drawn=False), report=report, drawn=drawn)
 
 
 def _loaded(machine: Path | None) -> Machine | None:
@@ -240,7 +237,7 @@ def waterfall(
     from rotordrop.machine import load_machine
     from rotordrop.record.record import Record, read_record
     from rotordrop.report.content import SIMULATED_MACHINE, SIMULATED_RECORD
-    from rotordrop.report.origin import origin_here
+    from rotordrop.report.origin import machine_facts
     from rotordrop.report.waterfall_page import waterfall_page
     from rotordrop.simulate.coast_down_file import is_coast_down
     from rotordrop.spectrum.coast_down import WaterfallChoice, write_findings
@@ -264,10 +261,8 @@ def waterfall(
         found,
         title=f"Frequencies of a coast-down of {described.name}",
         facts=(
-            ("machine", f"{described.name} ({machine.name})"),
-            ("record", record.name),
+            *machine_facts(described),
             ("centre of the bearings", found.signal.centre),
-            *origin_here(sys.argv[1:], [("machine file", machine), ("record", record)]).facts(),
         ),
         simulated=simulated,
         against=against.value,

@@ -18,7 +18,7 @@ from rotordrop.files import write_json
 from rotordrop.jobs.traces import write_traces
 from rotordrop.known import NINETY
 from rotordrop.report.content import SIMULATED_RECORD, Statement, Table
-from rotordrop.report.origin import Origin, UsedFile, command_line, now
+from rotordrop.report.origin import Origin, UsedFile, command_line, machine_facts
 from rotordrop.report.page import write_page
 from rotordrop.report.quantity import Quantity, System, display_unit
 
@@ -37,7 +37,7 @@ SYSTEMS: tuple[System, ...] = ("SI", "US")
 SHOWN_KINDS = ("length", "force", "pressure", "speed")
 
 
-def write_look(seen: Look, made: Path, machine: str) -> None:
+def write_look(seen: Look, machine: Machine | None, job: Job, made: Path, options: Mapping[str, Any]) -> None:
     """Write what a look shows: motion of every plane with the speed, its report and its page as JSON."""
     from rotordrop.report.look_page import look_page
 
@@ -50,8 +50,8 @@ def write_look(seen: Look, made: Path, machine: str) -> None:
     if seen.record.speed is not None:
         columns["speed"], labels["speed"] = seen.record.speed, "speed [rad/s]"
     write_traces(made, "motion", seen.motion.time, columns)
-    content = look_page(seen)
-    write_page(content, made / "report.html")
+    content = look_page(seen, machine)
+    write_page(content, made / "report.html", _origin(job, options, "look"))
     write_json(made / "document.json", seen.as_json(), sealed=True)
     stop = next((one for one in seen.findings if one.severity == "stop"), None)
     said = content.verdict[0] if stop is None else Statement(f"{stop.message}; {stop.remedy}", "bad")
@@ -62,7 +62,7 @@ def write_look(seen: Look, made: Path, machine: str) -> None:
     ]
     impacts += [_met(one, one.distance, None, one.approach_interval_90) for one in seen.contacts]
     row = {
-        "machine": machine,
+        "machine": "" if machine is None else machine.name,
         "recorded": seen.record.event_date,
         "simulated": seen.record.is_simulated,
         "falls": bool(seen.drops),
@@ -102,8 +102,9 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_content import weight_shares
+    from rotordrop.simulate.fingerprint import fingerprint
 
-    content = estimate_page(estimate, _origin(job, options, "estimate"))
+    content = estimate_page(estimate)
     names, grid, columns = histories_of(estimate)
     loads = weight_shares(estimate.machine)
     places = []
@@ -132,7 +133,8 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     for row, (*_, after) in zip(listed["impacts"], contacts, strict=True):
         row["impact"] = after
     write_traces(made, "drop", grid, {name: column.values for name, column in columns.items()})
-    write_page(content, made / "report.html")
+    origin = replace(_origin(job, options, "estimate"), fingerprint=fingerprint())
+    write_page(content, made / "report.html", origin)
     write_json(made / "document.json", estimate_document(estimate), sealed=True)
     row = {
         "machine": estimate.machine.name,
@@ -183,27 +185,22 @@ def write_waterfall(
     content = waterfall_page(
         found,
         title=f"Frequencies of a coast-down of {machine.name}",
-        facts=(
-            ("machine", machine.name),
-            ("record", f"{record.path.name if record.path else record.name}"),
-            ("SHA-256", record.sha256),
-            ("centre of the bearings", found.signal.centre),
-            *_origin(job, options, "waterfall").facts(record.sha256),
-        ),
+        facts=(*machine_facts(machine), ("centre of the bearings", found.signal.centre)),
         simulated=SIMULATED_RECORD if record.is_simulated else "",
     )
-    write_page(content, made / "report.html")
+    write_page(content, made / "report.html", _origin(job, options, "waterfall"))
     write_json(made / "document.json", found.as_json(), sealed=True)
 
 
-def write_check(machine: Machine, made: Path) -> None:
+def write_check(machine: Machine, job: Job, made: Path, options: Mapping[str, Any]) -> None:
     """Write what a machine amounts to: its report and its document."""
     from rotordrop.report.critical_speeds_page import machine_page
     from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine
 
     summary = summarise_machine(machine)
     warnings = machine_warnings(machine, summary)
-    write_page(machine_page(machine, summary, warnings), made / "report.html")
+    content = machine_page(machine, summary, warnings)
+    write_page(content, made / "report.html", _origin(job, options, "check"))
     write_json(made / "document.json", machine_json(machine, summary, warnings), sealed=True)
 
 
@@ -266,31 +263,22 @@ def _milliseconds(time: float) -> str:
     return f"{1e3 * time:.2g}" if time < 0.0995 else f"{1e3 * time:.0f}"
 
 
-def command_of(job: Job, options: Mapping[str, Any], verb: str) -> str:
-    """The command that does the same with the files of a job."""
-    told = job.read()["files"]
+def _origin(job: Job, options: Mapping[str, Any], verb: str) -> Origin:
+    """Where the report of a job comes from, with the command that does the same with its files."""
+    told, named = job.read()["files"], {"machine": "machine file"}
     words = [verb, *(told[role]["name"] for role in ("machine", "record") if role in told)]
     words += ["--tail", told["tail"]["name"]] if "tail" in told and verb == "estimate" else []
     words += ["--profile", told["profile"]["name"]] if "profile" in told else []
     if verb == "estimate":
         words += ["--method", "replay"] if options.get("method") == "replay" else []
         words += ["--quick"] if options.get("quick") else []
-    return command_line(words)
-
-
-def _origin(job: Job, options: Mapping[str, Any], verb: str) -> Origin:
-    from rotordrop.simulate.fingerprint import fingerprint
-
-    named = {"machine": "machine file"}
     return Origin(
-        command=command_of(job, options, verb),
+        command=command_line(words),
         operator=str(options.get("operator", "")),
         files=tuple(
             UsedFile(role=named.get(role, role.split(" ")[0]), name=file["name"], sha256=file["sha256"])
-            for role, file in job.read()["files"].items()
+            for role, file in told.items()
         ),
-        made=now(),
-        fingerprint=fingerprint(),
     )
 
 

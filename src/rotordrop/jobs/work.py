@@ -158,7 +158,7 @@ def _look(job: Job, made: Path, options: dict[str, Any], progress: Progress) -> 
         record=named(seen.record, job, "record"),
         findings=tuple(one for one in seen.findings if one.kind not in answered),
     )
-    write_look(seen, made, "" if machine is None else machine.name)
+    write_look(seen, machine, job, made, options)
 
 
 def _estimate(job: Job, made: Path, options: dict[str, Any], progress: Progress) -> None:
@@ -193,7 +193,7 @@ def _waterfall(job: Job, made: Path, options: dict[str, Any], progress: Progress
 
 
 def _check(job: Job, made: Path, options: dict[str, Any], progress: Progress) -> None:
-    write_check(machine_of(job), made)
+    write_check(machine_of(job), job, made, options)
 
 
 WORK: dict[Verb, Callable[[Job, Path, dict[str, Any], Progress], None]] = {

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.errors import UsageError
 from rotordrop.estimate.published import Drop, Value
 from rotordrop.known import NINETY
@@ -56,7 +55,6 @@ def compare_page(
         simulated=f"Simulated records{which}." if simulated else "",
         verdict=(judged, *said) if limits else (*said, judged),
         screen=_screen(drops, bearings),
-        facts=(("rotordrop", __version__),),
         sections=(_severity_section(drops, bearings),),
     )
 

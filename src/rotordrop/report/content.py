@@ -173,15 +173,13 @@ class Figure:
 
 @dataclass(frozen=True)
 class Section:
-    """One part of the report: heading, text, statements, figures, tables, facts, in this order."""
+    """One part of the report: heading, text, statements, figures, tables, in this order."""
 
     heading: str
     text: tuple[str, ...] = ()
     statements: tuple[Statement, ...] = ()
     figures: tuple[Figure, ...] = ()
     tables: tuple[Table, ...] = ()
-    facts: tuple[tuple[str, str], ...] = ()
-    """Names and texts, last of all."""
     folded: bool = False
     """Whether a page shows the heading alone until it is opened; what is closed is not printed."""
     printed: bool = False
@@ -201,7 +199,6 @@ def folded(heading: str, *sections: Section, printed: bool = False) -> Section:
         tuple(dict.fromkeys(chain.from_iterable(one.statements for one in sections))),
         tuple(chain.from_iterable(one.figures for one in sections)),
         tuple(chain.from_iterable(one.tables for one in sections)),
-        tuple(chain.from_iterable(one.facts for one in sections)),
         folded=True,
         printed=printed,
     )

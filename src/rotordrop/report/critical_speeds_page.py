@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.elements.magnet import DAMPING_RATIO, RIGID_FREQUENCY
 from rotordrop.report.content import (
     Card,
@@ -26,6 +25,7 @@ from rotordrop.report.content import (
     table,
 )
 from rotordrop.report.machine_content import drawing_section, machine_content, not_given, rotor_tables
+from rotordrop.report.origin import machine_facts
 from rotordrop.report.quantity import NO_BREAK
 from rotordrop.report.style import (
     INK,
@@ -107,7 +107,7 @@ def critical_speeds_page(
         title=f"Critical speeds of {machine.name}",
         verdict=_verdict(machine, maps["standstill"], diagrams, margins),
         screen=_screen(machine, diagrams),
-        facts=(("machine", machine.name), ("rotordrop", __version__)),
+        facts=machine_facts(machine),
         sections=(
             Section("Damped critical speeds", tables=(crossing_table(machine, diagrams, margins),)),
             _map_section(first),

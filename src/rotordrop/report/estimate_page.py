@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.bearing_numbers import numbers_of
@@ -51,7 +50,7 @@ from rotordrop.report.drop_sections import (
     unseen_in,
 )
 from rotordrop.report.machine_content import drawing_section, not_given, weight_shares
-from rotordrop.report.origin import Origin
+from rotordrop.report.origin import UsedFile, machine_facts
 from rotordrop.report.quantity import NO_INTERVAL, Quantity, shown, with_interval, written
 from rotordrop.report.style import (
     LIMIT,
@@ -121,34 +120,27 @@ ASSUMED = (
 """What every estimate takes for granted."""
 
 
-def estimate_page(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
-    """Build the report on one recorded drop, followed or replayed.
-
-    Everything it says of the drop comes from the estimate; the origin says how it was made.
-    """
-    summary = estimate_summary(estimate, origin)
-    identity = "record {record}, SHA-256 {SHA-256:.16}, rotordrop {rotordrop}".format_map(dict(summary.facts))
+def estimate_page(estimate: Estimate) -> ReportContent:
+    """Build the report on one recorded drop, followed or replayed; all it says comes from the estimate."""
+    summary = estimate_summary(estimate)
     return replace(
         summary,
-        subtitle=f"{summary.subtitle}; {identity}",
         verdict=(summary.verdict[0], *summary.grave),
         cards=tuple(replace(card, figures=card.figures[:MAIN]) for card in summary.cards),
         summary=(),
-        facts=(),
         to_do=_next(estimate),
         sections=_sections(estimate, summary),
         lead=FRONT,
     )
 
 
-def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> ReportContent:
+def estimate_summary(estimate: Estimate) -> ReportContent:
     """The same without its sections: what a terminal shows, for which no figure need be drawn."""
     replayed = isinstance(estimate.method, Replay)
     certain = estimate.consistent
     machine, date = estimate.machine, format_minute(estimate.record.event_date)
     serial = f"serial number {machine.serial_number}" if machine.serial_number else ""
-    made = [" ".join(one) for one in (origin or Origin()).facts() if one[0] in ("report made", "by")]
-    parts = (machine.name, serial, estimate.name, date, f"from {shown(estimate.speed, 'speed')}", *made)
+    parts = (machine.name, serial, estimate.name, date, f"from {shown(estimate.speed, 'speed')}")
     return ReportContent(
         title=f"Touchdown-bearing force and stress {'by replay of' if replayed else 'from'} a recorded drop",
         subtitle=", ".join(filter(None, parts)),
@@ -156,7 +148,7 @@ def estimate_summary(estimate: Estimate, origin: Origin | None = None) -> Report
         verdict=estimate_verdict(estimate),
         cards=tuple(headline_card(b, certain=certain) for b in estimate.bearings),
         summary=(_of_bearings(estimate),),
-        facts=(*_facts(estimate), *(origin or Origin()).facts(estimate.record.sha256)),
+        facts=_facts(estimate),
         ends=(estimate.bearings[0].name, estimate.bearings[-1].name),
     )
 
@@ -300,25 +292,22 @@ def _next(estimate: Estimate) -> Section:
 
 
 def _facts(estimate: Estimate) -> tuple[tuple[str, str], ...]:
-    record, machine = estimate.record, estimate.machine
+    record, path = estimate.record, estimate.record.path
     instant = estimate.drop_instant
     power_off = Quantity(value=instant.value, kind="time", interval_90=instant.interval_90)
-    path = machine.source_path
+    name = estimate.name if path is None else path.name
     method = "replay" if isinstance(estimate.method, Replay) else "tracked twin"
     if not isinstance(estimate.method, Replay) and estimate.method.quick:
         method = "tracked twin, one pass"
     facts = {
-        "machine": machine.name if path is None else f"{machine.name} ({path.name})",
-        "record": estimate.name if record.path is None else record.path.name,
-        "SHA-256": record.sha256 or "not from a file",
+        "record": UsedFile(role="record", name=name, sha256=record.sha256).fact[1],
         "event": format_second(record.event_date),
         "power-off": f"{power_off.text} in record time (90 %: {power_off.interval_text})",
         "method": method,
         "estimated part": f"0 to {1e3 * estimate.until:.0f} ms after power-off",
         "sampling": f"{record.sampling_rate:g} Hz, {len(record.sensors)} sensors",
-        "rotordrop": __version__,
     }
-    return tuple((name, text) for name, text in facts.items() if text)
+    return (*machine_facts(estimate.machine), *((name, text) for name, text in facts.items() if text))
 
 
 def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]:
@@ -348,11 +337,7 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         folded("Parameters", _parameters(estimate)),
         folded("Checks", notes, _checks(estimate)),
         folded("Severity", stress, _severity(estimate), printed=True),
-        folded(
-            "Record",
-            record_quality_section(estimate.findings, *unseen),
-            Section("", facts=summary.facts),
-        ),
+        folded("Record", record_quality_section(estimate.findings, *unseen)),
         folded(
             "Machine",
             drawing_section(estimate.machine),

@@ -6,7 +6,6 @@ from dataclasses import replace
 from math import degrees, floor, inf, log10
 from typing import TYPE_CHECKING
 
-from rotordrop._version import __version__
 from rotordrop.estimate.bearing_drop import AirGap, BearingMotions, Motion
 from rotordrop.evidence.held import LEAST_PERIODS, LINE_ABOVE, LINE_AROUND
 from rotordrop.evidence.impacts import AFTER_LAST
@@ -32,12 +31,14 @@ from rotordrop.report.drop_sections import (
     quality_statements,
     record_quality_section,
 )
+from rotordrop.report.origin import UsedFile, machine_facts
 from rotordrop.report.quantity import Quantity, shown, written
 from rotordrop.report.style import TURN, axis_title, curve, panels
 from rotordrop.units import format_moment
 
 if TYPE_CHECKING:
     from rotordrop.evidence.look import HeldContact, Impact, Level, Look, PlaneLook
+    from rotordrop.machine import Machine
 
 MOST_LISTED = 40
 """Impacts listed on the page; the JSON has all."""
@@ -51,8 +52,8 @@ RELEASE = "the release"
 SENSOR_PLANES = f"Displacement in the planes of the sensors; time counts from {RELEASE}."
 
 
-def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
-    """Build the page of a look at a record, with figures where they are wanted."""
+def look_page(seen: Look, machine: Machine | None = None, *, drawn: bool = True) -> ReportContent:
+    """Build the page of a look at a record, with figures where they are wanted; the machine is named."""
     told, facts = (_of_drop if seen.drops else _without_drop)(seen, drawn=drawn), _facts(seen)
     notes = tuple(map(Statement, seen.notes))
     # the terminal shows neither the facts nor the sections
@@ -61,7 +62,7 @@ def look_page(seen: Look, *, drawn: bool = True) -> ReportContent:
     quality = record_quality_section(seen.findings, seen.not_seen)
     return replace(
         told,
-        facts=facts,
+        facts=(*(() if machine is None else machine_facts(machine)), *facts),
         simulated=SIMULATED_RECORD if seen.record.is_simulated else "",
         verdict=told.verdict if drawn else (*told.verdict, said),
         sections=(*told.sections, quality, Section("What was read and guessed", statements=notes)),
@@ -228,11 +229,11 @@ def _facts(seen: Look) -> tuple[tuple[str, str], ...]:
     planes = [f"{'between' if names in between else end}: {names}" for names, end in ends.items()]
     span = f"{record.time[0]:.4g} to {record.time[-1]:.4g} s"
     return (
-        ("record", str(record.path.name if record.path else record.name)),
-        ("SHA-256", record.sha256 or "-"),
+        UsedFile(
+            role="record", name=record.path.name if record.path else record.name, sha256=record.sha256
+        ).fact,
         ("channels", "; ".join(planes) or ", ".join(level.channel for level in seen.levels)),
         ("samples", f"{len(record.time)} at {record.sampling_rate:.6g} Hz, {span}"),
-        ("program", f"rotordrop {__version__}"),
     )
 
 

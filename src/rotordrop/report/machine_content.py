@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.elements.catalog.lookup import CatalogueBearing
 from rotordrop.machine.ross_files import ImportedRotor
 from rotordrop.report.content import (
@@ -24,6 +23,7 @@ from rotordrop.report.content import (
     folded,
     table,
 )
+from rotordrop.report.origin import machine_facts
 from rotordrop.report.quantity import Quantity, shown
 from rotordrop.report.style import COLOURS, MILLI, MUTED, SERIES, axis_title, curve, panels, plain
 from rotordrop.rotor.assembly import rotor_fe
@@ -50,7 +50,7 @@ def machine_content(
     return ReportContent(
         title=f"Machine: {machine.name}",
         subtitle="; ".join(machine.notes),
-        facts=(("machine file", str(machine.source_path or "-")), ("rotordrop", __version__)),
+        facts=machine_facts(machine),
         verdict=(
             _verdict(warnings),
             *(Statement(f"{one.message}.", "warning") for one in warnings if one.kind == CRITICAL),

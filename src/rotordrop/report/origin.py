@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rotordrop.files import digest_of_file
+from rotordrop._version import __version__
+
+if TYPE_CHECKING:
+    from rotordrop.machine import Machine
 
 
 @dataclass(frozen=True, kw_only=True)
 class UsedFile:
-    """A file that went into a result: what for, its name, and the SHA-256 of its bytes."""
+    """A file that went into a result: what for, its name, and the SHA-256 of its bytes, empty if unknown."""
 
     role: str
     name: str
     sha256: str
 
-    @classmethod
-    def of(cls, role: str, path: Path) -> UsedFile:
-        """Take the hash of a file."""
-        return cls(role=role, name=path.name, sha256=digest_of_file(path))
+    @property
+    def fact(self) -> tuple[str, str]:
+        """Its line in a report."""
+        return self.role, f"{self.name}, SHA-256 {self.sha256}" if self.sha256 else self.name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,36 +38,28 @@ class Origin:
     """Machine, record, tail and whatever else was read."""
     operator: str = ""
     """Who made it; empty where nobody said."""
-    made: str = ""
-    """When, in UTC."""
+    made: str = field(default_factory=lambda: datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"))
+    """When."""
     fingerprint: str = ""
     """That of the arithmetic of this computer; empty where it was not taken."""
 
-    def facts(self, stated: str = "") -> tuple[tuple[str, str], ...]:
-        """Lines for a report; what is not known is left out, and a file whose hash is stated already."""
-        facts = [("report made", self.made), ("by", self.operator), ("command", self.command)]
-        files = (file for file in self.files if file.sha256 != stated)
-        facts += [(file.role, f"{file.name}, SHA-256 {file.sha256}") for file in files]
-        facts.append(("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""))
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        """Lines for a report; what is not known is left out."""
+        facts = (
+            ("report made", f"{self.made} by rotordrop {__version__}"),
+            ("operator", self.operator),
+            ("command", self.command),
+            *(file.fact for file in self.files),
+            ("arithmetic", f"fingerprint {self.fingerprint[:16]}" if self.fingerprint else ""),
+        )
         return tuple((name, text) for name, text in facts if text)
 
 
-def origin_here(arguments: Sequence[str], files: Sequence[tuple[str, Path]], operator: str = "") -> Origin:
-    """What a report says of a result that a command makes here and now from files, each with what for."""
-    from rotordrop.simulate.fingerprint import fingerprint
-
-    return Origin(
-        command=command_line(arguments),
-        files=tuple(UsedFile.of(role, path) for role, path in files),
-        operator=operator,
-        made=now(),
-        fingerprint=fingerprint(),
-    )
-
-
-def now() -> str:
-    """Give this minute in UTC, as a report writes it."""
-    return datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+def machine_facts(machine: Machine) -> tuple[tuple[str, str], ...]:
+    """Lines for a report on a machine: its name with its file, and its serial number where it has one."""
+    path = machine.source_path
+    named = ("machine", machine.name if path is None else f"{machine.name} ({path.name})")
+    return (named, ("serial number", machine.serial_number)) if machine.serial_number else (named,)
 
 
 def command_line(arguments: Sequence[str]) -> str:

@@ -6,12 +6,15 @@ import base64
 import hashlib
 import json
 import os
+from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from rotordrop.files import write_text
 from rotordrop.report.content import ReportContent
+from rotordrop.report.origin import Origin
 from rotordrop.report.quantity import Quantity, unbroken
 from rotordrop.sketch import still
 
@@ -23,15 +26,23 @@ _JSON_ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2
 LEVEL_WORDS = {"good": "good", "notice": "note", "warning": "warning", "bad": "problem"}
 
 
-def write_page(content: ReportContent, path: str | os.PathLike[str]) -> None:
+LONGEST_HEAD = 118
+"""Characters of the running head that fit one line of a printed page."""
+
+
+def write_page(content: ReportContent, path: str | os.PathLike[str], origin: Origin | None = None) -> None:
     """Write a report as one HTML file that needs no network; complete or not at all.
+
+    The origin stands with the facts of the content, at one place.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    write_text(path, render_page(content))
+    made = (origin or Origin()).facts()
+    facts = (*content.facts, *(one for one in made if one not in content.facts))
+    write_text(path, render_page(replace(content, facts=facts)))
 
 
 def render_page(content: ReportContent) -> str:
@@ -41,6 +52,7 @@ def render_page(content: ReportContent) -> str:
     loaded from anywhere. Figures travel as JSON, which no browser executes.
     """
     numbered = _numbered_sections(content)
+    head = " · ".join(filter(None, (content.title, content.subtitle)))
     drawn = any(section.figures for section in content.sections)
     drawing = (_text("assets", "plotly-cartesian.min.js"),) if drawn else ()
     scripts = (*drawing, _text("templates", "page.js"))
@@ -50,7 +62,7 @@ def render_page(content: ReportContent) -> str:
         .render(
             content=content,
             sections=numbered,
-            running_title=css_text(" · ".join(filter(None, (content.title, content.subtitle)))),
+            running_title=css_text(shorten(head, LONGEST_HEAD, placeholder=" …")),
             css_text=css_text,
             style=_text("templates", "page.css"),
             scripts=scripts,

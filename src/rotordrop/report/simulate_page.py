@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.elements.bearing_numbers import THROWN, numbers_of
 from rotordrop.elements.face import UNPRESSED
 from rotordrop.estimate.bearing_drop import BearingDrop, simulated_bearings
@@ -34,6 +33,7 @@ from rotordrop.report.drop_sections import (
     turning_section,
 )
 from rotordrop.report.machine_content import machine_sections, weight_shares
+from rotordrop.report.origin import machine_facts
 from rotordrop.report.quantity import BEYOND_GAP, shown, written
 from rotordrop.report.style import (
     BAND_FILL,
@@ -111,8 +111,8 @@ def _magnets(result: DropResult, magnets: MagnetHistory) -> Section:
         Figure(drawn_together(result.time, currents, "current", "A"), pulled),
     )
     happened = zip(magnets.events, magnets.event_time, strict=True)
-    facts = tuple((what, f"at {shown(time, 'time', 3)}") for what, time in happened if np.isfinite(time))
-    return Section("Magnets", figures=figures, facts=facts)
+    told = "; ".join(f"{what} at {shown(time, 'time', 3)}" for what, time in happened if np.isfinite(time))
+    return Section("Magnets", (f"{told}.",) if told else (), figures=figures)
 
 
 def _landing(result: DropResult, landed: tuple[Landing, ...]) -> Section:
@@ -142,7 +142,6 @@ def simulate_summary(result: DropResult, machine: Machine | None = None) -> Repo
     """Give what is said of one simulated drop before any figure; the machine gives the defaults in use."""
     bearings = simulated_bearings(result)
     speed, duration = shown(result.initial_speed, "speed"), shown(result.time[-1], "time")
-    path = getattr(machine, "source_path", None)
     uses = () if machine is None else clearance_uses(machine, result)
     return ReportContent(
         title=f"Simulated drop of {result.machine_name}",
@@ -151,21 +150,20 @@ def simulate_summary(result: DropResult, machine: Machine | None = None) -> Repo
         verdict=_verdict(result, bearings, machine, uses),
         cards=tuple(_card(result, bearing) for bearing in bearings),
         facts=(
-            *_facts(result, "" if path is None else f" ({path.name})"),
+            *_facts(result, machine),
             ("numerical error", _certificate(result).text.removeprefix(NUMERICAL)),
         ),
     )
 
 
-def _facts(result: DropResult | CoastDownResult, source: str = "") -> tuple[tuple[str, str], ...]:
-    """How a simulation was made; the source is the file of its machine."""
+def _facts(result: DropResult | CoastDownResult, machine: Machine | None) -> tuple[tuple[str, str], ...]:
+    """How a simulation was made, of which machine."""
     steps = f"{written(result.steps, 0)} taken, {written(result.rejected_steps, 0)} rejected"
     return (
-        ("machine", f"{result.machine_name}{source}"),
+        *((("machine", result.machine_name),) if machine is None else machine_facts(machine)),
         ("rotor basis", result.reduction),
         ("tolerance", f"{result.tolerance:g}"),
         ("steps", steps),
-        ("rotordrop", __version__),
     )
 
 
@@ -382,7 +380,11 @@ def coast_down_page(
         simulated=SIMULATED_MACHINE,
         verdict=_said_of_run(result, analysis, certificate),
         cards=tuple(_card_of_run(result, index) for index in range(len(result.bearing_names))),
-        facts=(*_facts(result), ("numerical error", f"energy balanced to {missing} of {scale}"), *samples),
+        facts=(
+            *_facts(result, machine),
+            ("numerical error", f"energy balanced to {missing} of {scale}"),
+            *samples,
+        ),
         sections=(
             Section("Second by second", figures=(seconds,)),
             turning,

@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 import numpy as np
 import plotly.graph_objects as go
 
-from rotordrop._version import __version__
 from rotordrop.elements.table import fitted_row
 from rotordrop.errors import UsageError, unknown_key
 from rotordrop.known import Known
@@ -25,6 +24,7 @@ from rotordrop.report.content import (
     appendix,
     table,
 )
+from rotordrop.report.origin import machine_facts
 from rotordrop.report.quantity import Quantity as Shown
 from rotordrop.report.quantity import display_unit, one_line, shown
 from rotordrop.report.simulate_page import EQUAL, SYMMETRIC
@@ -92,7 +92,7 @@ def study_page(
         verdict=tuple(_verdict(results, limits or {})),
         summary=(_table(results, SHARES, only=MATTERS),),
         facts=(
-            ("machine", study.machine.name),
+            *machine_facts(study.machine),
             ("design", f"{study.design}, seed {study.seed}, shards of {study.shard}"),
             ("digest", study.digest),
             ("rotordrop", results.version),
@@ -359,10 +359,9 @@ def repeat_page(results: StudyResults, found: Sequence[Repeat]) -> ReportContent
         verdict=_repeat_verdict(results, found),
         summary=(_repeat_table(results, found),),
         facts=(
-            ("machine", study.machine.name),
+            *machine_facts(study.machine),
             ("seed", str(study.seed)),
             ("digest", study.digest),
-            ("rotordrop", __version__),
         ),
         sections=(_distribution_section(results, columns, recorded, "the recorded drop"),),
     )

@@ -11,7 +11,6 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from rotordrop._version import __version__
 from rotordrop.arrays import Array, ComplexArray
 from rotordrop.estimate.bearing_drop import AirGap, History
 from rotordrop.evidence.rest import STANDSTILL
@@ -98,7 +97,7 @@ def waterfall_page(
         subtitle="times count from power-off",
         simulated=simulated,
         verdict=_verdict(analysis),
-        facts=(*facts, ("rotordrop", __version__)),
+        facts=facts,
         sections=frequency_sections(analysis, against) if drawn else (),
     )
 

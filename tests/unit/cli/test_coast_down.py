@@ -15,7 +15,7 @@ from rotordrop import build_drop_model, read_record, save_machine, simulate_coas
 from rotordrop.cli.app import run
 from rotordrop.errors import RecordError, SimulationError
 from rotordrop.estimate.coast_down import recorded_coast_down, simulated_coast_down, with_recorded_drag
-from rotordrop.files import new_hdf5
+from rotordrop.files import digest_of_file, new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.simulate import coast_down
 from rotordrop.simulate.case import CentredStart, CoastDownCase
@@ -185,7 +185,7 @@ def test_critical_speeds_of_the_paper(tmp_path, capsys):
     told, page = tmp_path / "c.json", tmp_path / "c.html"
     arguments = ["critical-speeds", PAPER, "--top-speed", "100 Hz", "--held", "touchdown bearings"]
     assert run([*arguments, "--json", str(told), "--report", str(page)]) == 0
-    assert "<dt>report made</dt>" in page.read_text(encoding="utf-8")
+    assert f"<dd>paper.toml, SHA-256 {digest_of_file(PAPER)}</dd>" in page.read_text(encoding="utf-8")
     found = json.loads(told.read_text())
     settled = found["maps"]["standstill"]["at_the_machine_Hz"]
     assert settled["tangent"][:2] == pytest.approx([134.0, 235.0], rel=5e-3)

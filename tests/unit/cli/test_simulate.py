@@ -11,14 +11,30 @@ import numpy as np
 import pytest
 from tests.unit.simulate.looped import looped_machine
 
-from rotordrop import load_result, save_machine
+from rotordrop import __version__, load_result, save_machine
 from rotordrop.cli.app import INTERRUPTED, run
 from rotordrop.errors import UsageError
+from rotordrop.examples import example_record_path
+from rotordrop.files import digest_of_file
 from rotordrop.machine import example_machine, example_path
 from rotordrop.simulate.case import MagnetEvent
 
 PAPER = str(example_path("paper"))
 SHORT = ["simulate", PAPER, "--speed", "60 Hz", "--duration", "12 ms", "--reduction", "quick"]
+
+
+@pytest.mark.parametrize("verb", ["check", "look", "simulate"])
+def test_every_report_says_when_how_and_from_which_files_it_was_made(verb, tmp_path, monkeypatch):
+    machine, page = tmp_path / "m.toml", tmp_path / "p.html"
+    save_machine(example_machine("lp400").model_copy(update={"serial_number": "4711"}), machine)
+    read = [machine, *([example_record_path("lp400_drop_060")] if verb == "look" else [])]
+    command = [verb, *map(str, read), *(SHORT[2:] if verb == "simulate" else []), "--report", str(page)]
+    monkeypatch.setattr(sys, "argv", ["rotordrop", *command])
+    assert run(command) == 0
+    told = page.read_text(encoding="utf-8").partition("<h2>How this was made</h2>")[2]
+    said = [f"by rotordrop {__version__}", f"rotordrop {verb} {read[0]}", *map(digest_of_file, read)]
+    assert all(told.count(one) == 1 for one in said), said
+    assert "<dt>serial number</dt><dd>4711</dd>" in told
 
 
 def test_a_drop_from_the_centre_reaches_every_output(tmp_path):
