@@ -311,6 +311,13 @@ class Extension:
         changed: M = cast(Any, machine).with_values(values) if values else machine
         return changed
 
+    def shows(self, machine: Any, values: Values) -> bool:
+        """Whether the 90 % interval of any of its unknowns that may be zero leaves zero out."""
+        rows = [row for row in self.rows if not row.logarithmic]
+        paths = (row.path_of(name) for row in rows for name, _ in parts_of(machine, self.owner))
+        known = [values[path] for path in paths if path in values]
+        return not known or any(not one.low <= 0.0 <= one.high for one in known)
+
     def found(self, machine: Any, values: Values, mean_load: float) -> str:
         """What the values found say, by path in the machine; in brackets 90 % intervals."""
         words = []

@@ -135,7 +135,8 @@ class Accepted:
             sentence = f"Tried beyond the base model, and not enough: {self.extension.name}."
         else:
             load = float(sum(bearing_load_shares(machine))) / len(machine.touchdown_bearings)
-            sentence = f"Found: {self.extension.found(machine, values, load)}."
+            found = "Found" if self.extension.shows(machine, values) else "Tried, and not told from none"
+            sentence = f"{found}: {self.extension.found(machine, values, load)}."
         rise = finite(self.gain)
         return Structure(
             name=self.extension.name, log_likelihood_rise=rise, sentence=sentence, probability=None

@@ -302,10 +302,11 @@ def test_every_extension_says_what_was_found_with_its_interval(lp400, extension)
     machine = extension.added_to(lp400)
     values = {
         u.path: Known(
-            value=u.value_of(u.begin), interval_90=(u.value_of(u.begin - half), u.value_of(u.begin + half))
+            value=u.value_of(middle), interval_90=(u.value_of(middle - half), u.value_of(middle + half))
         )
         for u in all_unknowns(build_drop_model(machine, "quick"))
-        for half in (0.1 * abs(u.begin) + 1e-6,)
+        for middle in (u.begin + 2e-6,)
+        for half in (0.1 * abs(middle) + 1e-6,)
     }
     said = Accepted(extension=extension, gain=math.inf).structure(machine, values, believed=True)
     assert said.sentence.startswith("Found: ") and " to " in said.sentence
@@ -369,6 +370,21 @@ def test_the_lift_of_the_magnets_is_longer_or_shorter_and_not_both(lp400, low, h
 def sentence_of(machine, name, values, *, believed=True):
     extension = next(one for one in EXTENSIONS if one.name == name)
     return Accepted(extension=extension, gain=50.0).structure(machine, values, believed=believed).sentence
+
+
+@pytest.mark.parametrize(
+    ("half", "begins"), [(4.9e-9, "Found: "), (5.1e-9, "Tried, and not told from none: ")]
+)
+def test_an_extension_whose_interval_holds_zero_is_not_found(lp400, half, begins):
+    machine = next(one for one in EXTENSIONS if one.name == "oval sleeve").added_to(lp400)
+    values = {
+        f"{name}.landing_sleeve.oval_{part}": Known(value=value, interval_90=(value - half, value + half))
+        for name in ("NDE", "DE")
+        for part, value in (("cosine", 5e-9), ("sine", 0.0))
+    }
+    words = sentence_of(machine, "oval sleeve", values)
+    assert words.startswith(f"{begins}the radius of the landing sleeve")
+    assert ("(0.000 to" in words) == (begins != "Found: ")
 
 
 def foundation(low, middle, high):
