@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from rotordrop.rotor.critical_speeds import critical_speed_map as critical_speed_map
     from rotordrop.rotor.parameters import DropModel as DropModel
     from rotordrop.rotor.parameters import build_drop_model as build_drop_model
+    from rotordrop.severity.ranking import DropSeverity as DropSeverity
     from rotordrop.severity.ranking import rank_drops as rank_drops
     from rotordrop.simulate.case import CoastDownCase as CoastDownCase
     from rotordrop.simulate.case import DropCase as DropCase
@@ -79,7 +80,7 @@ _PUBLIC = {
         "rotor.campbell": "campbell_diagram",
         "rotor.critical_speeds": "critical_speed_map",
         "rotor.parameters": "DropModel build_drop_model",
-        "severity.ranking": "rank_drops",
+        "severity.ranking": "DropSeverity rank_drops",
         "simulate.case": "CoastDownCase DropCase LevitatedStart PlacedStart UnbalanceJump",
         "simulate.coast_down": "simulate_coast_down",
         "simulate.drop": "simulate_drop",

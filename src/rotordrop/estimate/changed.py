@@ -120,6 +120,10 @@ class Changes:
         """Parameters that changed beyond chance."""
         return tuple(one for one in self.found if one.named)
 
+    def __repr__(self) -> str:
+        """The outcome in words."""
+        return f"<Changes: {self.sentence()}>"
+
     def sentence(self, name_of: Callable[[str], str] = str) -> str:
         """The outcome in words, with parameters by their paths or by other names."""
         hidden = ", ".join(f"{name_of(one.path)} {one.smallest_text}" for one in self.found if one.may_hide)

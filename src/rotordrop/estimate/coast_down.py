@@ -34,7 +34,7 @@ from rotordrop.require import require
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.parameters import build_drop_model
 from rotordrop.rotor.statics import bearing_load_shares
-from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
+from rotordrop.simulate.coast_down_file import is_coast_down, load_coast_down, open_samples
 from rotordrop.spectrum.candidates import machine_candidates
 from rotordrop.spectrum.coast_down import (
     RACES_SPUN_UP,
@@ -274,6 +274,11 @@ def waterfall(
     if isinstance(coast_down, Record):
         require_drop(coast_down, machine)
         signal = recorded_coast_down(machine, coast_down)
+    elif Path(coast_down).is_file() and not is_coast_down(coast_down):
+        raise RecordError(
+            f"{coast_down} is no simulated coast-down; expected a file of simulate_coast_down. Read a "
+            f"recorded one first: waterfall(machine, read_record({str(coast_down)!r}, machine))."
+        )
     else:
         signal = simulated_coast_down(Path(coast_down), machine)
     candidates = machine_candidates(

@@ -327,24 +327,9 @@ class Estimate:
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per bearing: peaks, mean force and air gap with their intervals [SI]."""
-        found = []
-        for bearing in self.bearings:
-            row: dict[str, Any] = {
-                "drop": self.name,
-                "bearing": bearing.name,
-                "consistent": self.consistent,
-                "speed [Hz]": self.speed / (2.0 * math.pi),
-            }
-            for name, known in (
-                ("peak force [N]", bearing.peak_force.known),
-                ("peak stress [Pa]", bearing.peak_stress.known),
-                ("mean force, 150 to 200 ms [N]", bearing.values.get("mean_force_0p15_0p2_N")),
-                ("air gap [m]", bearing.values.get("air_gap_m")),
-            ):
-                low, high = (known.interval_90 if known else None) or (math.nan, math.nan)
-                row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
-            found.append(row)
-        return found
+        from rotordrop.estimate.document import published_drop
+
+        return [row | {"drop": self.name} for row in published_drop(self).rows()]
 
     def __repr__(self) -> str:
         """Drop, machine and the peak force of every bearing."""

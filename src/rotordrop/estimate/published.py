@@ -28,6 +28,13 @@ from rotordrop.units import format_moment, format_quantity, si_unit
 
 FORMAT = "rotordrop estimate 2"
 MADE_BY = "rotordrop estimate --json"
+IN_ROWS = {
+    "peak force [N]": "peak_force_N",
+    "peak stress [Pa]": "peak_stress_Pa",
+    "mean force, 150 to 200 ms [N]": "mean_force_0p15_0p2_N",
+    "air gap [m]": "air_gap_m",
+}
+"""Columns of a table of drops, each with its 90 % interval, and their fields."""
 
 
 class Value(Document):
@@ -420,6 +427,19 @@ class Drop(Document):
             for name, one in self.bearings.items()
         }
         return sketch(repr(self), "time from power-off [s]", "peak force of contacts [kN]", peaks, 1e-3)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row per bearing: peaks, mean force and air gap with their intervals [SI], NaN where unknown."""
+        found = []
+        for bearing, of in self.bearings.items():
+            row = {"drop": self.record, "bearing": bearing, "consistent": self.consistent}
+            row["speed [Hz]"] = self.speed_Hz
+            for name, field in IN_ROWS.items():
+                known = of.numbers.get(field)
+                low, high = (known.interval if known else None) or (math.nan, math.nan)
+                row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
+            found.append(row)
+        return found
 
     @property
     def later_warning(self) -> str:

@@ -175,8 +175,9 @@ def _verdict(
         for name in ("tangent", "with support mass")
     )
     text = (
-        f"Natural frequencies settled in the touchdown bearings: {massive} Hz; on massless supports, as in "
-        f"the paper, {massless} Hz."
+        f"Natural frequencies at standstill, undamped, settled in the touchdown bearings: {massive} Hz; on "
+        f"massless supports, as in the paper, {massless} Hz. Critical speeds are where damped modes of the "
+        "turning rotor meet its speed."
     )
     said = [Statement(text), *_followed(found)]
     top = float(machine.speed.nominal)
@@ -234,7 +235,7 @@ def _screen(machine: Machine, diagrams: Mapping[str, CampbellDiagram]) -> Table:
     rows = range(min(ON_CARD, max(len(one.crossings) for one in diagrams.values())))
     number = Column("", lambda k: str(k + 1))
     columns = (number, *(of(name, one) for name, one in diagrams.items()))
-    return table(rows, columns, "Critical speeds, direction, damping ratio")
+    return table(rows, columns, "Critical speeds, lowest first: direction of whirl, damping ratio")
 
 
 def crossing_table(machine: Machine, diagrams: Mapping[str, CampbellDiagram], margins: Margins) -> Table:

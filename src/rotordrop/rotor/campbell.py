@@ -79,6 +79,15 @@ class CampbellDiagram:
     crossings: tuple[Crossing, ...]
     """Critical speeds between the first and the last speed."""
 
+    def __repr__(self) -> str:
+        """What holds the rotor, lines, speeds and critical speeds."""
+        met = ", ".join(f"{one.speed / TURN:.4g}" for one in self.crossings) or "none"
+        lines, low, high = self.frequency.shape[1], self.speed[0] / TURN, self.speed[-1] / TURN
+        return (
+            f"<CampbellDiagram, {self.suspension}: {lines} lines from {low:.4g} to {high:.4g} Hz, critical "
+            f"speeds {met} Hz>"
+        )
+
     def as_json(self) -> dict[str, Any]:
         """Give it ready for JSON, SI units, with the shapes at the lowest speed."""
         shapes = self.shapes[0]

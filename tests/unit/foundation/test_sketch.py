@@ -66,3 +66,17 @@ def test_what_one_uses_is_listed():
     with pytest.raises(AttributeError) as lost:
         rd.critical_speeds  # noqa: B018
     assert lost.value.name == "critical_speeds" and lost.value.obj is rd
+
+
+def test_what_has_no_figure_is_short_in_words_too():
+    told = repr(rd.campbell_diagram(LP400, [0.0, 400.0, 900.0], count=3))
+    assert told.startswith(
+        "<CampbellDiagram, touchdown bearings: 3 lines from 0 to 143.2 Hz, critical speeds "
+    )
+
+
+def test_an_estimate_that_was_read_has_rows():
+    (row,) = published(record="a.csv", bearings={"NDE": READ}).rows()
+    assert (row["drop"], row["bearing"]) == ("a.csv", "NDE")
+    assert [row[f"peak force [N]{end}"] for end in ("", " 5 %", " 95 %")] == [3e3, 2e3, 4e3]
+    assert np.isnan(row["air gap [m]"])
