@@ -164,7 +164,7 @@ class Impact:
     peak_force: Known
     impulse: Known
     dissipated_energy: Known
-    """Peak force [N], normal impulse [N s], energy lost in the contact [J]."""
+    """Peak bearing force [N]; normal impulse [N s] and energy lost [J] of the contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,8 +222,6 @@ class BearingDrop(BearingMotions):
     """The same of `contact_from` [s]."""
     largest: Known | None = None
     """Largest distance of the rotor from the centre [m], where its error is known."""
-    impact_force: str = "contact force"
-    """Name of the force whose peak the impacts state."""
     first_contact: FirstContact | None = None
     """None where the bearing was not touched."""
 
@@ -307,6 +305,22 @@ def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
         end = float(np.nan_to_num(log.end[0], nan=result.time[-1]))
         first = deepest(motion, float(log.start[0]), end, gap)
     free = result.indentation[0, b] < 0.0  # a drop that starts free shows what the preload alone does
+    impacts = []
+    for i in range(len(log)):
+        begun, ended = np.searchsorted(force.time, (log.start[i], np.nan_to_num(log.end[i], nan=np.inf)))
+        around = slice(max(int(begun) - 1, 0), int(ended) + 2)
+        peak, moment = refined_peak(force.time[around], force.values[around])
+        impacts.append(
+            Impact(
+                start=float(log.start[i]),
+                end=float(log.end[i]),
+                azimuth=float(np.angle(np.exp(1j * log.azimuth[i]))),
+                peak_time=moment,
+                peak_force=Known(value=peak, status="determined", unit="N"),
+                impulse=Known(value=float(log.impulse[i]), status="determined", unit="N s"),
+                dissipated_energy=Known(value=float(log.dissipated_energy[i]), status="determined", unit="J"),
+            )
+        )
     return BearingDrop(
         name=name,
         motions=(motion,),
@@ -318,18 +332,7 @@ def _simulated_bearing(result: DropResult, b: int) -> BearingDrop:
         peak_force=highest(force, "N", Origin.SIMULATION),
         peak_stress=highest(stress, "Pa", Origin.SIMULATION),
         values=mean_values(force, stress),
-        impacts=tuple(
-            Impact(
-                start=float(log.start[i]),
-                end=float(log.end[i]),
-                azimuth=float(np.angle(np.exp(1j * log.azimuth[i]))),
-                peak_time=float(log.peak_time[i]),
-                peak_force=Known(value=float(log.peak_force[i]), status="determined", unit="N"),
-                impulse=Known(value=float(log.impulse[i]), status="determined", unit="N s"),
-                dissipated_energy=Known(value=float(log.dissipated_energy[i]), status="determined", unit="J"),
-            )
-            for i in range(len(log))
-        ),
+        impacts=tuple(impacts),
         first_contact=first,
     )
 

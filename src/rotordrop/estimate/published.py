@@ -88,7 +88,9 @@ class Impact(Document):
     peak_time_s: float
     azimuth_rad: float
     peak_force_N: Value
+    """Largest bearing force during it."""
     impulse_N_s: Value
+    """Of the normal force in the contact."""
     dissipated_energy_J: Value
     after_flight: bool = False
     """Whether it begins an impact; the others follow a hop too short to be told from the displacement."""
@@ -440,6 +442,13 @@ class Drop(Document):
                 row |= {name: known.value if known else math.nan, f"{name} 5 %": low, f"{name} 95 %": high}
             found.append(row)
         return found
+
+    def largest(self, field: str) -> tuple[str, Value]:
+        """Bearing and value of the largest peak, by the upper end of its interval where one has one."""
+        found = {name: one.numbers[field] for name, one in self.bearings.items()}
+        known = {name: one.interval[1] for name, one in found.items() if one.interval is not None}
+        where = max(found, key=lambda name: known.get(name, -math.inf) if known else found[name].value)
+        return where, found[where]
 
     @property
     def later_warning(self) -> str:

@@ -24,6 +24,7 @@ from rotordrop.report.quantity import Quantity, System, display_unit
 
 if TYPE_CHECKING:
     from rotordrop.estimate.estimate import Estimate
+    from rotordrop.estimate.published import Drop
     from rotordrop.evidence.look import Look
     from rotordrop.jobs.workspace import Job
     from rotordrop.machine import Machine
@@ -98,7 +99,7 @@ def write_look(seen: Look, machine: Machine | None, job: Job, made: Path, option
 
 def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[str, Any]) -> None:
     """Write what an estimate says: histories with bands, its document, its report, and its page as JSON."""
-    from rotordrop.estimate.document import estimate_document
+    from rotordrop.estimate.document import published_drop
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_content import weight_shares
@@ -135,14 +136,15 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     write_traces(made, "drop", grid, {name: column.values for name, column in columns.items()})
     origin = replace(_origin(job, options, "estimate"), fingerprint=fingerprint())
     write_page(content, made / "report.html", origin)
-    write_json(made / "document.json", estimate_document(estimate), sealed=True)
+    published = published_drop(estimate)
+    write_json(made / "document.json", published.as_json(), sealed=True)
     row = {
         "machine": estimate.machine.name,
         "recorded": estimate.record.event_date,
         "simulated": estimate.simulated_record,
         "speed": quantity_json(Quantity(value=estimate.speed, kind="speed")),
-        "force": _largest(estimate, "peak_force", "force"),
-        "stress": _largest(estimate, "peak_stress", "pressure"),
+        "force": _largest(estimate, published, "peak_force_N", "force"),
+        "stress": _largest(estimate, published, "peak_stress_Pa", "pressure"),
     }
     write_json(
         made / "page.json",
@@ -224,15 +226,17 @@ def _common(
     }
 
 
-def _largest(estimate: Estimate, peak: str, kind: str) -> dict[str, Any] | None:
-    """The largest peak over the bearings, by the upper end of its interval; without one it is no evidence."""
-    found = [(bearing.name, getattr(bearing, peak)) for bearing in estimate.bearings]
-    known = [(name, one) for name, one in found if one.interval_90 is not None]
-    if not known:
+def _largest(estimate: Estimate, drop: Drop, field: str, kind: str) -> dict[str, Any] | None:
+    """The largest peak over the bearings; without an interval it is no evidence."""
+    name, one = drop.largest(field)
+    if one.interval is None:
         return None
-    name, one = max(known, key=lambda entry: entry[1].interval_90[1])
-    ends = list(one.interval_90)
-    return {"bearing": name, "interval_90": ends, **quantity_json(Quantity.of(one.known, kind))}
+    peak: Any = estimate.bearing(name).numbers[field]
+    return {
+        "bearing": name,
+        "interval_90": list(one.interval),
+        **quantity_json(Quantity.of(peak.known, kind)),
+    }
 
 
 def _events(estimate: Estimate) -> list[dict[str, Any]]:

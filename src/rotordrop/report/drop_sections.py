@@ -236,7 +236,7 @@ def _impacts(bearings: Sequence[BearingDrop]) -> Section:
     hit = [bearing for bearing in bearings if bearing.impacts]
     if not hit:
         return Section("Impacts", statements=reasons or (Statement(NO_IMPACT),))
-    return Section("Impacts", (), reasons, tables=(impact_table(hit, force=hit[0].impact_force),))
+    return Section("Impacts", (), reasons, tables=(impact_table(hit),))
 
 
 def motion_section(
@@ -400,8 +400,8 @@ def largest(bearing: BearingDrop) -> list[Impact]:
     return sorted(bearing.impacts, key=lambda one: -one.peak_force.value)[:NUMBERED]
 
 
-def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = LISTED) -> Table:
-    """List the strongest impacts in the order of time, with the name of the force whose peak is stated."""
+def impact_table(bearings: Sequence[BearingDrop], *, listed: int = LISTED) -> Table:
+    """List the strongest impacts in the order of time."""
     impacts = [
         (bearing.name, impact, after)
         for bearing in bearings
@@ -427,7 +427,7 @@ def impact_table(bearings: Sequence[BearingDrop], *, force: str, listed: int = L
         Column("bearing", lambda row: row[0]),
         Column("time of peak", lambda row: row[1].peak_time, "time"),
         *((place,) if exact else ()),
-        number(f"peak {force}", "peak_force", "force"),
+        number("peak bearing force", "peak_force", "force"),
         number("impulse", "impulse", "impulse"),
         number("dissipated energy", "dissipated_energy", "energy"),
         *((lasted,) if exact else ()),

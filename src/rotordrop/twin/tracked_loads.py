@@ -456,7 +456,6 @@ def bearing_drop(
         values={**values, **loads.means},
         missing=loads.missing,
         impacts=impacts,
-        impact_force="bearing force",
         first_contact=None if first is None else deepest(estimated, first.start, ends, gap.value),
         **seen,
     )

@@ -6,7 +6,7 @@ import json
 import math
 from typing import Any
 
-from rotordrop.estimate.published import Drop, Value, read_drop
+from rotordrop.estimate.published import Drop, read_drop
 from rotordrop.jobs.runner import Verb, result_folder
 from rotordrop.jobs.workspace import Job
 from rotordrop.report.compare_page import ComparedDrop, limit_statement
@@ -68,13 +68,10 @@ def _of_estimate(drop: Drop, watched: Watched | None) -> dict[str, Any]:
     found: dict[str, Any] = {"recorded": drop.recorded, "speed_Hz": drop.speed_Hz, "verdict": drop.verdict}
     places = []
     for name, unit in PEAKS:
-        stated: dict[str, Value] = {
-            bearing: one.numbers[f"{name}_{unit}"] for bearing, one in drop.bearings.items()
-        }
-        place = max(stated, key=lambda bearing: stated[bearing].value)
-        lower, upper = stated[place].interval or (None, None)
+        place, peak = drop.largest(f"{name}_{unit}")
+        lower, upper = peak.interval or (None, None)
         places.append(place)
-        found[f"{name}_{unit}"] = stated[place].value
+        found[f"{name}_{unit}"] = peak.value
         found[f"{name}_lower_{unit}"], found[f"{name}_upper_{unit}"] = lower, upper
     force, stress = places
     found["bearing"] = force if force == stress else f"{force} (force), {stress} (stress)"

@@ -80,3 +80,11 @@ def test_an_estimate_that_was_read_has_rows():
     assert (row["drop"], row["bearing"]) == ("a.csv", "NDE")
     assert [row[f"peak force [N]{end}"] for end in ("", " 5 %", " 95 %")] == [3e3, 2e3, 4e3]
     assert np.isnan(row["air gap [m]"])
+
+
+def test_the_largest_peak_is_that_with_the_highest_upper_end():
+    near, far, none = value(3e3, 2.9e3, 3.1e3), value(2.9e3, 2e3, 4e3), value(5e3)
+    for peaks, largest in (((near, far), "DE"), ((far, near, none), "NDE"), ((value(1e3), none), "DE")):
+        ends = zip(("NDE", "DE", "MID"), peaks, strict=False)
+        drop = published(bearings={name: bearing({"peak_force_N": peak}) for name, peak in ends})
+        assert drop.largest("peak_force_N")[0] == largest

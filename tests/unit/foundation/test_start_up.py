@@ -267,7 +267,10 @@ WRONG = {
     "a share of nothing": (lambda: quantile(TIME, None), "share is None; expected a finite number"),
     "a machine for its name": (lambda: logged_drops("l.db", machine=SMALL), "name of a machine is a Machine"),
     "an estimate of nothing": (lambda: drop_of_estimate(None, "A"), "drop is None; expected a Drop"),
-    "a table for a coast-down": (lambda: rd.waterfall(MACHINE, __file__), "recorded one first: .*read_record"),
+    "a table for a coast-down": (
+        lambda: rd.waterfall(MACHINE, __file__),
+        "recorded one first: .*read_record",
+    ),
     "an uneven clock": (lambda: rd.waterfall(MACHINE, made(time=UNEVEN)), "% of the steps of the clock are"),
     "an empty record": (lambda: plain(time=[], signals=SIGNALS[:0]), r"shape \(0, 4\).* one time"),
     "a clock that stands": (lambda: force(plain(time=0 * TIME), held="free-free"), "an even clock"),

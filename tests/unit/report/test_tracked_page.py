@@ -165,7 +165,7 @@ def test_what_is_estimated_has_its_interval_or_is_not_shown(estimate, page):
     assert "quartile" not in str(section(page, "Severity").tables)
     assert not {"azimuth", "duration"} & {*section(page, "Impacts").tables[0].columns}
     bare = [replace(b, impacts=tuple(without(one) for one in b.impacts)) for b in estimate.bearings]
-    assert {"azimuth", "duration"} <= {*impact_table(bare, force="bearing force").columns}
+    assert {"azimuth", "duration"} <= {*impact_table(bare).columns}
 
 
 def test_a_wider_gap_before_is_named_in_words(estimate):
