@@ -28,7 +28,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "numpydoc",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "generated/twelve_numbers.md"]  # the latter is included by a page
 html_theme = "furo"
 html_title = "rotordrop"
 html_show_copyright = False

@@ -24,6 +24,7 @@ def write(folder: Path) -> None:
     pages["parameters.md"] = parameter_page.parameter_page()
     pages["machine_file.md"] = reference_page.machine_page()
     pages["profile.md"] = reference_page.profile_page()
+    pages["twelve_numbers.md"] = reference_page.twelve_numbers()
     for name, text in pages.items():
         file = folder / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:

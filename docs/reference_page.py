@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rotordrop.machine.schema import field_meanings, machine_schema
+from rotordrop.machine.simple import simple_schema
 from rotordrop.record.profile import Profile
 
 MACHINE = """\
@@ -79,6 +80,11 @@ def profile_page() -> str:
     return "\n".join([*lines, ""])
 
 
+def twelve_numbers() -> str:
+    """The numbers of a machine made by ``init --simple``."""
+    return "\n".join([*_table(simple_schema(), {}), ""])
+
+
 def _table(
     part: Mapping[str, Any], kinds: Mapping[str, Any], meanings: Mapping[str, str] | None = None
 ) -> Iterator[str]:
@@ -98,6 +104,8 @@ def _example(entry: Mapping[str, Any], kinds: Mapping[str, Any]) -> str:
         if f"{kind}_number" in kinds:
             value = kinds[f"{kind}_number"]["examples"][0]
             return f"`{value}`" if isinstance(value, float) else f'`"{value}"`'
+        if "examples" in one:
+            return f"`{_written(one['examples'][0])}`"
         if "enum" in one:
             return ", ".join(f"`{_written(word)}`" for word in one["enum"])
     return _of_type(entry)

@@ -523,6 +523,8 @@ SHOWN = 0.04
 """Length of the window the paper shows [s]."""
 
 CONTACT_FILL = "rgba(217, 120, 10, 0.13)"
+ROOM_ABOVE = 1.45
+"""Height of a panel over that of its curves [1]: two lines of words stand above every rebound."""
 
 
 def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOWN) -> go.Figure:
@@ -532,9 +534,13 @@ def first_contact_figure(bearings: Sequence[BearingDrop], *, until: float = SHOW
     """
     figure = panels([b.name for b in bearings])
     for column, bearing in enumerate(bearings, start=1):
+        heights = [0.0 if bearing.air_gap is None else -MICRO * bearing.air_gap.upper]
         for motion in bearing.motions:
             history = motion.vertical.between(0.0, until)
             add_history(figure, history, MICRO, "µm", column=column, legend=column == 1)
+            heights += [MICRO * float(end(history.values)) for end in (np.nanmin, np.nanmax)]
+        low, span = min(heights), max(np.ptp(heights), 1.0)
+        figure.update_yaxes(range=[low - 0.06 * span, low + ROOM_ABOVE * span], row=1, col=column)
         if bearing.air_gap is not None:
             add_gap_limits(figure, bearing.air_gap, sign=-1.0, column=column, legend=column == 1)
         if bearing.first_contact is not None:
@@ -554,7 +560,6 @@ def _mark_first(figure: go.Figure, contact: FirstContact, bearing: BearingDrop, 
         upright(figure, value, MUTED, "dot", row=1, col=column)
     times = f"t₁ {start:.2f}, t₂ {end:.2f}, T {end - start:.2f} ms" if exact else "t₁ to t₂"
     top = "y domain" if column == 1 else f"y{column} domain"
-    # above the rebounds, where no curve runs through it
     text = f"{times}<br>indentation {' to '.join(f'{one:.1f}' for one in depths)} µm"
     look: dict[str, Any] = {"size": 11.5, "xanchor": "left", "yanchor": "top", "align": "left", "xshift": 3}
     words(figure, end, 1.0, text, column=column, yref=top, **look)
