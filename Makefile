@@ -52,6 +52,7 @@ lint: $(READY) ## check style, types, layers and sizes
 	@$(BIN)/python tools/rooms.py
 
 docs: $(READY) ## build the documentation and run its examples
+	@echo "Computing every validation case, then building the pages and running their examples, for some minutes ..."
 	@$(BIN)/python docs/generate_validation.py
 	@NUMBA_DISABLE_JIT=1 $(BIN)/python -m sphinx -q -W --keep-going -d docs/_build/read -b html docs docs/_build/html
 	@$(BIN)/python -m sphinx -q -W --keep-going -d docs/_build/read -b doctest docs docs/_build/doctest
