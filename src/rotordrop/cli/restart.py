@@ -34,7 +34,8 @@ def restart(
         Option(metavar="LIMIT", help='Limit of the next drop, "peak_stress=2.5 GPa"; repeat it.'),
     ] = None,
     drops: Annotated[
-        int | None, Option(min=0, metavar="N", help="Next drops to simulate a speed; 0 leaves them out.")
+        int | None,
+        Option(min=0, metavar="N", help=f"Next drops to simulate a speed, {FEWEST_DROPS} or more; 0: none."),
     ] = None,
     report: options.Report = None,
     json: options.Json = None,

@@ -118,6 +118,8 @@ def _syntax_error(lines: list[str], message: str, file: Path | None) -> MachineF
     elif unquoted := _UNQUOTED.search(lines[line - 1]):
         written = f'"{unquoted.group(1)} {unquoted.group(2)}"'
         reason = f"not valid TOML: a value with a unit is a text: write {written} in quotes"
+    elif (twice := lines[line - 1].partition("=")[0].strip()) and "Cannot overwrite" in message:
+        reason, column = f"{twice} stands here for the second time; keep one of the two", 1
     return MachineFileError(reason, file=file, line=line, column=column)
 
 

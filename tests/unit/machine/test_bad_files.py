@@ -23,6 +23,7 @@ BAD = [
     (GAP, "air_gap = { guess = 0,25 }", COMMA, "0,25"),
     (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
     (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
+    (NAME, f'{NAME}\nname = "other"', "name stands here for the second time; keep one", 'name = "other"'),
     # keys
     (NAME, f"{NAME}\ngravity = [0.0, -9.81]", "gravity as a direction is reserved", "gravity"),
     (NAME, f'{NAME}\nside_force = "5 N"', "'5 N' has a unit; side_force is .* over the weight", "5 N"),
