@@ -15,6 +15,7 @@ from rotordrop.record.arrangement import (
     pairs_of,
     planes_as_listed,
     sensors_of_planes,
+    sure_of,
 )
 from rotordrop.record.columns import find_speed, likeliest, options_for, units_missing
 from rotordrop.record.keys import speed_told
@@ -47,8 +48,9 @@ def guess_profile(recording: Recording, given: Profile, sensors: Sequence[Sensor
         hits = fitting(recording.channels, sensor.name)
         if sensor.name not in mapped and len(hits) == 1:
             mapped[sensor.name] = hits[0].label
-    likely = {name: channel.label for name, channel in likeliest(recording, sensors).items()}
-    if given.likely:
+    seated = likeliest(recording, sensors)
+    likely = {name: channel.label for name, channel in seated.items()}
+    if given.likely or sure_of(seated, sensors):
         mapped = {**likely, **mapped}
     unmapped = [sensor.name for sensor in sensors if sensor.name not in mapped]
     missing: list[str] = []

@@ -231,6 +231,10 @@ def test_planes_and_angles_in_the_names_of_channels_seat_them(ends, form, machin
     found = record_of(said, machine.sensors, profile=Profile(likely=ends[0] == "TE"))
     read = [3e-6, 2e-6, 1e-6, 0.0] if ends[0] == "de" else [1e-6, 0.0, 3e-6, 2e-6]
     np.testing.assert_allclose(found.signals[0], read)
+    guess = guess_profile(said, Profile(likely=ends[0] == "TE"), machine.sensors)
+    assert not any("channels of" in one for one in guess.missing)
+    again = record_of(said, machine.sensors, profile=Profile(channels=guess.profile.channels))
+    np.testing.assert_allclose(again.signals[0], read)
     assert arrangement_of(said, Profile()).angles_known
 
 
