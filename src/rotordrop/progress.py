@@ -49,7 +49,7 @@ BETWEEN_LINES_S = 5.0
 
 @contextmanager
 def told_in_lines(title: str) -> Iterator[Progress]:
-    """Tell stage, fraction and time left in lines on standard error, for a log; none where all is done."""
+    """Tell stage, fraction and time so far in lines on standard error, for a log; none where all is done."""
     ended, latest, begun = Event(), [""], monotonic()
 
     def say() -> None:
@@ -58,10 +58,10 @@ def told_in_lines(title: str) -> Iterator[Progress]:
             if latest[0] != said:
                 said = latest[0]
                 with suppress(OSError, ValueError):  # whoever read it has gone
-                    sys.stderr.write(f"{said}\n")
+                    sys.stderr.write(f"{said}, {monotonic() - begun:.0f} s so far\n")
 
     def tell(stage: str, fraction: float) -> None:
-        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %{_left(monotonic() - begun, fraction)})"
+        latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
 
     lines = Thread(target=say, daemon=True)
     lines.start()
@@ -72,23 +72,18 @@ def told_in_lines(title: str) -> Iterator[Progress]:
         lines.join()
 
 
-def _left(seconds: float, fraction: float) -> str:
-    """What is left after so many seconds, in words; nothing where too little is done to tell."""
-    return f", about {seconds * (1.0 / fraction - 1.0):.0f} s left" if 0.03 <= fraction < 1.0 else ""
-
-
 @contextmanager
 def _bar(title: str) -> Iterator[Progress]:
-    """Draw a bar with the time left on standard error while a long computation runs."""
+    """Draw a bar with the time so far on standard error while a long computation runs."""
     from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
+        TimeElapsedColumn(),
     )
     # a notebook draws what a terminal does; widgets, which rich would take there, need another package
     console = Console(stderr=True, force_terminal=True, force_jupyter=False)
