@@ -62,9 +62,9 @@ SHORT_SPEED = (
 AS_READ = f" The simulated motion was given the noise of a usual sensor, {1e6 * SENSOR_NOISE:g} µm rms."
 LINES_NOTE = (
     "Amplitudes are those in the direction and plane where they are largest, root mean square over the time "
-    "the line was seen. ± is one standard error, never less than what a line seen that long can be told "
-    "apart by: one over that time (for an order, one over the turns in it), divided by √12. X is the order, "
-    "the multiple of the rotor's speed."
+    "the line was seen. ± is one standard error, never less than one over the time that holds its power, "
+    "divided by √12; of an order half a turn over the turns in it, so far may a resonance turn it. "
+    "X is the order, the multiple of the rotor's speed."
 )
 BODE = (
     "Bode plot of 1X and 2X in x and y, zero-to-peak with 90 % intervals. The phase counts from the angle "

@@ -22,8 +22,8 @@ class SeenLine:
     changes too little to say."""
     frequency: float
     frequency_error: float
-    """Mean frequency over the time it was seen [Hz], weighted by power, and its standard error: never less
-    than the resolution of that time, which is one over it, divided by √12."""
+    """Mean frequency over the time it was seen [Hz], weighted by power, and its standard error, never less
+    than one over the time that holds its power, divided by √12, for an order by two."""
     order: float | None
     order_error: float | None
     """Multiple of the rotor speed [1], and its standard error, with the turns in place of the time; None for

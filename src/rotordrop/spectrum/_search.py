@@ -77,6 +77,10 @@ STEADY_PARTNERS = 3
 SURE_COMBINATION = 25.0
 """Minus the logarithm of the chance of noise [1] for a sum or difference to be believed."""
 
+EVEN, HALF_TURN = 1.0 / math.sqrt(12.0), 0.5
+"""Least error of a mean frequency, in resolutions [1]: of what may lie anywhere in one; of an order, whose
+phase a resonance turns."""
+
 COMBINED_ORDERS = (-2.0, -1.0, 1.0, 2.0)
 """Orders they are combined with: what 1X and 2X make in a contact that is not linear."""
 
@@ -341,14 +345,21 @@ class LineSearch:
         decided = self._decided(weight, mean, view.resolution)
         width = math.sqrt(max(peak.width**2 - (1.44 * view.spacing) ** 2, 0.0))
         order: tuple[float | None, float | None] = (None, None)
-        scale, drift = 1.0, self._drift(frequency, present)
+        scale, drift, least = 1.0, self._drift(frequency, present), EVEN
         if view.of_orders:
-            order, scale, drift = (coordinate, error), mean / coordinate, (mean, mean)
+            scale, drift, least = mean / coordinate, (mean, mean), HALF_TURN
+        known = self._error(weight, error * scale, least)
+        if view.of_orders:
+            order = (coordinate, known / scale)
         elif not decided and speed > 0.0:
-            order = (mean / speed, error / speed)
+            order = (mean / speed, known / speed)
         kind: LineKind = ("order" if view.of_orders else "steady") if decided else "undecided"
-        seen = {"kind": kind, "frequency": mean, "frequency_error": error * scale, "width": width * scale}
+        seen = {"kind": kind, "frequency": mean, "frequency_error": known, "width": width * scale}
         return self._line(envelope, present, part, peak, order=order, drift=drift, **seen)
+
+    def _error(self, weight: Array, error: float, least: float = EVEN) -> float:
+        """Standard error of a mean frequency [Hz], no less than a share of the resolution of its power."""
+        return max(error, least * self._clock.rate * float(weight @ weight))
 
     def _line(
         self,
@@ -455,15 +466,15 @@ class LineSearch:
         envelope = self._clock.extract(self._combined(partner_phase, k))
         present = self._present(envelope, peak, self._clock.reachable(envelope.phase))
         frequency = np.abs(self._clock.rate_of(envelope.phase))
-        part = self._part(envelope, present)
+        part, weight = self._part(envelope, present), power_share(envelope, present)
         line = self._line(
             envelope,
             present,
             part,
             peak,
             kind="combination",
-            frequency=float(np.sum(power_share(envelope, present) * frequency)),
-            frequency_error=partner.frequency_error,
+            frequency=float(np.sum(weight * frequency)),
+            frequency_error=self._error(weight, partner.frequency_error),
             drift=self._drift(frequency, present),
             width=0.0,
             parent=partner,

@@ -53,9 +53,6 @@ class Line(SeenLine, Name):
 MOST_LINES = 60
 """The search stops after so many lines [1]."""
 
-EVEN = 1.0 / math.sqrt(12.0)
-"""Standard deviation of what may lie anywhere in an interval, over the length of the interval [1]."""
-
 SWING_ERROR = 0.05
 """How well the frequency of a wandering swing is known at any time [Hz] (chosen)."""
 
@@ -176,29 +173,26 @@ def _same(line: Line, other: Line) -> bool:
     Where both ends swing at one frequency, the rotor swings as a whole.
     """
     swings = line.named and other.named and _swing(line) == _swing(other) == PENDULUM
-    if line.label != other.label and not swings:
+    if line.label != other.label and (line.named or other.named) and not swings:
         return False
     apart = line.first_seen >= other.last_seen - 1.0 or other.first_seen >= line.last_seen - 1.0
-    one = abs(line.frequency - other.frequency) <= line.frequency_error + other.frequency_error
-    if set(line.forward) & set(other.forward) and not (line.named and (apart or one)):
+    off, error = abs(line.frequency - other.frequency), line.frequency_error + other.frequency_error
+    reach = 0.15 + 3.0 * error
+    if line.order is not None and other.order is not None:
+        off, error, reach = abs(line.order - other.order), error * line.order / line.frequency, 0.01
+    if set(line.forward) & set(other.forward) and not (off <= error or (line.named and apart)):
         return False
     if "combination" in (line.kind, other.kind):
         return line.kind == other.kind
-    if line.kind != other.kind and "undecided" not in (line.kind, other.kind):
-        return False
-    if line.order is not None and other.order is not None:
-        return abs(line.order - other.order) <= 0.01
-    return abs(line.frequency - other.frequency) <= 0.15 + 3.0 * (
-        line.frequency_error + other.frequency_error
-    )
+    return off <= reach and (line.kind == other.kind or "undecided" in (line.kind, other.kind))
 
 
 def _merged(line: Line, other: Line) -> Line:
     strong, weak = (line, other) if line.amplitude >= other.amplitude else (other, line)
-    alike = line.label == other.label
+    alike = line.label == other.label or not line.named
     return replace(
         strong,
-        label=line.label if alike else f"{PENDULUM} {' and '.join({**line.forward, **other.forward})}",
+        label=strong.label if alike else f"{PENDULUM} {' and '.join({**line.forward, **other.forward})}",
         reason=strong.reason if alike else f"{line.reason}; {other.reason}",
         amplitude_xy={**weak.amplitude_xy, **strong.amplitude_xy},
         forward={**weak.forward, **strong.forward},
@@ -278,14 +272,9 @@ def _evidence(found: FoundLine, plane: str, bands: tuple[float, float]) -> LineE
 
 
 def _line(found: FoundLine, plane: str, name: Name) -> Line:
-    least = EVEN / max(found.last_seen - found.first_seen, 1e-9)
-    order_error = found.order_error
-    if found.order is not None and order_error is not None:
-        order_error = max(order_error, least * found.order / found.frequency)
     seen = {one.name: getattr(found, one.name) for one in fields(SeenLine)}
-    errors = {"frequency_error": max(found.frequency_error, least), "order_error": order_error}
     return Line(
-        **{**seen, **errors, **vars(name), "confidence": name.confidence * found.existence},
+        **{**seen, **vars(name), "confidence": name.confidence * found.existence},
         amplitude=float(found.amplitude.max()),
         amplitude_xy={plane: (float(found.amplitude[0]), float(found.amplitude[1]))},
         forward={plane: float(found.forward[0])},

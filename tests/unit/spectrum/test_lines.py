@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import binary_closing
-from tests.unit.spectrum.synthetic import CoastDown, found_line
+from tests.unit.spectrum.synthetic import TURN, CoastDown, found_line
 
 from rotordrop.errors import RecordError
 from rotordrop.series import closed
@@ -156,6 +156,19 @@ def test_amplitudes_drift_and_names_of_a_typical_coast_down(typical):
     assert not line.named
     assert line.label == "unnamed (bending mode 1?)"
     assert line.as_json()["candidates"][0]["name"] == "bending mode 1"
+
+
+def test_an_order_that_passes_a_resonance_is_named_and_its_interval_holds_it():
+    """Through a resonance the phase of 1X turns by half a turn, which moves its mean order."""
+    down = CoastDown(first_speed=250.0, duration=8.0, time_constant=5.6, seed=1)
+    r = down.speed / (TURN * 110.0)
+    swing = 3e-6 * r**2 / (1.0 - r**2 + 0.06j * r) * np.exp(1j * down.angle)
+    down.xy += np.column_stack([swing.real, swing.imag])
+    down.add_order(2.0, 0.5e-6)
+    lines = down.lines(down.recorded(noise=0.1), candidates=KNOWN, highest_frequency=600.0)
+    assert [line.label for line in lines] == ["1X", "2X"]
+    for order, line in enumerate(lines, start=1):
+        assert abs(line.order - order) < 1.645 * line.order_error < 0.01
 
 
 def test_constant_speed_leaves_the_kind_open_and_a_broad_line_is_not_called_hum():

@@ -206,6 +206,9 @@ def test_twice_a_swing_is_its_harmonic_in_a_record_too_short_to_decide():
     joined = _joined(name_lines(seen, ends, 285e-6, bands))  # both ends at one frequency: the rotor swings
     assert [line.label for line in joined] == ["pendulum NDE and DE", "pendulum, harmonic 2"]
     assert set(joined[0].forward) == {"NDE", "DE"}
+    # in one plane, each known to 0.2 Hz or 0.0033 of the speed
+    twins = [("DE", replace(swing, order=order, frequency_error=0.2)) for order in (0.480, 0.484, 0.488)]
+    assert [line.order for line in _joined(name_lines(twins, (), None, bands))] == [0.480, 0.488]
 
 
 def test_the_conical_swing_and_what_it_mixes_to_are_named_from_the_pendulum_found():
