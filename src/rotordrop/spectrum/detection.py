@@ -190,7 +190,7 @@ def clearest_peak(
             best = max(best, _best_in(ratio[first:last], looked, known, first, last))
     if best[1] < 0:
         return None
-    return _peak(frames, floor, ratio, *best)
+    return _peak(frames, ratio, *best)
 
 
 def stretches_of(count: int, shortest: int) -> Iterator[tuple[int, int]]:
@@ -220,7 +220,6 @@ def _best_in(
 
 def _peak(
     frames: FramePower,
-    floor: Array,
     ratio: Array,
     score: float,
     line: int,
@@ -235,7 +234,8 @@ def _peak(
     shape = np.zeros(power.shape[1])
     shape[reached] = median_of_known(power[:, reached])
     shift, height = _between_lines(shape, line)
-    around = float(np.median(floor[first:last, line, channel][used])) / MEDIAN_OF_NOISE
+    # by the ratio that it was found with: power and floor are not at their medians in the same frames
+    around = shape[line] / float(np.median(ratio[first:last, line, channel][used])) / MEDIAN_OF_NOISE
     return Peak(
         coordinate=float(frames.coordinate[line]) + shift * frames.spacing,
         channel=channel,

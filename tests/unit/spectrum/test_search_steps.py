@@ -112,6 +112,13 @@ def test_a_line_in_the_last_quarter_alone_is_seen_in_its_stretch():
     assert peak.coordinate == pytest.approx(200.0, abs=0.6)
     quiet = clearest_peak(frames, allowed, stretches[:3])
     assert quiet is None
+    # where the noise is loudest, the line is not there: it stands above the floor by the frames that show it
+    loudness = np.repeat([1.0, 20.0, 30.0], [12, 12, 16])[:, None]
+    power[:, :, 1] = loudness * dice.exponential(1e-16, size=(40, 400))
+    power[:24, 200, 1] = 4e-15 * loudness[:24, 0]
+    peak = clearest_peak(frames, allowed, [(0, 40)])
+    assert peak is not None and peak.coordinate == pytest.approx(200.0, abs=0.6)
+    assert peak.ratio == pytest.approx(math.sqrt(40.0), rel=0.2)
 
 
 @pytest.mark.parametrize("line", [1, 2, 3, 10])
