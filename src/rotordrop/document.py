@@ -8,10 +8,11 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from operator import attrgetter
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, Self, get_args
+from typing import Annotated, Any, Self, get_args, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -20,6 +21,7 @@ from pydantic_core import core_schema
 
 from rotordrop.errors import UsageError
 from rotordrop.files import DIGEST, read_sealed, without_digest
+from rotordrop.json_schema import closed, of_type
 from rotordrop.require import require
 
 ABSENT: Any = None
@@ -110,6 +112,27 @@ def stated(result: Any, keys: str, **given: Any) -> dict[str, Any]:
         key: _stated(given[key] if key in given else _read_off(result, source or without_unit(key)))
         for key, _, source in split
     }
+
+
+def typed(cls: type, keys: str, **given: Any) -> dict[str, Any]:
+    """Schema of what `stated` makes of an instance of a class, by the types of fields and properties."""
+    split = (key.partition("=") for key in keys.split())
+    return closed(
+        **{
+            key: given[key] if key in given else of_type(_type_at(cls, source or without_unit(key)))
+            for key, _, source in split
+        }
+    )
+
+
+_hints = cache(get_type_hints)
+
+
+def _type_at(cls: Any, path: str) -> Any:
+    for name in path.split("."):
+        own = getattr(cls, name, None)
+        cls = _hints(own.fget)["return"] if isinstance(own, property) else _hints(cls)[name]
+    return cls
 
 
 def without_unit(key: str) -> str:

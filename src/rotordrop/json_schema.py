@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 Schema = dict[str, Any]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER: Schema = {"type": "number"}
-MAYBE: Schema = {"type": ["number", "null"]}
-COUNT: Schema = {"type": "integer"}
 TEXT: Schema = {"type": "string"}
-FLAG: Schema = {"type": "boolean"}
-TEXTS: Schema = {"type": "array", "items": TEXT}
-NUMBERS: Schema = {"type": "array", "items": NUMBER}
-PAIR: Schema = {**NUMBERS, "minItems": 2, "maxItems": 2}
-MAYBE_PAIR: Schema = {**PAIR, "type": ["array", "null"]}
+PAIR: Schema = {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}
 
 
 def closed(optional: Schema | None = None, **needed: Any) -> Schema:
@@ -28,16 +22,14 @@ def closed(optional: Schema | None = None, **needed: Any) -> Schema:
     }
 
 
-def listed(**needed: Any) -> Schema:
-    """A list of closed objects."""
-    return {"type": "array", "items": closed(**needed)}
-
-
-def by_name(entry: Schema) -> Schema:
-    """An object with any keys and entries of one form."""
-    return {"type": "object", "additionalProperties": entry}
-
-
-def numbers(*names: str) -> Schema:
-    """Numbers by these names."""
-    return dict.fromkeys(names, NUMBER)
+def of_type(kind: Any) -> Schema:
+    """What JSON has of a number, text, flag, choice, pair of numbers or texts, perhaps of none."""
+    choices = get_args(kind)
+    if type(None) in choices:
+        made = of_type(next(one for one in choices if one is not type(None)))
+        return {**made, "type": [made["type"], "null"]}
+    if get_origin(kind) is Literal:
+        return {"enum": list(choices)}
+    if get_origin(kind) is tuple:
+        return {"type": "array", "items": TEXT} if choices[0] is str else PAIR
+    return {float: NUMBER, int: NUMBER, str: TEXT, bool: {"type": "boolean"}}[kind]

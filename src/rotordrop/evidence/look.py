@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from rotordrop.document import stated, typed
+from rotordrop.elements.sensor import Sensor
 from rotordrop.errors import NothingFallsError, RecordError, UnpairedError, UsageError
 from rotordrop.evidence.events import expected_gap
 from rotordrop.evidence.evidence import Evidence, Missing, sought
@@ -51,19 +53,7 @@ from rotordrop.evidence.rest import STANDSTILL, standstill_of
 from rotordrop.evidence.synchronous import Synchronous, synchronous_motion
 from rotordrop.evidence.wall import GAIN, LEVER_DOUBT
 from rotordrop.files import DIGEST, digest_of_file
-from rotordrop.json_schema import (
-    DIALECT,
-    FLAG,
-    MAYBE,
-    MAYBE_PAIR,
-    NUMBER,
-    PAIR,
-    TEXT,
-    TEXTS,
-    Schema,
-    closed,
-    listed,
-)
+from rotordrop.json_schema import DIALECT, NUMBER, PAIR, TEXT, Schema, closed
 from rotordrop.known import NINETY
 from rotordrop.machine import Machine
 from rotordrop.record.arrangement import Arrangement
@@ -227,7 +217,8 @@ class Look:
 
     def as_json(self) -> dict[str, Any]:
         """Everything as JSON-ready numbers and text, in SI units; times in record time."""
-        return {name: of(self) for name, (_, of) in _DOCUMENT.items()}
+        document: dict[str, Any] = _DOCUMENT[1](self)
+        return document
 
 
 def look(
@@ -621,149 +612,105 @@ Part = tuple[Schema, Callable[[Any], Any]]
 """A part of the document: its schema, and how it is read off."""
 
 
-def _read_off(schema: Schema, path: str) -> Part:
-    """A number or a text by the name of a field, with dots; pairs become lists, as JSON has them."""
-    of = attrgetter(path)
-    return schema, lambda one: list(value) if isinstance(value := of(one), tuple) else value
+def _part(cls: type, keys: str, **own: Part) -> Part:
+    """An object of a class, by keys as `stated` has them; ``own`` are those that no attribute is."""
+    schema = typed(cls, keys, **{key: part for key, (part, _) in own.items()})
+    return schema, lambda one: stated(one, keys, **{key: read(one) for key, (_, read) in own.items()})
 
 
-def _rows(of: Callable[[Any], Iterable[Any]], **columns: Part) -> Part:
-    """A list of objects with these parts."""
-    schema = listed(**{name: part for name, (part, _) in columns.items()})
-    return schema, lambda whole: [
-        {name: read(row) for name, (_, read) in columns.items()} for row in of(whole)
-    ]
+def _rows(cls: type, path: str, keys: str, **own: Part) -> Part:
+    """A list of such objects, from a field or a method."""
+    schema, read = _part(cls, keys, **own)
+
+    def rows(whole: Any) -> list[Any]:
+        found = attrgetter(path)(whole)
+        return [read(one) for one in (found() if callable(found) else found)]
+
+    return {"type": "array", "items": schema}, rows
 
 
-_DOCUMENT: dict[str, Part] = {
-    "record": _read_off(TEXT, "record.name"),
-    "sha256": _read_off(TEXT, "record.sha256"),
-    "simulated_record": _read_off(FLAG, "record.is_simulated"),
-    "channels": _rows(
-        lambda seen: seen.record.sensors,
-        name=_read_off(TEXT, "name"),
-        plane=_read_off(TEXT, "bearing"),
+_DOCUMENT = _part(
+    Look,
+    "record=record.name sha256=record.sha256 simulated_record=record.is_simulated channels "
+    "sampling_rate_Hz=record.sampling_rate start_s end_s speed_rad_per_s standstill_s findings not_seen "
+    "no_fall drops planes impacts contacts levels whirls synchronous timeline notes",
+    channels=_rows(
+        Sensor,
+        "record.sensors",
+        "name plane=bearing angle_rad",
         angle_rad=(NUMBER, lambda sensor: float(sensor.angle)),
     ),
-    "sampling_rate_Hz": _read_off(NUMBER, "record.sampling_rate"),
-    "start_s": (NUMBER, lambda seen: float(seen.record.time[0])),
-    "end_s": (NUMBER, lambda seen: float(seen.record.time[-1])),
-    "speed_rad_per_s": _read_off(MAYBE, "speed"),
-    "standstill_s": _read_off(MAYBE, "standstill"),
-    "findings": _rows(
-        lambda seen: seen.findings,
-        kind=_read_off(TEXT, "kind"),
-        severity=_read_off({"enum": ["stop", "warning", "note"]}, "severity"),
-        channel=_read_off({"type": ["string", "null"]}, "channel"),
-        time_s=_read_off(MAYBE, "time"),
-        message=_read_off(TEXT, "message"),
-        remedy=_read_off(TEXT, "remedy"),
+    start_s=(NUMBER, lambda seen: seen.record.time[0]),
+    end_s=(NUMBER, lambda seen: seen.record.time[-1]),
+    findings=_rows(Finding, "findings", "kind severity channel time_s message remedy"),
+    drops=_rows(
+        Drop,
+        "drops",
+        "release_s release_interval_90_s end_s permanent_contact_s permanent_contact_interval_90_s lifted",
     ),
-    "not_seen": _read_off(TEXT, "not_seen"),
-    "no_fall": _read_off(TEXT, "no_fall"),
-    "drops": _rows(
-        lambda seen: seen.drops,
-        release_s=_read_off(NUMBER, "release"),
-        release_interval_90_s=_read_off(PAIR, "release_interval_90"),
-        end_s=_read_off(NUMBER, "end"),
-        permanent_contact_s=_read_off(MAYBE, "permanent_contact"),
-        permanent_contact_interval_90_s=_read_off(MAYBE_PAIR, "permanent_contact_interval_90"),
-        lifted=_read_off(FLAG, "lifted"),
-    ),
-    "planes": _rows(
-        lambda seen: seen.planes,
-        plane=_read_off(TEXT, "plane"),
-        air_gap_m=_read_off(NUMBER, "gap"),
-        air_gap_interval_90_m=_read_off(MAYBE_PAIR, "gap_interval_90"),
-        air_gap_determined=_read_off(FLAG, "gap_determined"),
-        first_touch_s=_read_off(MAYBE, "touch"),
-        first_touch_interval_90_s=_read_off(MAYBE_PAIR, "touch_interval_90"),
+    planes=_rows(
+        PlaneLook,
+        "planes",
+        "plane air_gap_m=gap air_gap_interval_90_m=gap_interval_90 air_gap_determined=gap_determined "
+        "first_touch_s=touch first_touch_interval_90_s=touch_interval_90 impacts "
+        "impacts_interval_90=settling.count_interval_90 contact_from_s=settling.contact_from "
+        "contact_from_interval_90_s=settling.contact_from_interval_90 largest_displacement_m=largest "
+        "largest_displacement_interval_90_m=largest_interval_90 largest_displacement_time_s=largest_time "
+        "beyond_air_gap_m=excess beyond_air_gap_interval_90_m=excess_interval_90 position_index "
+        "position_index_interval_90 velocity_index velocity_index_interval_90",
         impacts=(NUMBER, lambda plane: len(plane.settling.touched)),
-        impacts_interval_90=_read_off(PAIR, "settling.count_interval_90"),
-        contact_from_s=_read_off(MAYBE, "settling.contact_from"),
-        contact_from_interval_90_s=_read_off(MAYBE_PAIR, "settling.contact_from_interval_90"),
-        largest_displacement_m=_read_off(NUMBER, "largest"),
-        largest_displacement_interval_90_m=_read_off(PAIR, "largest_interval_90"),
-        largest_displacement_time_s=_read_off(NUMBER, "largest_time"),
-        beyond_air_gap_m=_read_off(NUMBER, "excess"),
-        beyond_air_gap_interval_90_m=_read_off(PAIR, "excess_interval_90"),
-        position_index=_read_off(NUMBER, "position_index"),
-        position_index_interval_90=_read_off(PAIR, "position_index_interval_90"),
-        velocity_index=_read_off(MAYBE, "velocity_index"),
-        velocity_index_interval_90=_read_off(MAYBE_PAIR, "velocity_index_interval_90"),
     ),
-    "impacts": _rows(
-        lambda seen: seen.impacts,
-        plane=_read_off(TEXT, "plane"),
-        time_s=_read_off(NUMBER, "time"),
-        time_interval_90_s=_read_off(PAIR, "time_interval_90"),
-        azimuth_rad=_read_off(NUMBER, "azimuth"),
-        azimuth_interval_90_rad=_read_off(PAIR, "azimuth_interval_90"),
-        depth_m=_read_off(NUMBER, "depth"),
-        depth_interval_90_m=_read_off(PAIR, "depth_interval_90"),
-        approach_m_per_s=_read_off(NUMBER, "approach"),
+    impacts=_rows(
+        Impact,
+        "impacts",
+        "plane time_s time_interval_90_s azimuth_rad azimuth_interval_90_rad depth_m depth_interval_90_m "
+        "approach_m_per_s approach_bounds_m_per_s rebound_m_per_s rebound_bounds_m_per_s",
         approach_bounds_m_per_s=(PAIR, lambda hit: [hit.approach, hit.approach + TOO_SLOW]),
-        rebound_m_per_s=_read_off(NUMBER, "rebound"),
         rebound_bounds_m_per_s=(PAIR, lambda hit: [hit.rebound, hit.rebound + TOO_SLOW]),
     ),
-    "contacts": _rows(
-        lambda seen: seen.contacts,
-        plane=_read_off(TEXT, "plane"),
-        time_s=_read_off(NUMBER, "time"),
-        azimuth_rad=_read_off(NUMBER, "azimuth"),
-        distance_m=_read_off(NUMBER, "distance"),
-        approach_m_per_s=_read_off(NUMBER, "approach"),
-        approach_interval_90_m_per_s=_read_off(PAIR, "approach_interval_90"),
-        departure_m_per_s=_read_off(NUMBER, "departure"),
-        departure_interval_90_m_per_s=_read_off(PAIR, "departure_interval_90"),
-        velocity_change_bounds_m_per_s=_read_off(PAIR, "velocity_change"),
-        impulse_bounds_N_s=_read_off(MAYBE_PAIR, "impulse"),
+    contacts=_rows(
+        HeldContact,
+        "contacts",
+        "plane time_s azimuth_rad distance_m approach_m_per_s approach_interval_90_m_per_s departure_m_per_s "
+        "departure_interval_90_m_per_s velocity_change_bounds_m_per_s=velocity_change "
+        "impulse_bounds_N_s=impulse",
     ),
-    "levels": _rows(
-        lambda seen: seen.levels,
-        channel=_read_off(TEXT, "channel"),
-        unit=_read_off(TEXT, "unit"),
-        mean=_read_off(NUMBER, "mean"),
-        rms=_read_off(NUMBER, "rms"),
-        peak_to_peak=_read_off(NUMBER, "peak_to_peak"),
-        resolution_Hz=_read_off(NUMBER, "resolution"),
+    levels=_rows(
+        Level,
+        "levels",
+        "channel unit mean rms peak_to_peak resolution_Hz lines",
         lines=_rows(
-            lambda level: level.lines, frequency_Hz=(NUMBER, itemgetter(0)), amplitude=(NUMBER, itemgetter(1))
+            tuple,
+            "lines",
+            "frequency_Hz amplitude",
+            frequency_Hz=(NUMBER, itemgetter(0)),
+            amplitude=(NUMBER, itemgetter(1)),
         ),
     ),
-    "whirls": _rows(
-        lambda seen: seen.whirls,
-        plane=_read_off(TEXT, "plane"),
-        start_s=_read_off(NUMBER, "start"),
-        end_s=_read_off(NUMBER, "end"),
-        turns=_read_off(NUMBER, "turns"),
-        turns_interval_90=_read_off(PAIR, "turns_interval_90"),
+    whirls=_rows(
+        Whirl,
+        "whirls",
+        "plane start_s end_s turns turns_interval_90 frequency_Hz frequency_interval_90_Hz fastest_Hz "
+        "fastest_interval_90_Hz last_Hz last_interval_90_Hz sense",
         frequency_Hz=(NUMBER, lambda one: abs(one.frequency)),
-        frequency_interval_90_Hz=_read_off(PAIR, "frequency_interval_90"),
         fastest_Hz=(NUMBER, lambda one: abs(one.fastest)),
-        fastest_interval_90_Hz=(PAIR, lambda one: list(one.interval_90(one.fastest))),
+        fastest_interval_90_Hz=(PAIR, lambda one: one.interval_90(one.fastest)),
         last_Hz=(NUMBER, lambda one: abs(one.last)),
-        last_interval_90_Hz=(PAIR, lambda one: list(one.interval_90(one.last))),
-        sense=_read_off({"enum": ["forward", "backward"]}, "sense"),
+        last_interval_90_Hz=(PAIR, lambda one: one.interval_90(one.last)),
     ),
-    "synchronous": _rows(
-        lambda seen: seen.synchronous,
-        plane=_read_off(TEXT, "plane"),
-        amplitude_m=_read_off(NUMBER, "amplitude"),
-        amplitude_interval_90_m=_read_off(PAIR, "amplitude_interval_90"),
-        phase_rad=_read_off(NUMBER, "phase"),
-        phase_interval_90_rad=_read_off(PAIR, "phase_interval_90"),
-        turns=_read_off(NUMBER, "turns"),
+    synchronous=_rows(
+        Synchronous,
+        "synchronous",
+        "plane amplitude_m amplitude_interval_90_m phase_rad phase_interval_90_rad turns",
     ),
-    "timeline": _rows(
-        lambda seen: seen.timeline(), time_s=(NUMBER, itemgetter(0)), event=(TEXT, itemgetter(1))
+    timeline=_rows(
+        tuple, "timeline", "time_s event", time_s=(NUMBER, itemgetter(0)), event=(TEXT, itemgetter(1))
     ),
-    "notes": _read_off(TEXTS, "notes"),
-}
+)
 """The document of a look: SI units, times in record time, positive turns with the spin."""
 
 
 def look_schema() -> dict[str, Any]:
     """JSON Schema of a look at a record."""
-    content = closed({DIGEST: TEXT}, **{name: schema for name, (schema, _) in _DOCUMENT.items()})
+    content = closed({DIGEST: TEXT}, **_DOCUMENT[0]["properties"])
     return {"$schema": DIALECT, "title": "rotordrop look", **content}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -377,7 +378,7 @@ class Whirl(WhirlSpell):
         return min(low, high), max(low, high)
 
     @property
-    def sense(self) -> str:
+    def sense(self) -> Literal["forward", "backward"]:
         """Forward (with the spin) or backward."""
         return "forward" if self.turns > 0 else "backward"
 
