@@ -68,7 +68,7 @@ def static_safety_of_load(rating: float, force: float) -> float:
 
 
 def _falling(known: Known, factor: Factor) -> Known:
-    """A safety factor, which falls where the load rises."""
+    """A factor that falls where what it is of rises: a load, or an air gap."""
     interval = None
     if known.interval_90 is not None and known.interval_90[0] > 0.0:
         interval = (factor(known.interval_90[1]), factor(known.interval_90[0]))
@@ -95,17 +95,11 @@ def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kn
     if not np.isfinite(path).all():  # of a model that lost the record
         return
     velocity = np.gradient(path, time, axis=0)
-    yield "severity.position_index", _over_gap(float(np.mean(np.hypot(*path.T))), gap)
+    mean = float(np.mean(np.hypot(*path.T)))
+    yield "severity.position_index", _falling(gap, lambda value: mean / value)
     if estimate.speed > 0.0:
         rms = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1))))
-        yield "severity.velocity_index", _over_gap(rms / estimate.speed, gap)
-
-
-def _over_gap(length: float, gap: Known) -> Known:
-    interval = None
-    if gap.interval_90 is not None and gap.interval_90[0] > 0.0:
-        interval = (length / gap.interval_90[1], length / gap.interval_90[0])
-    return Known(value=length / gap.value, status=gap.status, interval_90=interval, unit="1")
+        yield "severity.velocity_index", _falling(gap, lambda value: rms / estimate.speed / value)
 
 
 def _fatigue(

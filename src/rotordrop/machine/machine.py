@@ -352,7 +352,7 @@ class Machine(Description):
                     f"{path} = {value if isinstance(value, str) else f'{float(value):g}'}"
                     for path, value in values.items()
                 )
-                raise UsageError(f"cannot set {stated} (SI units): {_reasons(error)}") from error
+                raise UsageError(f"cannot set {stated} (SI units): {reasons(error)}") from error
         copy = self.completed_with(parts)
         copy.__pydantic_fields_set__.update(parts)
         if parts.keys() - {"speed"}:
@@ -369,7 +369,7 @@ class Machine(Description):
         try:
             changed = self.bearing(name).with_designation(designation)
         except ValueError as error:
-            raise UsageError(f"{name} cannot have a bearing {designation!r}: {_reasons(error)}") from error
+            raise UsageError(f"{name} cannot have a bearing {designation!r}: {reasons(error)}") from error
         others = tuple(changed if one.name == name else one for one in self.touchdown_bearings)
         return self.completed_with({"touchdown_bearings": others})
 
@@ -456,7 +456,7 @@ def value_of_path(machine: Machine, path: str) -> float:
     return float(part)
 
 
-def _reasons(error: ValueError) -> str:
+def reasons(error: Exception) -> str:
     """Why a description was refused, without the places pydantic names."""
     if not isinstance(error, ValidationError):
         return str(error)

@@ -16,7 +16,8 @@ from rotordrop.elements.rotor import Rotor
 from rotordrop.elements.support import REFERENCE_MASS
 from rotordrop.elements.unbalance import BalanceGrade
 from rotordrop.errors import UsageError
-from rotordrop.machine.machine import Machine
+from rotordrop.json_schema import DIALECT, TEXT, closed
+from rotordrop.machine.machine import Machine, reasons
 from rotordrop.machine.ross_files import MAGNETIC, ImportedRotor, Spring
 from rotordrop.machine.saving import machine_text
 from rotordrop.machine.schema import field_meanings
@@ -105,17 +106,9 @@ EXAMPLES = {
 def simple_schema() -> dict[str, Any]:
     """Give the JSON Schema (draft 2020-12) of the twelve numbers, as texts with units."""
     meanings = field_meanings(SimpleMachine)
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "rotordrop machine of twelve numbers",
-        "type": "object",
-        "properties": {
-            name: {"type": "string", "description": meanings[name], "examples": [example]}
-            for name, example in EXAMPLES.items()
-        },
-        "required": [name for name in EXAMPLES if name != "preload"],
-        "additionalProperties": False,
-    }
+    texts = {name: TEXT | {"description": meanings[name], "examples": [of]} for name, of in EXAMPLES.items()}
+    content = closed(texts) | {"required": [name for name in EXAMPLES if name != "preload"]}
+    return {"$schema": DIALECT, "title": "rotordrop machine of twelve numbers", **content}
 
 
 def simple_machine(known: SimpleMachine) -> Machine:
@@ -160,7 +153,7 @@ def simple_text(given: Mapping[str, str]) -> str:
     try:
         made = simple_machine(SimpleMachine(**said))
     except ValidationError as error:
-        raise UsageError(f"these numbers make no machine: {_reasons(error)}") from None
+        raise UsageError(f"these numbers make no machine: {reasons(error)}") from None
     weight = f"both halves together: {said['mass']}, centre at {said['centre']}"
     remarks = {
         "speed.nominal": said["speed"],
@@ -193,8 +186,7 @@ def read_number(name: str, said: Mapping[str, str]) -> str | tuple[str, str]:
     try:
         return _read(name, said[name], length)
     except (UsageError, LookupError, ValidationError) as error:
-        reason = _reasons(error) if isinstance(error, ValidationError) else str(error)
-        reason = reason.removeprefix(f"{name}: ")
+        reason = reasons(error).removeprefix(f"{name}: ")
         raise UsageError(f"{name}, such as {EXAMPLES[name]!r}: {reason}") from None
 
 
@@ -221,10 +213,6 @@ def _read(name: str, text: str, length: float) -> str | tuple[str, str]:
         if name == "centre" and math.isfinite(length):
             _share_at_de(value, length)
     return text
-
-
-def _reasons(error: ValidationError) -> str:
-    return "; ".join(str(e["msg"]).removeprefix("Value error, ") for e in error.errors())
 
 
 def drafted_machine(

@@ -378,7 +378,7 @@ def coast_down_page(
         title=f"Simulated coast-down of {result.machine_name}",
         subtitle=f"from {speed}, {end} after power-off",
         simulated=SIMULATED_MACHINE,
-        verdict=_said_of_run(result, analysis, certificate),
+        verdict=_said_of_run(result, certificate),
         cards=tuple(_card_of_run(result, index) for index in range(len(result.bearing_names))),
         facts=(
             *_facts(result, machine),
@@ -396,9 +396,7 @@ def coast_down_page(
     )
 
 
-def _said_of_run(
-    result: CoastDownResult, analysis: CoastDownAnalysis | None, certificate: CoastDownCertificate | None
-) -> tuple[Statement, ...]:
+def _said_of_run(result: CoastDownResult, certificate: CoastDownCertificate | None) -> tuple[Statement, ...]:
     said = [Statement(result.outcome, "good" if result.finished else "bad")]
     maxima = result.maxima()
     held = all(maximum.in_first_window for maximum in maxima)

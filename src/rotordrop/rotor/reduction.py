@@ -151,7 +151,7 @@ def reduce_rotor(
     if choice.modes is None or not nodes:
         modes = free_free_modes(fe, choice.modes)
         rate = 2.0 * fe.modal_damping * modes.omega
-        return _basis(fe, modes.shapes, modes.omega**2, np.diag(rate), choice, ())
+        return _basis(fe, modes.shapes, modes.omega**2, np.diag(rate), choice)
     everything = free_free_modes(fe)
     kept = choice.modes
     inner, eigenvalues, damping = attachment_coordinates(fe, everything, kept, nodes)
@@ -162,7 +162,7 @@ def reduce_rotor(
     projected[:kept, :kept] = np.diag(2.0 * fe.modal_damping * everything.omega[:kept])
     projected[kept:, kept:] = signs[:, None] * damping * signs
     values = np.concatenate([everything.omega[:kept] ** 2, eigenvalues])
-    return _basis(fe, shapes, values, projected, choice, nodes)
+    return _basis(fe, shapes, values, projected, choice)
 
 
 def attachment_coordinates(
@@ -180,12 +180,7 @@ def attachment_coordinates(
 
 
 def _basis(
-    fe: RotorFE,
-    shapes: Array,
-    eigenvalues: Array,
-    damping: Array,
-    reduction: Reduction,
-    nodes: tuple[int, ...],
+    fe: RotorFE, shapes: Array, eigenvalues: Array, damping: Array, reduction: Reduction
 ) -> RotorBasis:
     polar = product(product(shapes.T, fe.polar), shapes)
     return RotorBasis(

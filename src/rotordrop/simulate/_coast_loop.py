@@ -25,7 +25,7 @@ TURNING_BACK = 0.5 * math.pi
 
 
 @kernel
-def carry_open_contacts(log: Array, n_log: int, running: Array) -> int:
+def carry_open_contacts(log: Array, running: Array) -> int:
     """Move the contacts that still last to the head of the log; returns how many they are."""
     kept = 0
     for b in range(running.shape[0]):

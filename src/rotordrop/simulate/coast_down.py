@@ -195,7 +195,7 @@ def _ended_contacts(setup: Setup, run: Run, log: Array, already: int) -> tuple[A
     for b in range(len(run.whirl)):
         run.totals[b, 1] += float(np.sum(entries[done & (owner == b)][:, _loop.LOG_DISSIPATED]))
         run.totals[b, 0] += float(began[b])
-    kept = C.carry_open_contacts(log, count, run.running)
+    kept = C.carry_open_contacts(log, run.running)
     run.log[:] = 0.0
     run.log[:kept] = log[:kept]
     run.progress[_loop.LOGGED] = kept

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from typing import Any
 
@@ -160,17 +160,9 @@ def _result(
 
 
 def _contact_log(log: Array, owner: NDArray[np.int64]) -> ContactLog:
-    return ContactLog(
-        bearing=owner,
-        start=log[:, _loop.LOG_START].copy(),
-        end=log[:, _loop.LOG_END].copy(),
-        peak_force=log[:, _loop.LOG_PEAK_FORCE].copy(),
-        peak_time=log[:, _loop.LOG_PEAK_TIME].copy(),
-        azimuth=log[:, _loop.LOG_AZIMUTH].copy(),
-        impulse=log[:, _loop.LOG_IMPULSE].copy(),
-        dissipated_energy=log[:, _loop.LOG_DISSIPATED].copy(),
-        sliding_energy=log[:, _loop.LOG_SLIDING].copy(),
-    )
+    # the columns behind that of the contact are the fields behind that of the bearing
+    names = [one.name for one in fields(ContactLog)][1:]
+    return ContactLog(bearing=owner, **dict(zip(names, log[:, _loop.LOG_START :].T.copy(), strict=True)))
 
 
 def _sentence(machine: Machine, case: DropCase, run: Run, contacts: int) -> str:

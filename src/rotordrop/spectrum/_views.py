@@ -84,20 +84,6 @@ def _share_inside(count: int, size: int) -> Array:
     return weight
 
 
-def near_path(signal: Array, path: Array, factor: int) -> Near:
-    """Turn a signal back by the phase of a path and keep every so manieth sample of what lies near it.
-
-    The signal (N, C) [m] is without its mean, the path (N,) is a phase [rad].
-    """
-    channels = signal.shape[1]
-    turned = np.empty((2 * channels, len(signal)))  # one row per channel: real parts, then imaginary parts
-    np.multiply(2.0 * signal.T, np.cos(path), out=turned[:channels])
-    np.multiply(-2.0 * signal.T, np.sin(path), out=turned[channels:])
-    if factor > 1:
-        turned = _thinned(turned, factor) / _share_thinned(len(path), factor)
-    return Near(value=(turned[:channels] + 1j * turned[channels:]).T, path=path, phase=path[::factor].copy())
-
-
 def _thinned(rows: Array, factor: int) -> Array:
     half = TAPS_PER_FACTOR // 2
     taps = firwin(2 * half * factor + 1, 1.0 / factor, window=("kaiser", 0.1102 * (STOP_BAND - 8.7)))
@@ -110,24 +96,6 @@ def _thinned(rows: Array, factor: int) -> Array:
 def _share_thinned(count: int, factor: int) -> Array:
     """Share of the filter that lies inside a series, at every sample that is left."""
     return _thinned(np.ones(count), factor)
-
-
-def extract(near: Near, sampling_rate: float, turn: Array | float, *, bandwidth: float) -> Envelope:
-    """Take the part out that follows a path and a further phase, with an amplitude that changes slowly.
-
-    ``turn`` (M,) is what the phase of the line has more than that of the path [rad], the bandwidth the
-    distance from the line up to which amplitude changes are followed [Hz].
-    """
-    samples = round(0.5 * sampling_rate / bandwidth)
-    back = (near.value * np.exp(-1j * np.broadcast_to(turn, near.phase.shape))[:, None]).T
-    turned = np.concatenate([back.real, back.imag])
-    value = np.zeros_like(turned)
-    for _ in range(SHARPENING):
-        missed = turned - value
-        _smooth_rows(missed, samples)
-        value += missed
-    channels = len(back)
-    return Envelope(value=(value[:channels] + 1j * value[channels:]).T, phase=near.phase + turn, near=near)
 
 
 def power_share(envelope: Envelope, present: NDArray[np.bool_]) -> Array:
@@ -258,12 +226,35 @@ class Clock:
         return (frequency >= LOWEST_FREQUENCY) & (frequency <= self.highest_frequency)
 
     def near(self, signal: Array, path: Array) -> Near:
-        """What a signal [m] holds near a path, whose phase [rad] is known at every sample of the signal."""
-        return near_path(signal, path, self.factor)
+        """Turn a signal back by the phase of a path and thin out what lies near it.
+
+        The signal (N, C) [m] is without its mean, the path (N,) is a phase [rad].
+        """
+        channels, factor = signal.shape[1], self.factor
+        turned = np.empty((2 * channels, len(signal)))  # a row per channel: real parts, then imaginary parts
+        np.multiply(2.0 * signal.T, np.cos(path), out=turned[:channels])
+        np.multiply(-2.0 * signal.T, np.sin(path), out=turned[channels:])
+        if factor > 1:
+            turned = _thinned(turned, factor) / _share_thinned(len(path), factor)
+        value = (turned[:channels] + 1j * turned[channels:]).T
+        return Near(value=value, path=path, phase=path[::factor].copy())
 
     def extract(self, near: Near, turn: Array | float = 0.0) -> Envelope:
-        """The part that follows a path and a further phase [rad]."""
-        return extract(near, self.rate, turn, bandwidth=BANDWIDTH)
+        """Take the part out that follows a path and a further phase, with an amplitude that changes slowly.
+
+        ``turn`` (M,) is what the phase of the line has more than that of the path [rad].
+        """
+        samples = round(0.5 * self.rate / BANDWIDTH)
+        back = (near.value * np.exp(-1j * np.broadcast_to(turn, near.phase.shape))[:, None]).T
+        turned = np.concatenate([back.real, back.imag])
+        value = np.zeros_like(turned)
+        for _ in range(SHARPENING):
+            missed = turned - value
+            _smooth_rows(missed, samples)
+            value += missed
+        channels = len(back)
+        found = (value[:channels] + 1j * value[channels:]).T
+        return Envelope(value=found, phase=near.phase + turn, near=near)
 
     def line(self, envelope: Envelope, size: NDArray[np.complex128]) -> Array:
         """A line with a complex amplitude [m] at every sample of the signal, shape (N, C)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -262,10 +262,8 @@ def fit_exponential(time: ArrayLike, speed: ArrayLike, *, start: float) -> Expon
     guess = max(_half_time(t, omega, start) / math.log(2.0), 1e-6)
     scale = np.array([max(float(omega[0]), 1e-9), guess])
     lower = np.array([0.0, 1e-6])
-    found = _fitted(
-        "One time constant", _exponential, t, omega, start, scale, lower, ("initial_speed", "time_constant")
-    )
-    return ExponentialFit(**found)
+    units = {"initial_speed": "rad/s", "time_constant": "s"}
+    return ExponentialFit(**_fitted("One time constant", _exponential, t, omega, start, scale, lower, units))
 
 
 def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float) -> DragFit:
@@ -283,18 +281,9 @@ def fit_drag(time: ArrayLike, speed: ArrayLike, *, start: float) -> DragFit:
     # each of the three drags alone would stop about half of the rotor's speed in the half time
     half, first = max(_half_time(t, omega, float(t[0])), 1e-6), float(omega[0])
     scale = np.array([first, 0.05 * first / half, 0.5 / half, 0.1 / (half * first)])
-    names = ("initial_speed", "constant", "linear", "quadratic")
+    units = {"initial_speed": "rad/s", "constant": "rad/s²", "linear": "1/s", "quadratic": "1/rad"}
     said = "Dry, linear and quadratic drag"
-    return DragFit(**_fitted(said, _drag_solution, t, omega, start, scale, np.zeros(4), names))
-
-
-_UNITS = {
-    "initial_speed": "rad/s",
-    "time_constant": "s",
-    "constant": "rad/s²",
-    "linear": "1/s",
-    "quadratic": "1/rad",
-}
+    return DragFit(**_fitted(said, _drag_solution, t, omega, start, scale, np.zeros(4), units))
 
 
 def _fitted(
@@ -305,9 +294,11 @@ def _fitted(
     start: float,
     scale: Array,
     lower: Array,
-    names: tuple[str, ...],
+    units: Mapping[str, str],
 ) -> dict[str, Any]:
-    """A law fitted to recorded speeds [rad/s] from a first guess, by the fields of `FittedLaw`."""
+    """A law fitted to recorded speeds [rad/s] from a first guess, by the fields of `FittedLaw` and the units
+    of its parameters.
+    """
     expected = _reading(time, speed)
 
     def model(p: Array) -> Array:
@@ -318,9 +309,9 @@ def _fitted(
     rms, noise = float(np.sqrt(np.mean(residual**2))), neighbour_noise(speed)
     follows = not rms > max(1.5 * noise, CLOSE_ENOUGH * float(speed.max()))
     found = {
-        name: _positive(value, error, guess, _UNITS[name])
-        for name, value, error, guess in zip(
-            names, parameters.tolist(), errors.tolist(), scale.tolist(), strict=True
+        name: _positive(value, error, guess, unit)
+        for (name, unit), value, error, guess in zip(
+            units.items(), parameters.tolist(), errors.tolist(), scale.tolist(), strict=True
         )
     }
     return found | {

@@ -76,7 +76,7 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path, *,
         ask = f"name them in the profile, text.names = [{example}, or export each channel as a column"
         raise RecordError(f"{path}: no row names the {layout.columns} columns ({line}); {ask}")
     unused = [line[:_LONGEST_LINE] for i, line in enumerate(lines) if i not in used]
-    entries = _entries(unused, rows, used, layout)
+    entries = _entries(unused, rows, layout)
     labels = [
         f"{name} [{unit}]" if unit and not known_unit(split_unit(name)[2]) else name
         for name, unit in zip(names, units, strict=True)
@@ -286,7 +286,7 @@ def _was_a_row(line: str, fields: list[str], layout: Layout, below_names: bool) 
     return numbers > 0 and (below_names or whole)
 
 
-def _entries(lines: list[str], rows: list[list[str]], used: set[int], layout: Layout) -> dict[str, str]:
+def _entries(lines: list[str], rows: list[list[str]], layout: Layout) -> dict[str, str]:
     """Keys and values of all lines, and those of a clock that stand below their keys."""
     entries: dict[str, str] = {}
     for line in lines:
