@@ -1,16 +1,26 @@
-"""Values of one bearing that follow from its identified parameters, whichever method identified them."""
+"""Values of one bearing that follow from its identified parameters, and how severe the drop was for it.
+
+Safety, impulse, energy, indices and fatigue, with intervals.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from rotordrop.elements.bearing_numbers import numbers_of
+import numpy as np
+
+from rotordrop.arrays import Array
+from rotordrop.elements.ball_bearing import STATIC_STRESS
+from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.elements.table import following, parameter, published
-from rotordrop.estimate.estimate import FittedParameter
-from rotordrop.known import NINETY, Known
+from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.evidence.look import INDEX_WINDOW
+from rotordrop.known import NINETY, Known, Status
 from rotordrop.machine import Machine
+from rotordrop.severity.fatigue import fatigue_share
 
 
 def bearing_values(
@@ -63,3 +73,106 @@ def equivalent_stiffness(
 
 def _series(one: float, other: float) -> float:
     return one * other / (one + other)
+
+
+if TYPE_CHECKING:
+    from rotordrop.estimate.estimate import Estimate, FittedParameter
+
+Factor = Callable[[float], float]
+
+
+def severity_values(estimate: Estimate, bearing: BearingDrop) -> dict[str, Known]:
+    """Severity of one bearing by the fields of `severity.numbers.SEVERITY`; what is not known is left out.
+
+    Intervals follow from those of the peaks and impacts. Impulse and energy add the errors of all impacts as
+    if they were one, because they rest on the same contact and the same machine.
+    """
+    return dict(_values(estimate, bearing))
+
+
+def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
+    stress, force = bearing.peak_stress, bearing.peak_force
+    if stress.value > 0.0:
+        yield "severity.static_safety", _falling(stress.known, static_safety_of_stress)
+    ratings = numbers_of(estimate.machine.bearing(bearing.name)).ratings()
+    if force.value > 0.0:
+        yield (
+            "severity.static_safety_of_rating",
+            _falling(force.known, lambda load: static_safety_of_load(ratings.static, load)),
+        )
+    if "impacts" not in bearing.missing:
+        yield "severity.impulse_N_s", _sum([one.impulse for one in bearing.impacts], "N s")
+        yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
+    yield from _indices(estimate, bearing)
+    if bearing.force_vector is not None and bearing.impacts:
+        loads = numbers_of(estimate.machine.bearing(bearing.name)).element_loads_under(bearing.force_vector)
+        yield from _fatigue(bearing, ratings, loads, estimate.speed)
+
+
+def static_safety_of_stress(stress: float) -> float:
+    """Static safety factor s0 of a largest Hertz stress [Pa], ``(4200 MPa / σ)³`` [1].
+
+    Source: ISO 76, which defines the static load rating of ball bearings by that stress at the most loaded
+    ball; its load goes with the cube of the stress.
+    """
+    return (STATIC_STRESS / stress) ** 3
+
+
+def static_safety_of_load(rating: float, force: float) -> float:
+    """Static safety factor s0 of a radial force [N] for a static load rating C0 [N], ``C0 / P0`` [1].
+
+    Source: ISO 76, with the radial force as equivalent load P0 where no axial one acts from outside. The
+    preload counts in the stress, not here.
+    """
+    return rating / force
+
+
+def _falling(known: Known, factor: Factor) -> Known:
+    """A factor that falls where what it is of rises: a load, or an air gap."""
+    interval = None
+    if known.interval_90 is not None and known.interval_90[0] > 0.0:
+        interval = (factor(known.interval_90[1]), factor(known.interval_90[0]))
+    return Known(value=factor(known.value), status=known.status, interval_90=interval, unit="1")
+
+
+def _sum(parts: list[Known], unit: str) -> Known:
+    ends = [one.interval_90 for one in parts if one.interval_90 is not None]
+    interval = (
+        (sum(low for low, _ in ends), sum(high for _, high in ends)) if len(ends) == len(parts) else None
+    )
+    value = sum(one.value for one in parts)
+    doubted: list[Status] = [one.status for one in parts if one.status != "determined"]
+    return Known(value=value, status=[*doubted, "determined"][0], interval_90=interval, unit=unit)
+
+
+def _indices(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Known]]:
+    """Position and velocity index of the motion, as `rotordrop.look` has them; intervals from the air gap."""
+    motion, gap = bearing.motions[-1], bearing.values.get("air_gap_m")
+    if gap is None or not gap.value > 0.0 or len(motion.time) < 3:
+        return
+    during = (motion.time >= 0.0) & (motion.time <= INDEX_WINDOW)
+    time, path = motion.time[during], motion.displacement[during]
+    if not np.isfinite(path).all():  # of a model that lost the record
+        return
+    velocity = np.gradient(path, time, axis=0)
+    mean = float(np.mean(np.hypot(*path.T)))
+    yield "severity.position_index", _falling(gap, lambda value: mean / value)
+    if estimate.speed > 0.0:
+        rms = float(np.sqrt(np.mean(np.sum(velocity**2, axis=1))))
+        yield "severity.velocity_index", _falling(gap, lambda value: rms / estimate.speed / value)
+
+
+def _fatigue(
+    bearing: BearingDrop, ratings: Ratings, loads: Array, speed: float
+) -> Iterator[tuple[str, Known]]:
+    """Share of the rating life as if the race turned with the rotor from the first impact on.
+
+    It turns slower, so that the number is an upper end; the lower one is nothing.
+    """
+    time = bearing.force.time
+    spin = np.where(time >= bearing.impacts[0].start, speed, 0.0)
+    _, high = bearing.peak_force.interval_90 or (0.0, bearing.peak_force.value)
+    share = fatigue_share(ratings, time, loads, spin)
+    most = (high / bearing.peak_force.value) ** 3 * share  # as the life goes with the load
+    known = Known(value=share, status=bearing.peak_force.known.status, interval_90=(0.0, most), unit="1")
+    yield "severity.fatigue_by_16281", known

@@ -22,6 +22,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.parameter import Parameter
 from rotordrop.errors import needing
 from rotordrop.estimate.bearing_drop import BearingDrop
+from rotordrop.estimate.bearing_values import severity_values
 from rotordrop.estimate.methods import Method
 from rotordrop.estimate.published import (
     Advice,
@@ -33,7 +34,6 @@ from rotordrop.estimate.published import (
     later_warning,
     peak_text,
 )
-from rotordrop.estimate.severity_numbers import severity_values
 from rotordrop.estimate.unbalance import PlaneUnbalance
 from rotordrop.evidence.contacts import TimedContact as TimedContact
 from rotordrop.evidence.events import PowerOff

@@ -1,12 +1,14 @@
 """The paper's route: the drop replayed open loop with what was identified of it (Neisi 2020, Fig. 4).
 
+Its initial state the paper's way, by modal expansion, stands beside the smoothed one it starts from.
+
 A replay cannot follow a chaotic drop for long: after some contacts its force is that of *a* drop like the
 recorded one, so it has no interval; the tracked twin, from whose smoothed estimate it starts, has.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,10 +24,10 @@ from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
 from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Expansion, InitialState, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
-from rotordrop.evidence.contacts import identify_first_contacts
+from rotordrop.evidence.contacts import identify_first_contacts, local_polynomial
 from rotordrop.evidence.evidence import Missing, sought
 from rotordrop.physics import columns as L
-from rotordrop.replay.modal_expansion import expand_initial_state
+from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.case import DropCase, StateStart
 from rotordrop.simulate.drop import simulate_drop
 from rotordrop.simulate.result import DropResult
@@ -35,6 +37,69 @@ from rotordrop.twin.tracked import TrackedDrop
 from rotordrop.twin.tracked_estimate import measured_motion, motion_later
 from rotordrop.twin.tracked_loads import widening_of
 from rotordrop.twin.tracked_parameters import joint_estimate, parameters
+
+SMOOTHING = 2e-3
+"""Width of the window from which displacement and velocity at power-off are taken [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpandedState:
+    """Initial state by modal expansion; m modes per plane, B bearings."""
+
+    amplitudes: Array
+    """Amplitudes (x, y) and their velocities; zero beyond the modes used, shape (2, m, 2)."""
+    at_bearings: Array
+    """Displacement [m] and velocity [m/s] at the bearing nodes, shape (2, B, 2)."""
+
+
+def expansion_matrix(rows: Array, modes: int) -> Array:
+    """Amplitudes of the lowest modes per measured displacement, ``(QΦ)^+``, shape (2·modes, S).
+
+    ``rows`` (S, 2m) is the displacement along each sensor per amplitude, QΦ of all modes, x amplitudes before
+    y; of the modes per plane at most half the number of sensors can be used.
+
+    Source: Neisi 2020, eqs. (14)–(16). Differs from the paper: pseudo-inverse with a rank check instead of
+    the normal equations.
+
+    Raises
+    ------
+    IdentificationError
+        If the sensors cannot tell these modes apart.
+    """
+    m = rows.shape[1] // 2
+    chosen = rows[:, [*range(modes), *range(m, m + modes)]]
+    strength = np.linalg.svd(chosen / np.maximum(np.linalg.norm(chosen, axis=0), 1e-300), compute_uv=False)
+    if len(chosen) < 2 * modes or strength[-1] < 0.02:
+        weakest = strength[-1] if len(chosen) >= 2 * modes else 0.0
+        raise IdentificationError(
+            f"{len(chosen)} sensors cannot tell {modes} modes per plane apart: smallest singular value "
+            f"{weakest:.2g}, "
+            "at least 0.02 is needed. The sensor planes coincide or lie in a node of a mode: give the "
+            "sensors' true nodes, or use fewer modes."
+        )
+    return np.asarray(np.linalg.pinv(chosen), dtype=np.float64)
+
+
+def expand_initial_state(
+    time: Array, along: Array, rows: Array, model: DropModel, *, modes: int = 2
+) -> ExpandedState:
+    """Initial displacement and velocity at all degrees of freedom by modal expansion.
+
+    Displacements along the sensors (N, S) [m] have their zeros taken off, times (N,) count from power-off
+    [s], ``rows`` (S, s) give the former from the states; 2 modes per plane are the rigid ones of the paper.
+
+    Source: Neisi 2020, section 3.1. The velocity comes from a local polynomial through samples on both sides
+    of power-off. Sensors need not sit at the bearing nodes.
+    """
+    live = np.isfinite(along).any(axis=0)
+    known = np.isfinite(along[:, live]).all(axis=1)
+    seen = local_polynomial(time[known], along[known][:, live], 0.0, width=SMOOTHING, order=2)
+    x, y = model.layout.modal_x, model.layout.modal_y
+    inverse = expansion_matrix(np.hstack([rows[live][:, x], rows[live][:, y]]), modes)
+    amplitudes = np.zeros((2, model.basis.size, 2))
+    amplitudes[:, :modes] = [(inverse @ one).reshape(2, modes).T for one in seen]
+    return ExpandedState(amplitudes=amplitudes, at_bearings=model.parameters.bearing_shape @ amplitudes)
+
 
 DURATION = 0.2
 """Part of the drop that is replayed [s]: that of Neisi 2020."""

@@ -42,7 +42,8 @@ from rotordrop.simulate._run import (
     setup_of,
 )
 from rotordrop.simulate.case import CoastDownCase
-from rotordrop.simulate.checkpoint import (
+from rotordrop.simulate.coast_down_file import (
+    ended_run,
     load_checkpoint,
     open_work_folder,
     part_path,
@@ -50,8 +51,9 @@ from rotordrop.simulate.checkpoint import (
     run_digest,
     save_checkpoint,
     work_folder,
+    write_coast_down,
+    write_part,
 )
-from rotordrop.simulate.coast_down_file import ended_run, write_coast_down, write_part
 from rotordrop.simulate.coast_down_result import QUANTILES, QUANTITIES, CoastDownResult, WindowStatistics
 from rotordrop.simulate.levitation import start_of_drop
 

@@ -12,21 +12,25 @@ from scipy.ndimage import label
 
 from rotordrop.arrays import Array, Mask
 from rotordrop.series import closed
-from rotordrop.spectrum._found_line import FIVE_MOMENTS, FoundLine, path_range, radius
 from rotordrop.spectrum._views import (
     BANDWIDTH,
     BESIDE,
+    FIVE_MOMENTS,
     LOWEST_FREQUENCY,
     Clock,
     Envelope,
+    FoundLine,
     Near,
     Offset,
     View,
     drift_phase,
     mean_offset,
+    path_range,
     power_share,
+    radius,
     smooth,
 )
+from rotordrop.spectrum.candidates import LineKind
 from rotordrop.spectrum.detection import (
     FALSE_ALARM,
     Peak,
@@ -35,7 +39,6 @@ from rotordrop.spectrum.detection import (
     median_of_known,
     stretches_of,
 )
-from rotordrop.spectrum.naming import LineKind
 
 LASTING = 4
 """Fewest frames [1] in which a line must be seen (chosen)."""

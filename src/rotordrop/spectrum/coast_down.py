@@ -26,8 +26,7 @@ from rotordrop.spectrum.indentation import (
     find_settling,
 )
 from rotordrop.spectrum.lines import MOST_LINES, Line, find_lines
-from rotordrop.spectrum.orders import OrderTrack, track_orders, tracking_for
-from rotordrop.spectrum.resonances import PassedResonance, find_resonances
+from rotordrop.spectrum.orders import OrderTrack, PassedResonance, find_resonances, track_orders, tracking_for
 from rotordrop.spectrum.speed import (
     DragFit,
     ExponentialFit,

@@ -9,17 +9,18 @@ from typing import Any
 
 from rotordrop.document import stated
 from rotordrop.errors import RecordError
-from rotordrop.spectrum._found_line import FoundLine, SeenLine
 from rotordrop.spectrum._search import LineSearch
-from rotordrop.spectrum._views import HIGHEST_ORDER, Clock
+from rotordrop.spectrum._views import HIGHEST_ORDER, Clock, FoundLine, SeenLine
 from rotordrop.spectrum.candidates import (
     CONICAL,
     PENDULUM,
     Candidate,
+    LineEvidence,
+    Name,
     harmonic_candidates,
     mixed_candidates,
+    name_line,
 )
-from rotordrop.spectrum.naming import LineEvidence, Name, name_line
 from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
 from rotordrop.spectrum.waterfall import FEWEST_POINTS, PlanarSignal, reduce_rate
 

@@ -19,8 +19,7 @@ from rotordrop.files import digest_of_file, new_hdf5
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.simulate import coast_down
 from rotordrop.simulate.case import CentredStart, CoastDownCase
-from rotordrop.simulate.checkpoint import work_folder
-from rotordrop.simulate.coast_down_file import load_coast_down, open_samples
+from rotordrop.simulate.coast_down_file import load_coast_down, open_samples, work_folder
 from rotordrop.spectrum.coast_down import analyse_coast_down
 
 PAPER = str(example_path("paper"))

@@ -50,9 +50,15 @@ from rotordrop.record.readers import read_recording
 from rotordrop.record.record import write_hdf5
 from rotordrop.record.recording import Channel, Recording
 from rotordrop.simulate.case import CoastDownCase
-from rotordrop.simulate.checkpoint import load_checkpoint, part_path, save_checkpoint
 from rotordrop.simulate.coast_down import simulate_coast_down
-from rotordrop.simulate.coast_down_file import load_coast_down, write_coast_down, write_part
+from rotordrop.simulate.coast_down_file import (
+    load_checkpoint,
+    load_coast_down,
+    part_path,
+    save_checkpoint,
+    write_coast_down,
+    write_part,
+)
 from rotordrop.study.folder import Shard, open_folder, publish, study_of
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.summary import load_results

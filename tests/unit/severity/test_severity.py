@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.elements.catalog.inference import dynamic_rating
 from rotordrop.errors import UsageError
-from rotordrop.estimate.severity_numbers import static_safety_of_load, static_safety_of_stress
+from rotordrop.estimate.bearing_values import static_safety_of_load, static_safety_of_stress
 from rotordrop.machine import example_machine
 from rotordrop.severity.fatigue import LIFE, ball_row, fatigue_share, share_by_16281
 from rotordrop.severity.numbers import SEVERITY

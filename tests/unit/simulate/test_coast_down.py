@@ -22,9 +22,14 @@ from rotordrop.physics import columns as L
 from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.simulate import _coast_loop as C
-from rotordrop.simulate.checkpoint import part_path, work_folder
 from rotordrop.simulate.coast_down_certificate import compare_coast_downs
-from rotordrop.simulate.coast_down_file import is_coast_down, load_coast_down, open_samples
+from rotordrop.simulate.coast_down_file import (
+    is_coast_down,
+    load_coast_down,
+    open_samples,
+    part_path,
+    work_folder,
+)
 
 TURN = 2.0 * math.pi
 DECELERATION = 0.11

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotordrop.spectrum._found_line import FoundLine
+from rotordrop.spectrum._views import FoundLine
 from rotordrop.spectrum.coast_down import CoastDownSignal
 from rotordrop.spectrum.lines import find_lines
 from rotordrop.spectrum.orders import track_orders

@@ -10,7 +10,7 @@ from tests.unit.spectrum.synthetic import TURN, CoastDown, found_line
 
 from rotordrop.errors import RecordError
 from rotordrop.series import closed
-from rotordrop.spectrum._found_line import path_range
+from rotordrop.spectrum._views import path_range
 from rotordrop.spectrum.candidates import (
     mains_candidates,
     mode_candidate,

@@ -6,8 +6,7 @@ from tests.unit.spectrum.synthetic import TURN, CoastDown
 
 from rotordrop.errors import RecordError, UsageError
 from rotordrop.spectrum.candidates import mains_candidates, mode_candidate
-from rotordrop.spectrum.orders import track_orders, tracking_for
-from rotordrop.spectrum.resonances import find_resonances
+from rotordrop.spectrum.orders import find_resonances, track_orders, tracking_for
 from rotordrop.spectrum.speed import FrequencyPath, exact_speed_profile
 from rotordrop.spectrum.waterfall import waterfalls
 

@@ -15,7 +15,9 @@ from rotordrop.rotor.assembly import build_rotor_fe
 from rotordrop.spectrum._search import BRIEF, LineSearch
 from rotordrop.spectrum._views import BANDWIDTH, LOWEST_FREQUENCY, Clock, View
 from rotordrop.spectrum.candidates import (
+    LineEvidence,
     bearing_defect_candidates,
+    density_of,
     mode_candidate,
     pendulum_candidate,
     settled_modes,
@@ -27,7 +29,6 @@ from rotordrop.spectrum.detection import (
     half_power_width,
 )
 from rotordrop.spectrum.lines import MOST_LINES, SWING_ERROR, _joined, name_lines, of_swings
-from rotordrop.spectrum.naming import LineEvidence, density_of
 from rotordrop.spectrum.speed import inflation
 from rotordrop.spectrum.waterfall import waterfalls
 

@@ -17,9 +17,9 @@ from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin, Jo
 from rotordrop.machine.saving import machine_text
 from rotordrop.study.distributions import normal_score
 from rotordrop.study.folder import open_folder, study_of
+from rotordrop.study.numbers import influences
 from rotordrop.study.plan import read_study
 from rotordrop.study.repeat import next_draw, place_among, recorded_numbers, repeat_study, repeats
-from rotordrop.study.sensitivity import influences
 from rotordrop.study.summary import StudyResults, exceedance, quantile
 
 PATHS = ("NDE.air_gap", "NDE.support.stiffness", "NDE.support.mass", "NDE.friction.dynamic")

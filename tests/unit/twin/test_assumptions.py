@@ -16,7 +16,7 @@ from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem, with_end_planes, with_sensors_of
 from rotordrop.twin.steps import BEYOND, DESCRIBED, FORM, GUESSES, LASTS, WEIGHED, WHOLE, Steps
-from rotordrop.twin.tracked_unbalance import plane_unbalances, polar_of
+from rotordrop.twin.tracked_estimate import plane_unbalances, polar_of
 from rotordrop_bench import hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
 

@@ -71,7 +71,7 @@ def read_head(lines: list[str], layout: Layout, profile: Profile, path: Path, *,
         raise RecordError(f"{path}, {words}")
     if not given and not any(names):
         line = f"the line above the numbers reads {lines[-1][:60]!r}" if lines else "there is no header"
-        timed = timed or clock_told(_entries(lines, rows, set(), layout)).step is not None
+        timed = timed or clock_told(_entries(lines, rows, layout)).step is not None
         example = '"Time [s]", ...]' if timed else '"X1 [um]", ...], with [time] step = "50 us"'
         ask = f"name them in the profile, text.names = [{example}, or export each channel as a column"
         raise RecordError(f"{path}: no row names the {layout.columns} columns ({line}); {ask}")

@@ -18,7 +18,7 @@ from rotordrop.evidence.contacts import (
 from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import held_by
 from rotordrop.evidence.sensing import build_sensing
-from rotordrop.replay.modal_expansion import expand_initial_state, expansion_matrix
+from rotordrop.replay.replay import expand_initial_state, expansion_matrix
 from rotordrop.rotor.statics import rest_on
 from rotordrop.track.problem import sensor_rows
 
