@@ -17,8 +17,7 @@ from rotordrop import (
     example_record_path,
     read_record,
 )
-from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimate.methods import Tracked
+from rotordrop.estimate.estimate import Estimate, Tracked
 from rotordrop.estimate.record_facts import facts_of
 from rotordrop.evidence.evidence import Evidence, read_evidence
 from rotordrop.replay.replay import replayed_drop

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rotordrop.estimate.methods import Method as Method
-from rotordrop.estimate.methods import Replay as Replay
-from rotordrop.estimate.methods import Tracked as Tracked
+from rotordrop.estimate.estimate import Method as Method
+from rotordrop.estimate.estimate import Replay as Replay
+from rotordrop.estimate.estimate import Tracked as Tracked
 from rotordrop.one_thread import one_thread
 from rotordrop.progress import Shown, shown
 from rotordrop.require import require

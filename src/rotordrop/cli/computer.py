@@ -75,7 +75,7 @@ def doctor(
     Example: rotordrop doctor
     """
     if fingerprint:
-        from rotordrop.simulate.fingerprint import fingerprint as of_this_computer
+        from rotordrop.simulate.result import fingerprint as of_this_computer
 
         bits = of_this_computer()
         deliver({"fingerprint": bits}, json, lambda out: out.print(bits, no_wrap=True, crop=True))

@@ -61,7 +61,7 @@ def estimate(
     from rotordrop.estimation import Replay, Tracked, estimate_drops
     from rotordrop.machine import load_machine
     from rotordrop.report.estimate_page import estimate_page, estimate_screen, estimate_summary
-    from rotordrop.simulate.fingerprint import fingerprint
+    from rotordrop.simulate.result import fingerprint
     from rotordrop.twin.search import is_calibrated
 
     machine, *records = options.machine_first(machine, *records)

@@ -18,7 +18,7 @@ from rotordrop.arrays import Array
 from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import Known
 from rotordrop.severity.statistics import Statistics, stress_statistics
-from rotordrop.simulate.certificate import refined_peak
+from rotordrop.simulate.result import refined_peak
 
 if TYPE_CHECKING:
     from rotordrop.simulate.result import DropResult

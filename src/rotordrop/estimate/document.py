@@ -7,10 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from rotordrop._version import __version__
-from rotordrop.estimate.estimate import Estimate
-from rotordrop.estimate.methods import Replay
+from rotordrop.estimate.estimate import Estimate, Replay
 from rotordrop.estimate.published import FORMAT, Bearing, Drop, FirstContact
-from rotordrop.simulate.fingerprint import fingerprint
+from rotordrop.simulate.result import fingerprint
 
 
 def published_drop(estimate: Estimate) -> Drop:

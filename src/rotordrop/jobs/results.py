@@ -103,7 +103,7 @@ def write_estimate(estimate: Estimate, job: Job, made: Path, options: Mapping[st
     from rotordrop.report.drop_sections import force_panel, stress_panel
     from rotordrop.report.estimate_page import estimate_page
     from rotordrop.report.machine_content import weight_shares
-    from rotordrop.simulate.fingerprint import fingerprint
+    from rotordrop.simulate.result import fingerprint
 
     content = estimate_page(estimate)
     names, grid, columns = histories_of(estimate)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from rotordrop.elements.sensor import Sensor
-from rotordrop.ends import far_end_first
 from rotordrop.errors import UnpairedError, UsageError, mapped
 from rotordrop.known import Known
 from rotordrop.record.clock import TIME_UNITS
@@ -25,6 +25,17 @@ from rotordrop.record.recording import (
     plain_name,
 )
 from rotordrop.units import is_unit, parse_quantity
+
+_FAR = re.compile(r"NDE|NAS", re.IGNORECASE)
+"""The end away from the drive in names of planes and bearings, English and German."""
+
+One = TypeVar("One")
+
+
+def far_end_first(things: Iterable[One], name: Callable[[One], str]) -> list[One]:
+    """The things with those first whose name is of the end away from the drive, else in their order."""
+    return sorted(things, key=lambda one: not _FAR.search(name(one)))
+
 
 _LENGTHS = ("m", "mm", "um", "nm", "mil", "in", "V", "mV", FULL_SCALE, "")
 _AXES = ("XY", "HV", "UW", "VW", "LR", "+-", "AB", "12")

@@ -20,8 +20,7 @@ from rotordrop.estimate.assumptions import twin_assumptions
 from rotordrop.estimate.bearing_drop import AirGap, FirstContact, Motion, Origin, simulated_bearings
 from rotordrop.estimate.bearing_drop import Role as MotionRole
 from rotordrop.estimate.bearing_values import bearing_values
-from rotordrop.estimate.estimate import Estimate, ReplaySteps, Verdict
-from rotordrop.estimate.methods import Replay
+from rotordrop.estimate.estimate import Estimate, Replay, ReplaySteps, Verdict
 from rotordrop.estimate.published import Expansion, InitialState, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
 from rotordrop.evidence.contacts import identify_first_contacts, local_polynomial

@@ -20,9 +20,9 @@ from rotordrop.estimate.estimate import (
     CrossCheck,
     Estimate,
     FittedParameter,
+    Replay,
     TimedContact,
 )
-from rotordrop.estimate.methods import Replay
 from rotordrop.estimate.published import Agreement
 from rotordrop.evidence.impacts import CONTACT_FROM
 from rotordrop.known import NINETY, Known

@@ -25,8 +25,7 @@ from rotordrop.files import new_hdf5, read_hdf5, require_file
 from rotordrop.labelled import read, write
 from rotordrop.rotor.parameters import DropModel
 from rotordrop.simulate.coast_down_result import CoastDownResult
-from rotordrop.simulate.fingerprint import fingerprint
-from rotordrop.simulate.result import HISTORIES, opened
+from rotordrop.simulate.result import HISTORIES, fingerprint, opened
 
 Arrays = dict[str, NDArray[np.float64]]
 

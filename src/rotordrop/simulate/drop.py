@@ -24,10 +24,16 @@ from rotordrop.simulate import _loop
 from rotordrop.simulate import _sampled as S
 from rotordrop.simulate._run import ENDED, PHASE, Run, Window, energies, follow, given_up, setup_of
 from rotordrop.simulate.case import DropCase, MagnetEvent, StateStart, UnbalanceJump
-from rotordrop.simulate.certificate import COMPARABLE_WINDOW, Certificate, peaks_of
 from rotordrop.simulate.levitation import start_of_drop
 from rotordrop.simulate.magnets import MagnetHistory, table_of_events
-from rotordrop.simulate.result import ContactLog, DropResult, stop_of
+from rotordrop.simulate.result import (
+    COMPARABLE_WINDOW,
+    Certificate,
+    ContactLog,
+    DropResult,
+    peaks_of,
+    stop_of,
+)
 
 
 def simulate_drop(machine: Machine | DropModel, case: DropCase, *, certify: bool = False) -> DropResult:

@@ -1,11 +1,18 @@
-"""The result of a simulation: named histories, how it ended, how far it can be trusted."""
+"""The result of a simulation: named histories, how it ended, how far it can be trusted, and its file.
+
+Every file carries the hash of a short probe drop. Where it differs, drops differ in their last digits at
+first and visibly some contacts later, so that comparing two files point by point means nothing; statistics
+still agree.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,11 +27,10 @@ from rotordrop.elements.face import AXIAL_STATE
 from rotordrop.errors import SimulationError, UsageError, needing
 from rotordrop.files import new_hdf5, read_hdf5
 from rotordrop.labelled import Stored, declared, put, read, write
-from rotordrop.machine import Machine
+from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.hertz import LineContact
 from rotordrop.require import each, require
 from rotordrop.rotor.layout import ROTOR_AXIAL
-from rotordrop.simulate.certificate import Certificate, refined_peak
 from rotordrop.simulate.heat import Heat
 from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
 from rotordrop.sketch import sketch
@@ -33,6 +39,68 @@ from rotordrop.units import format_quantity
 if TYPE_CHECKING:
     import pandas
     import xarray
+
+COMPARABLE_WINDOW = 0.02
+"""Window [s] over which histories are compared point by point; later the drop is chaotic."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certificate:
+    """Error certificate of one simulated drop."""
+
+    energy_residual: float
+    """Largest imbalance of stored, dissipated and supplied energy [J]."""
+    energy_scale: float
+    """Energy it is to be compared with: the largest change of stored energy [J]."""
+    peak_force: Array
+    """Peak magnitude of the ball force [N], shape (B,)."""
+    peak_change_tolerance: Array | None = None
+    """Relative change of the peak in the first 20 ms when the tolerance is ten times tighter [1], shape (B,).
+    """
+    peak_change_truncation: Array | None = None
+    """Relative change of the peak in the first 20 ms with eight more modes per plane [1], shape (B,)."""
+
+    def sentence(self) -> str:
+        """The certificate in words."""
+        parts = [f"energy balanced to {self.energy_residual:.2g} J of {self.energy_scale:.3g} J"]
+        if self.peak_change_tolerance is not None:
+            parts.append(
+                f"peak force in the first 20 ms moves {100 * np.max(self.peak_change_tolerance):.2g} % "
+                "at a ten times tighter tolerance"
+            )
+        if self.peak_change_truncation is not None:
+            parts.append(
+                f"and {100 * np.max(self.peak_change_truncation):.2g} % with eight more modes per plane"
+            )
+        return ", ".join(parts)
+
+
+def refined_peak(time: Array, values: Array) -> tuple[float, float]:
+    """Peak of a sampled history and its time [s], by a parabola through the largest sample and its
+    neighbours.
+
+    Parameters
+    ----------
+    time : ndarray, shape (T,)
+        Equidistant times [s].
+    values : ndarray, shape (T,)
+        History, for instance a force [N].
+    """
+    i = int(np.argmax(values))
+    if i == 0 or i == len(values) - 1:
+        return float(values[i]), float(time[i])
+    left, middle, right = (float(values[j]) for j in (i - 1, i, i + 1))
+    curvature = left - 2.0 * middle + right
+    if curvature >= 0.0:
+        return middle, float(time[i])
+    shift = 0.5 * (left - right) / curvature
+    return middle - 0.25 * (left - right) * shift, float(time[i] + shift * (time[i + 1] - time[i]))
+
+
+def peaks_of(time: Array, force: Array, until: float = np.inf) -> Array:
+    """Refined peaks [N], shape (B,), of force histories (T, B) up to a time [s]."""
+    inside = time <= until
+    return np.array([refined_peak(time[inside], force[inside, b])[0] for b in range(force.shape[1])])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,8 +376,6 @@ _FORMAT = "rotordrop drop 2"
 
 
 def _write(result: DropResult, file: Any) -> None:
-    from rotordrop.simulate.fingerprint import fingerprint
-
     file.attrs["format"] = _FORMAT
     file.attrs["fingerprint"] = fingerprint()
     file.attrs["Conventions"] = "CF-1.8"
@@ -361,3 +427,36 @@ def load_result(path: str | Path) -> DropResult:
             ),
             certificate=Certificate(**certificate),
         )
+
+
+PROBE_SPEED = 2.0 * np.pi * 100.0
+PROBE_DURATION = 12e-3
+"""From levitation to some milliseconds after the first contacts [s]: every part of the model takes part."""
+
+
+@lru_cache(maxsize=1)
+def fingerprint() -> str:
+    """SHA-256 (hexadecimal) of all histories of the probe drop on this computer, computed once a process.
+
+    Equal on two computers where a drop has the same bits on both.
+    """
+    return history_hash(probe_drop())
+
+
+def probe_drop() -> DropResult:
+    """The paper's machine dropped from its AMBs at 100 Hz, with few modes and for 12 ms."""
+    from rotordrop.simulate.case import DropCase, LevitatedStart
+    from rotordrop.simulate.drop import simulate_drop
+
+    case = DropCase(
+        speed=PROBE_SPEED, duration=PROBE_DURATION, reduction="quick", start=LevitatedStart(rotor_angle=1.0)
+    )
+    return simulate_drop(example_machine("paper"), case)
+
+
+def history_hash(result: DropResult) -> str:
+    """SHA-256 of every number of every history of a drop, in hexadecimal."""
+    digest = hashlib.sha256()
+    for values in (result.time, *(getattr(result, name) for name in HISTORIES)):
+        digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()

@@ -13,7 +13,7 @@ from rotordrop.arrays import Array
 from rotordrop.document import stated
 from rotordrop.errors import UsageError
 from rotordrop.known import Known
-from rotordrop.simulate.fingerprint import fingerprint
+from rotordrop.simulate.result import fingerprint
 from rotordrop.study.plan import Study
 from rotordrop.study.quantities import LIFT
 from rotordrop.study.repeat import Repeat

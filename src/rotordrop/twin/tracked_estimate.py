@@ -20,14 +20,15 @@ from rotordrop.estimate.estimate import (
     Estimate,
     FittedParameter,
     Innovations,
+    PlaneUnbalance,
     SensorErrors,
     SensorMotion,
+    Tracked,
     Verdict,
+    unbalance_notes,
 )
-from rotordrop.estimate.methods import Tracked
 from rotordrop.estimate.published import Advice, LaterMotion, later_warning
 from rotordrop.estimate.record_facts import RecordFacts
-from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
 from rotordrop.evidence.synchronous import MarkAngle, angle_since_mark
 from rotordrop.known import NINETY, Known
 from rotordrop.track.consistency import NIS_RANGE, Check

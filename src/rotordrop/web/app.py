@@ -6,25 +6,108 @@ import asyncio
 import contextlib
 import hmac
 import json
+import math
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib import import_module, resources
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from starlette.applications import Starlette
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from rotordrop.errors import DamagedFileError, OutputError, RotordropError, UsageError
 from rotordrop.jobs.runner import VERBS, Runner, Verb, published, result_folder, state_of
 from rotordrop.jobs.workspace import ROLES, Job, Role, Workspace, labelled
-from rotordrop.web import windows
 from rotordrop.web.desk import Desk, NotThereError, options_of, order_of, receive, verb_of
 from rotordrop.web.guard import App, Guard
+
+if TYPE_CHECKING:
+    from rotordrop.jobs.traces import Traces
+
+CSV_ROWS = 20_000
+"""Rows of a table that are made at once; chosen, not measured."""
+
+
+async def window(desk: Desk, request: Request) -> Response:
+    """Few samples that show a window of histories, in single precision."""
+    folder = await desk.found(request)
+
+    def shown() -> bytes:
+        from rotordrop.jobs.traces import MOST_POINTS, sent
+
+        traces, rows, start, end = _asked_window(folder, request)
+        points = min(max(int(_number(request, "points", MOST_POINTS)), 2), MOST_POINTS)
+        return sent(traces, rows, traces.window(rows, start, end, points))
+
+    return Response(await asyncio.to_thread(shown), media_type="application/octet-stream")
+
+
+async def csv(desk: Desk, request: Request) -> Response:
+    """Every sample of a window as a table, in SI units."""
+    import numpy as np
+
+    from rotordrop.estimate.histories import SIMULATED_COLUMN
+
+    folder = await desk.found(request)
+    traces, rows, start, end = await asyncio.to_thread(_asked_window, folder, request)
+    page = _page_of(folder)
+    first, last = np.searchsorted(traces.time, start), np.searchsorted(traces.time, end, side="right")
+
+    def table() -> Iterator[str]:
+        heads = ["time [s]", *(page["labels"][traces.columns[row]] for row in rows)]
+        yield ",".join([*heads, SIMULATED_COLUMN] if page["simulated"] else heads) + "\n"
+        for begin in range(int(first), int(last), CSV_ROWS):
+            stop = min(begin + CSV_ROWS, int(last))
+            columns = [[repr(float(time)) for time in traces.time[begin:stop]]]
+            columns += [[f"{value:.9g}" for value in traces.values[row, begin:stop].tolist()] for row in rows]
+            if page["simulated"]:
+                columns.append(["yes"] * (stop - begin))
+            yield "".join(",".join(line) + "\n" for line in zip(*columns, strict=True))
+
+    headers = {"content-disposition": 'attachment; filename="rotordrop.csv"'}
+    return StreamingResponse(table(), media_type="text/csv; charset=utf-8", headers=headers)
+
+
+def _asked_window(folder: Path, request: Request) -> tuple[Traces, list[int], float, float]:
+    from rotordrop.jobs.traces import open_traces
+
+    told = _page_of(folder).get("traces")
+    if told is None:
+        raise NotThereError("this result has no histories")
+    traces = open_traces(folder, told["name"], tuple(told["columns"]))
+    rows = traces.chosen(tuple(request.query_params.getlist("column")))
+    start, end = _number(request, "start", told["start"]), _number(request, "end", told["end"])
+    if not start < end:
+        raise UsageError(
+            f"the window from {start:g} s to {end:g} s holds nothing; give an end after its start"
+        )
+    return traces, rows, start, end
+
+
+def _number(request: Request, name: str, usual: float) -> float:
+    """A number that follows an address, or its usual value."""
+    text = request.query_params.get(name)
+    try:
+        value = float(usual if text is None else text)
+    except ValueError:
+        value = math.nan
+    if not abs(value) < 1e9:
+        raise UsageError(f"{name} is {labelled(str(text))!r}; expected a number")
+    return value
+
+
+@lru_cache(maxsize=64)
+def _page_of(folder: Path) -> dict[str, Any]:
+    """What the routes need of the content of a page."""
+    file = folder / "page.json"
+    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    return {key: found[key] for key in ("traces", "labels", "simulated") if key in found}
+
 
 ASSETS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 """What of the folder of the page is sent, by its ending."""
@@ -274,8 +357,8 @@ OPERATIONS = (
     Operation("POST", f"{_RESULT}/cancel", cancel),
     Operation("GET", f"{_RESULT}/page", partial(found_file, "page.json")),
     Operation("GET", f"{_RESULT}/document", partial(found_file, "document.json")),
-    Operation("GET", f"{_RESULT}/window", windows.window, _WINDOW),
-    Operation("GET", f"{_RESULT}/csv", windows.csv, _WINDOW[:3]),
+    Operation("GET", f"{_RESULT}/window", window, _WINDOW),
+    Operation("GET", f"{_RESULT}/csv", csv, _WINDOW[:3]),
 )
 
 

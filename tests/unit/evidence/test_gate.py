@@ -25,13 +25,13 @@ from rotordrop.evidence.quality import (
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.fall import fell_as_described
-from rotordrop.evidence.quality.low_pass import check_low_pass
 from rotordrop.evidence.quality.motion import check_rotation_line, check_units, first_motion
 from rotordrop.evidence.quality.recorder import (
     check_blocks,
     check_clock,
     check_continuity,
     check_coupling,
+    check_low_pass,
     check_speed,
 )
 from rotordrop.evidence.quality.tail import check_rest_in_record

@@ -8,8 +8,7 @@ import pytest
 from rotordrop.estimate.document import estimate_document
 from rotordrop.physics.hertz import LineContact
 from rotordrop.report.estimate_page import estimate_page
-from rotordrop.simulate.certificate import Certificate
-from rotordrop.simulate.result import ContactLog, DropResult
+from rotordrop.simulate.result import Certificate, ContactLog, DropResult
 
 GAPS = (275e-6, 285e-6)
 TIME = np.linspace(0.0, 0.2, 4001)

@@ -24,8 +24,14 @@ from rotordrop.evidence.evidence import insisted
 from rotordrop.files import new_hdf5
 from rotordrop.machine import example_machine, loads_machine
 from rotordrop.simulate.expected_steps import MANY_STEPS, expected_steps
-from rotordrop.simulate.fingerprint import fingerprint, history_hash, probe_drop
-from rotordrop.simulate.result import ContactLog, DropResult, load_result
+from rotordrop.simulate.result import (
+    ContactLog,
+    DropResult,
+    fingerprint,
+    history_hash,
+    load_result,
+    probe_drop,
+)
 
 
 def test_texts_are_read_with_their_units():

@@ -10,7 +10,7 @@ import pytest
 from rotordrop import build_drop_model, example_machine, example_record_path, load_machine, read_record
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.document import estimate_document
-from rotordrop.estimate.unbalance import PlaneUnbalance, unbalance_notes
+from rotordrop.estimate.estimate import PlaneUnbalance, unbalance_notes
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.evidence.synchronous import MarkAngle
 from rotordrop.known import NINETY

@@ -40,7 +40,6 @@ from rotordrop.evidence.quality.finding import (
     stops,
 )
 from rotordrop.evidence.quality.flight import check_flights, gains_hold
-from rotordrop.evidence.quality.low_pass import check_low_pass
 from rotordrop.evidence.quality.motion import (
     check_gaps,
     check_length,
@@ -55,6 +54,7 @@ from rotordrop.evidence.quality.recorder import (
     check_blocks,
     check_clock,
     check_coupling,
+    check_low_pass,
     check_speed,
 )
 from rotordrop.evidence.quality.tail import check_rest_in_record, check_tail
