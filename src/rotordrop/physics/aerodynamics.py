@@ -5,10 +5,7 @@ from __future__ import annotations
 from rotordrop.physics._compile import kernel
 from rotordrop.physics.elementary import exp
 
-OFF = 0
-EXPONENTIAL_IN_TIME = 1
-PRESCRIBED_SPEED = 2
-FUNCTION_OF_SPEED = 3
+OFF, EXPONENTIAL_IN_TIME, PRESCRIBED_SPEED, FUNCTION_OF_SPEED = range(4)
 
 
 @kernel

@@ -23,32 +23,20 @@ if TYPE_CHECKING:
 LANES = 8
 
 # Entries of a ball set; SI units.
-BALL_STIFFNESS = 0
-GROOVE_DISTANCE = 1
-RADIAL_OFFSET = 2
-AXIAL_OFFSET = 3
-STRESS_COEFFICIENT = 4
-N_ENTRIES = 5
+BALL_STIFFNESS, GROOVE_DISTANCE, RADIAL_OFFSET, AXIAL_OFFSET, STRESS_COEFFICIENT, N_ENTRIES = range(6)
 
 # Entries of a rolling bearing: its ball set, then its drag and damping, then the axial force of its rows that
 # brakes the race beside the radial one (zero unless the bearing warms), then the dashpots along the lines of
 # contact of all balls over the radial damping [1]; SI units.
-DRAG_COEFFICIENT = N_ENTRIES
-DRAG_SPEED = N_ENTRIES + 1
-PITCH_DIAMETER = N_ENTRIES + 2
-DAMPING = N_ENTRIES + 3
-PRESSED = N_ENTRIES + 4
-LINES = N_ENTRIES + 5
-ROLLING_N_ENTRIES = N_ENTRIES + 6
+DRAG_COEFFICIENT, DRAG_SPEED, PITCH_DIAMETER, DAMPING = range(N_ENTRIES, N_ENTRIES + 4)
+PRESSED, LINES, ROLLING_N_ENTRIES = range(N_ENTRIES + 4, N_ENTRIES + 7)
 
 LEAST_DAMPING = 1e-9
 """Share of a loaded ball's stiffness [1] added to what holds a loose race, sideways perhaps nothing."""
 
 
 # Rows of the array of balls.
-COSINE = 0
-SINE = 1
-COUNT = 2
+COSINE, SINE, COUNT = range(3)
 
 
 def ball_set_entries(constants: BearingConstants) -> Array:

@@ -23,12 +23,7 @@ if TYPE_CHECKING:
 
 
 # Entries of a table of balls at speed; SI units. A step of the speed of zero is balls without inertia.
-SPEED_STEP = 0
-TOUCH = 1
-FIRST = 2
-STEP = 3
-OUTER_STRESS = 4
-N_ENTRIES = 5
+SPEED_STEP, TOUCH, FIRST, STEP, OUTER_STRESS, N_ENTRIES = range(6)
 
 PLACES, SPEEDS = 129, 97
 """Nodes of the table: forces come out within 1e-6 of the largest one, and so does their change with speed."""

@@ -36,10 +36,7 @@ CONTACT_END = CONTACT + contact.N_ENTRIES
 CONTACT_STIFFNESS = CONTACT + contact.STIFFNESS
 CONTACT_EXPONENT = CONTACT + contact.EXPONENT
 CONTACT_DAMPING = CONTACT + contact.DAMPING
-RACE_MASS = TOUCH_END
-RACE_INERTIA = TOUCH_END + 1
-RACE_WEIGHT = TOUCH_END + 2
-ROLLING = TOUCH_END + 3
+RACE_MASS, RACE_INERTIA, RACE_WEIGHT, ROLLING = range(TOUCH_END, TOUCH_END + 4)
 ROLLING_END = ROLLING + ball_set.ROLLING_N_ENTRIES
 BALL_SET = ROLLING
 BALL_SET_END = BALL_SET + ball_set.N_ENTRIES
@@ -56,12 +53,8 @@ PITCH_DIAMETER = ROLLING + ball_set.PITCH_DIAMETER
 BEARING_DAMPING = ROLLING + ball_set.DAMPING
 PRESSED = ROLLING + ball_set.PRESSED
 LINES = ROLLING + ball_set.LINES
-SUPPORT_MASS_X = ROLLING_END
-SUPPORT_MASS_Y = ROLLING_END + 1
-SUPPORT_STIFFNESS_X = ROLLING_END + 2
-SUPPORT_STIFFNESS_Y = ROLLING_END + 3
-SUPPORT_DAMPING_X = ROLLING_END + 4
-SUPPORT_DAMPING_Y = ROLLING_END + 5
+SUPPORT_MASS_X, SUPPORT_MASS_Y, SUPPORT_STIFFNESS_X = range(ROLLING_END, ROLLING_END + 3)
+SUPPORT_STIFFNESS_Y, SUPPORT_DAMPING_X, SUPPORT_DAMPING_Y = range(ROLLING_END + 3, ROLLING_END + 6)
 SUPPORT_FORM = ROLLING_END + 6
 SUPPORT_FORM_END = SUPPORT_FORM + support.N_ENTRIES
 MOUNT = SUPPORT_FORM_END
@@ -82,40 +75,17 @@ N_BEARING_COLUMNS = LANDING_SLEEVE_END
 
 # Entries of `KernelParameters.spin`: of the rotor as a whole, how it turns, what holds it along its axis
 # and what pushes it sideways.
-POLAR_INERTIA = 0
-INITIAL_SPEED = 1
-AERO_TIME_CONSTANT = 2
-AERO_LINEAR = 3
-AERO_QUADRATIC = 4
-POWER_OFF_DELAY = 5
-REMANENCE_TIME_CONSTANT = 6
-ROTOR_MASS = 7
-AXIAL_STIFFNESS = 8
-AXIAL_DAMPING = 9
-AXIAL_HOLDING = 10
-CLOCK_ERROR = 11
-SIDE_FORCE = 12
-N_SPIN_ENTRIES = 13
+POLAR_INERTIA, INITIAL_SPEED, AERO_TIME_CONSTANT, AERO_LINEAR, AERO_QUADRATIC, POWER_OFF_DELAY = range(6)
+REMANENCE_TIME_CONSTANT, ROTOR_MASS, AXIAL_STIFFNESS, AXIAL_DAMPING, AXIAL_HOLDING, CLOCK_ERROR = range(6, 12)
+SIDE_FORCE, N_SPIN_ENTRIES = range(12, 14)
 
 # Entries of `KernelParameters.flags`.
-SPIN_MODE = 0
-MAGNETS_ACT = 1
-LOADS_ACT = 2
-LOOPS_ACT = 3
-N_FLAGS = 4
+SPIN_MODE, MAGNETS_ACT, LOADS_ACT, LOOPS_ACT, N_FLAGS = range(5)
 
 # Columns of `KernelParameters.magnet`, one row per AMB: remanent force, holding force [N], spring, damper,
 # reference, whether it holds on when the others let go.
-REMANENT_X = 0
-REMANENT_Y = 1
-HOLDING_X = 2
-HOLDING_Y = 3
-AMB_STIFFNESS = 4
-AMB_DAMPING = 5
-AMB_REFERENCE_X = 6
-AMB_REFERENCE_Y = 7
-AMB_STAYS = 8
-N_MAGNET_COLUMNS = 9
+REMANENT_X, REMANENT_Y, HOLDING_X, HOLDING_Y, AMB_STIFFNESS, AMB_DAMPING, AMB_REFERENCE_X = range(7)
+AMB_REFERENCE_Y, AMB_STAYS, N_MAGNET_COLUMNS = range(7, 10)
 
 # Behind these, in a model whose magnets are in the loop: numbers of coils and controller, then the shape (m,)
 # of the plane that the controller measures.
@@ -125,61 +95,31 @@ LOOP_END = LOOP + magnet.N_NUMBERS
 # Columns of `KernelParameters.load`, one row per load, that of the ground last: value along x and y, power of
 # the speed and its nominal, speed and phase of a sine, first point of its course and the one behind its last,
 # whether it is the acceleration of the ground, whether its value along x is one along the axis of the rotor.
-LOAD_X = 0
-LOAD_Y = 1
-LOAD_EXPONENT = 2
-LOAD_NOMINAL = 3
-LOAD_TURN = 4
-LOAD_PHASE = 5
-LOAD_FIRST = 6
-LOAD_END = 7
-LOAD_OF_BASE = 8
-LOAD_AXIAL = 9
-N_LOAD_COLUMNS = 10
+LOAD_X, LOAD_Y, LOAD_EXPONENT, LOAD_NOMINAL, LOAD_TURN, LOAD_PHASE, LOAD_FIRST, LOAD_END = range(8)
+LOAD_OF_BASE, LOAD_AXIAL, N_LOAD_COLUMNS = range(8, 11)
 
 # Entries of `KernelParameters.rotor_at`: where the states of the rotor, its books and the whole vector stand.
 # The velocity of a coordinate stands N_COORDINATES behind it. The step control looks at the first
 # N_CONTROLLED states, the filter estimates the first N_DYNAMIC. AXIAL is the place of the axial displacement
 # of the rotor, its velocity behind it; -1 where it does not move along its axis.
-MODES_X = 0
-MODES_Y = 1
-ROTOR_SPEED = 2
-ROTOR_ANGLE = 3
-DISSIPATED = 4
-WORK_IN = 5
-N_COORDINATES = 6
-N_CONTROLLED = 7
-N_DYNAMIC = 8
-N_STATES = 9
-AXIAL = 10
-N_ROTOR_PLACES = 11
+MODES_X, MODES_Y, ROTOR_SPEED, ROTOR_ANGLE, DISSIPATED, WORK_IN, N_COORDINATES, N_CONTROLLED = range(8)
+N_DYNAMIC, N_STATES, AXIAL, N_ROTOR_PLACES = range(8, 12)
 
 # Columns of `KernelParameters.bearing_at`, one row per touchdown bearing: place of its race and of its
 # support (x, then y), of the spin of its race and of the first of its further states; -1 where it has none.
 # Then its first contact and the one behind its last, and the first state of its mount, of its sprung rings
 # and of the axial motion of its race; -1 without one.
-RACE = 0
-SUPPORT = 1
-RACE_SPIN = 2
-BEARING_OWN = 3
-CONTACTS = 4
-CONTACTS_END = 5
-MOUNT_STATES = 6
-RING_STATES = 7
-FACE_STATES = 8
-N_BEARING_PLACES = 9
+RACE, SUPPORT, RACE_SPIN, BEARING_OWN, CONTACTS, CONTACTS_END, MOUNT_STATES, RING_STATES = range(8)
+FACE_STATES, N_BEARING_PLACES = range(8, 10)
 
 # Columns of `KernelParameters.contact_at`, one row per contact, those of a bearing side by side: the bearing
 # whose row holds its numbers, place of the body that the rotor touches (x, then y), place of the spin of that
 # body; -1 where it does not turn.
-CONTACT_BEARING = 0
-CONTACT_BODY = 1
-CONTACT_SPIN = 2
+CONTACT_BEARING, CONTACT_BODY, CONTACT_SPIN = range(3)
 
 # Columns of `KernelParameters.magnet_at`, one row per AMB in the loop: place of the first of its currents
 # (x+, x-, y+, y-), and of the first entry that it has in the memory, behind the clock of all.
-MAGNET_OWN = 0
-MAGNET_MEMORY = 1
+MAGNET_OWN, MAGNET_MEMORY = range(2)
 
 # Kinds of states: they set error scale, process noise and prior.
 POSITION, VELOCITY, SPIN, INTERNAL, ANGLE, HEAT, AUDIT = range(7)

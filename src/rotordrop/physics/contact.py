@@ -14,10 +14,7 @@ from rotordrop.physics._compile import inner_kernel, kernel
 from rotordrop.physics.elementary import power
 
 # Entries of a contact law; SI units.
-STIFFNESS = 0
-EXPONENT = 1
-DAMPING = 2
-N_ENTRIES = 3
+STIFFNESS, EXPONENT, DAMPING, N_ENTRIES = range(4)
 
 
 def contact_law(stiffness: float, exponent: float, damping: float) -> Array:

@@ -13,11 +13,7 @@ from rotordrop.physics.friction import SMOOTHING_SPEED, stribeck_coefficient
 
 # Entries of an axial face; SI units. A side of zero is a face on both sides, of one and minus one a face that
 # stops the rotor towards +z and -z.
-GAP = 0
-SIDE = 1
-RADIUS = 2
-FRICTION = 3
-LAW = 4
+GAP, SIDE, RADIUS, FRICTION, LAW = range(5)
 N_ENTRIES = LAW + contact.N_ENTRIES
 
 POINTS = 8

@@ -15,12 +15,7 @@ from rotordrop.physics._compile import lean_kernel
 from rotordrop.physics.elementary import sine_cosine
 
 # Entries of a landing sleeve; SI units. PRESENT is one where a machine describes it, though it were round.
-PRESENT = 0
-ONCE_COSINE = 1
-ONCE_SINE = 2
-TWICE_COSINE = 3
-TWICE_SINE = 4
-N_ENTRIES = 5
+PRESENT, ONCE_COSINE, ONCE_SINE, TWICE_COSINE, TWICE_SINE, N_ENTRIES = range(6)
 
 LARGEST_OVAL = 1.0 / 12.0
 """Largest amplitude twice a turn over the air gap [1]: up to a quarter there is one place of contact, and up

@@ -22,19 +22,8 @@ MOST_PENDING = 8
 
 # Numbers of a magnet and its controller; SI units. FEED is what the controller puts out beside its own
 # states, x and y; INPUT, OUTPUT and UNWIND are vectors over its states, STEP is the matrix that moves them.
-FORCE = 0
-GAP = 1
-BIAS = 2
-LEAKAGE = 3
-RESISTANCE = 4
-VOLTAGE = 5
-CURRENT_LIMIT = 6
-BANDWIDTH = 7
-SAMPLE_TIME = 8
-DELAY = 9
-OUTPUT_LIMIT = 10
-ORDER = 11
-FEED = 12
+FORCE, GAP, BIAS, LEAKAGE, RESISTANCE, VOLTAGE, CURRENT_LIMIT, BANDWIDTH, SAMPLE_TIME, DELAY = range(10)
+OUTPUT_LIMIT, ORDER, FEED = range(10, 13)
 DIRECT = 14
 INPUT = 15
 OUTPUT = INPUT + MOST_STATES
@@ -44,10 +33,7 @@ N_NUMBERS = STEP + MOST_STATES * MOST_STATES
 
 # What is remembered of an axis: what it does, the control current that is asked for [A], the last output [A],
 # the states of the controller, outputs on their way.
-MODE = 0
-REFERENCE = 1
-LAST = 2
-STATES = 3
+MODE, REFERENCE, LAST, STATES = range(4)
 PENDING = STATES + MOST_STATES
 N_AXIS = PENDING + MOST_PENDING
 N_MEMORY = 2 * N_AXIS
@@ -57,11 +43,7 @@ N_MEMORY = 2 * N_AXIS
 OFF, LEVITATES, HOLDS, LOST, DECAYS = range(5)
 
 # The clock of all magnets: samples taken, outputs made, events past, time since when the rotor is quiet [s].
-SAMPLES = 0
-OUTPUTS = 1
-EVENTS = 2
-QUIET = 3
-N_CLOCK = 4
+SAMPLES, OUTPUTS, EVENTS, QUIET, N_CLOCK = range(5)
 
 
 def force_constant(turns: float, pole_area: float, angle: float) -> float:

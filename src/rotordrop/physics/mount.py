@@ -15,15 +15,10 @@ from rotordrop.physics._compile import inner_kernel
 from rotordrop.physics.elementary import power
 
 # Entries of a mount; SI units. All at zero is none: no stop, no ribbon, no branch that relaxes.
-PRESENT = 0
-STATES = 1
-GAP = 2
-STOP = 3
+PRESENT, STATES, GAP, STOP = range(4)
 STOP_END = STOP + contact.N_ENTRIES
 RIBBON = STOP_END
-SLIP = STOP_END + 1
-SHARPNESS = STOP_END + 2
-BRANCHES = STOP_END + 3
+SLIP, SHARPNESS, BRANCHES = range(STOP_END + 1, STOP_END + 4)
 BRANCH_ENTRIES = 2
 MOST_BRANCHES = 3
 N_ENTRIES = BRANCHES + BRANCH_ENTRIES * MOST_BRANCHES

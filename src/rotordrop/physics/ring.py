@@ -24,16 +24,7 @@ if TYPE_CHECKING:
 # Entries of the rings that springs press on; SI units. Mass zero is a preload by rigid spacers. GROWN is what
 # heat adds to the radial offset of the balls, and no part of what the springs were set to. DAMPING is that of
 # a ring over that of dashpots along the lines of contact.
-MASS = 0
-RATE = 1
-TRAVEL = 2
-STOP = 3
-FRICTION = 4
-BALLS = 5
-ROWS = 6
-GROWN = 7
-DAMPING = 8
-N_ENTRIES = 9
+MASS, RATE, TRAVEL, STOP, FRICTION, BALLS, ROWS, GROWN, DAMPING, N_ENTRIES = range(10)
 
 SMOOTHING_SPEED = 1e-2
 """Speed of a ring [m/s] below which the friction of its fit is smoothed: chosen, not measured. A hundredth of

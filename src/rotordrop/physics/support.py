@@ -12,14 +12,8 @@ from rotordrop.arrays import Array
 from rotordrop.physics._compile import inner_kernel
 
 # Entries of a form; SI units. All at zero is the plain support.
-PRESENT = 0
-COUPLING = 1
-CUBIC = 2
-FOUNDATION_SHARE = 3
-FOUNDATION_SPEED = 4
-FOUNDATION_DAMPING = 5
-FRICTION = 6
-N_ENTRIES = 7
+PRESENT, COUPLING, CUBIC, FOUNDATION_SHARE, FOUNDATION_SPEED, FOUNDATION_DAMPING = range(6)
+FRICTION, N_ENTRIES = range(6, 8)
 
 SLOW = 1e-3
 """Speed [m/s] below which friction in a support gives way like a damper: small against the 10 to 100 mm/s of

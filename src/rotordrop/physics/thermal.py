@@ -32,24 +32,12 @@ N_NODES = 6
 CAPACITY = 0
 CONDUCTANCE = CAPACITY + N_NODES
 SLEEVE_OUT = CONDUCTANCE + N_NODES - 1
-HOUSING_OUT = SLEEVE_OUT + 1
-SLIP_SHARE = HOUSING_OUT + 1
-BALL_SHARE = SLIP_SHARE + 1
-EXPANSION = BALL_SHARE + 1
-BALL_EXPANSION = EXPANSION + 1
-INNER_RADIUS = BALL_EXPANSION + 1
-OUTER_RADIUS = INNER_RADIUS + 1
-BALL_REACH = OUTER_RADIUS + 1
-ROWS = BALL_REACH + 1
-ROW_BALLS = ROWS + 1
-N_ENTRIES = ROW_BALLS + 1
+HOUSING_OUT, SLIP_SHARE, BALL_SHARE, EXPANSION, BALL_EXPANSION = range(SLEEVE_OUT + 1, SLEEVE_OUT + 6)
+INNER_RADIUS, OUTER_RADIUS, BALL_REACH, ROWS, ROW_BALLS, N_ENTRIES = range(SLEEVE_OUT + 6, SLEEVE_OUT + 12)
 
 # What is remembered of every bearing that warms: temperatures of its nodes [K], heat taken up and gone
 # outwards [J], how fast its temperatures last changed [K/s].
-TAKEN = N_NODES
-GONE = TAKEN + 1
-CHANGE = GONE + 1
-N_MEMORY = CHANGE + 1
+TAKEN, GONE, CHANGE, N_MEMORY = range(N_NODES, N_NODES + 4)
 
 SKIN_SHARE = 0.25
 """Share of the race that is its skin [1]: the two halves of the row then follow the slowest wave of heat

@@ -15,14 +15,8 @@ from rotordrop.physics.friction import stribeck_coefficient
 from rotordrop.physics.spin import surface_speed
 
 # Entries of a contact; SI units.
-AIR_GAP = 0
-ROTOR_RADIUS = 1
-BORE_RADIUS = 2
-FRICTION_STATIC = 3
-FRICTION_DYNAMIC = 4
-STRIBECK_SPEED = 5
-SMOOTHING_SPEED = 6
-LAW = 7
+AIR_GAP, ROTOR_RADIUS, BORE_RADIUS, FRICTION_STATIC, FRICTION_DYNAMIC, STRIBECK_SPEED = range(6)
+SMOOTHING_SPEED, LAW = range(6, 8)
 N_ENTRIES = LAW + contact.N_ENTRIES
 
 

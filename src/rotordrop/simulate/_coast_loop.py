@@ -10,15 +10,8 @@ from rotordrop.physics.elementary import atan2
 from rotordrop.simulate._loop import RUN_IN_CONTACT
 
 # Columns of the whirl of each bearing: the present sweep of the azimuth, and the time spent in whole turns.
-AZIMUTH = 0
-SWEEP_START = 1
-SWEEP_START_TIME = 2
-SWEEP_END = 3
-SWEEP_END_TIME = 4
-SWEEP_SENSE = 5
-FORWARD_TIME = 6
-BACKWARD_TIME = 7
-N_WHIRL = 8
+AZIMUTH, SWEEP_START, SWEEP_START_TIME, SWEEP_END, SWEEP_END_TIME, SWEEP_SENSE, FORWARD_TIME = range(7)
+BACKWARD_TIME, N_WHIRL = range(7, 9)
 
 TURNING_BACK = 0.5 * math.pi
 """An azimuth that falls back by more than this [rad] has turned round; less is the shiver of an impact."""

@@ -39,41 +39,17 @@ from rotordrop.simulate._rhs import (
 from rotordrop.simulate._tableau import Tableau
 
 # Outcome of the loop.
-FINISHED = 0
-STEP_TOO_SMALL = 1
-TOO_MANY_STEPS = 2
-NOT_FINITE = 3
-STANDSTILL = 4
+FINISHED, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, STANDSTILL = range(5)
 
 # Columns of the contact log.
-LOG_CONTACT = 0
-LOG_START = 1
-LOG_END = 2
-LOG_PEAK_FORCE = 3
-LOG_PEAK_TIME = 4
-LOG_AZIMUTH = 5
-LOG_IMPULSE = 6
-LOG_DISSIPATED = 7
-LOG_SLIDING = 8
-N_LOG_COLUMNS = 9
+LOG_CONTACT, LOG_START, LOG_END, LOG_PEAK_FORCE, LOG_PEAK_TIME, LOG_AZIMUTH, LOG_IMPULSE = range(7)
+LOG_DISSIPATED, LOG_SLIDING, N_LOG_COLUMNS = range(7, 10)
 
 # Columns of the running state of each contact.
-RUN_IN_CONTACT = 0
-RUN_FORCE = 1
-RUN_POWER = 2
-RUN_DELTA = 3
-RUN_SLIDING = 4
-N_RUN_COLUMNS = 5
+RUN_IN_CONTACT, RUN_FORCE, RUN_POWER, RUN_DELTA, RUN_SLIDING, N_RUN_COLUMNS = range(6)
 
 # Entries of the progress array.
-TIME = 0
-STEP = 1
-PREVIOUS_ERROR = 2
-ACCEPTED = 3
-REJECTED = 4
-SAMPLES = 5
-LOGGED = 6
-N_PROGRESS = 7
+TIME, STEP, PREVIOUS_ERROR, ACCEPTED, REJECTED, SAMPLES, LOGGED, N_PROGRESS = range(8)
 
 # Columns of the peaks of each bearing: value and time of each quantity, then the largest travel of the race
 # [m²].

@@ -22,13 +22,7 @@ from rotordrop.simulate._tableau import Tableau
 
 # Columns of the table of events, in order: what lets one happen and its value (time [s], speed [rad/s],
 # velocity [m/s]); what the axes do from then on; magnet and axis, -1 for all; when it happened [s].
-EVENT_KIND = 0
-EVENT_VALUE = 1
-EVENT_MODE = 2
-EVENT_MAGNET = 3
-EVENT_AXIS = 4
-EVENT_TIME = 5
-N_EVENT_COLUMNS = 6
+EVENT_KIND, EVENT_VALUE, EVENT_MODE, EVENT_MAGNET, EVENT_AXIS, EVENT_TIME, N_EVENT_COLUMNS = range(7)
 AT_TIME, BELOW_SPEED, AT_REST = range(3)
 
 REST_TIME = 0.02
