@@ -42,8 +42,14 @@ from rotordrop.report.style import (
     square,
     words,
 )
-from rotordrop.spectrum.coast_down import RACES_SPUN_UP, SENSOR_NOISE, SHORTEST_LAW, SpeedLaw
-from rotordrop.spectrum.indentation import PAPER_WINDOW, DisplacementHistory
+from rotordrop.spectrum.coast_down import (
+    PAPER_WINDOW,
+    RACES_SPUN_UP,
+    SENSOR_NOISE,
+    SHORTEST_LAW,
+    DisplacementHistory,
+    SpeedLaw,
+)
 from rotordrop.spectrum.lines import Line
 from rotordrop.spectrum.orders import LEAST_APART, REVOLUTIONS, STEADY_APART, OrderTrack
 from rotordrop.spectrum.waterfall import Waterfall

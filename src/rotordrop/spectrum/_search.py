@@ -31,7 +31,7 @@ from rotordrop.spectrum._views import (
     smooth,
 )
 from rotordrop.spectrum.candidates import LineKind
-from rotordrop.spectrum.detection import (
+from rotordrop.spectrum.waterfall import (
     FALSE_ALARM,
     Peak,
     clearest_peak,

@@ -14,8 +14,8 @@ from scipy.signal import firwin, upfirdn
 
 from rotordrop.arrays import Array, ComplexArray, Mask
 from rotordrop.spectrum.candidates import LineKind
-from rotordrop.spectrum.detection import FramePower, frame_power, order_power
 from rotordrop.spectrum.speed import FrequencyPath, SpeedProfile
+from rotordrop.spectrum.waterfall import FramePower, frame_power, order_power
 
 LOWEST_FREQUENCY, HIGHEST_ORDER = 5.0, 20.0
 """Where lines are looked for [Hz], [1]."""

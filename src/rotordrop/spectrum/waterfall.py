@@ -1,16 +1,23 @@
-"""Overlapping frames of a displacement, their spectra, and fewer samples where low frequencies matter."""
+"""Overlapping frames of a displacement, their spectra, and the clearest line in them against the noise floor.
+
+Fewer samples where low frequencies matter.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, cast
+from typing import Any, Literal, Protocol, cast
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import firwin, upfirdn
+from scipy.fft import fft, next_fast_len, rfft
+from scipy.ndimage import map_coordinates, spline_filter1d
+from scipy.signal import firwin, resample_poly, upfirdn
 
-from rotordrop.arrays import Array
+from rotordrop.arrays import Array, Mask
 from rotordrop.errors import RecordError
 
 Component = Literal["x", "y", "full"]
@@ -243,3 +250,311 @@ def _extended(displacement: PlanarSignal, first: int, last: int) -> Array:
     before, after = np.arange(first, 0)[:, None], np.arange(1, last - samples + 1)[:, None]
     inside = np.asarray(displacement[max(first, 0) : min(last, samples)], dtype=np.float64)
     return np.concatenate([ends[0] + slope * before, inside, ends[1] + slope * after])
+
+
+UPSAMPLING = 3
+SPLINE_DEGREE = 5
+"""Finer sampling, and degree of the spline through it, before the signal is read at equal angles (chosen)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FramePower:
+    """Power of each channel over a coordinate (frequency or order), frame by frame."""
+
+    time: Array
+    """Middle of each frame [s], shape (F,)."""
+    coordinate: Array
+    """Frequency [Hz] or order [1], shape (K,)."""
+    power: Array
+    """Square of the zero-to-peak amplitude [m²]; nan where a frame does not reach, shape (F, K, C)."""
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring coordinates."""
+        return float(self.coordinate[1] - self.coordinate[0])
+
+
+def frame_power(
+    signal: NDArray[Any], sampling_rate: float, *, start_time: float, frame: float, highest: float
+) -> FramePower:
+    """Power over frequency in half-overlapping Hann frames.
+
+    The signal (N, C) is the displacement of every channel [m]; or, complex, twice the displacement turned
+    back by the phase of a path, whose power is found on both sides of the path. A frame [s] is drawn out to a
+    number of samples that transforms fast; kept is what lies below the highest frequency, or nearer to the
+    path [Hz].
+    """
+    turned = np.iscomplexobj(signal)
+    half = next_fast_len(max(round(frame * sampling_rate / 2), 8), real=not turned)
+    points = min(2 * half, len(signal) // 2 * 2)
+    window = hann_window(points)
+    starts = np.arange(0, len(signal) - points + 1, points // 2)
+    frequency = (np.fft.fftfreq if turned else np.fft.rfftfreq)(points, 1.0 / sampling_rate)
+    kept = np.flatnonzero(np.abs(frequency) <= highest)
+    kept = kept[np.argsort(frequency[kept])]
+    power = np.empty((starts.size, kept.size, signal.shape[1]))
+    for channel in range(signal.shape[1]):
+        frames = sliding_window_view(signal[:, channel], points)[:: points // 2]
+        if turned:
+            spectrum = fft(frames * window, overwrite_x=True)[:, kept]
+        else:
+            spectrum = rfft((frames - frames.mean(axis=1, keepdims=True)) * window, overwrite_x=True)[:, kept]
+        power[:, :, channel] = np.abs(spectrum) ** 2
+    power *= ((2.0 if turned else 4.0) / points) ** 2
+    middle = start_time + (starts.astype(np.float64) + points / 2) / sampling_rate
+    return FramePower(time=middle, coordinate=cast(Array, frequency[kept]), power=power)
+
+
+def order_power(
+    signal: Array,
+    time: Array,
+    angle: Array,
+    speed: Array,
+    *,
+    turns: int,
+    highest_order: float,
+    highest_frequency: float,
+    lowest_speed: float,
+) -> FramePower | None:
+    """Power over order in half-overlapping Hann frames of equal rotor angle; None if not one frame fits.
+
+    The signal (N, C) is the displacement of every channel [m], with time [s], rotor angle [rad] and speed
+    [rad/s] (N,) at every sample. Frequencies above the highest [Hz] are not in the signal any more; frames
+    that reach below the lowest speed [rad/s] are left out.
+    """
+    angle = angle / math.tau
+    slow = np.flatnonzero(speed < lowest_speed)
+    end = float(angle[slow[0]] if slow.size else angle[-1])
+    starts = np.arange(float(angle[0]), end - turns, turns / 2)
+    if starts.size == 0:
+        return None
+    fine = spline_filter1d(resample_poly(signal.T, UPSAMPLING, 1, axis=1, padtype="line"), SPLINE_DEGREE)
+    coordinate = np.arange(int(highest_order * turns) + 1) / turns
+    power = np.full((starts.size, coordinate.size, signal.shape[1]), np.nan)
+    middle, steps = np.empty(starts.size), np.arange(float(len(angle)))
+    for row, start in enumerate(starts):
+        first, last = np.searchsorted(angle, [start, start + turns])
+        points = int(turns * max(math.ceil((last - first) / turns * 1.5), 4))
+        turned = start + np.arange(points) * turns / points
+        near = slice(max(first - 1, 0), last + 1)
+        place = (near.start + np.interp(turned, angle[near], steps[: len(angle[near])])) * UPSAMPLING
+        middle[row] = np.interp(start + turns / 2, angle[near], time[near])
+        cut = np.stack([map_coordinates(one, [place], order=SPLINE_DEGREE, prefilter=False) for one in fine])
+        spectrum = rfft((cut - cut.mean(axis=1, keepdims=True)) * hann_window(points)).T
+        fastest = speed[min(first, len(time) - 1)] / math.tau
+        reach = min(coordinate.size, len(spectrum), int(highest_frequency / fastest * turns) + 1)
+        power[row, :reach] = np.abs(spectrum[:reach]) ** 2 * (4.0 / points) ** 2
+    return FramePower(time=middle, coordinate=coordinate, power=power)
+
+
+MEDIAN_OF_NOISE = math.log(2.0)
+"""Median over mean of the power of noise in one frame [1]."""
+
+HANN_OVERLAP_SHARE = 1.0 / 18.0
+"""How much half-overlapping Hann frames repeat each other: averages counted as n / (1 + share)."""
+
+
+LEAST_RATIO = 2.0
+"""Amplitude over the local floor from which a peak counts as a line [1]."""
+FALSE_ALARM = 1e-3
+"""Accepted probability that noise alone shows any line in the whole search [1]."""
+FLOOR_LINES = 81
+"""Neighbouring lines whose median is the local floor [1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """The clearest peak of a view."""
+
+    coordinate: float
+    """Frequency [Hz] or order [1], interpolated between lines."""
+    channel: int
+    """Channel in which it is clearest."""
+    first: int
+    last: int
+    """Frames it was found in, last one excluded."""
+    amplitude: float
+    floor: float
+    """Zero-to-peak amplitude and local floor [m]."""
+    score: float
+    """Minus the logarithm of the probability that noise alone shows it [1]."""
+    width: float
+    """Full width at half power of the peak [unit of the coordinate]."""
+
+    @property
+    def ratio(self) -> float:
+        """Amplitude over the local floor [1]."""
+        return self.amplitude / self.floor
+
+
+def clearest_peak(
+    frames: FramePower,
+    allowed: Mask,
+    stretches: Sequence[tuple[int, int]],
+    usual: Array | None = None,
+) -> Peak | None:
+    """Find the peak that noise explains worst, over all channels and all given stretches of frames.
+
+    ``allowed`` (F, K) says where a line may be looked for; a line must be seen in half the frames of a
+    stretch, given by its first frame and the one after its last; ``usual`` (K, C) is power [m²] that is not
+    to count as a line: the floor is nowhere lower. None where noise explains everything.
+    """
+    trials = max(int(np.sum(allowed.any(axis=0))), 1) * frames.power.shape[2] * max(len(stretches), 1)
+    threshold = math.log(trials / FALSE_ALARM)
+    floor = _floor(frames.power)
+    if usual is not None:
+        floor = np.maximum(floor, usual)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(allowed[:, :, None] & (floor > 0.0), frames.power / floor, np.nan)
+    # Counts over the frames say at once which lines a stretch can hold: sorting all of them takes long.
+    nearly = (1.0 - 1e-9) * LEAST_RATIO**2 / MEDIAN_OF_NOISE
+    seen, above = (
+        np.concatenate([np.zeros((1, *part.shape[1:]), dtype=np.intp), np.cumsum(part, axis=0)])
+        for part in (np.isfinite(ratio), ratio >= nearly)
+    )
+    best: tuple[float, int, int, int, int] = (threshold, -1, -1, -1, -1)
+    for first, last in stretches:
+        known = seen[last] - seen[first]
+        enough = known >= max(1, (last - first + 1) // 2)
+        possible = enough & (2 * (above[last] - above[first]) >= known)
+        if possible.any():
+            around = possible.copy()
+            around[1:] |= possible[:-1]
+            around[:-1] |= possible[1:]
+            looked = around & enough
+            best = max(best, _best_in(ratio[first:last], looked, known, first, last))
+    if best[1] < 0:
+        return None
+    return _peak(frames, ratio, *best)
+
+
+def stretches_of(count: int, shortest: int) -> Iterator[tuple[int, int]]:
+    """All frames, then half of them in overlapping steps, and so on down to the shortest stretch."""
+    length = count
+    while length >= max(shortest, 1):
+        for first in range(0, count - length + 1, max(length // 2, 1)):
+            yield first, first + length
+        length = length // 2
+
+
+def _best_in(
+    ratio: Array, looked: Mask, known: NDArray[np.intp], first: int, last: int
+) -> tuple[float, int, int, int, int]:
+    """Score, line, channel and stretch of the clearest peak in one stretch, of the lines looked at.
+
+    A line is as clear as half of its frames show it: what only passes through, or a bang, leaves that alone.
+    """
+    typical = np.full(ratio.shape[1:], np.nan)
+    typical[looked] = median_of_known(ratio[:, looked])
+    independent = np.maximum(known / (1.0 + HANN_OVERLAP_SHARE), 1.0)
+    clear = (typical * MEDIAN_OF_NOISE >= LEAST_RATIO**2) & _local_maximum(typical)
+    score = np.where(clear, _improbability(np.nan_to_num(typical), independent), 0.0)
+    line, channel = np.unravel_index(int(np.argmax(score)), score.shape)
+    return float(score[line, channel]), int(line), int(channel), first, last
+
+
+def _peak(
+    frames: FramePower,
+    ratio: Array,
+    score: float,
+    line: int,
+    channel: int,
+    first: int,
+    last: int,
+) -> Peak:
+    used = np.isfinite(ratio[first:last, line, channel])
+    # the typical form of the peak: the median over the frames, zero where no frame reaches
+    power = frames.power[first:last, :, channel][used]
+    reached = np.isfinite(power).any(axis=0)
+    shape = np.zeros(power.shape[1])
+    shape[reached] = median_of_known(power[:, reached])
+    shift, height = _between_lines(shape, line)
+    # by the ratio that it was found with: power and floor are not at their medians in the same frames
+    around = shape[line] / float(np.median(ratio[first:last, line, channel][used])) / MEDIAN_OF_NOISE
+    return Peak(
+        coordinate=float(frames.coordinate[line]) + shift * frames.spacing,
+        channel=channel,
+        first=first,
+        last=last,
+        amplitude=math.sqrt(height),
+        floor=math.sqrt(around),
+        score=score,
+        width=half_power_width(shape, line) * frames.spacing,
+    )
+
+
+def _floor(power: Array) -> Array:
+    """Median power of the lines around each line, frame by frame: half-overlapping blocks, joined by
+    straight lines.
+    """
+    count = power.shape[1]
+    half = max(min(FLOOR_LINES, count) // 2, 1)
+    centres = np.arange(half, max(count - half, half + 1), half)
+    blocks = np.empty((power.shape[0], centres.size, power.shape[2]))
+    for k, centre in enumerate(centres):
+        block = power[:, centre - half : centre + half + 1]
+        reached = np.isfinite(block).sum(axis=1) > half
+        blocks[:, k] = np.where(reached, median_of_known(np.moveaxis(block, 1, 0)), np.nan)
+    place = np.clip((np.arange(count) - centres[0]) / half, 0.0, centres.size - 1.0)
+    low = np.minimum(place.astype(int), max(centres.size - 2, 0))
+    share = (place - low)[:, None]
+    high = np.minimum(low + 1, centres.size - 1)
+    left, right = blocks[:, low], blocks[:, high]
+    joined = np.where(np.isnan(right), left, np.where(np.isnan(left), right, left + share * (right - left)))
+    return cast(Array, np.where(np.isfinite(power), joined, np.nan))
+
+
+def median_of_known(values: Array) -> Array:
+    """Median along the first axis of what is not nan; nan where nothing is known."""
+    ordered = np.sort(values, axis=0)
+    known = np.isfinite(ordered).sum(axis=0, keepdims=True)
+    low = np.take_along_axis(ordered, np.maximum(known - 1, 0) // 2, axis=0)
+    high = np.take_along_axis(ordered, np.minimum(known // 2, len(values) - 1), axis=0)
+    return cast(Array, 0.5 * (low + high)[0])
+
+
+def _improbability(ratio: Array, frames: Array) -> Array:
+    """Minus the logarithm of (Chernoff's bound of) the chance that noise exceeds its median so far in half
+    the frames.
+
+    Power of noise in one frame is exponentially distributed: it exceeds ``ratio`` medians with probability
+    2^(−ratio), independently in each frame.
+    """
+    above = np.clip(ratio, 1.0, None)
+    share = np.exp2(-np.minimum(above, 60.0))
+    return 0.5 * frames * ((above - 2.0) * math.log(2.0) - np.log1p(-share))
+
+
+def _local_maximum(values: Array) -> Mask:
+    """Higher than both neighbours, which must be looked at too: the edge of what is left out is no line."""
+    result = np.zeros(values.shape, dtype=np.bool_)
+    with np.errstate(invalid="ignore"):
+        result[1:-1] = (values[1:-1] >= values[:-2]) & (values[1:-1] >= values[2:])
+    return result
+
+
+def _between_lines(power: Array, line: int) -> tuple[float, float]:
+    """Place of a peak between lines and its power there, by a parabola through the logarithms."""
+    if not 0 < line < len(power) - 1:
+        return 0.0, float(power[line])
+    left, here, right = np.log(np.maximum(power[line - 1 : line + 2], 1e-300))
+    if not np.isfinite(left + right):
+        return 0.0, float(power[line])
+    bend = left - 2.0 * here + right
+    shift = 0.0 if bend >= 0.0 else float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5))
+    return shift, float(np.exp(here - 0.25 * (left - right) * shift))
+
+
+def half_power_width(power: Array, line: int) -> float:
+    """Width of a peak at half its power, in lines."""
+    half = 0.5 * power[line]
+    left, right = line, line
+    while left > 0 and power[left - 1] > half:
+        left -= 1
+    while right < len(power) - 1 and power[right + 1] > half:
+        right += 1
+    below = 0.0 if left == 0 else float((power[left] - half) / (power[left] - power[left - 1]))
+    above = (
+        0.0 if right == len(power) - 1 else float((power[right] - half) / (power[right] - power[right + 1]))
+    )
+    return right - left + below + above

@@ -24,7 +24,7 @@ from rotordrop.known import NINETY, Known
 from rotordrop.machine import example_machine, example_path, load_machine
 from rotordrop.machine.calibration import CalibrationDrop, CalibrationOrigin
 from rotordrop.machine.saving import machine_text
-from rotordrop.spectrum.indentation import find_settling
+from rotordrop.spectrum.coast_down import find_settling
 from rotordrop.track.calibration import BLIND_SCHEDULE, Stage
 from rotordrop.track.consistency import Check
 from rotordrop.twin.search import is_calibrated, track_drops

@@ -8,7 +8,7 @@ import pytest
 from rotordrop import example_machine, example_record_path, look, read_record
 from rotordrop.estimate.coast_down import recorded_coast_down, with_found_air_gaps
 from rotordrop.spectrum.candidates import machine_candidates, swing_ranges
-from rotordrop.spectrum.indentation import displacement_history, find_settling
+from rotordrop.spectrum.coast_down import displacement_history, find_settling
 
 # Of the bundled recording, which is simulated: the DE floats 26.5 µm below the centre of its bearing.
 TRUE_GAP = {"NDE": 275e-6, "DE": 285e-6}

@@ -10,9 +10,9 @@ from rotordrop.errors import RecordError
 from rotordrop.evidence.impacts import shortest_flight
 from rotordrop.report.waterfall_page import bode_figure, polar_figure, waterfall_figure
 from rotordrop.spectrum.candidates import order_candidates
-from rotordrop.spectrum.coast_down import analyse_coast_down
-from rotordrop.spectrum.indentation import (
+from rotordrop.spectrum.coast_down import (
     BLOCK,
+    analyse_coast_down,
     displacement_history,
     find_settling,
 )

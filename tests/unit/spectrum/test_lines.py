@@ -17,8 +17,8 @@ from rotordrop.spectrum.candidates import (
     order_candidates,
     pendulum_candidate,
 )
-from rotordrop.spectrum.detection import median_of_known
 from rotordrop.spectrum.lines import find_lines
+from rotordrop.spectrum.waterfall import median_of_known
 
 AIR_GAP = 285e-6
 KNOWN = (*order_candidates(), *mains_candidates(), pendulum_candidate("pendulum", 28.3, 29.8))

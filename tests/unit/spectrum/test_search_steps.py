@@ -22,15 +22,15 @@ from rotordrop.spectrum.candidates import (
     pendulum_candidate,
     settled_modes,
 )
-from rotordrop.spectrum.detection import (
+from rotordrop.spectrum.lines import MOST_LINES, SWING_ERROR, _joined, name_lines, of_swings
+from rotordrop.spectrum.speed import inflation
+from rotordrop.spectrum.waterfall import (
     FALSE_ALARM,
     FramePower,
     clearest_peak,
     half_power_width,
+    waterfalls,
 )
-from rotordrop.spectrum.lines import MOST_LINES, SWING_ERROR, _joined, name_lines, of_swings
-from rotordrop.spectrum.speed import inflation
-from rotordrop.spectrum.waterfall import waterfalls
 
 
 def search(signal, rate, profile=None):
