@@ -240,7 +240,7 @@ def estimate_of(drop: TrackedDrop, method: Tracked, facts: RecordFacts) -> Estim
 def _advice(drop: TrackedDrop, judged: _Judgement) -> tuple[Advice, ...]:
     """What to measure of a machine whose rotor is not known by its drawing, or whose forces are wide."""
     unsure = any(unknown.path == "rotor.stiffness_factor" for unknown in drop.problem.unknowns)
-    loads = (_loads(drop, judged, b).peak_force for b in range(len(drop.problem.model.bearing_names)))
+    loads = (_loads(drop, judged, b).force.peak for b in range(len(drop.problem.model.bearing_names)))
     wide = any(one.is_wide for one in loads)
     # of a model that does not fit the covariances say nothing
     if not judged.fits or not (unsure or wide) or drop.drops != 1:

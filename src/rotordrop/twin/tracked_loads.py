@@ -79,16 +79,29 @@ RIPPLE = 4e-3
 NO_LATE_MEAN = f"estimate ends before {1e3 * LATE[1]:.0f} ms"
 
 
+@dataclass(frozen=True)
+class Load:
+    """One load of a bearing: its history, the band of that, and its peak."""
+
+    history: History
+    band: Band
+    peak: Peak
+
+    def with_peak(self, known: Known) -> Load:
+        """The load with another peak, and a band at least as wide everywhere, so that both say the same."""
+        peak, band = replace(self.peak, known=known), self.band
+        low, high = known.interval_90 or (known.value, known.value)
+        scale = self.history.values / max(known.value, 1e-300)
+        lower, upper = np.minimum(band.lower, low * scale), np.maximum(band.upper, high * scale)
+        return Load(self.history, replace(band, lower=lower, upper=upper), peak)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Loads:
     """Force and stress of one bearing, all from one origin."""
 
-    force: History
-    force_band: Band
-    stress: History
-    stress_band: Band
-    peak_force: Peak
-    peak_stress: Peak
+    force: Load
+    stress: Load
     means: Mapping[str, Known]
     missing: Mapping[str, str] = field(default_factory=dict)
 
@@ -164,15 +177,24 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
 
     ``ball_sigma`` is the relative standard deviation of the stress by balls inferred from a designation [1].
     """
-    force, force_sigma = _history(forces, forces.magnitude, forces.magnitude_sigma, b, MODEL_FORCE_SIGMA)
-    model_sigma = math.hypot(MODEL_STRESS_SIGMA, ball_sigma)
-    stress, stress_sigma = _history(forces, forces.stress, forces.stress_sigma, b, model_sigma)
-    mean_stress = float(np.mean(stress.values))
+
+    def load(values: Array, sigma: Array, unit: str, model_share: float) -> Load:
+        history = History(label="estimated", time=forces.time, values=values[:, b], role="estimated")
+        error = np.hypot(sigma[:, b], model_share * values[:, b])
+        value, moment = refined_peak(history.time, history.values)
+        at_peak = float(error[int(np.argmax(history.values))])
+        known = with_interval(value, at_peak, widening, unit, model_share * value)
+        peak = Peak(known=known, time=moment, origin=Origin.TWIN)
+        return Load(history, _band(history, NINETY * widening * error), peak)
+
+    force = load(forces.magnitude, forces.magnitude_sigma, "N", MODEL_FORCE_SIGMA)
+    stress = load(forces.stress, forces.stress_sigma, "Pa", math.hypot(MODEL_STRESS_SIGMA, ball_sigma))
+    mean_stress = float(np.mean(stress.history.values))
     spread = float(np.mean(forces.stress_sigma[:, b]))
     left_out = math.hypot(MODEL_MEAN_STRESS_SIGMA, ball_sigma) * mean_stress
     sigma = math.hypot(spread, left_out)
     means = {"mean_stress_Pa": with_interval(mean_stress, sigma, widening, "Pa", left_out)}
-    late_mean = mean_late(force)
+    late_mean = mean_late(force.history)
     if late_mean is not None:
         # What the force of one sample gets wrong the next ones take back, or the readings would show it: the
         # errors of a mean are those of independent samples at most.
@@ -186,11 +208,7 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
         means["mean_force_0p15_0p2_N"] = with_interval(late_mean, sigma, widening, "N", left_out)
     return Loads(
         force=force,
-        force_band=_band(force, NINETY * widening * force_sigma),
         stress=stress,
-        stress_band=_band(stress, NINETY * widening * stress_sigma),
-        peak_force=_peak(force, force_sigma, widening, "N", MODEL_FORCE_SIGMA),
-        peak_stress=_peak(stress, stress_sigma, widening, "Pa", model_sigma),
         means=means,
         missing={} if late_mean is not None else {"mean_force_0p15_0p2_N": NO_LATE_MEAN},
     )
@@ -200,15 +218,15 @@ def mixed_loads(loads: Loads, others: Sequence[tuple[float, Loads]]) -> Loads:
     """Force and stress with the intervals of a mixture of models: their probabilities [1] and their loads."""
     if not others:
         return loads
-    force = [(weight, one.peak_force.known) for weight, one in others]
-    stress = [(weight, one.peak_stress.known) for weight, one in others]
-    peak_force = replace(loads.peak_force, known=mixed(loads.peak_force.known, force))
-    peak_stress = replace(loads.peak_stress, known=mixed(loads.peak_stress.known, stress))
+    force = mixed(loads.force.peak.known, [(weight, one.force.peak.known) for weight, one in others])
+    stress = mixed(loads.stress.peak.known, [(weight, one.stress.peak.known) for weight, one in others])
     means = {
         name: mixed(known, [(weight, one.means[name]) for weight, one in others])
         for name, known in loads.means.items()
     }
-    return _match_width(loads, peak_force, peak_stress, means)
+    return replace(
+        loads, force=loads.force.with_peak(force), stress=loads.stress.with_peak(stress), means=means
+    )
 
 
 def interval_from_zero(loads: Loads) -> Loads:
@@ -219,28 +237,14 @@ def interval_from_zero(loads: Loads) -> Loads:
 
     return replace(
         loads,
-        peak_force=replace(loads.peak_force, known=held(loads.peak_force.known)),
+        force=replace(loads.force, peak=replace(loads.force.peak, known=held(loads.force.peak.known))),
         means={name: held(known) if known.unit == "N" else known for name, known in loads.means.items()},
     )
-
-
-def _history(
-    forces: ForceHistory, values: Array, sigma: Array, b: int, model_share: float
-) -> tuple[History, Array]:
-    history = History(label="estimated", time=forces.time, values=values[:, b], role="estimated")
-    return history, np.hypot(sigma[:, b], model_share * values[:, b])
 
 
 def _band(history: History, half: Array) -> Band:
     lower = np.maximum(history.values - half, 0.0)
     return Band(time=history.time, lower=lower, upper=history.values + half)
-
-
-def _peak(history: History, sigma: Array, widening: float, unit: str, model_share: float) -> Peak:
-    value, moment = refined_peak(history.time, history.values)
-    error = float(sigma[int(np.argmax(history.values))])
-    known = with_interval(value, error, widening, unit, model_share * value)
-    return Peak(known=known, time=moment, origin=Origin.TWIN)
 
 
 def widened_to(value: Known, ratio: float, accuracy: float) -> Known:
@@ -300,8 +304,8 @@ def widened_to_cross_check(loads: Loads, check: InputEstimate, b: int, preload: 
     direction than the model allows, with innovations 14 % too large. The preload may be anything between its
     prior and the fit, and the mean stress goes with its third root.
     """
-    force_ratio = float(check.peak[b]) / max(loads.peak_force.value, 1e-9)
-    stress_ratio = float(check.peak_stress[b]) / max(loads.peak_stress.value, 1e-9)
+    force_ratio = float(check.peak[b]) / max(loads.force.peak.value, 1e-9)
+    stress_ratio = float(check.peak_stress[b]) / max(loads.stress.peak.value, 1e-9)
     peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
     held = {"mean_stress_Pa": [(stress_ratio, stress_error)]}
     if preload is not None and preload.interval_90 is not None and preload.interval_90[0] > 0.0:
@@ -315,26 +319,14 @@ def widened_to_cross_check(loads: Loads, check: InputEstimate, b: int, preload: 
         # the ratio of two mean vectors says nothing of the stated number.
         late_means = (float(check.mean_magnitude_late[b]), _calm_mean(check, b))
         held["mean_force_0p15_0p2_N"] = [(one / max(late.value, 1e-9), MEAN_ERROR) for one in late_means]
-    peak_force = replace(loads.peak_force, known=widened_to(loads.peak_force.known, force_ratio, peak_error))
-    peak_stress = replace(
-        loads.peak_stress, known=widened_to(loads.peak_stress.known, stress_ratio, stress_error)
-    )
     means = {
         name: reduce(lambda known, other: widened_to(known, *other), held.get(name, ()), value)
         for name, value in loads.means.items()
     }
-    return _match_width(loads, peak_force, peak_stress, means)
-
-
-def _match_width(loads: Loads, force: Peak, stress: Peak, means: Mapping[str, Known]) -> Loads:
-    """The loads with other peaks and means, and bands at least as wide as these peaks."""
+    force = widened_to(loads.force.peak.known, force_ratio, peak_error)
+    stress = widened_to(loads.stress.peak.known, stress_ratio, stress_error)
     return replace(
-        loads,
-        force_band=_stretched(loads.force_band, loads.force, force),
-        stress_band=_stretched(loads.stress_band, loads.stress, stress),
-        peak_force=force,
-        peak_stress=stress,
-        means=means,
+        loads, force=loads.force.with_peak(force), stress=loads.stress.with_peak(stress), means=means
     )
 
 
@@ -349,21 +341,17 @@ def _calm_mean(check: InputEstimate, b: int) -> float:
     return float(np.mean(np.hypot(*(sums[length:] - sums[:-length]).T))) / length
 
 
-def _stretched(band: Band, history: History, peak: Peak) -> Band:
-    """The band with the relative width of the stated peak everywhere, so that both say the same."""
-    low, high = peak.interval_90 or (peak.value, peak.value)
-    scale = history.values / max(peak.value, 1e-300)
-    return replace(
-        band, lower=np.minimum(band.lower, low * scale), upper=np.maximum(band.upper, high * scale)
-    )
-
-
 def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
     """What the cross-check knows, with errors larger than those it makes on drops that the model fits."""
-    peak_error, stress_error = float(check.peak_error[b]), float(check.stress_error[b])
-    force = History(label="cross-check", time=check.time, values=check.magnitude[:, b], role="cross-check")
-    stress = History(label="cross-check", time=check.time, values=check.stress[:, b], role="cross-check")
-    means = {"mean_stress_Pa": _where_diverged(float(np.mean(stress.values)), MEAN_STRESS_ERROR, "Pa")}
+
+    def load(values: Array, error: float, unit: str) -> Load:
+        history = History(label="cross-check", time=check.time, values=values, role="cross-check")
+        at = int(np.argmax(values))
+        known = _where_diverged(float(values[at]), error, unit)
+        peak = Peak(known=known, time=float(check.time[at]), origin=Origin.CROSS_CHECK)
+        return Load(history, _band(history, DIVERGED_WIDENING * error * values), peak)
+
+    means = {"mean_stress_Pa": _where_diverged(float(np.mean(check.stress[:, b])), MEAN_STRESS_ERROR, "Pa")}
     late = float(check.mean_magnitude_late[b])
     if math.isfinite(late):
         # No mean magnitude is below that of the mean vector; how much of what is above is noise is not known.
@@ -371,26 +359,13 @@ def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
         held = widened_to(mean, float(check.mean_late[b]) / max(late, 1e-9), MEAN_ERROR)
         means["mean_force_0p15_0p2_N"] = replace(held, status=mean.status)
     return Loads(
-        force=force,
-        force_band=_band(force, DIVERGED_WIDENING * peak_error * force.values),
-        stress=stress,
-        stress_band=_band(stress, DIVERGED_WIDENING * stress_error * stress.values),
-        peak_force=_checked_peak(force, peak_error, "N"),
-        peak_stress=_checked_peak(stress, stress_error, "Pa"),
+        force=load(check.magnitude[:, b], float(check.peak_error[b]), "N"),
+        stress=load(check.stress[:, b], float(check.stress_error[b]), "Pa"),
         means=means,
         missing={
             "impacts": "the model lost the record",
             **({} if math.isfinite(late) else {"mean_force_0p15_0p2_N": NO_LATE_MEAN}),
         },
-    )
-
-
-def _checked_peak(history: History, error: float, unit: str) -> Peak:
-    at = int(np.argmax(history.values))
-    return Peak(
-        known=_where_diverged(float(history.values[at]), error, unit),
-        time=float(history.time[at]),
-        origin=Origin.CROSS_CHECK,
     )
 
 
@@ -428,14 +403,13 @@ def bearing_drop(
     samples = forces.time[:: forces.substeps]
     shown = Motion(label="measured", time=samples, displacement=measured[: len(samples)], role="measured")
     # the stress rises with the force; sizes of balls and preload are in all of its instants alike
-    begin, end = when_largest(loads.force, loads.force_band, doubt)
-    at = loads.peak_stress.time
+    force, stress = loads.force, loads.stress
+    begin, end = when_largest(force.history, force.band, doubt)
+    at = stress.peak.time
     impacts: tuple[Impact, ...] = ()
     seen: dict[str, Any] = {}
-    if loads.peak_force.origin is Origin.TWIN:
-        impacts = tuple(
-            _as_unsure(one, loads.peak_force) for one in twin_impacts(forces, b, widening, cross_check)
-        )
+    if force.peak.origin is Origin.TWIN:
+        impacts = tuple(_as_unsure(one, force.peak) for one in twin_impacts(forces, b, widening, cross_check))
         seen = race_moved(forces, b, gap, widening, doubt)
         if cross_check is not None:  # as is handed over of a model that is not believed
             seen["largest"] = replace(seen["largest"], status=INCONSISTENT)
@@ -443,16 +417,16 @@ def bearing_drop(
     ends = math.nan if first is None else float(np.nan_to_num(first.end, nan=forces.time[-1]))
     return BearingDrop(
         name=name,
-        motions=(estimated if loads.peak_force.origin is Origin.TWIN else shown,),
+        motions=(estimated if force.peak.origin is Origin.TWIN else shown,),
         air_gap=AirGap(lower=gap.low, upper=gap.high),
-        force=loads.force,
-        force_band=loads.force_band,
-        force_vector=forces.force[:, b] if loads.peak_force.origin is Origin.TWIN else None,
-        stress=loads.stress,
-        stress_band=loads.stress_band,
-        preload_stress=float(loads.stress.values[0]),
-        peak_force=replace(loads.peak_force, time_interval_90=(begin, end)),
-        peak_stress=replace(loads.peak_stress, time_interval_90=(min(begin, at), max(end, at))),
+        force=force.history,
+        force_band=force.band,
+        force_vector=forces.force[:, b] if force.peak.origin is Origin.TWIN else None,
+        stress=stress.history,
+        stress_band=stress.band,
+        preload_stress=float(stress.history.values[0]),
+        peak_force=replace(force.peak, time_interval_90=(begin, end)),
+        peak_stress=replace(stress.peak, time_interval_90=(min(begin, at), max(end, at))),
         values={**values, **loads.means},
         missing=loads.missing,
         impacts=impacts,
@@ -570,8 +544,8 @@ def cross_checks(
 ) -> tuple[CrossCheck, ...]:
     """Peak force, peak stress and late mean force vector of one bearing, found in both ways."""
     pairs = [
-        ("peak force", twin.peak_force.known, check.peak[b], float(check.peak_error[b])),
-        ("peak stress", twin.peak_stress.known, check.peak_stress[b], float(check.stress_error[b])),
+        ("peak force", twin.force.peak.known, check.peak[b], float(check.peak_error[b])),
+        ("peak stress", twin.stress.peak.known, check.peak_stress[b], float(check.stress_error[b])),
     ]
     if np.isfinite(check.mean_late[b]):
         late = (forces.time >= LATE[0]) & (forces.time <= LATE[1])

@@ -442,23 +442,23 @@ def test_a_bearing_with_play_is_cross_checked_however_quick(workshop):
 def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop, tracked, check):
     forces = workshop.forces
     own = twin_loads(forces, 0, 1.0)
-    assert not is_beyond_factor(own.peak_force.value, check, 0)
+    assert not is_beyond_factor(own.force.peak.value, check, 0)
     assert is_beyond_factor(2.1 * float(check.peak[0]), check, 0)
     assert not is_beyond_factor(3000.0, replace(check, peak=np.full(2, math.nan)), 0)
     assert not is_beyond_factor(0.0, check, 0)
     held = widened_to_cross_check(own, check, 0)
-    assert (held.peak_force.value, held.peak_force.time) == (own.peak_force.value, own.peak_force.time)
+    assert (held.force.peak.value, held.force.peak.time) == (own.force.peak.value, own.force.peak.time)
 
     given = loads_of_cross_check(check, 0)
-    assert given.peak_force.time == check.time[check.magnitude[:, 0].argmax()]
-    assert given.peak_force.value == check.peak[0] == given.force.values.max()
-    assert given.peak_force.known.status == OF_CROSS_CHECK
-    low, high = given.peak_force.interval_90 or (math.nan, math.nan)
+    assert given.force.peak.time == check.time[check.magnitude[:, 0].argmax()]
+    assert given.force.peak.value == check.peak[0] == given.force.history.values.max()
+    assert given.force.peak.known.status == OF_CROSS_CHECK
+    low, high = given.force.peak.interval_90 or (math.nan, math.nan)
     half = DIVERGED_WIDENING * check.peak_error[0]
     assert (low, high) == pytest.approx(((1.0 - half) * check.peak[0], (1.0 + half) * check.peak[0]))
-    assert given.force_band.upper.max() == pytest.approx(high)
-    assert low < own.peak_force.value < high
-    assert {one.origin for one in (given.peak_force, given.peak_stress)} == {Origin.CROSS_CHECK}
+    assert given.force.band.upper.max() == pytest.approx(high)
+    assert low < own.force.peak.value < high
+    assert {one.origin for one in (given.force.peak, given.stress.peak)} == {Origin.CROSS_CHECK}
     assert "impacts" in given.missing
     for field, limit in (("mean_stress_Pa", 0.2), ("mean_force_0p15_0p2_N", 0.1)):
         assert given.means[field].value == pytest.approx(number(tracked, "NDE", field).value, rel=limit)
