@@ -38,7 +38,7 @@ from rotordrop.physics.ball_set import (
 from rotordrop.physics.columns import KernelParameters
 from rotordrop.physics.elementary import sine_cosine
 from rotordrop.physics.load import load_now
-from rotordrop.physics.remanence import remanent_fraction
+from rotordrop.physics.magnet import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque
 
 PRESCRIBED = aerodynamics.PRESCRIBED_SPEED

@@ -8,7 +8,7 @@ import pytest
 from rotordrop.physics import pendulum
 from rotordrop.physics.aerodynamics import exponential_deceleration, speed_dependent_deceleration
 from rotordrop.physics.friction import stribeck_coefficient
-from rotordrop.physics.remanence import remanent_fraction
+from rotordrop.physics.magnet import remanent_fraction
 from rotordrop.physics.spin import race_drag_torque, surface_speed
 from rotordrop.physics.whirl import race_spin_up_time
 from rotordrop.physics.whirl_spells import whirl_spells

@@ -22,10 +22,9 @@ from rotordrop.report.study_page import study_page
 from rotordrop.study import run, summary
 from rotordrop.study.folder import StudyFolder, alone_in, open_folder, read_shards, study_of
 from rotordrop.study.numbers import study_numbers
-from rotordrop.study.plan import load_study, read_study
+from rotordrop.study.plan import independent, load_study, read_study, sobol
 from rotordrop.study.quantities import columns_of
 from rotordrop.study.run import compute_shard, one_drop, run_study, work_on
-from rotordrop.study.sampling import independent, sobol
 from rotordrop.study.summary import EarlyEnd, load_results, save_results
 
 MACHINE = example_machine("lp400")
