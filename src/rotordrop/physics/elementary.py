@@ -14,6 +14,7 @@ Where a result must keep more than a double holds, it is carried as an unevaluat
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -395,34 +396,21 @@ def magnitude(x: Array, y: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y))
 
 
-def exp_each(x: float | Array) -> Any:
-    """Exponential [1] of every entry. Source: `exp`."""
-    return _each(EXP_OF, x)
-
-
-def ln_each(x: float | Array) -> Any:
-    """Natural logarithm [1] of every entry. Source: `ln`."""
-    return _each(LN_OF, x)
-
-
-def sin_each(x: float | Array) -> Any:
-    """Sine [1] of every angle [rad]. Source: `sine_cosine`."""
-    return _each(SIN_OF, x)
-
-
-def cos_each(x: float | Array) -> Any:
-    """Cosine [1] of every angle [rad]. Source: `sine_cosine`."""
-    return _each(COS_OF, x)
-
-
-def cube_root_each(x: float | Array) -> Any:
-    """Cube root [1] of every entry. Source: `cube_root`."""
-    return _each(CUBE_ROOT_OF, x)
-
-
 def _each(function: int, x: float | Array) -> Any:
     values = np.asarray(x, dtype=np.float64)
     return _values_of(function, values.ravel()).reshape(values.shape)[()]
+
+
+exp_each = partial(_each, EXP_OF)
+"""Exponential [1] of every entry. Source: `exp`."""
+ln_each = partial(_each, LN_OF)
+"""Natural logarithm [1] of every entry. Source: `ln`."""
+sin_each = partial(_each, SIN_OF)
+"""Sine [1] of every angle [rad]. Source: `sine_cosine`."""
+cos_each = partial(_each, COS_OF)
+"""Cosine [1] of every angle [rad]. Source: `sine_cosine`."""
+cube_root_each = partial(_each, CUBE_ROOT_OF)
+"""Cube root [1] of every entry. Source: `cube_root`."""
 
 
 @kernel
