@@ -16,6 +16,7 @@ from rotordrop.arrays import Array
 from rotordrop.elements.ball_bearing import STATIC_STRESS
 from rotordrop.elements.bearing_numbers import Ratings, numbers_of
 from rotordrop.elements.table import following, parameter, published
+from rotordrop.errors import SimulationError
 from rotordrop.estimate.bearing_drop import BearingDrop
 from rotordrop.evidence.look import INDEX_WINDOW
 from rotordrop.known import NINETY, Known, Status
@@ -105,7 +106,11 @@ def _values(estimate: Estimate, bearing: BearingDrop) -> Iterator[tuple[str, Kno
         yield "severity.skid_energy_J", _sum([one.dissipated_energy for one in bearing.impacts], "J")
     yield from _indices(estimate, bearing)
     if bearing.force_vector is not None and bearing.impacts:
-        loads = numbers_of(estimate.machine.bearing(bearing.name)).element_loads_under(bearing.force_vector)
+        own = numbers_of(estimate.machine.bearing(bearing.name))
+        try:
+            loads = own.element_loads_under(bearing.force_vector)
+        except SimulationError:  # a force beyond all balls: no reason to lose the rest
+            return
         yield from _fatigue(bearing, ratings, loads, estimate.speed)
 
 

@@ -68,7 +68,7 @@ def displacement_under(constants: BearingConstants, force: Array) -> Array:
     cosine, sine = np.cos(angles), np.sin(angles)
     wanted = -np.asarray(force, dtype=np.float64)
     size = np.hypot(wanted[:, 0], wanted[:, 1])
-    found = constants.radial_play * wanted / np.maximum(size, 1e-12)[:, None]
+    found = _between_two_balls(constants, wanted) if constants.radial_play > 0.0 else np.zeros_like(wanted)
     for _ in range(_STEPS):
         radial = constants.radial_offset + np.outer(found[:, 0], cosine) + np.outer(found[:, 1], sine)
         distance = np.hypot(radial, constants.axial_offset)
@@ -98,6 +98,26 @@ def displacement_under(constants: BearingConstants, force: Array) -> Array:
             break
     _refuse_unsettled(length, size)
     return found
+
+
+def _between_two_balls(constants: BearingConstants, wanted: Array) -> Array:
+    """Displacement (T, 2) [m] at which the two balls beside a push (T, 2) [N] bear it alone.
+
+    A race with play that starts elsewhere has one ball in its way or none, and nothing leads it aside.
+    """
+    angles = np.unique(np.round(np.mod(constants.row_ball_angles, 2.0 * np.pi), 9))
+    toward = np.mod(np.arctan2(wanted[:, 1], wanted[:, 0]), 2.0 * np.pi)
+    after = np.searchsorted(angles, toward, side="right")
+    first, second = angles[after - 1], angles[after % len(angles)]
+    across = np.sin(second - first)
+    size = np.hypot(wanted[:, 0], wanted[:, 1])
+    ways = []
+    for share in (np.sin(second - toward), np.sin(toward - first)):
+        load = np.maximum(size * share / across, 0.0) / len(constants.row_ball_angles)
+        ways.append(constants.radial_play + (load / constants.ball_stiffness) ** (2.0 / 3.0))
+    x = (ways[0] * np.sin(second) - ways[1] * np.sin(first)) / across
+    y = (ways[1] * np.cos(first) - ways[0] * np.cos(second)) / across
+    return np.where(size[:, None] > 0.0, np.stack([x, y], axis=1), 0.0)
 
 
 def _refuse_unsettled(last_step: Array, force: Array) -> None:

@@ -185,7 +185,7 @@ def twin_loads(forces: ForceHistory, b: int, widening: float, ball_sigma: float 
         at_peak = float(error[int(np.argmax(history.values))])
         known = with_interval(value, at_peak, widening, unit, model_share * value)
         peak = Peak(known=known, time=moment, origin=Origin.TWIN)
-        return Load(history, _band(history, NINETY * widening * error), peak)
+        return Load(history, _band(history, NINETY * widening * error, unit), peak)
 
     force = load(forces.magnitude, forces.magnitude_sigma, "N", MODEL_FORCE_SIGMA)
     stress = load(forces.stress, forces.stress_sigma, "Pa", math.hypot(MODEL_STRESS_SIGMA, ball_sigma))
@@ -242,9 +242,12 @@ def interval_from_zero(loads: Loads) -> Loads:
     )
 
 
-def _band(history: History, half: Array) -> Band:
-    lower = np.maximum(history.values - half, 0.0)
-    return Band(time=history.time, lower=lower, upper=history.values + half)
+def _band(history: History, half: Array, unit: str) -> Band:
+    """Band of a force [N] or of a stress [Pa], which goes with its third root and near none has no slope."""
+    root = {"N": 1, "Pa": 3}[unit]
+    load, way = history.values**root, root * history.values ** (root - 1) * half
+    lower, upper = (np.maximum(end, 0.0) ** (1.0 / root) for end in (load - way, load + way))
+    return Band(time=history.time, lower=lower, upper=upper)
 
 
 def widened_to(value: Known, ratio: float, accuracy: float) -> Known:
@@ -349,7 +352,7 @@ def loads_of_cross_check(check: InputEstimate, b: int) -> Loads:
         at = int(np.argmax(values))
         known = _where_diverged(float(values[at]), error, unit)
         peak = Peak(known=known, time=float(check.time[at]), origin=Origin.CROSS_CHECK)
-        return Load(history, _band(history, DIVERGED_WIDENING * error * values), peak)
+        return Load(history, _band(history, DIVERGED_WIDENING * error * values, unit), peak)
 
     means = {"mean_stress_Pa": _where_diverged(float(np.mean(check.stress[:, b])), MEAN_STRESS_ERROR, "Pa")}
     late = float(check.mean_magnitude_late[b])

@@ -10,7 +10,7 @@ from tests.plain_bearing import BallBearingGeometry
 from rotordrop.errors import SimulationError
 from rotordrop.machine import example_machine
 from rotordrop.physics.ball_bearing import bearing_constants
-from rotordrop.physics.ball_loads import ball_loads, displacement_under
+from rotordrop.physics.ball_loads import ball_loads, displacement_under, loads_and_angles
 from rotordrop.physics.ball_set import (
     ball_set_energy,
     ball_set_entries,
@@ -103,6 +103,19 @@ def test_the_displacement_is_found_back_from_the_force_on_the_race(bearing):
     np.testing.assert_allclose(
         ball_loads(constants, found), ball_loads(constants, MOVED), rtol=1e-6, atol=1e-6
     )
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-2, 1.0, 1e2, 1e4])
+def test_a_race_with_play_bears_a_force_of_any_size_in_any_direction(size):
+    constants = bearing_constants(DEEP)
+    angles = constants.row_ball_angles
+    at = np.linspace(0.0, 2.0 * np.pi, 401)
+    force = size * np.stack([np.cos(at), np.sin(at)], axis=1)
+    found = displacement_under(constants, force)
+    load, contact = loads_and_angles(constants, found)
+    push = load * np.cos(contact)
+    pushed = np.stack([(push * np.cos(angles)).sum(axis=(1, 2)), (push * np.sin(angles)).sum(axis=(1, 2))], 1)
+    np.testing.assert_allclose(pushed, -force, atol=1e-6 * size)
 
 
 def test_pairs_carry_their_preload_and_a_force_that_no_bearing_bears_is_refused():
