@@ -1,22 +1,26 @@
-"""Bundled machines, and a synthetic drop of a hidden one for the tests of what is estimated from it."""
+"""Bundled machines with their recordings, and a synthetic drop of a hidden machine."""
+
+from pathlib import Path
 
 import pytest
 from tests.bank import SEED
 
-from rotordrop.machine import example_machine
+from rotordrop import example_machine, example_record_path, read_record
 from rotordrop_bench import hidden_machine
+
+RECORDINGS = Path(__file__).parent / "record" / "recordings"
 
 
 @pytest.fixture(scope="session")
-def known():
+def lp400():
     """The machine of the supplied records, as its owner knows it."""
     return example_machine("lp400")
 
 
 @pytest.fixture(scope="session")
-def lp400(known):
-    """The same by its name."""
-    return known
+def machine(lp400):
+    """The same, where a test has no other."""
+    return lp400
 
 
 @pytest.fixture(scope="session")
@@ -26,9 +30,33 @@ def paper():
 
 
 @pytest.fixture(scope="session")
-def hidden(known):
-    """A machine drawn around it."""
-    return hidden_machine(known, SEED)
+def whole_drop(lp400):
+    """The bundled drop at 60 Hz."""
+    return read_record(example_record_path("lp400_drop_060"), lp400)
+
+
+@pytest.fixture(scope="session")
+def drop(whole_drop):
+    """It from 0.25 s before to 0.3 s after."""
+    return whole_drop.window(-0.25, 0.3)
+
+
+@pytest.fixture(scope="session")
+def tail(lp400):
+    """Its tail."""
+    return read_record(example_record_path("lp400_drop_060_tail"), lp400)
+
+
+@pytest.fixture(scope="session")
+def fast_drop(lp400):
+    """A short drop at 150 Hz, simulated too."""
+    return read_record(RECORDINGS / "drop_150_short.h5", lp400)
+
+
+@pytest.fixture(scope="session")
+def hidden(lp400):
+    """A machine drawn around that of the records."""
+    return hidden_machine(lp400, SEED)
 
 
 @pytest.fixture

@@ -15,13 +15,7 @@ from rotordrop.evidence.evidence import Evidence
 from rotordrop.evidence.free_rotor import free_rotor
 from rotordrop.evidence.levitated import fit_levitated
 from rotordrop.evidence.one_end import as_dropped
-from rotordrop.evidence.quality import (
-    Finding,
-    check_record,
-    gate,
-    refuse_unusable,
-    standing,
-)
+from rotordrop.evidence.quality import Finding, check_record, gate, refuse_unusable, standing
 from rotordrop.evidence.quality.arrangement import check_ends_named, check_planes
 from rotordrop.evidence.quality.channels import check_channels
 from rotordrop.evidence.quality.fall import fell_as_described
@@ -470,12 +464,12 @@ class TestSpeed:
 
 
 class TestUnits:
-    def test_a_tail_without_its_level_is_coupled_and_not_in_another_unit(self, drop, tail, machine, edited):
+    def test_a_tail_without_its_level_is_coupled_and_not_in_another_unit(self, drop, tail, machine):
         level = np.mean(drop.signals[drop.time < -0.02], axis=0)
-        moved = edited(tail, lambda signals: signals - np.mean(signals, axis=0) + level)
+        moved = signals(lambda s: s - np.mean(s, axis=0) + level)(tail)
         found = check_record(drop, machine, moved)
         assert [(one.kind, one.severity) for one in found] == [("AC coupling", "stop")]
-        small = edited(tail, lambda signals: 0.02 * (signals - level) + level)
+        small = signals(lambda s: 0.02 * (s - level) + level)(tail)
         assert {one.kind for one in check_record(drop, machine, small)} == {"wrong unit factor"}
 
 
@@ -484,15 +478,12 @@ class TestArrangement:
         found = only(drop, machine.changed(ambs=()), tail, severity="note")
         assert "cannot be decided: it takes two AMB planes" in found.message
 
-    def test_sensors_at_other_angles_than_described(self, drop, machine, edited):
+    def test_sensors_at_other_angles_than_described(self, drop, machine):
         """Turned by 45°: no exchange explains it, and the rotor falls aside before it touches anything."""
 
-        def change(signals):
-            c, s = np.cos(np.radians(45.0)), np.sin(np.radians(45.0))
-            a, b = signals[:, 0], signals[:, 1]
-            return np.column_stack([c * a + s * b, c * b - s * a, signals[:, 2], signals[:, 3]])
-
-        turned = edited(drop, change)
+        c = s = np.sqrt(0.5)
+        both = np.array([[c, -s, 0.0, 0.0], [s, c, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        turned = signals(lambda readings: readings @ both)(drop)
         assert only(turned, machine).kind == "leaning fall"
         aside = only(turned, machine, severity="warning", without="record ends before standstill")
         assert (aside.kind, aside.channel) == ("turned sensors", "S_NDE_A, S_NDE_B")
@@ -539,14 +530,14 @@ class TestArrangement:
         fall = find_fall(record, rotor, Beginning(coarse=coarse, levitated=levitated))
         assert fell_as_described(record, machine, fall) is told
 
-    def test_nothing_is_refused_for_the_fall_of_a_beam(self, fast_drop, machine, edited):
+    def test_nothing_is_refused_for_the_fall_of_a_beam(self, fast_drop, machine):
         """A beam in place of the rotor bends otherwise: what its fall seems to say is a warning."""
         beam = machine.changed(rotor=machine.rotor.changed(mass_to_ends=0.0))
         every = check_record(order(2, 1, 0, 3)(fast_drop), beam)
         (found,) = (one for one in every if one.kind == "swapped channels")
         assert (found.severity, found.channel) == ("warning", "S_NDE_A, S_DE_A")
 
-    def test_a_tiny_orbit_cannot_show_its_sense(self, drop, tail, machine, edited):
+    def test_a_tiny_orbit_cannot_show_its_sense(self, drop, tail, machine):
         """Without an orbit before the drop the exchange of A and B stays open, and this is said."""
         model = fit_levitated(drop, -0.004, speed=60 * HZ)
         wave = np.outer(np.exp(2j * np.pi * model.frequency * drop.time), model.amplitudes[0]).real
@@ -565,7 +556,7 @@ def test_a_tail_that_moves_or_bounces_blames_no_channel(whole_drop, drop, tail, 
     assert {(one.kind, one.severity) for one in found} == {("not settled", "warning")}
 
 
-def test_unusable_records_are_refused_with_all_faults(drop, machine, edited):
+def test_unusable_records_are_refused_with_all_faults(drop, machine):
     found = check_record(times(all=-1.0)(drop), machine)
     with pytest.raises(
         RecordError,

@@ -608,14 +608,14 @@ def test_noise_is_named_and_what_it_hides_is_not_stated(noise, rows, tmp_path):
         assert low < GAP < high and high - low > 4.0 * noise
 
 
-def test_what_a_high_pass_or_a_stuck_channel_hides_is_not_stated(machine):
-    drop = read_record(example_record_path("lp400_drop_060"), machine)
-    high = butter(1, 1.0, "high", fs=drop.sampling_rate, output="sos")
-    coupled = sosfilt(high, drop.signals - drop.signals[0], axis=0)
-    stuck = np.where(drop.time[:, None] > (np.inf, np.inf, 0.03, np.inf), drop.signals[0], drop.signals)
+def test_what_a_high_pass_or_a_stuck_channel_hides_is_not_stated(machine, whole_drop):
+    time, read = whole_drop.time[:, None], whole_drop.signals
+    high = butter(1, 1.0, "high", fs=whole_drop.sampling_rate, output="sos")
+    coupled = sosfilt(high, read - read[0], axis=0)
+    stuck = np.where(time > (np.inf, np.inf, 0.03, np.inf), read[0], read)
     for signals, kind, ends in ((coupled, "AC coupling", set()), (stuck, "stuck channel", {"NDE"})):
         for of in (None, machine):
-            seen = look(replace(drop, signals=signals), machine=of)
+            seen = look(replace(whole_drop, signals=signals), machine=of)
             assert {one.kind for one in seen.findings if one.severity == "stop"} == {kind}
             page = look_page(seen, drawn=False)
             stated = {card.title for card in page.cards if "air gap" in {f.label for f in card.figures}}
@@ -623,11 +623,11 @@ def test_what_a_high_pass_or_a_stuck_channel_hides_is_not_stated(machine):
             assert ("impacts (" in page.verdict[0].text) == bool(ends)
 
 
-def test_a_plane_between_the_bearings_has_the_name_of_neither(machine):
+def test_a_plane_between_the_bearings_has_the_name_of_neither(machine, whole_drop):
     middle = [one.model_copy(update={"name": f"M{one.name}", "node": 12}) for one in machine.sensors[:2]]
     three = machine.model_copy(update={"sensors": (*machine.sensors, *middle)})
-    drop = read_record(example_record_path("lp400_drop_060"), machine)
-    record = replace(drop, sensors=three.sensors, signals=drop.signals[:, [0, 1, 2, 3, 2, 3]])
+    signals = whole_drop.signals[:, [0, 1, 2, 3, 2, 3]]
+    record = replace(whole_drop, sensors=three.sensors, signals=signals)
     read = dict(look_page(look(record, machine=three), drawn=False).facts)["channels"]
     assert read.endswith("; between: MS_NDE_A, MS_NDE_B")
 

@@ -27,9 +27,9 @@ HELD, FELL = "NDE", "DE"
 
 
 @pytest.fixture(scope="module")
-def drop(known):
+def drop(lp400):
     """A recorded drop of a hidden machine whose NDE magnet stays on."""
-    hidden = hidden_machine(known, 14, Violations.of({"magnets": {"stays_on": [HELD]}}))
+    hidden = hidden_machine(lp400, 14, Violations.of({"magnets": {"stays_on": [HELD]}}))
     made = synthesize_drop(hidden, SPEED, 140, duration=0.22, name="one end")
     assert made.tail is None
     assert made.truth["violated"] == ["one end held"]
@@ -37,35 +37,35 @@ def drop(known):
 
 
 @pytest.fixture(scope="module")
-def evidence(known, drop):
-    return Evidence(record=drop.record, machine=as_dropped(drop.record, known), name="one end")
+def evidence(lp400, drop):
+    return Evidence(record=drop.record, machine=as_dropped(drop.record, lp400), name="one end")
 
 
-def test_the_record_shows_which_end_was_held(known, drop, synthetic):
+def test_the_record_shows_which_end_was_held(lp400, drop, synthetic):
     found = one_end(drop.record)
     assert found is not None
     assert found.held == (True, False)
-    assert [amb.stays_on for amb in as_dropped(drop.record, known).ambs] == [True, False]
+    assert [amb.stays_on for amb in as_dropped(drop.record, lp400).ambs] == [True, False]
     still = synthetic.record.signals.copy()
     still[:, 0] = 0.0  # a dead channel says nothing of its end
     seen = look(replace(synthetic.record, signals=still))
     assert one_end(seen.record) is None and [one.plane for one in seen.planes] == [FELL]
     assert one_end(synthetic.record) is None
-    assert as_dropped(synthetic.record, known) is known
+    assert as_dropped(synthetic.record, lp400) is lp400
 
 
-def test_the_gate_takes_what_a_machine_file_says_of_its_magnets(drop, known):
-    said = known.with_magnets_on([FELL])
+def test_the_gate_takes_what_a_machine_file_says_of_its_magnets(drop, lp400):
+    said = lp400.with_magnets_on([FELL])
     assert as_dropped(drop.record, said) is said
-    found = check_record(drop.record, known)
+    found = check_record(drop.record, lp400)
     assert [one.severity for one in found if one.kind == "one end held"] == ["warning"]
     assert not [one for one in found if one.severity == "stop"]
     assert "wrong unit factor" not in {one.kind for one in found}
 
 
 @pytest.mark.parametrize("with_machine", [False, True])
-def test_a_look_is_of_the_end_that_fell_and_says_so(drop, known, with_machine):
-    seen = look(drop.record, machine=known if with_machine else None)
+def test_a_look_is_of_the_end_that_fell_and_says_so(drop, lp400, with_machine):
+    seen = look(drop.record, machine=lp400 if with_machine else None)
     assert [plane.plane for plane in seen.planes] == [FELL]
     assert seen.impacts
     assert {impact.plane for impact in seen.impacts} == {FELL}
@@ -121,11 +121,11 @@ def test_the_cross_check_has_the_magnet_as_described_and_no_gate_there(evidence)
     assert moved[1] < -1.5e-4
 
 
-def test_drops_that_do_not_go_together_are_refused(drop, known, synthetic):
+def test_drops_that_do_not_go_together_are_refused(drop, lp400, synthetic):
     with pytest.raises(UsageError, match="drops are of one end"):
-        estimate_drops(known, [drop.record, synthetic.record])
+        estimate_drops(lp400, [drop.record, synthetic.record])
     with pytest.raises(RecordError, match="the replay knows no drop of one end"):
-        estimate_drops(known, [drop.record], method=Replay())
+        estimate_drops(lp400, [drop.record], method=Replay())
 
 
 @pytest.fixture(scope="module")

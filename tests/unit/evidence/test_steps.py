@@ -9,7 +9,6 @@ from rotordrop.cli.app import run
 from rotordrop.errors import RecordError
 from rotordrop.evidence.paths import split_drops
 from rotordrop.evidence.rest import settled_tail
-from rotordrop.examples import example_record_path
 from rotordrop.machine import example_machine, example_path
 from rotordrop.record.record import read_record, save_record
 from rotordrop.record.sandbox import MEMORY, UNPACKED_PER_BYTE, refuse_bomb
@@ -60,8 +59,8 @@ def test_rest_is_found_behind_the_motion_and_not_where_the_shaft_turns(tail, mac
 
 
 @pytest.fixture(scope="module")
-def single():
-    return read_record(example_record_path("lp400_drop_060"), example_machine("lp400")).window(-0.25, 0.6)
+def single(whole_drop):
+    return whole_drop.window(-0.25, 0.6)
 
 
 @pytest.fixture(scope="module")

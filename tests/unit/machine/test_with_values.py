@@ -12,12 +12,6 @@ from rotordrop.machine import example_machine, example_names, example_path, load
 from rotordrop.machine.plausibility import doubts, unusual_values
 from rotordrop.machine.simple import SimpleMachine, simple_machine
 
-
-@pytest.fixture(scope="module")
-def machine():
-    return example_machine("lp400")
-
-
 CONTRACT = [
     *(f"NDE.{name}" for name in ("air_gap", "bore_radius", "damping_time", "preload")),
     *(f"DE.support.{name}{end}" for name in ("mass", "stiffness", "damping") for end in ("", "_horizontal")),

@@ -131,9 +131,9 @@ def test_a_replay_and_the_twin_of_one_record_know_of_no_change(replayed, bank):
     assert not changes(published_drop(bank("tracked")), published_drop(replayed)).named
 
 
-def test_what_the_model_does_not_follow_is_not_replayed(bank, known, synthetic):
+def test_what_the_model_does_not_follow_is_not_replayed(bank, lp400, synthetic):
     with pytest.raises(UsageError, match=r"the method is 'guess'; expected Tracked\(...\) or Replay\(...\)"):
-        estimate_drop(known, synthetic.record, method="guess")
+        estimate_drop(lp400, synthetic.record, method="guess")
     drop = bank("workshop")
     failed = replace(drop, checks=(replace(drop.checks[0], passed=False), *drop.checks[1:]))
     with pytest.raises(IdentificationError, match=r"does not follow the record hidden_060 .*tracked twin"):
@@ -141,8 +141,8 @@ def test_what_the_model_does_not_follow_is_not_replayed(bank, known, synthetic):
 
 
 @pytest.mark.slow
-def test_command_writes_numbers_and_report(known, synthetic, tmp_path):
-    place = write_drop(synthetic, known, tmp_path, "drop_1")
+def test_command_writes_numbers_and_report(lp400, synthetic, tmp_path):
+    place = write_drop(synthetic, lp400, tmp_path, "drop_1")
     record, tail = place / "record.csv", place / "tail.csv"
     out, page = tmp_path / "out.json", tmp_path / "report.html"
     arguments = ["estimate", str(example_path("lp400")), str(record), "--tail", str(tail)]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rotordrop import build_drop_model, example_record_path, read_record
+from rotordrop import build_drop_model
 from rotordrop.evidence.evidence import read_evidence
 from rotordrop.track.smoother import PassSettings, forward, smooth
 from rotordrop.twin.problems import COARSE_BASIS, drop_problem
@@ -16,11 +16,9 @@ def model(lp400):
 
 
 @pytest.fixture(scope="session")
-def prepared(lp400):
+def prepared(lp400, whole_drop, tail):
     """The bundled record with its power-off and its settled tail."""
-    record = read_record(example_record_path("lp400_drop_060"), lp400)
-    tail = read_record(example_record_path("lp400_drop_060_tail"), lp400)
-    return read_evidence(build_drop_model(lp400), record, tail, name="drop_060")
+    return read_evidence(build_drop_model(lp400), whole_drop, tail, name="drop_060")
 
 
 def flight_of(machine, prepared):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotordrop import build_drop_model, example_machine, example_record_path, load_machine, read_record
+from rotordrop import build_drop_model, load_machine
 from rotordrop.estimate.assumptions import left_to_assumption, twin_assumptions
 from rotordrop.estimate.document import estimate_document
 from rotordrop.estimate.estimate import PlaneUnbalance, unbalance_notes
@@ -24,16 +24,8 @@ UNTIL = 3e-3
 
 
 @pytest.fixture(scope="module")
-def machine():
-    """The bundled machine, whose owner says nothing of the drag of the air."""
-    return example_machine("lp400")
-
-
-@pytest.fixture(scope="module")
-def evidence(machine):
-    record = read_record(example_record_path("lp400_drop_060"), machine)
-    early = record.window(-0.25, 0.05)
-    return read_evidence(build_drop_model(machine), early)
+def evidence(machine, whole_drop):
+    return read_evidence(build_drop_model(machine), whole_drop.window(-0.25, 0.05))
 
 
 def said(machine, evidence):

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 calibration = handed_out("calibration")
 
 
-def test_supports_and_gaps_come_near_the_truth_from_guesses(calibration, hidden, known):
+def test_supports_and_gaps_come_near_the_truth_from_guesses(calibration, hidden, lp400):
     assert calibration.consistent, calibration.sentence()
     for bearing in hidden.machine.touchdown_bearings:
         for path, limit in (("stiffness", 0.03), ("mass", 0.03), ("damping", 0.15)):
@@ -33,15 +33,15 @@ def test_supports_and_gaps_come_near_the_truth_from_guesses(calibration, hidden,
         assert gap == pytest.approx(float(bearing.air_gap), abs=3e-6)
     apart = [
         abs(float(guess.support.stiffness) / float(true.support.stiffness) - 1.0)
-        for guess, true in zip(known.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True)
+        for guess, true in zip(lp400.touchdown_bearings, hidden.machine.touchdown_bearings, strict=True)
     ]
     assert max(apart) > 0.1
 
 
-def test_the_calibrated_machine_loads_and_says_what_was_determined(calibration, known, tmp_path):
+def test_the_calibrated_machine_loads_and_says_what_was_determined(calibration, lp400, tmp_path):
     save_machine(calibration.machine, tmp_path / "calibrated.toml")
     again = load_machine(tmp_path / "calibrated.toml")
-    assert is_calibrated(again) and not is_calibrated(known)
+    assert is_calibrated(again) and not is_calibrated(lp400)
     for bearing in again.touchdown_bearings:
         for quantity in (bearing.support.stiffness, bearing.contact.stiffness, bearing.air_gap):
             assert quantity.source == "calibrated on hidden_060, hidden_150"
@@ -88,11 +88,11 @@ def test_confounded_values_are_said_in_the_document_too(calibration):
         assert calibration.values[entry.path].status == entry.verdict
 
 
-def test_what_the_records_do_not_determine_stays_a_guess(calibration, known):
+def test_what_the_records_do_not_determine_stays_a_guess(calibration, lp400):
     undetermined = {e.path for e in calibration.identifiability if e.verdict in NOT_DETERMINED}
     assert {"NDE.race.inertia", "DE.race.inertia"} <= undetermined
     for b, bearing in enumerate(calibration.machine.touchdown_bearings):
-        inertia, before = bearing.race.inertia, known.touchdown_bearings[b].race.inertia
+        inertia, before = bearing.race.inertia, lp400.touchdown_bearings[b].race.inertia
         assert inertia.status == "guess" and inertia.range is not None
         sigma = prior(parameter("race.inertia"), inertia).sigma
         assert sigma == pytest.approx(prior(parameter("race.inertia"), before).sigma, rel=1e-6)

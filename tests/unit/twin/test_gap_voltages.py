@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rotordrop import calibrate_machine, estimate_drops, example_machine, example_record_path, read_record
+from rotordrop import calibrate_machine, estimate_drops
 from rotordrop.evidence.one_end import LEVITATED
 from rotordrop.twin import calibrated, tracked
 
@@ -17,10 +17,12 @@ class Followed(Exception):
 
 
 @pytest.mark.parametrize("estimates", [False, True])
-def test_drops_on_other_gap_voltages_are_read_with_the_zeros_of_one(estimates, monkeypatch):
-    machine = example_machine("lp400")
-    read = [read_record(example_record_path(f"lp400_drop_060{part}"), machine) for part in ("", "_tail")]
-    drops, tails = ([replace(one, signals=one.signals + bias, sha256="") for bias in BIASES] for one in read)
+def test_drops_on_other_gap_voltages_are_read_with_the_zeros_of_one(
+    estimates, machine, whole_drop, tail, monkeypatch
+):
+    drops, tails = (
+        [replace(one, signals=one.signals + bias, sha256="") for bias in BIASES] for one in (whole_drop, tail)
+    )
 
     def follow(machine, evidence):
         raise Followed(machine, evidence)

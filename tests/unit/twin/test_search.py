@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 import rotordrop
-from rotordrop import build_drop_model, check_record, example_machine, read_record
+from rotordrop import build_drop_model, check_record, read_record
 from rotordrop.elements.rotor import FORM
 from rotordrop.elements.table import EXTENSIONS
 from rotordrop.evidence.evidence import Evidence, read_evidence
@@ -26,11 +26,7 @@ from rotordrop.twin.problems import Drops, recorded_drop
 from rotordrop.twin.rises import LogLikelihoodGains, _density_beside, _log_density
 from rotordrop.twin.rotor_search import with_found_rotor
 from rotordrop.twin.tracked import OtherModel
-from rotordrop.twin.tracked_loads import (
-    check_with_form_error,
-    is_beyond_accuracy,
-    with_form_error,
-)
+from rotordrop.twin.tracked_loads import check_with_form_error, is_beyond_accuracy, with_form_error
 from rotordrop.twin.value_of_information import advice_of, explained
 from rotordrop_bench import hidden_machine, synthesize_drop
 
@@ -115,14 +111,9 @@ RECORDS = Path(rotordrop.__file__).parent / "examples" / "lp400"
 
 
 @pytest.fixture(scope="module")
-def described():
-    return example_machine("lp400")
-
-
-@pytest.fixture(scope="module")
-def twelve(described):
+def twelve(lp400):
     """The machine of the bundled record as twelve numbers tell it."""
-    rotor, bearings, sensors = described.rotor, described.touchdown_bearings, described.sensors
+    rotor, bearings, sensors = lp400.rotor, lp400.touchdown_bearings, lp400.sensors
     at = rotor.node_positions
     machine = simple_machine(
         SimpleMachine(
@@ -152,13 +143,13 @@ def seen(twelve):
 
 
 @pytest.mark.slow
-def test_bending_and_inertia_are_found_from_the_record_without_a_contact_law(described, twelve, seen):
+def test_bending_and_inertia_are_found_from_the_record_without_a_contact_law(lp400, twelve, seen):
     held = {f"rotor.{row.path}": 0.0 for row in FORM[1:]}
     tried: list[float] = []
     told = with_found_rotor(twelve.with_values(held), seen, lambda _, share: tried.append(share))
     found = told.rotor
     assert len(tried) < 40 and tried == sorted(tried)  # two thirds of it with longer steps of the derivatives
-    true = rotor_fe(described.rotor)
+    true = rotor_fe(lp400.rotor)
     frequencies = free_free_modes(true, 4).frequency[2:]
     cylinder = rotor_fe(twelve.with_values({"rotor.stiffness_factor": 1.0, "rotor.mass_to_ends": 0.0}).rotor)
     assert free_free_modes(cylinder, 3).frequency[2] > 1.7 * frequencies[0]
@@ -179,8 +170,8 @@ def test_a_hollow_rotor_is_found_stiffer_than_the_middle_of_its_prior(twelve):
     assert float(found.stiffness_factor) == pytest.approx(1.4, rel=0.15)
 
 
-def test_a_rotor_that_is_sought_does_not_judge_what_a_filter_took(described, twelve):
-    for machine, seen in ((described, ["recorder low-pass"]), (twelve, [])):
+def test_a_rotor_that_is_sought_does_not_judge_what_a_filter_took(lp400, twelve):
+    for machine, seen in ((lp400, ["recorder low-pass"]), (twelve, [])):
         record = read_record(RECORDS / "drop_060.h5", machine)
         low = butter(2, 200.0, fs=record.sampling_rate, output="sos")
         smooth = record.signals[0] + sosfilt(low, record.signals - record.signals[0], axis=0)
@@ -188,8 +179,8 @@ def test_a_rotor_that_is_sought_does_not_judge_what_a_filter_took(described, twe
         assert [kind for kind in found if kind == "recorder low-pass"] == seen
 
 
-def test_what_is_known_of_a_rotor_is_not_sought(described, twelve):
-    assert with_found_rotor(described, []) is described
+def test_what_is_known_of_a_rotor_is_not_sought(lp400, twelve):
+    assert with_found_rotor(lp400, []) is lp400
     known = twelve.with_values({f"rotor.{row.path}": 0.1 for row in FORM} | {"rotor.stiffness_factor": 0.3})
     assert with_found_rotor(known, []) is known
 

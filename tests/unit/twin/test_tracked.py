@@ -54,12 +54,7 @@ from rotordrop.twin.tracked_loads import (
     twin_loads,
     widened_to_cross_check,
 )
-from rotordrop.twin.tracked_parameters import (
-    UNDETERMINED,
-    fitted_values,
-    gap_of_record,
-    is_impossible_gap,
-)
+from rotordrop.twin.tracked_parameters import UNDETERMINED, fitted_values, gap_of_record, is_impossible_gap
 from rotordrop_bench import Violations, hidden_machine, synthesize_drop
 from rotordrop_bench.event import FINER
 from rotordrop_bench.rotors import bench_rotor
@@ -101,14 +96,14 @@ def told_of(drop, machine, made):
     return estimate_of(drop, Tracked(), facts_of(evidence))
 
 
-def test_loads_and_large_impacts_come_within_their_intervals(tracked, known, synthetic, quick):
+def test_loads_and_large_impacts_come_within_their_intervals(tracked, lp400, synthetic, quick):
     assert tracked.consistent, tracked.sentence
     assert_right(tracked, synthetic)
     peaks = [number(tracked, name, "peak_force_N").value for name in BEARINGS]
     assert np.all(np.array(half_widths(tracked, "peak_force_N")) < 0.08 * np.array(peaks))
     for name in BEARINGS:
         true = np.array(synthetic.truth["contact_intervals_0_0p25_s"][name])  # start, end [s], peak [N]
-        true = true[true[:, 2] > 1.7 * 0.5 * 9.81 * known.rotor.mass]
+        true = true[true[:, 2] > 1.7 * 0.5 * 9.81 * lp400.rotor.mass]
         told = document(tracked)["bearings"][name]["impacts"]
         found = [
             max(
@@ -297,8 +292,8 @@ def test_without_tail_and_levitated_part_less_is_known(calibrated, workshop, qui
 
 
 @pytest.mark.slow
-def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(known, calibrated, quick):
-    elsewhere = hidden_machine(known, SEED, Violations.of({"sensors": {"plane_shift": "30 mm"}}))
+def test_sensor_planes_elsewhere_than_stated_are_flagged_and_intervals_widened(lp400, calibrated, quick):
+    elsewhere = hidden_machine(lp400, SEED, Violations.of({"sensors": {"plane_shift": "30 mm"}}))
     record = synthesize_drop(elsewhere, SPEED, 10 * SEED, duration=0.22, tolerance=1e-7, name="moved")
     drop = estimate_drop(calibrated, record.record, tail=record.tail, method=Tracked(quick=True))
     assert drop.verdict in (Verdict.WIDENED, Verdict.REPLACED) and not drop.consistent
@@ -371,17 +366,17 @@ def test_what_spins_along_with_a_race_is_found_where_the_file_is_silent():
         assert told.low < peak < told.high and told.high < 1.08 * told.low
 
 
-def test_gaps_and_tails_belong_to_no_single_drop(known, synthetic):
-    model = build_drop_model(known, "quick")
-    item = read_evidence(build_drop_model(known), synthetic.record)
+def test_gaps_and_tails_belong_to_no_single_drop(lp400, synthetic):
+    model = build_drop_model(lp400, "quick")
+    item = read_evidence(build_drop_model(lp400), synthetic.record)
     started = drop_problem(model, item)
     for name in BEARINGS:
         entry = started.n_dynamic + [u.path for u in started.unknowns].index(f"{name}.air_gap")
         true = synthetic.truth["air_gap_m"][name]
         assert abs(started.mean[entry] - true) < 15e-6
-        guess = known.bearing(name).air_gap
+        guess = lp400.bearing(name).air_gap
         assert started.mean[entry] != float(guess)
-    model = build_drop_model(known)
+    model = build_drop_model(lp400)
     without = read_evidence(model, synthetic.record)
     having = read_evidence(model, synthetic.record, synthetic.tail)
     first, second = tail_first([without, having])
@@ -399,12 +394,7 @@ def test_a_fit_inconsistent_with_the_record_is_noticed(nis, factor, diverged, in
     drops = [
         SimpleNamespace(nis=one, done=3 - lost, means=range(3)) for one, lost in ((0.9, 0), (nis, diverged))
     ]
-    fit = TrackedDrops(
-        problems=(),
-        filtered=tuple(drops),
-        trajectories=(),
-        noise_factors=(1.0, factor),
-    )
+    fit = TrackedDrops(problems=(), filtered=tuple(drops), trajectories=(), noise_factors=(1.0, factor))
     assert is_inconsistent(fit) == inconsistent
 
 
