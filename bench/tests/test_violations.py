@@ -1,6 +1,7 @@
 """Case files of violations: what they may hold, what they refuse, and what becomes of sensors and magnets."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,29 +18,7 @@ from rotordrop_bench.true_values import violated_kinds
 
 SPEED = 2.0 * np.pi * 60.0
 
-CASE = """
-[support]
-axes_angle = "30 deg"
-stiffness_ratio = 0.65
-
-[bearing.DE.foundation]
-mass = "400 kg"
-frequency = "85 Hz"
-
-[[contact.law]]
-depth = "1 um"
-force = "90 N"
-[[contact.law]]
-depth = "4 um"
-force = "1.6 kN"
-
-[sensors]
-time_constant = "80 us"
-
-[unbalance_jump]
-node = 33
-amount = "600 g mm"
-"""
+CASE = (Path(__file__).parent / "violated.toml").read_text(encoding="utf-8")
 
 
 def violations(**parts):

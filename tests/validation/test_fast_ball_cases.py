@@ -1,17 +1,17 @@
 """Balls at speed: angles, loads and stiffness of one ball between grooves under its centrifugal force."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 from cases import checks_of
+from tests.plain_bearing import BallBearingGeometry
 
 from rotordrop.physics.ball_bearing import bearing_constants
 from rotordrop.physics.fast_balls import FastBalls, ball_equilibrium, centred_balls, offset_on_springs
 
 
 def row_of(v):
-    described = SimpleNamespace(
+    described = BallBearingGeometry(
         ball_diameter=v["ball_diameter"],
         pitch_diameter=v["pitch_diameter"],
         ball_count=v["balls"],
@@ -19,15 +19,10 @@ def row_of(v):
         conformity_inner=v["conformity"],
         conformity_outer=v["conformity"],
         preload=v["preload"],
-        clearance=None,
         ring_youngs_modulus=v["ring_modulus"],
-        ring_poisson_ratio=0.3,
         ball_youngs_modulus=v["ball_modulus"],
         ball_poisson_ratio=v["ball_poisson"],
         ball_density=v["ball_density"],
-        first_ball_angle=0.0,
-        second_row_offset=0.0,
-        arrangement="X",
     )
     constants = bearing_constants(described)
     return constants, FastBalls.of(described, constants)
