@@ -30,11 +30,7 @@ def folder(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("drops", "expected"),
-    [
-        (DROPS[:73], "461267f655696cb7"),
-        (DROPS[73:99], "a126008bda1fe9ac"),
-        (DROPS[99:], "c12c3dc2e1ebf476"),
-    ],
+    [(DROPS[:73], "461267f655696cb7"), (DROPS[73:99], "a126008bda1fe9ac"), (DROPS[99:], "c12c3dc2e1ebf476")],
 )
 def test_the_list_is_fixed(drops, expected):
     digest = hashlib.sha256()

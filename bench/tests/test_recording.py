@@ -9,14 +9,7 @@ from tests.scaled_machines import scaled_machine
 from rotordrop.errors import UsageError
 from rotordrop_bench import SensorChain, Violations, hidden_machine, synthesize_drop
 from rotordrop_bench.event import drop_conditions
-from rotordrop_bench.sensor_chain import (
-    PERFECT,
-    drawn_errors,
-    fitted_to,
-    quantised,
-    readings,
-    shape_at,
-)
+from rotordrop_bench.sensor_chain import PERFECT, drawn_errors, fitted_to, quantised, readings, shape_at
 from rotordrop_bench.settled import settled_coordinates, swinging_amplitudes
 
 SPEED = 2.0 * np.pi * 60.0

@@ -99,12 +99,6 @@ def test_printed_loads_one_agrees_and_one_is_flagged():
     assert expected["static load NDE"].deviation(177.0) == pytest.approx(0.0136, abs=5e-4)
 
 
-CASES = {
-    "M03": undamped,
-    "P01": small_swing,
-    "P02a": large_swing,
-    "ST01": sealed,
-    "X01": static_loads,
-}
+CASES = {"M03": undamped, "P01": small_swing, "P02a": large_swing, "ST01": sealed, "X01": static_loads}
 
 test_case, test_a_changed_input_is_noticed = checks_of(CASES)

@@ -8,12 +8,7 @@ import pytest
 from tests.published import published
 
 from rotordrop.errors import UsageError
-from rotordrop.estimate.agreement import (
-    AFTER_CONTACT,
-    TENFOLD,
-    compare_orbits,
-    orbit_disagreement,
-)
+from rotordrop.estimate.agreement import AFTER_CONTACT, TENFOLD, compare_orbits, orbit_disagreement
 from rotordrop.estimate.bearing_drop import (
     AirGap,
     Band,

@@ -51,9 +51,7 @@ def told(tmp_path, monkeypatch):
         file = tmp_path / name
         reads, held = os.pipe()
         starter.start(
-            *("functions_of_test", function, str(file), *arguments),
-            imports=("functions_of_test",),
-            held=held,
+            *("functions_of_test", function, str(file), *arguments), imports=("functions_of_test",), held=held
         )
         os.close(held)
         until = time.monotonic() + 600.0

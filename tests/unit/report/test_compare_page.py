@@ -222,11 +222,7 @@ def test_limits_are_kept_passed_open_or_not_given(limits, level, text):
 @pytest.mark.parametrize(
     ("limit", "level", "text"),
     [
-        (
-            "peak_stress=2.2 GPa",
-            "warning",
-            "MPa until 200 ms and further out after that",
-        ),
+        ("peak_stress=2.2 GPa", "warning", "MPa until 200 ms and further out after that"),
         ("peak_stress=1.5 GPa", "bad", "passed by a at NDE"),
         ("mean_stress=2.2 GPa", "good", "kept by all drops"),
     ],

@@ -7,10 +7,7 @@ from tests.unit.report.conftest import section
 
 from rotordrop.estimate.agreement import compare_orbits
 from rotordrop.evidence.contacts import TimedContact
-from rotordrop.report.estimate_page import (
-    estimate_page,
-    first_contact_table,
-)
+from rotordrop.report.estimate_page import estimate_page, first_contact_table
 from rotordrop.report.quantity import Quantity
 
 GAPS = np.array([275e-6, 285e-6])

@@ -7,11 +7,7 @@ import pytest
 
 from rotordrop.estimate.bearing_drop import simulated_bearings, simulated_gap
 from rotordrop.machine import example_machine
-from rotordrop.report.machine_content import (
-    not_given,
-    spoken_key,
-    weight_shares,
-)
+from rotordrop.report.machine_content import not_given, spoken_key, weight_shares
 from rotordrop.report.simulate_page import simulate_page
 
 

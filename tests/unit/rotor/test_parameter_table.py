@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from rotordrop.elements.parameter import Role
-from rotordrop.elements.table import (
-    TABLE,
-    following,
-    keys_of,
-    parameter,
-    published,
-    row_of,
-    rows,
-)
+from rotordrop.elements.table import TABLE, following, keys_of, parameter, published, row_of, rows
 from rotordrop.known import NINETY, Known
 from rotordrop.machine.examples import example_machine
 from rotordrop.physics import columns as L

@@ -23,11 +23,7 @@ from rotordrop.machine.plausibility import doubts
 from rotordrop.machine.saving import machine_text
 from rotordrop.physics import columns as L
 from rotordrop.physics.ball_bearing_response import bearing_response
-from rotordrop.physics.ball_set import (
-    ball_set_energy,
-    two_row_axial_force,
-    two_row_force,
-)
+from rotordrop.physics.ball_set import ball_set_energy, two_row_axial_force, two_row_force
 from rotordrop.physics.face import face_contact, face_energy, mean_friction_radius
 from rotordrop.report.simulate_page import simulate_page
 from rotordrop.rotor.machine_summary import machine_json, machine_warnings, summarise_machine

@@ -12,13 +12,7 @@ from rotordrop.track import smoother
 from rotordrop.track._arrays import is_covariance
 from rotordrop.track.calibration import filtered_chain, prior_of_next, smoothed_chain, smoothed_means_of_chain
 from rotordrop.track.problem import WATCHED, private_copy
-from rotordrop.track.smoother import (
-    PassSettings,
-    fastest_frequency,
-    forward,
-    smooth,
-    smooth_means,
-)
+from rotordrop.track.smoother import PassSettings, fastest_frequency, forward, smooth, smooth_means
 
 SETTINGS = PassSettings(impulse=1e-3, share=0.01)
 
