@@ -348,7 +348,6 @@ def test_many_writers_and_a_killed_one_lose_nothing(log):
 @pytest.fixture
 def postgresql():
     """A PostgreSQL server of our own on loopback; where none is installed its tests are left out."""
-    pytest.importorskip("psycopg", reason="needs the extra 'postgres'")
     programs = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
     if not programs:
         pytest.skip("no PostgreSQL server is installed (Debian: apt-get install postgresql)")
@@ -400,7 +399,6 @@ def test_the_same_log_in_postgresql(postgresql):
     ],
 )
 def test_an_address_that_is_none_is_said(url):
-    pytest.importorskip("psycopg")
     for use in USES:
         with pytest.raises(RotordropError, match=r"the log at .* cannot be used"):
             use(url)

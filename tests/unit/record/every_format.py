@@ -7,7 +7,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import pytest
 import scipy.io
 
 from rotordrop.machine import example_machine
@@ -91,7 +90,7 @@ def _mat_73(path: Path) -> None:
 
 def as_tdms(record: Record, path: Path, *, without: tuple[str, ...] = ()) -> None:
     """Two groups with the clock of each, `without` some of its properties."""
-    nptdms = pytest.importorskip("nptdms")
+    import nptdms
 
     def channel(group: str, name: str, values: np.ndarray, unit: str, start: float, step: float) -> object:
         properties = {
@@ -153,7 +152,6 @@ def universal(
 
 def as_uff(record: Record, path: Path, binary: str = "<") -> None:
     """A record as universal file."""
-    pytest.importorskip("pyuff")
     channels = dict(zip(record.channel_names, record.signals.T, strict=True))
     path.write_bytes(universal(channels, record.time[0], 1.0 / record.sampling_rate, binary=binary))
 
@@ -260,9 +258,6 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "Excel": ("xlsx", _xlsx),
 }
 """Suffix and writer of every format by its name."""
-
-NEEDS = {"TDMS": "nptdms", "UFF text": "pyuff", "UFF binary": "pyuff", "Excel": "openpyxl"}
-"""Packages beyond those always there."""
 
 CARRIES = {"WAV": 500e-6 / 2**15, "WAV 24": 500e-6 / 2**23, "WAV 32": 500e-6 / 2**31} | {
     f"COMTRADE {kind}": 0.01e-6 for kind in ("binary", "ASCII", "cfg", "BINARY32", "FLOAT32")

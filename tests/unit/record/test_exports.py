@@ -31,8 +31,6 @@ def test_the_table_is_as_large_as_the_documentation_says():
 
 @pytest.mark.parametrize("export", READ, ids=lambda one: f"{one.maker}, {one.form}")
 def test_an_export_is_read_without_an_option(export, tmp_path):
-    if export.file.endswith("tdms"):
-        pytest.importorskip("nptdms")
     recording = read_recording(export.written(tmp_path), Profile())
     assert recording.warnings == ()
     channels = {channel.name: channel for channel in recording.channels}
@@ -53,16 +51,12 @@ def test_an_export_is_read_without_an_option(export, tmp_path):
 
 @pytest.mark.parametrize("one", ASKED.values(), ids=ASKED)
 def test_what_a_file_does_not_say_is_asked_with_the_answer_to_give(one, tmp_path):
-    if one.file.endswith("xlsx"):
-        pytest.importorskip("openpyxl")
     with pytest.raises(RecordError, match=one.question):
         open_record(one.written(tmp_path), None, profile=Profile())
 
 
 @pytest.mark.parametrize("one", REPORTED_READ, ids=lambda one: one.kind)
 def test_a_reported_file_is_read(one, tmp_path):
-    if one.file.endswith("xlsx"):
-        pytest.importorskip("openpyxl")
     record, arranged = open_record(one.written(tmp_path), None, profile=Profile())
     labels = [label.removeprefix("table/") for label in arranged.channels.values()]
     assert labels == list(one.names)
@@ -89,13 +83,7 @@ def read_by_name(path, name):
     return read_record(path, every.MACHINE, profile=every.BY_PROFILE if name in every.BY_HAND else None)
 
 
-@pytest.fixture(params=every.WRITERS)
-def name(request):
-    if request.param in every.NEEDS:
-        pytest.importorskip(every.NEEDS[request.param])
-    return request.param
-
-
+@pytest.mark.parametrize("name", every.WRITERS)
 def test_readings_are_those_written_to_the_last_bit(name, tmp_path):
     """A reading in micrometres times 1e-6 is rounded once; a format with steps is off by half of one."""
     record = read_by_name(every.written(name, tmp_path), name)
@@ -110,6 +98,7 @@ def test_readings_are_those_written_to_the_last_bit(name, tmp_path):
         np.testing.assert_allclose(record.speed_readings, 2 * np.pi * every.SPEED, rtol=0, atol=1.01 * step)
 
 
+@pytest.mark.parametrize("name", every.WRITERS)
 @pytest.mark.parametrize("kept", [0.03, 0.2, 0.5, 0.8, 0.97])
 def test_a_file_that_was_cut_says_so(name, kept, tmp_path):
     path = every.written(name, tmp_path)
