@@ -31,6 +31,7 @@ _EXPECTED = {
     "missing_argument": "expected two entries",
 }
 _UNQUOTED = re.compile(r"=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([A-Za-zµ°%][^#\"']*?)\s*(#.*)?$")
+_BARE = re.compile(r"=\s*((?!true\b|false\b|inf\b|nan\b)[A-Za-z][^#\"']*?)\s*(?:#.*)?$")
 _SYNTAX_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)")
 
 
@@ -118,6 +119,10 @@ def _syntax_error(lines: list[str], message: str, file: Path | None) -> MachineF
     elif unquoted := _UNQUOTED.search(lines[line - 1]):
         written = f'"{unquoted.group(1)} {unquoted.group(2)}"'
         reason = f"not valid TOML: a value with a unit is a text: write {written} in quotes"
+    elif word := _BARE.search(lines[line - 1]):
+        reason = f'not valid TOML: a text stands in quotes: write "{word.group(1)}"'
+    elif "=" not in lines[0] and lines[0].lstrip()[:1] not in ("#", "[", ""):
+        reason += "; if this is a recording: a machine file belongs here, which 'rotordrop init' makes"
     elif (twice := lines[line - 1].partition("=")[0].strip()) and "Cannot overwrite" in message:
         reason, column = f"{twice} stands here for the second time; keep one of the two", 1
     return MachineFileError(reason, file=file, line=line, column=column)

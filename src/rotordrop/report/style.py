@@ -133,7 +133,7 @@ def panels(
         subplot_titles=[plain(title) for title in titles],
         shared_xaxes="columns" if rows > 1 else False,
         horizontal_spacing=spacing if columns > 1 else 0.0,
-        vertical_spacing=58 / plot_height if rows > 1 else 0.0,
+        vertical_spacing=66 / plot_height if rows > 1 else 0.0,
     )
     figure.update_layout(
         template=_TEMPLATE, height=plot_height + 110, margin={"l": 64, "r": 16, "t": TOP_MARGIN, "b": 50}

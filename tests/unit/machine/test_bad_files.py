@@ -23,6 +23,7 @@ BAD = [
     (GAP, "air_gap = { guess = 0,25 }", COMMA, "0,25"),
     (GAP, "air_gap = 250 um", r'a value with a unit is a text: write "250 um" in quotes', "um"),
     (GAP, 'air_gap = "250 um', "not valid TOML", "air_gap"),
+    (NAME, "name = small", 'a text stands in quotes: write "small"', "small"),
     (NAME, f'{NAME}\nname = "other"', "name stands here for the second time; keep one", 'name = "other"'),
     # keys
     (NAME, f"{NAME}\ngravity = [0.0, -9.81]", "gravity as a direction is reserved", "gravity"),
