@@ -116,3 +116,25 @@ def block_extremes(values: NDArray[np.float64], edges: NDArray[np.int64]) -> NDA
     inside = index < edges[1:, None]
     block = np.where(inside, values[np.minimum(index, len(values) - 1)], np.inf)
     return np.asarray(edges[:-1] + np.argmin(block, axis=1), dtype=np.int64)
+
+
+def refined_peak(time: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float]:
+    """Peak of a sampled history and its time [s], by a parabola through the largest sample and its
+    neighbours.
+
+    Parameters
+    ----------
+    time : ndarray, shape (T,)
+        Equidistant times [s].
+    values : ndarray, shape (T,)
+        History, for instance a force [N].
+    """
+    i = int(np.argmax(values))
+    if i == 0 or i == len(values) - 1:
+        return float(values[i]), float(time[i])
+    left, middle, right = (float(values[j]) for j in (i - 1, i, i + 1))
+    curvature = left - 2.0 * middle + right
+    if curvature >= 0.0:
+        return middle, float(time[i])
+    shift = 0.5 * (left - right) / curvature
+    return middle - 0.25 * (left - right) * shift, float(time[i] + shift * (time[i + 1] - time[i]))

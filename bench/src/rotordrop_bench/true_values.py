@@ -14,8 +14,9 @@ from rotordrop.elements.table import published
 from rotordrop.machine import Machine
 from rotordrop.machine.saving import machine_text
 from rotordrop.rotor.statics import bearing_load_shares
+from rotordrop.series import refined_peak
 from rotordrop.simulate.levitation import levitated_orbit, levitated_static
-from rotordrop.simulate.result import DropResult, refined_peak
+from rotordrop.simulate.result import DropResult
 from rotordrop_bench.departures import DEPARTURES, Parts
 from rotordrop_bench.event import DropConditions, HiddenMachine
 from rotordrop_bench.sensor_chain import SensorChain, SensorErrors, true_places

@@ -17,8 +17,8 @@ import numpy as np
 from rotordrop.arrays import Array
 from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import Known
+from rotordrop.series import refined_peak
 from rotordrop.severity.statistics import Statistics, stress_statistics
-from rotordrop.simulate.result import refined_peak
 
 if TYPE_CHECKING:
     from rotordrop.simulate.result import DropResult

@@ -31,6 +31,7 @@ from rotordrop.machine import Machine, example_machine
 from rotordrop.physics.hertz import LineContact
 from rotordrop.require import each, require
 from rotordrop.rotor.layout import ROTOR_AXIAL
+from rotordrop.series import refined_peak
 from rotordrop.simulate.heat import Heat
 from rotordrop.simulate.magnets import Lift, MagnetHistory, lift_of
 from rotordrop.sketch import sketch
@@ -73,28 +74,6 @@ class Certificate:
                 f"and {100 * np.max(self.peak_change_truncation):.2g} % with eight more modes per plane"
             )
         return ", ".join(parts)
-
-
-def refined_peak(time: Array, values: Array) -> tuple[float, float]:
-    """Peak of a sampled history and its time [s], by a parabola through the largest sample and its
-    neighbours.
-
-    Parameters
-    ----------
-    time : ndarray, shape (T,)
-        Equidistant times [s].
-    values : ndarray, shape (T,)
-        History, for instance a force [N].
-    """
-    i = int(np.argmax(values))
-    if i == 0 or i == len(values) - 1:
-        return float(values[i]), float(time[i])
-    left, middle, right = (float(values[j]) for j in (i - 1, i, i + 1))
-    curvature = left - 2.0 * middle + right
-    if curvature >= 0.0:
-        return middle, float(time[i])
-    shift = 0.5 * (left - right) / curvature
-    return middle - 0.25 * (left - right) * shift, float(time[i] + shift * (time[i + 1] - time[i]))
 
 
 def peaks_of(time: Array, force: Array, until: float = np.inf) -> Array:

@@ -31,8 +31,7 @@ from rotordrop.estimate.estimate import CrossCheck
 from rotordrop.evidence.impacts import after_flights, lasting_from
 from rotordrop.known import NINETY, Known, Status
 from rotordrop.one_thread import one_thread
-from rotordrop.series import runs_of
-from rotordrop.simulate.result import refined_peak
+from rotordrop.series import refined_peak, runs_of
 from rotordrop.track.consistency import Check, direction_check
 from rotordrop.track.forces import ForceHistory
 from rotordrop.track.input_state import (

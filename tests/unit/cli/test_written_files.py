@@ -246,7 +246,9 @@ WRITTEN = {
     "coast-down": Written((f"{COAST}write_coast_down",), _coast_down, load_coast_down),
     "part of a coast-down": Written((f"{COAST}write_part",), _part, _joined),
     "checkpoint": Written(
-        ("simulate.checkpoint:save_checkpoint",), _checkpoint, lambda p: load_checkpoint(p.parent, "d" * 64)
+        ("simulate.coast_down_file:save_checkpoint",),
+        _checkpoint,
+        lambda p: load_checkpoint(p.parent, "d" * 64),
     ),
     "estimate": Written(
         ("estimate.estimate:save",), _into("e.json", _estimate), lambda p: read_drop(p).as_json()
