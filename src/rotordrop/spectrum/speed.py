@@ -384,7 +384,8 @@ def find_standstill(time: ArrayLike, speed: ArrayLike) -> Known:
         value=value if determined else float(t[-1]),
         status=status,
         standard_error=error if determined else None,
-        interval_90=(value - NINETY * error, value + NINETY * error) if determined else None,
+        # what is seen after it may rock or turn
+        interval_90=(value - NINETY * error, max(value, last_seen) + NINETY * error) if determined else None,
         lower=last_seen,
         unit="s",
     )

@@ -233,6 +233,16 @@ def test_standstill_is_found_within_its_interval(seed):
     assert cut.lower < stop
 
 
+def test_the_interval_of_a_standstill_holds_the_time_until_which_the_rotor_is_seen_to_move():
+    truth = drag_speed(TIME, dry=0.25)
+    stop = int(np.flatnonzero(truth <= 0.0)[0])
+    truth[stop + 60] = TURN * 0.5  # it rocks once more, and a tacho does not say which way
+    noisy = truth + TURN * 0.05 * np.random.default_rng(0).standard_normal(TIME.size)
+    found = find_standstill(TIME, np.maximum(noisy, 0.0))
+    assert found.status == "determined" and found.lower == TIME[stop + 60]
+    assert found.low < TIME[stop] < found.value + 1.0 < found.lower < found.high < found.lower + 1.0
+
+
 def test_wrong_records_are_refused():
     with pytest.raises(RecordError, match=r"time does not rise at value 5 \(4\.000000 s, then 3\.000000 s\)"):
         fit_speed_profile([0, 1, 2, 3, 4, 3, 6, 7, 8], np.ones(9))
