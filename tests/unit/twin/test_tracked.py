@@ -429,6 +429,16 @@ def test_a_bearing_with_play_is_cross_checked_however_quick(workshop):
     assert cross_checked(workshop, Tracked(quick=True))[1] is None
 
 
+def test_the_band_of_a_stress_ends_near_none_where_the_balls_bear_next_to_nothing(workshop):
+    """Stress goes with the third root of a load, so that its slope there is without end."""
+    stress, sigma = workshop.forces.stress.copy(), workshop.forces.stress_sigma.copy()
+    stress[0, 0], sigma[0, 0] = 1e5, 1e10
+    band = twin_loads(replace(workshop.forces, stress=stress, stress_sigma=sigma), 0, 1.0).stress.band
+    load = stress[0, 0] ** 3 + 3.0 * stress[0, 0] ** 2 * NINETY * sigma[0, 0]
+    assert band.lower[0] == 0.0 and band.upper[0] == pytest.approx(load ** (1.0 / 3.0), rel=1e-3)
+    assert band.upper[0] < 0.01 * stress.max()
+
+
 def test_a_twin_far_from_the_cross_check_is_replaced_by_it(workshop, tracked, check):
     forces = workshop.forces
     own = twin_loads(forces, 0, 1.0)
