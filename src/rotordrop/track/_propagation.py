@@ -420,10 +420,11 @@ def unknown_impulses(settings: FilterSettings, impulses: Array, largest: float, 
 
 
 @kernel
-def unit_impulses(p: KernelParameters) -> tuple[Array, Integers]:
+def unit_impulses(t: float, p: KernelParameters, settings: FilterSettings) -> tuple[Array, Integers]:
     """Velocities that unit impulses between rotor and race give, and where they stand, shape (2 B, m + 1).
 
-    They are equal and opposite, in x and y of each bearing; modes have unit mass.
+    They are equal and opposite, in x and y of each bearing; modes have unit mass. Before the first contact
+    they act on the rotor alone: nothing touches a race then, and a light one would be made to ring.
     """
     m, n_q, n_b = p.eigenvalue.shape[0], p.rotor_at[L.N_COORDINATES], p.bearing.shape[0]
     g, place = np.empty((2 * n_b, m + 1)), np.empty((2 * n_b, m + 1), dtype=np.int64)
@@ -432,7 +433,7 @@ def unit_impulses(p: KernelParameters) -> tuple[Array, Integers]:
         for k in range(m):
             g[r, k] = -p.bearing_shape[b, k]
             place[r, k] = n_q + p.rotor_at[L.MODES_X + axis] + k
-        g[r, m] = 1.0 / p.bearing[b, L.RACE_MASS]
+        g[r, m] = 0.0 if t < settings.fall_end else 1.0 / p.bearing[b, L.RACE_MASS]
         place[r, m] = n_q + p.bearing_at[b, L.RACE] + axis
     return g, place
 
@@ -454,7 +455,7 @@ def own_noise(n: int, p: KernelParameters, settings: FilterSettings, sigmas: Arr
 
 @kernel
 def add_process_noise(
-    P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
+    t: float, P: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array
 ) -> None:
     """Add unknown impulses at the bearings, noise of the spins and drift of the parameters to ``P`` (n, n).
 
@@ -462,7 +463,7 @@ def add_process_noise(
     """
     # Process noise enters where the model errs: as an impulse between rotor and race. White noise on every
     # state would let the filter explain a record by motions that nothing can cause.
-    g, place = unit_impulses(p)
+    g, place = unit_impulses(t, p, settings)
     for r in range(g.shape[0]):
         sigma = sigmas[r // 2]
         for i in range(g.shape[1]):
@@ -475,10 +476,16 @@ def add_process_noise(
 
 @kernel
 def subtract_process_noise(
-    score: Array, p: KernelParameters, settings: FilterSettings, sigmas: Array, drift: Array, out: Array
+    t: float,
+    score: Array,
+    p: KernelParameters,
+    settings: FilterSettings,
+    sigmas: Array,
+    drift: Array,
+    out: Array,
 ) -> None:
     """Take off ``out`` (n,) the product of what `add_process_noise` adds with ``score`` (n,)."""
-    g, place = unit_impulses(p)
+    g, place = unit_impulses(t, p, settings)
     for r in range(g.shape[0]):
         sigma, along = sigmas[r // 2], 0.0
         for i in range(g.shape[1]):
