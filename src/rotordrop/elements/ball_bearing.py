@@ -26,7 +26,7 @@ from rotordrop.elements.race import STEEL_DENSITY, Race
 from rotordrop.elements.race_bearing import Oddity, RaceBearing
 from rotordrop.elements.rotor import DENSITY, ELASTIC, POISSON
 from rotordrop.elements.values import default, follows
-from rotordrop.known import Known
+from rotordrop.known import NINETY, Known
 from rotordrop.physics import columns as L
 from rotordrop.physics import ring
 from rotordrop.units import format_quantity
@@ -371,7 +371,7 @@ class BallBearing(RaceBearing):
     def _of_clearance(self, entry: CatalogueBearing | None) -> dict[str, Any]:
         """Clearance of a class, and what goes without saying beside one: no preload, no contact angle."""
         known, values = self.model_fields_set, dict[str, Any]()
-        preloaded = "preload" in known or self.preload_class is not None
+        preloaded = ("preload" in known and self.preload.value > 0.0) or self.preload_class is not None
         if not preloaded:
             why = "a bearing with clearance has none unless it is given"
             values["preload"] = Known(value=0.0, status="default", source=why, unit="N")
@@ -566,6 +566,18 @@ def _by_offset(bearing: Any) -> Measure:
         of_value=partial(_offset_of_preload, bearing.bearing),
         value_of=partial(preload_of_offset, constants),
     )
+
+
+def clearance_sigma(balls: BallBearing) -> float:
+    """Standard deviation of a clearance [m]: by its range, else as a class leaves it and a fit takes away.
+
+    As wide as CN of ISO 5753-1 for the bore; a third of the clearance where the bore is not known.
+    """
+    assert balls.clearance is not None
+    within = balls.clearance.range
+    if within is None and balls.bore_diameter is not None:
+        within = clearance_range("CN", balls.bore_diameter.value)
+    return balls.clearance.value / 3.0 if within is None else (within[1] - within[0]) / (2.0 * NINETY)
 
 
 PARAMETERS: tuple[Parameter, ...] = (

@@ -46,11 +46,12 @@ CENTRED = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A kernel entry that an unknown sets: which, in which row, and the factor on the value."""
+    """A kernel entry that an unknown sets: which, in which row, the factor on the value, what is added."""
 
     entry: Entry
     row: int
     factor: float = 1.0
+    shift: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,8 +194,10 @@ def bearing_unknowns(model: DropModel, index: int) -> Iterator[Unknown]:
     bearing = model.machine.touchdown_bearings[index]
     for row in rows("bearing"):
         if not row.entries or float(quantity := row.described(bearing)) == 0.0:
-            continue  # for a loose bearing, the air gap takes up an error of the play
+            continue
         if row.estimated_by is not None:
+            if bearing.bearing.clearance is not None:
+                continue  # the preload of a race that is only held lightly is nobody's
             measure = row.estimated_by(bearing)
             known = _by_measure(row, quantity, measure)
             least = measure.of_value(LEAST_SHARE * float(quantity))
@@ -229,7 +232,12 @@ def _unknown(
             return contact.typical_depth(float(np.mean(model.load_shares)))
         return 1.0
 
-    targets = tuple(Target(entry=entry, row=index, factor=factor(entry)) for entry in row.entries)
+    def shift(entry: Entry) -> float:
+        if (entry.array, entry.column) != ("bearing", L.AIR_GAP):
+            return 0.0
+        return float(model.parameters.bearing[index, L.AIR_GAP]) - float(quantity)  # play of a held race
+
+    targets = tuple(Target(entry=e, row=index, factor=factor(e), shift=shift(e)) for e in row.entries)
     calibrated = quantity.status == "estimated"
     return Unknown(parameter=row, owner=owner, targets=targets, calibrated=calibrated, **vars(known), **rest)
 

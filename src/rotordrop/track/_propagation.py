@@ -43,7 +43,8 @@ Flags = NDArray[np.bool_]
 class ParameterTargets(NamedTuple):
     """Which kernel entries the unknown parameters set; R targets, P parameters, U unbalance planes.
 
-    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1]; ``logarithmic`` (P,) flags;
+    ``target`` (R, 4): parameter, kind, row, column; ``factor`` (R,) [1] and ``shift`` (R,), what is added;
+    ``logarithmic`` (P,) flags;
     ``step`` (P,) of the finite difference by which the right-hand side is differentiated; ``drift`` (P,)
     standard deviation of the random walk of each parameter per square root of a second, ``late_drift`` the
     same later in a drop; ``plane_shape`` (U, m) mode shapes of the planes. Beyond ``lower`` and ``upper``
@@ -59,6 +60,7 @@ class ParameterTargets(NamedTuple):
     together: Integers
     starts: Integers
     factor: Array
+    shift: Array
     logarithmic: Integers
     step: Array
     drift: Array
@@ -113,7 +115,7 @@ def target_values(theta: Array, targets: ParameterTargets, steps: float) -> Arra
         if targets.target[i, 1] == AT_TYPICAL_DEPTH:
             values[i] = power(targets.factor[i], exp(targets.mean[k]) - value)
         else:
-            values[i] = value * targets.factor[i]
+            values[i] = value * targets.factor[i] + targets.shift[i]
     return values
 
 

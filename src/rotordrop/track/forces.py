@@ -26,6 +26,9 @@ from rotordrop.track._propagation import ParameterTargets, apply_parameters, rk4
 from rotordrop.track.problem import WATCHED, DropProblem, parameters_at, private_copy
 from rotordrop.track.smoother import Smoothed
 
+LOOSE_FORCE_SIGMA, LOOSE_STRESS_SIGMA = 0.04, 0.025
+"""Relative standard deviations of force and stress of a loose race, which was followed as a held one [1]."""
+
 FORCE_X, FORCE_Y, FORCE, STRESS = range(4)
 N_VALUES = 4
 
@@ -186,6 +189,9 @@ def force_history(problem: DropProblem, smoothed: Smoothed) -> ForceHistory:
     smoothed = replace(smoothed, means=means, watched=smoothed.watched[steps // substeps])
     values, gradients, contacts = _values_at(problem, time, means)
     sigma = _standard_deviations(smoothed, gradients)
+    if (play := problem.model.play) is not None:
+        for part, share in ((FORCE, LOOSE_FORCE_SIGMA), (STRESS, LOOSE_STRESS_SIGMA)):
+            sigma[..., part] = np.hypot(sigma[..., part], share * (play[1] > 0.0) * values[..., part])
     displacement, displacement_sigma = displacements_of(problem, smoothed)
     touching = contacts[..., 0] > 0.0
     return ForceHistory(

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotordrop.arrays import Array
-from rotordrop.elements.bearing_numbers import numbers_of
 from rotordrop.physics import columns as L
 from rotordrop.record.axes import end_columns
 from rotordrop.rotor.parameters import DropModel
@@ -131,8 +130,8 @@ def corrections_by_record(problem: DropProblem) -> SensorCorrections:
     margin = GATE_MARGIN * problem.mean[entries] + 2.0 * np.sqrt(variance[entries] + zero)
     motion = at_bearings(problem, (problem.readings - offsets) / (1.0 + gain_errors))
     # so far may a loose race lie off its centre
-    play = [numbers_of(bearing).play for bearing in problem.model.machine.touchdown_bearings]
-    reach = problem.mean[entries] - margin - np.array(play)
+    play = 0.0 if problem.model.play is None else problem.model.play[0]
+    reach = problem.mean[entries] - margin - play
     # at an end that was held, what the description of its magnet gets wrong is found as a force
     reach[list(problem.held)] = 0.0
     return SensorCorrections(

@@ -483,6 +483,7 @@ def parameter_targets(model: DropModel, unknowns: tuple[Unknown, ...]) -> P.Para
         together=together,
         starts=starts,
         factor=np.array([t.factor for _, t in targets]),
+        shift=np.array([t.shift for _, t in targets]),
         logarithmic=np.array([int(u.logarithmic) for u in unknowns], dtype=np.int64),
         drift=drift,
         late_drift=drift * np.array([u.parameter.late_drift_factor for u in unknowns]),

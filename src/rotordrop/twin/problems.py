@@ -10,7 +10,7 @@ import numpy as np
 from rotordrop.evidence.evidence import Evidence, Missing
 from rotordrop.machine import Machine
 from rotordrop.record.axes import end_columns
-from rotordrop.rotor.parameters import DropModel, build_drop_model
+from rotordrop.rotor.parameters import DropModel, build_drop_model, held_lightly
 from rotordrop.rotor.reduction import Reduction, reduction_for_contact
 from rotordrop.track.calibration import BLIND_SCHEDULE, window_end
 from rotordrop.track.prior import fall_time
@@ -144,7 +144,7 @@ class Drops:
             until = window_end(BLIND_SCHEDULE[-1], contact, fall_time(machine)) + 0.01
         seen = machine if fine else with_end_planes(machine)
         basis = _basis(machine, FINE_REACH if fine else COARSE_REACH)
-        model = build_drop_model(seen, basis)
+        model = held_lightly(build_drop_model(seen, basis))
         items = self.evidence if fine else [with_sensors_of(model, item) for item in self.evidence]
         problems = tuple(drop_problem(model, item, until) for item in items)
         self.posed[id(machine), fine] = machine, problems

@@ -254,12 +254,10 @@ def cross_checked(drop: TrackedDrop, method: Tracked) -> tuple[TrackedDrop, Inpu
     A twin whose innovations are white may still be wrong where its contact law is, or an extension: a peak
     beyond the accuracy of the cross-check is not called consistent. That one takes nothing from the twin,
     since what it says of gaps and sensors may be as wrong as what it says of forces. Where noise would hide
-    as much of the forces of the twin from it, it says nothing against them. A quick estimate does without it,
-    but not for a bearing with play, whose force no study has validated.
+    as much of the forces of the twin from it, it says nothing against them. A quick estimate does without it.
     """
     problem = drop.problem
-    with_play = any(not numbers_of(b).held for b in problem.model.machine.touchdown_bearings)
-    if not drop.sees_all_directions or (drop.consistent and method.quick and not with_play):
+    if not drop.sees_all_directions or (drop.consistent and method.quick):
         return drop, None
     if drop.consistent:
         check = drop.without_contact_law()

@@ -23,6 +23,11 @@ from rotordrop.track.smoother import Smoothed, has_diverged
 from rotordrop.twin.mixture import mixed
 from rotordrop.twin.tracked_loads import INCONSISTENT, OF_CROSS_CHECK, symmetric, with_interval
 
+LOOSE_SIGMA = 0.04
+"""Standard deviation of the logarithm of friction and supports that a loose race adds, followed as a held one
+[1]."""
+STAND_FOR_PLAY = ("contact.", "race.", "damping_time")
+"""What the parameters of a race that stand in for its play begin with."""
 UNSURE_GAP = 0.05
 """Relative prior standard deviation from which an air gap counts as guessed [1]."""
 UNDETERMINED: Status = "the record does not determine it"
@@ -131,26 +136,33 @@ def fitted_values(problem: DropProblem, mean: Array, covariance: Array, widening
     """Every unknown with its interval and verdict, from mean (n,) and covariance (n, n) of an estimate.
 
     Inertia and drag of a race show together, when it catches up with the rotor. Where one of them ended at
-    its bound the other one stands in for it, and neither is a finding.
+    its bound the other one stands in for it, and neither is a finding. Contact, race and balls of a loose
+    race, which was followed as a held one, stand in for its play.
     """
     theta = mean[problem.parameter_slice]
     sigma = np.sqrt(np.maximum(np.diag(covariance)[problem.parameter_slice], 0.0))
     values = []
     for unknown, t, s in zip(problem.unknowns, theta.tolist(), sigma.tolist(), strict=True):
-        left_out = MODEL_GAP_ERROR * unknown.begin if unknown.parameter is AIR_GAP else 0.0
+        left_out = _left_out(problem, unknown)
         error = math.hypot(s, left_out)
         wider = parameter_widening(unknown, error, widening)
         value, allowed = identified(unknown, t, error, wider), NINETY * wider * left_out
-        values.append(replace(value, allowance_90=allowed) if allowed > 0.0 else value)
+        values.append(replace(value, allowance_90=allowed) if unknown.parameter is AIR_GAP else value)
     races = list(zip(problem.unknowns, values, strict=True))
     astray = {u.owner for u, v in races if u.parameter.spin_up_only and v.status == AT_BOUND}
+
+    def stands_in(unknown: Unknown) -> bool:
+        if _play_sigma(problem, unknown) > 0.0 and unknown.parameter.path.startswith(STAND_FOR_PLAY):
+            return True
+        return unknown.parameter.spin_up_only and unknown.owner in astray
+
     return [
         replace(
             value,
             status=UNDETERMINED,
             interval_90=_hull(value, identified(unknown, unknown.mean, unknown.sigma)),
         )
-        if unknown.parameter.spin_up_only and unknown.owner in astray and value.status != AT_BOUND
+        if value.status != AT_BOUND and stands_in(unknown)
         else value
         for unknown, value in races
     ]
@@ -192,6 +204,22 @@ def prior_of(problem: DropProblem) -> tuple[Array, Array]:
 
 def _hull(one: Known, other: Known) -> tuple[float, float]:
     return min(one.low, other.low), max(one.high, other.high)
+
+
+def _left_out(problem: DropProblem, unknown: Unknown) -> float:
+    """Standard deviation of an unknown beyond its fit, in the measure it is estimated in."""
+    play = _play_sigma(problem, unknown)
+    if unknown.parameter is AIR_GAP:
+        return math.hypot(MODEL_GAP_ERROR * unknown.begin, play)
+    return LOOSE_SIGMA if play > 0.0 else 0.0
+
+
+def _play_sigma(problem: DropProblem, unknown: Unknown) -> float:
+    """Standard deviation of the play of the race that an unknown belongs to [m]; zero of all others."""
+    play = problem.model.play
+    if play is None or unknown.parameter.owner != "bearing":
+        return 0.0
+    return float(play[1, unknown.targets[0].row])
 
 
 def gap_of_record(problem: DropProblem, b: int) -> Known:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.scaled_machines import scaled_machine
 from tests.unit.track.conftest import flight_of, place_of
 
 from rotordrop import build_drop_model, example_machine, read_record
@@ -14,6 +15,8 @@ from rotordrop.errors import IdentificationError, RecordError
 from rotordrop.evidence.colour import SlowNoise
 from rotordrop.evidence.evidence import Missing, read_evidence
 from rotordrop.known import NINETY, Known
+from rotordrop.physics import columns as L
+from rotordrop.rotor.parameters import held_lightly
 from rotordrop.rotor.reduction import Reduction
 from rotordrop.rotor.unknowns import aero_time_constant, all_unknowns, inferred_together, prior, smallest_gap
 from rotordrop.simulate.levitation import levitated_orbit
@@ -117,6 +120,23 @@ def test_what_a_drop_owns_is_not_shared_and_friction_drifts(flight):
     g = by_path["NDE.air_gap"][1]
     assert flight.targets.drift[g] == pytest.approx(0.032 * 250e-6)
     assert by_path["NDE.preload"][0].parameter.drift == 0.0
+
+
+def test_a_loose_race_is_followed_held_lightly_with_its_play_in_the_gap(lp400):
+    machine = scaled_machine(60.0, bearing='{ designation = "6015", clearance = "20 um" }')
+    as_described = build_drop_model(machine, "quick")
+    held = held_lightly(as_described)
+    gap = as_described.parameters.bearing[:, L.AIR_GAP]
+    np.testing.assert_allclose(held.play[0], 10e-6, atol=2e-6)  # half the clearance, and what balls give way
+    np.testing.assert_allclose(held.play[1], 0.5 * (30e-6 - 10e-6) / (2.0 * NINETY), rtol=1e-9)  # CN, 75 mm
+    np.testing.assert_allclose(held.parameters.bearing[:, L.AIR_GAP], gap + held.play[0], rtol=1e-12)
+    assert not as_described.parameters.bearing[:, L.AXIAL_OFFSET].any()
+    assert (held.parameters.bearing[:, L.AXIAL_OFFSET] > 0.0).all()
+    unknowns = {u.path: u for u in all_unknowns(held)}
+    assert "NDE.preload" not in unknowns
+    assert unknowns["NDE.air_gap"].targets[0].shift == pytest.approx(held.play[0, 0], rel=1e-9)
+    rigid = build_drop_model(lp400, "quick")
+    assert held_lightly(rigid) is rigid
 
 
 def test_unknowns_are_there_with_and_without_magnets_and_drag(lp400):
