@@ -121,9 +121,12 @@ PARAMETERS: tuple[Parameter, ...] = (
 
 
 def _with_carrier(bearing: Any) -> dict[str, Known]:
-    """Mass and inertia of a race that carries more than the size of the bearing tells, where nobody said."""
+    """Mass and inertia of a race that carries more than the size of the bearing tells, where nobody said.
+
+    What the mass of a loose race is found to be stands in for its play.
+    """
     race: Race | None = bearing.race
-    if race is None or race.mass.status != "inferred":
+    if race is None or race.mass.status != "inferred" or bearing.bearing.clearance is not None:
         return {}
     values = {}
     for name, least in (("mass", RACE_MASS), ("inertia", RACE_MASS * RACE_FORM)):
