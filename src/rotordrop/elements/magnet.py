@@ -18,7 +18,6 @@ from rotordrop.elements.parameter import (
     Extension,
     Parameter,
     Values,
-    guess,
     in_words,
     itself,
 )
@@ -411,6 +410,5 @@ EXTENSIONS: tuple[Extension, ...] = (
         names=("remanence_time_constant",),
         neutral=_long,
         sentence=_decay,
-        base=lambda machine: {"remanence_time_constant": guess(REMANENCE_TIME)} if machine.ambs else {},
     ),
 )

@@ -278,9 +278,6 @@ class Extension:
     begins_as_base_model: bool = False
     """Whether a machine with the values to begin with computes what it does without, and knows of everything
     else what it does without."""
-    base: Callable[[Any], dict[str, Known]] = lambda _: {}
-    """Values with which a machine says what the base model says and is followed as with this extension:
-    smaller process noise in the fall is no evidence of a long remanence."""
     inferred: bool = False
     """Whether it widens what a silent file leaves to be inferred: it is as probable as not, and as another
     minimum may lie there its search begins from guesses too."""
@@ -292,23 +289,15 @@ class Extension:
         parts = [part for _, part in parts_of(machine, self.owner)]
         if any(_at(part, name) is not None for part in parts for name in self.names):
             return {}
-        return self._of_parts(machine, self.neutral)
-
-    def _of_parts(self, machine: Any, values: Callable[[Any], dict[str, Known]]) -> dict[str, Known]:
-        parts = parts_of(machine, self.owner)
         return {
-            path_of(self.owner, name, key): one for name, part in parts for key, one in values(part).items()
+            path_of(self.owner, name, key): one
+            for name, part in parts_of(machine, self.owner)
+            for key, one in self.neutral(part).items()
         }
 
     def added_to(self, machine: M) -> M:
         """The machine with this extension."""
         changed: M = cast(Any, machine).with_values(self.values(machine))
-        return changed
-
-    def as_base_model(self, machine: M) -> M:
-        """The machine followed as with this extension, which says nothing; itself where that is the same."""
-        values = self._of_parts(machine, self.base)
-        changed: M = cast(Any, machine).with_values(values) if values else machine
         return changed
 
     def shows(self, machine: Any, values: Values) -> bool:

@@ -238,8 +238,7 @@ def predict(
         for k in range(s, n):
             P[k, j] = head[j, k]
     noise_step(x, P, form)
-    largest = settings.fall_impulse if time[i] < settings.fall_end else np.inf
-    unknown_impulses(settings, impulses, largest, sigma)
+    unknown_impulses(settings, impulses, sigma)
     add_process_noise(time[i], P, p, settings, sigma, drift_at(time[i], targets, settings))
     # Rounding leaves what has moved lopsided by a little, and sample by sample the error would grow.
     symmetrise(P, s)

@@ -82,7 +82,7 @@ class FilterSettings(NamedTuple):
     ``impulse`` is the standard deviation of an unknown impulse per sample at each bearing and axis,
     ``share`` the same as a fraction of the contact impulse, ``spin_noise`` that of the race spins per
     sample [rad/s], ``speed_noise`` that of the rotor speed [rad/s]. After ``learning_end`` [s] the late
-    drift of the parameters holds. Before ``fall_end`` [s] no unknown impulse is larger than ``fall_impulse``.
+    drift of the parameters holds. Before ``fall_end`` [s] unknown impulses act on the rotor alone.
     """
 
     dt: float
@@ -95,7 +95,6 @@ class FilterSettings(NamedTuple):
     speed_noise: float
     learning_end: float
     fall_end: float
-    fall_impulse: float
 
 
 @kernel
@@ -412,13 +411,13 @@ def propagate(
 
 
 @lean_kernel
-def unknown_impulses(settings: FilterSettings, impulses: Array, largest: float, sigmas: Array) -> None:
+def unknown_impulses(settings: FilterSettings, impulses: Array, sigmas: Array) -> None:
     """Fill ``sigmas`` (B,) with the standard deviation of the unknown impulse at each bearing [N s].
 
-    ``impulses`` (B,) are those of the contacts, ``largest`` is what none exceeds.
+    ``impulses`` (B,) are those of the contacts.
     """
     for b in range(sigmas.shape[0]):
-        sigmas[b] = min(settings.impulse + settings.share * impulses[b], largest)
+        sigmas[b] = settings.impulse + settings.share * impulses[b]
 
 
 @kernel

@@ -100,9 +100,6 @@ class DropProblem:
     """What the sensors do beyond gain, offset and runout."""
     first_contact: float
     """When the rotor first touched a race [s]; the windows of a schedule lie around it."""
-    impulse_in_fall: float = math.inf
-    """Largest unknown impulse per 50 µs before it [N s], where the lift of the magnets may last longer than
-    in most drops: larger ones would explain that."""
 
     @property
     def reading_rows(self) -> Array:

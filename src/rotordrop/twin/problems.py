@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,9 +29,6 @@ Six peaks of three drops of DropBench moved by 0.25 % at most from a reach above
 WINDOW = 0.2
 """Part of a drop that is estimated [s]."""
 
-FALL_SHARE = 1.7e-7
-"""Largest impulse of process noise per 50 µs while the rotor falls, over its weight [s]."""
-
 
 def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) -> DropProblem:
     """Estimation problem of a record up to a time [s].
@@ -41,10 +38,7 @@ def drop_problem(model: DropModel, evidence: Evidence, until: float = WINDOW) ->
     problem = build_problem(model, recorded_drop(evidence, until), until=until)
     if isinstance(evidence.settled_level, Missing):
         _start_gaps(problem, evidence)
-    if model.machine.remanence_time_constant is None:
-        return problem
-    weight = model.machine.rotor.mass * float(model.machine.gravity)
-    return replace(problem, impulse_in_fall=FALL_SHARE * weight)
+    return problem
 
 
 def recorded_drop(evidence: Evidence, until: float = WINDOW) -> RecordedDrop:

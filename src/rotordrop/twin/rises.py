@@ -57,11 +57,7 @@ class LogLikelihoodGains:
 
             def rise(one: Extension) -> float:
                 with_it = self._negative_log_likelihood(one.added_to(self.machine))
-                plain = one.as_base_model(self.machine)
-                without = (
-                    described.result() if plain is self.machine else self._negative_log_likelihood(plain)
-                )
-                return without - with_it
+                return described.result() - with_it
 
             return list(zip(pool.map(rise, extensions), extensions, strict=True))
 

@@ -514,23 +514,21 @@ class Search:
 
     def _beside(self, found: Candidate, extension: Extension) -> Candidate:
         """The more probable one of a candidate and the same with an extension; the other is remembered."""
-        described, had = found.machine, tuple(one.extension for one in found.accepted)
-        plain = extension.as_base_model(described)
+        had, without = tuple(one.extension for one in found.accepted), found
         against = math.exp(-evidence_threshold(extension, len(found.fit.problems)))
         try:
-            without = found if plain is described else self._again(found, plain)
             other = self._with_it(found, extension)
         except IdentificationError:
             return found
         if against * bayes_factor(other, without) >= 1.0:
             # It may have only led to a better start: the model without it is given what it has found.
             with suppress(IdentificationError):
-                back = self._again(other, plain)
+                back = self._again(other, found.machine)
                 without = min(without, back, key=lambda one: one.sized_score)
         odds = against * bayes_factor(other, without)
-        stated = without if plain is described else found
         if odds < 1.0:
-            scale, alternative = bayes_factor(found, stated), Alternative((*had, extension), odds, other.fit)
+            stated, scale = without, bayes_factor(found, without)
+            alternative = Alternative((*had, extension), odds, other.fit)
         else:
             scale, alternative = 1.0 / odds, Alternative(had, 1.0 / odds, without.fit)
             gain = math.inf if without.sized_score[0] else without.sized_score[1] - other.sized_score[1]

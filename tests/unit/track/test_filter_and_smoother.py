@@ -58,7 +58,7 @@ class PlainFilter:
         noise = np.zeros((n, n))
         noise[parts, parts] = (1.0 - form.noise_decay**2) * form.noise_variance
         sigmas = np.empty_like(impulses)
-        P.unknown_impulses(self.numbers, impulses, np.inf, sigmas)
+        P.unknown_impulses(self.numbers, impulses, sigmas)
         P.add_process_noise(problem.time[i], noise, p, self.numbers, sigmas, problem.targets.drift)
         self.matrices.append(whole)
         return np.concatenate([y[:s], whole[s:, s:] @ mean[s:]]), whole @ covariance @ whole.T + noise

@@ -227,7 +227,7 @@ def test_process_noise_is_an_impulse_between_rotor_and_race_once_they_can_touch(
     noise = PassSettings(impulse=2e-3, share=0.1, spin_noise=0.2, speed_noise=0.03)
     numbers, t = noise.for_sampling(DT, contact=contact), 0.05
     drift = np.arange(len(flight.unknowns), dtype=float)
-    P.unknown_impulses(numbers, impulses, np.inf, sigmas)
+    P.unknown_impulses(numbers, impulses, sigmas)
     P.add_process_noise(t, covariance, p, numbers, sigmas, drift)
     expected = np.zeros((n, n))
     for b, sigma in enumerate((2e-3 + 0.1 * 0.5, 2e-3)):

@@ -199,7 +199,6 @@ class Weighed:
 
 
 BASE, CROSS, SOFTER = frozenset[str](), frozenset({"cross-axis sensitivity"}), frozenset({"rotor stiffness"})
-LONG = frozenset({"long remanence"})
 LEFT_OPEN = {"the base model": math.exp(-1.5), "rotor stiffness": math.exp(-1.8)}
 PALER = {"cross-axis sensitivity": math.exp(-1.5), "rotor stiffness": math.exp(-0.3)}
 
@@ -243,7 +242,6 @@ PALER = {"cross-axis sensitivity": math.exp(-1.5), "rotor stiffness": math.exp(-
         ({CROSS: 90.0}, {CROSS: 965.0}, 985.0, {"cross-axis sensitivity": 20.0}, None),
         ({CROSS: 90.0}, {CROSS: 965.0}, math.inf, {"cross-axis sensitivity": 35.0}, None),
         ({SOFTER: 91.0, CROSS: 90.0}, {CROSS: 1000.5 - ASKED, SOFTER: 999.3 - ASKED}, 999.0, {}, PALER),
-        ({BASE: 1000.0, LONG: 900.0}, {LONG: 900.0}, None, {}, None),
     ],
     ids=[
         "the one that raises the likelihood most",
@@ -258,7 +256,6 @@ PALER = {"cross-axis sensitivity": math.exp(-1.5), "rotor stiffness": math.exp(-
         "better than from its start",
         "the base model loses the record from there",
         "left open beside a worse start",
-        "a long remanence, at the same process noise of the fall",
     ],
 )
 def test_what_the_readings_ask_for_beside_a_model_that_fits_is_added(
