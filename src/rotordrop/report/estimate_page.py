@@ -333,10 +333,10 @@ def _sections(estimate: Estimate, summary: ReportContent) -> tuple[Section, ...]
         force,
         orbit,
         impacts,
+        folded("Severity", stress, _severity(estimate), printed=True),
         folded("Motion at the sensors", motion, *agreement),
         folded("Parameters", _parameters(estimate)),
         folded("Checks", notes, _checks(estimate)),
-        folded("Severity", stress, _severity(estimate), printed=True),
         folded("Record", record_quality_section(estimate.findings, *unseen)),
         folded(
             "Machine",

@@ -144,8 +144,10 @@ def test_every_curve_is_drawn_once(estimate, page):
     verdict, numbers, advice = (html.index(part) for part in ('id="verdict"', 'class="cards"', 'id="to-do"'))
     assert verdict < numbers < html.index("Figure 1") < advice
     assert html[advice:].partition("</section>")[0].count("<li") == len(page.to_do.statements)
-    parts = "Impacts,Motion at the sensors,Parameters,Checks,Severity,Record,Machine"
+    parts = "Impacts,Severity,Motion at the sensors,Parameters,Checks,Record,Machine"
     assert [one.heading for one in page.sections[page.lead :] if one.folded] == parts.split(",")
+    printed = [one.printed for one in page.sections[page.lead :]]
+    assert printed == sorted(printed, reverse=True), "else figures on paper leave numbers out"
     assert html.count("<details") == 7
     assert [len(section(page, name).figures) for name in ("Bearing force", "Motion at the sensors")] == [1, 2]
 
