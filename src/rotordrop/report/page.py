@@ -9,7 +9,6 @@ import os
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
-from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from rotordrop.files import write_text
@@ -24,10 +23,6 @@ if TYPE_CHECKING:
 _PACKAGE = "rotordrop.report"
 _JSON_ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 LEVEL_WORDS = {"good": "good", "notice": "note", "warning": "warning", "bad": "problem"}
-
-
-LONGEST_HEAD = 118
-"""Characters of the running head that fit one line of a printed page."""
 
 
 def write_page(content: ReportContent, path: str | os.PathLike[str], origin: Origin | None = None) -> None:
@@ -62,7 +57,7 @@ def render_page(content: ReportContent) -> str:
         .render(
             content=content,
             sections=numbered,
-            running_title=css_text(shorten(head, LONGEST_HEAD, placeholder=" …")),
+            running_title=css_text(head),
             css_text=css_text,
             style=_text("templates", "page.css"),
             scripts=scripts,

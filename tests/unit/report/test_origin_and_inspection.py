@@ -39,11 +39,12 @@ def test_the_origin_names_who_when_how_and_from_what():
 
 def test_a_running_title_cannot_leave_its_string():
     assert css_text('a"; } body { x: 1') == "a\\000022 \\00003b  \\00007d  body \\00007b  x\\00003a  1"
-    page = render_page(ReportContent(title='T"</style><script>window.stolen=1</script>', subtitle="µ"))
+    page = render_page(ReportContent(title='T"</style><script>window.stolen=1</script>', subtitle=200 * "m"))
     assert page.count("<script>window.stolen") == 0
     assert page.index("<noscript>") < page.index("<footer>")
     assert 'page " counter(page)' in page
     assert '@top-left { content: "T\\000022 \\00003c \\00002f style' in page
+    assert f'{200 * "m"}"; }}' in page, "the running title is whole"
 
 
 def test_without_scripts_the_first_figures_are_small_pictures():
