@@ -50,15 +50,12 @@ BETWEEN_LINES_S = 5.0
 @contextmanager
 def told_in_lines(title: str) -> Iterator[Progress]:
     """Tell stage, fraction and time so far in lines on standard error, for a log; none where all is done."""
-    ended, latest, begun = Event(), [""], monotonic()
+    ended, latest, begun = Event(), [title], monotonic()
 
     def say() -> None:
-        said = ""
         while not ended.wait(BETWEEN_LINES_S):
-            if latest[0] != said:
-                said = latest[0]
-                with suppress(OSError, ValueError):  # whoever read it has gone
-                    sys.stderr.write(f"{said}, {monotonic() - begun:.0f} s so far\n")
+            with suppress(OSError, ValueError):  # whoever read it has gone
+                sys.stderr.write(f"{latest[0]}, {monotonic() - begun:.0f} s so far\n")
 
     def tell(stage: str, fraction: float) -> None:
         latest[0] = f"{title}: {stage} ({100.0 * fraction:.0f} %)"
