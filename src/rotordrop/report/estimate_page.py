@@ -83,8 +83,8 @@ SHOWN_SHARE = 0.995
 """Share of the innovations inside the drawn range [1]; the first ones, before anything is known, are huge."""
 
 MEANS = (
-    "A mean force is the mean of the magnitude; the mean Hertz stress covers 0 to 200 ms, or what the record "
-    "has of them."
+    "A mean force is the mean of the magnitude; the mean Hertz stress ends with the record where that is "
+    "shorter."
 )
 """What the mean numbers of an estimate are means of."""
 PRIOR_NOTE = (

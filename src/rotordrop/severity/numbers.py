@@ -33,7 +33,7 @@ LOADS = (
     Number("peak_force_N", "peak bearing force", "force"),
     Number("peak_stress_Pa", "peak Hertz stress", "pressure"),
     Number("mean_force_0p15_0p2_N", "mean force, 150 to 200 ms", "force", only_worsens=False),
-    Number("mean_stress_Pa", "mean Hertz stress", "pressure", only_worsens=False),
+    Number("mean_stress_Pa", "mean Hertz stress, 0 to 200 ms", "pressure", only_worsens=False),
 )
 """Force and stress, which every estimate states, in the order in which they are shown."""
 
